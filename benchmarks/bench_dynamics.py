@@ -157,8 +157,8 @@ question_group = pytest.mark.benchmark(group=QUESTIONS, timer=process_time)
 
 @question_group
 def test_branch(benchmark):
-    from femgear.solvers.continuation.arclength import StepOptions
     from femgear.solvers.continuation.branches import frequency_response_curve
+    from femgear.solvers.continuation.corrector import StepOptions
 
     # the default step needs 70 points for this range
     options = StepOptions(largest=0.0135)

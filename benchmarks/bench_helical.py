@@ -16,9 +16,10 @@ HERTZ = np.linspace(10.0, 15e3, 2000)
 def inputs():
     """System, modes, rows of the loads and errors (8, 8, 4): four tooth sums, two lags of the planets."""
     from published.planetary_sets import kahraman_set
+    from validation.reference.mode_energy import gear_set_springs
 
     from femgear.gears.phasing import MeshPhasing
-    from femgear.system.assembler import gear_set_springs, gear_set_system
+    from femgear.system.assembler import gear_set_system
     from femgear.trains.helical.model import helical_modes, phased_errors, spring_loads
 
     data = kahraman_set()

@@ -33,7 +33,7 @@ def _status(key: str) -> float:
 def _measure(name: str) -> None:
     from stages import STAGES, Reference
 
-    from femgear.threads import one_blas_thread
+    from femgear.trains.protocol import one_blas_thread
 
     stage, reference = STAGES[name], Reference()
     with one_blas_thread():

@@ -106,10 +106,10 @@ def _given(error: CycloptsError) -> list[str]:
     return ["--output" if token == "-o" else token for token in error.root_input_tokens or ()]
 
 
-def _warn(sentences) -> None:
+def _warn(findings) -> None:
     """Print what deserves a look on standard error, as `show_warning` does."""
-    for text in sentences:
-        print(f"warning: {text}", file=sys.stderr)
+    for finding in findings:
+        print(f"warning: {finding}", file=sys.stderr)
 
 
 def show_warning(message, category, filename, lineno, file=None, line=None) -> None:

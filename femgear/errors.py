@@ -1,10 +1,12 @@
 """The exceptions of femgear: every refusal says what was wrong, where, what is allowed and what to do.
 
 `checked_numbers`, `checked_tolerance` and `checked_count` refuse by name what is no number, tolerance or
-count.
+count. What is allowed but deserves a look is a `Finding`.
 """
 
 from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
@@ -100,6 +102,39 @@ CODES = {
     "E-VARIABLE": "There is no such variable, or it has no such values.",
 }
 """Meaning of every code; docs/errors.md lists the messages that carry it."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is allowed but deserves a look; ``str(finding)`` is the sentence that the user reads.
+
+    Parameters
+    ----------
+    code : str
+        Stable identifier such as ``"W-TORQUE"``; empty for a remark.
+    key : str
+        Dotted path of the entry of the case file that draws it, or empty.
+    text : str
+        What is worth a look, with the numbers.
+    remedy : str, optional
+        What to do about it.
+    """
+
+    code: str
+    key: str
+    text: str
+    _: KW_ONLY
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        head = f"[{self.code}] " if self.code else ""
+        where = f"{self.key}: " if self.key else ""
+        return f"{head}{where}{self.text}{'; ' if self.remedy else ''}{self.remedy}"
+
+
+def remark(text: str) -> Finding:
+    """A finding without code and entry: what was read in a way that deserves to be said."""
+    return Finding("", "", text)
 
 
 class FemgearError(Exception):

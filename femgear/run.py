@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from femgear.report.html import write_report
 from femgear.storage.files import write_dataset, write_text
-from femgear.storage.results import finish, record
-from femgear.trains.protocol import Context, Drawn, Progress, Stage
+from femgear.storage.results import finish, folder_lock, record
+from femgear.trains.protocol import Context, Drawn, Progress, Stage, one_blas_thread
 from femgear.trains.reading import open_results
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -57,8 +58,6 @@ def solve(case: Any, only: str | None = None, *, progress: Progress | None = Non
 
 def _solved(case: Any, only: str | None, context: Context) -> Iterator[tuple[Stage, Any, float]]:
     """Stages of a case with their results and seconds, one after the other."""
-    from femgear.threads import one_blas_thread
-
     if only == "stress":
         case = case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})})
     results, say = {}, context.progress or (lambda name, done, total: None)
@@ -117,8 +116,6 @@ def run_case(
         timings["pictures"] = time.perf_counter() - start
     finish(folder, names, timings=timings, convergence=convergence)
     if pictures:
-        from femgear.report.html import write_report
-
         write_report(train_of(case), open_results(folder))
         finish(folder, [*names, "report.html"], timings=timings, convergence=convergence)
 
@@ -132,8 +129,6 @@ def report_again(folder: Path) -> None:
         Results of a complete run.
     """
     from femgear.report.draw import write_pictures
-    from femgear.report.html import write_report
-    from femgear.storage.results import folder_lock
 
     with folder_lock(folder):
         results = open_results(folder, partial=False)

@@ -301,7 +301,7 @@ def ring_surface(planetary_set, radial, tangential, *, columns: int = 360):
 
 def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
     """The ring's deflection as VTU; the polar modulation as VTP and PNG."""
-    from femgear.report.scene import polar_curve, write_vtu
+    from femgear.report.scene import write_vtu
     from femgear.storage.files import replace_file
 
     shown = slice(0, max(EXPORTED, heard.harmonic) + 1)
@@ -310,16 +310,30 @@ def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
     write_vtu(surface, folder / "ring_deflection.vtu")
     radius = planetary_set.ring.rim_radius
     envelope = heard.bands["exact"].envelope
-    # polar_curve scales by the largest value: no part of the curve reaches into the ring
+    # scaled by the largest value: no part of the curve reaches into the ring
     curve = polar_curve(envelope, radius=1.02 * radius, height=0.4 * radius)
-    curve.rename_array("value", "envelope [m/s^2]")
     replace_file(folder / "modulation.vtp", lambda path: curve.save(path, binary=True))
     _polar_picture(folder / "modulation.png", planetary_set, heard, curve)
 
 
+def polar_curve(values, *, radius: float, height: float):
+    """A periodic function [m/s^2], equally spaced over a turn from angle 0, as a closed line round a circle.
+
+    The value zero lies at `radius`, the largest magnitude `height` outside it [m].
+    """
+    from femgear.report.scene import load_pyvista
+
+    angle = 2 * np.pi * np.arange(len(values)) / len(values)
+    r = radius + height * values / (np.abs(values).max(initial=0.0) or 1.0)
+    points = np.column_stack([r * np.cos(angle), r * np.sin(angle), np.zeros(len(values))])
+    curve = load_pyvista().PolyData(points, lines=[len(values) + 1, *range(len(values)), 0])
+    curve.point_data["envelope [m/s^2]"] = values
+    return curve
+
+
 def _polar_picture(path: Path, planetary_set, heard: Heard, curve) -> None:
     """The envelope around the ring over the angle of the carrier, beside that of the Hanning model."""
-    from femgear.report.scene import add_text, load_pyvista, look_down, polar_curve, write_png
+    from femgear.report.scene import add_text, load_pyvista, look_down, write_png
 
     pv = load_pyvista()
     size, ring = 900, planetary_set.ring

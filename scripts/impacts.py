@@ -185,17 +185,17 @@ def eccentric_set(eccentricity: float, floating: bool):
     from dataclasses import replace
 
     from published.planetary_sets import lin_parker_set
-
-    from femgear.system.assembler import mesh_elements
-    from femgear.system.rigid_bodies import PlanarTorque
-    from femgear.system.transmission_errors import (
+    from published.transmission_errors import (
         Eccentricity,
         TransmissionErrors,
         equivalent_damping,
         planar_mesh_dampers,
-        tooth_lines,
         with_errors,
     )
+
+    from femgear.system.assembler import mesh_elements
+    from femgear.system.fourier import tooth_lines
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.planar.model import phased_series, planar_problem
 
     data = lin_parker_set(3)

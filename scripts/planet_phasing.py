@@ -63,7 +63,7 @@ def main(
     from femgear.gears.planetary import equal_planet_angles, feasible_angles
     from femgear.gears.teeth_numbers import check_teeth, neighbouring_teeth
     from femgear.report.style import save_figure
-    from femgear.trains.static.figures import phase_diagram
+    from femgear.trains.static.charts import phase_diagram
 
     if points < 2 or not 1 <= harmonics <= MOST_HARMONICS:
         raise CaseError(

@@ -33,7 +33,7 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
 
     from femgear.cli import show_warning, wrong_arguments
     from femgear.storage.files import storage_error
-    from femgear.threads import one_blas_thread
+    from femgear.trains.protocol import one_blas_thread
 
     program = Path(sys.argv[0]).name
     app = App(

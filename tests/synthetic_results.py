@@ -64,6 +64,8 @@ def static(*, defect: float = 0.0) -> xr.Dataset:
             "ste": _variable(mp, ste, "m", "static transmission error"),
             "ste_overall": _variable(("planet", "position"), ste[:N] + ste[N:], "m", "sun to ring"),
             "mesh_force": _variable(mp, np.full((2 * N, 64), force), "N", "mesh force"),
+            "back_force": _variable(mp, np.zeros((2 * N, 64)), "N", "force on the back flanks"),
+            "member_motion": _variable(("member", "position"), np.zeros((0, 64)), "m", "displacement"),
             "mesh_stiffness": _variable(mp, stiffness, "N/m", "tangent mesh stiffness"),
             "mesh_stiffness_secant": _variable(mp, force / ste, "N/m", "secant mesh stiffness"),
             "tooth_load": _variable(("mesh", "tooth", "position"), pair, "N", "load of a tooth pair"),

@@ -191,7 +191,7 @@ def test_a_pitch_error_that_separates_a_planet_is_computed_and_said():
     cycle = static.cycle
     assert cycle.open_planets[1].any() and not cycle.open_planets[[0, 2]].any()
     assert np.isfinite(cycle.stiffness).all() and not cycle.force[1][cycle.open_planets[1]].any()
-    assert any("[W-OPEN] planet 2" in warning for warning in static.warnings)
+    assert any("[W-OPEN] planet 2" in str(warning) for warning in static.warnings)
 
 
 # --- loads and linear algebra -------------------------------------------------------------------------

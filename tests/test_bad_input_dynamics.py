@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.continuation.arclength import StepOptions
 from femgear.solvers.continuation.branches import frequency_response_curve
+from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral

@@ -153,7 +153,7 @@ def test_entries_can_be_left_out_and_numpy_numbers_are_numbers():
 def test_negative_ring_teeth_mean_internal_and_are_echoed():  # bad input 32
     case = with_value(read_case(CASE), "ring.teeth", -108)
     assert case.ring.teeth == 108
-    assert "ring.teeth = -108" in case.notices[0] and "ISO 21771" in case.notices[0]
+    assert "ring.teeth = -108" in case.notices[0].text and "ISO 21771" in case.notices[0].text
 
 
 def test_zero_and_negative_torque_are_read():  # bad input 24, 25
@@ -533,7 +533,7 @@ def test_published_lines_need_their_speed_and_harmonic(tmp_path):
 def test_published_lines_that_a_change_leaves_behind_are_dropped_and_said():
     case = with_value(read_case(CASE), "operation.speeds", ["250 rpm"])
     assert [entry.harmonic for entry in case.housing.published] == [1]
-    assert any("2 of 3 entries housing.published" in notice for notice in case.notices)
+    assert any("2 of 3 entries housing.published" in notice.text for notice in case.notices)
     assert parse_case(to_toml(case)) == case
 
 

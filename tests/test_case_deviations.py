@@ -314,7 +314,7 @@ def test_negative_amounts_of_reliefs_are_a_warning(kind):
     start = "" if kind == "profile crowning" else 'start_diameter = "43.5 mm"\n'
     extra = f'\n[[sun.modifications]]\nkind = "{kind}"\namount = "-12 um"\n{start}'
     case = case_of(RELIEF + extra)
-    found = [text for text in set_warnings(case) if "W-RELIEF-SIGN" in text]
+    found = [str(one) for one in set_warnings(case) if one.code == "W-RELIEF-SIGN"]
     assert len(found) == 1 and "sun.modifications[1].amount" in found[0] and "-12 um" in found[0]
     assert not with_value(case, "sun.modifications[1].amount", "12 um").notices
     slope = RELIEF.replace("tip relief", "profile slope").replace("12 um", "-12 um")

@@ -176,7 +176,7 @@ def test_contact_loss_and_its_notice(own):
     assert case.simulation.contact_loss and case.notices == ()
     open_back = with_value(case, "parallel[0].mesh.backlash", None)
     (notice,) = open_back.notices
-    assert "[W-BACKLASH] parallel[0].mesh" in notice and "back flank" in notice
+    assert "[W-BACKLASH] parallel[0].mesh" in str(notice) and "back flank" in notice.text
 
 
 def test_chains_too_large_for_dense_matrices_are_refused():

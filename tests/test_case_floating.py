@@ -36,7 +36,7 @@ def test_a_member_that_the_planets_cannot_hold(member, change, planets, monkeypa
     def no_mesh(*_, **__):
         raise AssertionError("meshed before it was refused")
 
-    monkeypatch.setattr("femgear.contact.bodies.make_sectors", no_mesh)
+    monkeypatch.setattr("femgear.trains.static.stages.make_sectors", no_mesh)
     text = edited(change, planets)
     case = parse_case(text, name="case.toml")
     for refuses in (planetary_set, solve_static):

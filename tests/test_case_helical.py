@@ -53,7 +53,7 @@ def test_the_shipped_case_is_the_train_of_the_paper(given):
             np.testing.assert_allclose(one.stiffness, other.stiffness, rtol=1e-4)
         elif name != "face_width":
             np.testing.assert_allclose(one, other, rtol=2e-4, err_msg=name)
-    assert given.notices == (
+    assert tuple(map(str, given.notices)) == (
         "static, dynamics have no effect while helical.mesh_stiffness is given: it leaves nothing that "
         "excites, and modes are all that is computed",
     )
@@ -166,7 +166,7 @@ def test_keys_without_effect_are_said(case):
     more = with_value(with_value(case, "housing.points", 60), "planet.bearing_clearance", "5 um")
     more = with_value(with_value(more, "static.stresses", True), "ring.foundation_radial", "1e10 N/m^3")
     unused = "housing, ring.foundation_radial, static.stresses, planet.bearing_clearance"
-    assert more.notices == (f"{unused} have no effect in this helical case",)
+    assert tuple(map(str, more.notices)) == (f"{unused} have no effect in this helical case",)
 
 
 def test_thrust_that_nothing_takes_up_is_refused(given):
@@ -217,10 +217,10 @@ def test_a_torque_that_no_teeth_carry_is_refused(case):
 
 
 def test_contact_points_of_the_paper_and_many_slices_are_warned_of(case):
-    (said,) = with_value(case, "helical.contact_points", "base_circles").notices
+    (said,) = map(str, with_value(case, "helical.contact_points", "base_circles").notices)
     assert said.startswith("[W-CONTACT-POINTS] helical.contact_points:") and "13 %" in said
     assert with_value(case, "helical.slices", 10).notices == ()
-    (said,) = with_value(case, "helical.slices", 30).notices
+    (said,) = map(str, with_value(case, "helical.slices", 30).notices)
     assert (
         said.startswith("[W-SLICES] helical.slices: 30 slices of 8 meshes at 95 speeds") and "6 min" in said
     )

@@ -165,5 +165,5 @@ def test_check_tells_speeds_torques_and_what_is_left_out(case, printed, capsys):
     without = read_case(CASES / "published_four_stages.toml")
     assert tuple(MULTISTAGE.warnings(without)) == ()
     asked = with_value(without, "response", {"lowest": "1 rpm", "highest": "2 rpm"})
-    assert [text.split()[0] for text in MULTISTAGE.warnings(asked)] == ["[W-RESPONSE]"]
+    assert [warning.code for warning in MULTISTAGE.warnings(asked)] == ["W-RESPONSE"]
     assert np.isfinite(multistage_of(printed).stages[3].data.planet.mass)

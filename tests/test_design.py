@@ -270,7 +270,7 @@ def test_refusals(basis):
         relief_grid(basis, amounts=[1e-6], lengths=[1.0], torques=[1.0, -1.0])
     with pytest.raises(CaseError, match="not plausible"):
         relief_starts(gears, length=2.0)
-    with pytest.raises(CaseError, match="nothing to share"):
+    with pytest.raises(CaseError, match="nothing touches"):
         sharing_model(basis, sun_torque=0.0)
     with pytest.raises(CaseError, match="no such position"):
         sharing_model(basis, sun_torque=1.0, position=8)

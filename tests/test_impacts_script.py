@@ -1,23 +1,13 @@
 """scripts/impacts.py: what it writes, and that bad input ends in a message."""
 
 import csv
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
-
-SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "impacts.py"
+from script_runs import run_script
 
 
 def run(*arguments, folder):
-    """The script as a user runs it, from a folder that is not the repository."""
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "COLUMNS": "160"}
-    return subprocess.run(
-        [sys.executable, str(SCRIPT), *map(str, arguments)], cwd=folder, env=environment,
-        capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+    return run_script("impacts.py", *arguments, folder=folder)
 
 
 @pytest.mark.slow

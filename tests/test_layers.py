@@ -10,7 +10,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "femgear"
 LAYERS = (
-    ("errors", "threads"),
+    ("errors",),
     ("gears", "fe"),
     ("contact", "system", "housing"),
     ("solvers",),

@@ -428,7 +428,7 @@ def test_thousands_of_cases_say_how_long_they_take(case, capsys):
     quick = function("x", lambda x, y: x)
     over = {"dynamics.damping_ratio": [0.01 * n for n in range(1, 9)], "carrier.mass": ["1 kg"]}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys.modules["femgear.study.sweep"], "MANY", 8)
+        patch.setattr(sys.modules["femgear.study.sweep"], "_MANY", 8)
         sweep(case, over, [quick])
     assert "[W-SWEEP] 5 more cases of about" in capsys.readouterr().err
     sweep(case, over, [quick])

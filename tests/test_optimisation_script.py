@@ -1,12 +1,10 @@
 """scripts/optimise.py: what it writes, how it goes on, and what it refuses."""
 
 import csv
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from script_runs import run_script
 
 from femgear.trains.reading import read_case
 
@@ -15,11 +13,7 @@ CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 
 
 def run(*arguments, folder):
-    command = [sys.executable, str(ROOT / "scripts" / "optimise.py"), *map(str, arguments)]
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "COLUMNS": "160"}
-    return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
-    )
+    return run_script("optimise.py", *arguments, folder=folder)
 
 
 def test_a_search_of_the_gears_and_its_continuation(tmp_path):
@@ -65,13 +59,9 @@ def test_a_search_of_the_gears_and_its_continuation(tmp_path):
         ([str(ROOT / "cases" / "nrel_pgb.toml")], "planar.mesh_stiffness"),
     ],
 )
-def test_bad_input_ends_in_a_message(arguments, message, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    from optimise import main
-    from script_tools import run_script
-
-    assert run_script(main, arguments=arguments) == 2
-    assert message in capsys.readouterr().err
+def test_bad_input_ends_in_a_message(arguments, message, tmp_path):
+    done = run(*arguments, folder=tmp_path)
+    assert done.returncode == 2 and message in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 

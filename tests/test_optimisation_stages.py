@@ -184,7 +184,7 @@ def test_reliefs_are_on_the_loaded_flanks(coarse):
 
 def test_words_of_the_command_line():
     assert named_quantity("STE  sun-planet").name == transmission_error("sun-planet").name
-    assert named_quantity("ste", torque="50 N m").torque == 50.0
+    assert transmission_error(torque="50 N m").torque == 50.0
     limit = parse_limit("root stress sun <= 300 MPa")
     assert limit.high == 300e6 and limit.violation(330e6) == pytest.approx(0.1)
     assert parse_limit("contact ratio planet-ring >= 1.3").low == 1.3
@@ -198,8 +198,8 @@ def test_words_of_the_command_line():
     [
         (lambda: named_quantity("noise"), "no such quantity"),
         (lambda: named_quantity("mesh force"), "range of speeds"),
-        (lambda: named_quantity("ste", torque="0 N m"), "no tooth bends"),
-        (lambda: named_quantity("ste", torque="5 mm"), "not a unit of torque"),
+        (lambda: transmission_error(torque="0 N m"), "no tooth bends"),
+        (lambda: transmission_error(torque="5 mm"), "not a unit of torque"),
         (lambda: mesh_force("3500 rpm", "1000 rpm"), "not a range of speeds"),
         (lambda: mesh_force(*SPEEDS, part="mean"), "no such part"),
         (lambda: transmission_error("ring"), "no such mesh"),

@@ -13,6 +13,7 @@ from scipy.ndimage import maximum_filter1d
 
 from femgear.errors import StorageError
 from femgear.report import style
+from femgear.report.response import campbell
 from femgear.report.style import COLOURS, distinct_lines
 from femgear.trains.elastic import figures as elastic_figures
 from femgear.trains.elastic.figures import _highest
@@ -262,10 +263,26 @@ def test_figures_do_without_pyplot():
     drawing = {path for path in package.rglob("*.py") if "matplotlib" in path.read_text(encoding="utf-8")}
     drawing |= set(package.rglob("figures.py"))
     names = [".".join(path.relative_to(package.parent).with_suffix("").parts) for path in sorted(drawing)]
-    assert {"femgear.report.style", "femgear.report.frequency"} <= set(names)
+    assert {"femgear.report.style", "femgear.report.response"} <= set(names)
     assert len([name for name in names if name.startswith("femgear.trains.")]) >= 7
     code = f"import sys, {', '.join(names)}; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_campbell_diagram_names_its_lines_and_marks_the_critical_speeds():
+    speed = np.linspace(0, 300, 40)
+    modes = np.column_stack([743 - speed / 7, 743 + speed / 7, 1475 + 0 * speed])
+    figure = campbell(
+        speed, modes, orders=np.array([73, 146]) / (2 * np.pi), order_names=["mesh", "2 x mesh"],
+        critical=[(62.0, 735.0)], speed_unit="rpm",
+    )  # fmt: skip
+    (ax,) = figure.axes
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["mode", "mesh", "2 x mesh", "critical speed"]
+    assert ax.lines[1].get_ydata() == pytest.approx(modes[:, 1])
+    assert ax.lines[4].get_ydata()[-1] == pytest.approx(146 * 300 / (2 * np.pi))
+    assert ax.get_xlabel() == "speed [rpm]" and ax.get_ylabel() == "natural frequency [Hz]"
+    assert style.png_bytes(figure).startswith(b"\x89PNG")
 
 
 def test_unloaded_set_is_drawn_flat():

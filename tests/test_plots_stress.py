@@ -7,6 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from femgear.contact.root_stress import RootCycle
 from femgear.report.style import png_bytes
+from femgear.storage.dataset import dataset, declared
 from femgear.trains.static.figures import (
     contact_pressure,
     load_spectrum,
@@ -14,7 +15,7 @@ from femgear.trains.static.figures import (
     root_stress_history,
     root_stress_profile,
 )
-from femgear.trains.static.results import root_stress_dataset
+from femgear.trains.static.results import STRESS_VARIABLES, root_values
 
 MESHES = ["sun-planet 1", "sun-planet 2", "planet 1-ring", "planet 2-ring"]
 P = 8
@@ -41,6 +42,11 @@ def cycles(**options):
     return tuple(cycle(mesh, gear, **options) for mesh in range(4) for gear in (0, 1))
 
 
+def root_stress_dataset(roots, meshes):
+    data = dataset(declared(STRESS_VARIABLES, root_values(roots)), {}, {})
+    return data.assign_coords(mesh=meshes, gear=["first", "second"], root=["loaded", "back"])
+
+
 @pytest.fixture(scope="module")
 def stress():
     return root_stress_dataset(cycles(), MESHES)
@@ -48,7 +54,7 @@ def stress():
 
 def test_dataset_holds_the_extremes(stress):
     assert dict(stress.sizes) == {"mesh": 4, "gear": 2, "step": 4 * P, "root": 2, "point": 14}
-    for variable in stress.variables.values():
+    for variable in stress.data_vars.values():
         assert {"units", "long_name"} <= set(variable.attrs)
     for root in cycles():
         row = stress.isel(mesh=root.mesh, gear=root.gear)

@@ -412,7 +412,7 @@ def test_truncation_is_said(results):
     assert results.manifest.convergence["branch"]["force_tail"] == data["force_tail"].values.max()
     assert "came to the end of its range, 37.2 Hz" in data.attrs["message"]
     few = data.assign(tail=0.0 * data["tail"] + 2e-3, force_tail=0.0 * data["tail"])
-    assert ["4e-06 of the energy" in note for note in tail_warnings(few, "key")] == [True]
+    assert ["4e-06 of the energy" in note.text for note in tail_warnings(few, "key")] == [True]
     assert tail_warnings(few.assign(tail=0.4 * few["tail"]), "key") == ()
 
 
@@ -483,7 +483,7 @@ def test_a_branch_that_ran_out_of_points_says_which_entry_to_raise(pgb):
     )
     assert found.ending.startswith("NOT COMPLETE") and "raise planar.branch.points" in found.ending
     assert "before 45 Hz" in describe_branch(found.dataset()).notes[0]
-    assert any("planar.branch.points" in text for text in planar_verdicts(found.dataset(), None))
+    assert any("planar.branch.points" in finding.text for finding in planar_verdicts(found.dataset(), None))
 
 
 def test_equal_forces_are_drawn_once(results):

@@ -1,21 +1,11 @@
 """What scripts/planet_phasing.py refuses and remarks on."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
-
-SCRIPT = Path(__file__).parents[1] / "scripts" / "planet_phasing.py"
+from script_runs import run_script
 
 
 def run(folder, *arguments):
-    command = [sys.executable, str(SCRIPT), *arguments]
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "COLUMNS": "160"}
-    return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
-    )
+    return run_script("planet_phasing.py", *arguments, folder=folder)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The scripts: their help, what they write, and that bad input ends in a message, not in a traceback."""
 
 import csv
-import os
 import re
 import subprocess
 import sys
@@ -9,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from script_runs import run_script as run
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = (
@@ -31,15 +31,6 @@ SET_SCRIPTS = (
     "multistage.py",
 )
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
-
-
-def run(name, *arguments, folder):
-    """Run a script as a user does, from a folder that is not the repository."""
-    command = [sys.executable, str(ROOT / "scripts" / name), *map(str, arguments)]
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "COLUMNS": "160"}
-    return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
-    )
 
 
 def table(path):
@@ -65,6 +56,12 @@ def quick_case(tmp_path_factory):
     path = tmp_path_factory.mktemp("case") / "quick.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def test_a_script_is_a_command_of_its_own(tmp_path):
+    command = [sys.executable, str(ROOT / "scripts" / "mesh_stiffness.py"), "--torque", "20 mm"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2 and "not a unit of torque" in done.stderr
 
 
 @pytest.mark.parametrize("name", SCRIPTS + SET_SCRIPTS)

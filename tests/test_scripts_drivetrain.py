@@ -1,20 +1,10 @@
 """scripts/drivetrain.py on chains that have no gears, or no picture of contact loss."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
-SCRIPT = Path(__file__).parents[1] / "scripts" / "drivetrain.py"
+from script_runs import run_script
 
 
 def run(path, output):
-    """Run the script as a user does, from a folder that is not the repository."""
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "COLUMNS": "160"}
-    command = [sys.executable, str(SCRIPT), str(path), "-o", str(output)]
-    return subprocess.run(
-        command, cwd=path.parent, env=environment, capture_output=True, text=True, timeout=120, check=False
-    )
+    return run_script("drivetrain.py", path, "-o", output, folder=path.parent)
 
 
 def test_drivetrain_takes_a_chain_without_gears(tmp_path):

@@ -32,7 +32,7 @@ def warned(printed: str) -> list[str]:
 )
 def test_warnings_are_those_of_check(name, key, value, words):
     case = with_value(read_case(CASES / f"{name}.toml"), key, value)
-    found = case_warnings(train_of(case), case)
+    found = [str(one) for one in case_warnings(train_of(case), case)]
     assert any(text.startswith(words) for text in found) and len(set(found)) == len(found)
     assert set(found) == set(train_of(case).describe(case)[-1].notes)
 
@@ -44,7 +44,7 @@ def test_run_prints_warnings_of_the_case_once(name, tmp_path, capsys):
     path.write_text(case.source, encoding="utf-8")
     assert cli.main(["run", str(path), "-o", str(tmp_path / "out"), "--only", "modes", "--no-pictures"]) == 0
     printed = capsys.readouterr()
-    assert warned(printed.err) == list(case_warnings(train_of(case), case)) != []
+    assert warned(printed.err) == [str(one) for one in case_warnings(train_of(case), case)] != []
     assert "warning:" not in printed.out and printed.err.index("warning:") < printed.err.index("modes")
 
 
@@ -59,8 +59,9 @@ def test_run_and_report_say_what_results_say_against_themselves(tmp_path, capsys
     assert cli.main(["run", str(path), "-o", str(out)]) == 0
     found = warned(capsys.readouterr().err)
     results = open_results(out)
-    said = result_warnings(train_of(results.case), results)
-    assert found == [*case_warnings(train_of(case), case), *said] and len(set(found)) == len(found)
+    said = [str(one) for one in result_warnings(train_of(results.case), results)]
+    warned_of = [str(one) for one in case_warnings(train_of(case), case)]
+    assert found == [*warned_of, *said] and len(set(found)) == len(found)
     assert "[W-RATE]" in found[0] and any("[W-PULL]" in text and "pulls for" in text for text in said)
     page = (out / "report.html").read_text(encoding="utf-8")
     warnings = page.split('<ul class="warnings">')[1].split("</ul>")[0]
@@ -133,7 +134,7 @@ def transient(
     ],
 )
 def test_what_a_run_says_against_itself(changes, words):
-    found = list(transient_warnings(transient(**changes)))
+    found = [str(one) for one in transient_warnings(transient(**changes))]
     assert len(found) == len(words) and all(word in text for word, text in zip(words, found))
 
 

@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.checks import check_floating
-from femgear.case.deviations import CarrierErrors, GearErrors
+from femgear.case.deviations import CarrierErrors, GearErrors, RingErrors
 from femgear.case.problems import in_terms_of_the_case, rack_at
 from femgear.case.sections import Case, PlanetSection, RingSection, SunSection
 from femgear.errors import CaseError, FemgearError, GeometryError
+from femgear.fe.elasticity import Material
+from femgear.fe.shaft import ShaftStep, shaft_support_stiffness, timoshenko_flexibility
 from femgear.gears.checks import check_set
 from femgear.gears.deviations import (
     Ovality,
@@ -47,7 +49,7 @@ if TYPE_CHECKING:
     from femgear.case.deviations import ModificationSection
     from femgear.case.sections import CarrierSection
 
-MEMBERS = ("sun", "carrier")
+_ON_SHAFTS = ("sun", "carrier")
 """Members that may stand on a shaft."""
 
 
@@ -206,31 +208,33 @@ def set_deviations(case: Case) -> SetDeviations:
         what `planetary_set` refuses.
     """
     s = planetary_set(case)
+    sun, ring = case.sun.errors or GearErrors(), case.ring.errors or RingErrors()
     planets = [_planet_errors(case, n) for n in range(1, s.n_planets + 1)]
     pitch = [_pitch(errors, s.planet) for errors in planets]
+    oval = ring.ovality
     pins = np.zeros((s.n_planets, 2))
     for pin in case.set.pin_errors:
         pins[pin.planet - 1] = pin.radial, pin.tangential
     found = replace(
         no_deviations(s),
-        sun=flank_form(case, s.sun),
-        planet_sun_side=flank_form(case, s.planet, "sun side"),
-        planet_ring_side=flank_form(case, s.planet, "ring side"),
-        ring=flank_form(case, s.ring),
+        sun=_flank_form(case, s.sun),
+        planet_sun_side=_flank_form(case, s.planet, "sun side"),
+        planet_ring_side=_flank_form(case, s.planet, "ring side"),
+        ring=_flank_form(case, s.ring),
         # a tooth that stands further on brings its left flank nearer to the mate, its right flank away
-        sun_pitch=-_pitch(case.sun.errors, s.sun),
+        sun_pitch=-_pitch(sun, s.sun),
         planet_pitch=[-displaced for displaced in pitch],
         planet_ring_side_pitch=pitch,
-        ring_pitch=-_pitch(case.ring.errors, s.ring),
-        sun_runout=_runout(case.sun.errors),
+        ring_pitch=-_pitch(ring, s.ring),
+        sun_runout=_runout(sun),
         planet_runout=tuple(_runout(errors) for errors in planets),
-        ring_runout=_runout(case.ring.errors),
-        carrier_runout=_runout(case.carrier.errors),
+        ring_runout=_runout(ring),
+        carrier_runout=_runout(case.carrier.errors or CarrierErrors()),
         pin_errors=pins,
-        ovality=_ovality(case),
-        sun_thickness=_thickness(case.sun.errors),
-        planet_thickness=[_thickness(errors) for errors in planets],
-        ring_thickness=_thickness(case.ring.errors),
+        ovality=Ovality(**oval.model_dump()) if oval else Ovality(),
+        sun_thickness=sun.thickness_reduction or 0.0,
+        planet_thickness=[errors.thickness_reduction or 0.0 for errors in planets],
+        ring_thickness=ring.thickness_reduction or 0.0,
     )
     try:
         check_deviations(found, s)
@@ -240,61 +244,27 @@ def set_deviations(case: Case) -> SetDeviations:
     return found
 
 
-def _planet_errors(case: Case, number: int) -> GearErrors | None:
+def _planet_errors(case: Case, number: int) -> GearErrors:
     """Errors of one planet: those of all planets, replaced by what is given for this one."""
+    common = case.planet.errors or GearErrors()
     own = next((one for one in case.planet.individual if one.planet == number), None)
-    if own is None:
-        return case.planet.errors
-    values = {} if case.planet.errors is None else case.planet.errors.model_dump()
-    given = own.model_dump(exclude_unset=True, exclude={"planet"})
+    given = {} if own is None else own.model_dump(exclude_unset=True, exclude={"planet"})
     if "pitch" in given or "cumulative_pitch" in given:
-        values |= {"pitch": None, "cumulative_pitch": None}
-    return GearErrors.model_construct(**(GearErrors().model_dump() | values | given))
+        given = {"pitch": None, "cumulative_pitch": None} | given
+    return common.model_copy(update=given)
 
 
-def _pitch(errors: GearErrors | None, gear: Gear) -> np.ndarray:
+def _pitch(errors: GearErrors, gear: Gear) -> np.ndarray:
     """Displacement of every tooth on the base circle [m]."""
-    if errors is None:
-        return np.zeros(gear.teeth)
     return tooth_displacements(gear, cumulative=errors.cumulative_pitch, single=errors.pitch)
 
 
-def _runout(errors: CarrierErrors | None) -> Runout:
-    if errors is None:
-        return Runout()
+def _runout(errors: CarrierErrors) -> Runout:
     return Runout(errors.runout_amplitude or 0.0, errors.runout_phase or 0.0)
 
 
-def _thickness(errors: GearErrors | None) -> float:
-    return (errors.thickness_reduction or 0.0) if errors is not None else 0.0
-
-
-def _ovality(case: Case) -> Ovality:
-    given = case.ring.errors.ovality if case.ring.errors is not None else None
-    if given is None:
-        return Ovality()
-    return Ovality(given.nodal_diameter, given.amplitude, given.phase, given.inextensional)
-
-
-def flank_form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
-    """Form of a flank of a gear; planets have one on the side of the sun and one on that of the ring.
-
-    Parameters
-    ----------
-    case : Case
-    gear : Gear
-    side : str
-        Flank of a planet, "sun side" or "ring side"; sun and ring have "both" alike.
-
-    Returns
-    -------
-    FlankForm
-
-    Raises
-    ------
-    GeometryError
-        E-MODIFICATION, with key, file and line: what the flank cannot have.
-    """
+def _flank_form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
+    """Form of both flanks of sun or ring, or of a planet's flank on the "sun side" or the "ring side"."""
     found = []
     for i, section in enumerate(getattr(case, gear.name).modifications):
         if getattr(section, "flank", "both") not in (side, "both"):
@@ -341,13 +311,7 @@ def _modification(section: ModificationSection, gear: Gear) -> Modification:
 
 
 def _check_reach(case: Case, profile: MeasuredProfile, gear: Gear, key: str) -> None:
-    """Refuse a measured profile that lies beside the flank.
-
-    Raises
-    ------
-    GeometryError
-        E-MODIFICATION, with the file of the profile and both ranges.
-    """
+    """Refuse a measured profile that lies beside the flank, with its file and both ranges."""
     low, high = sorted((gear.form_roll, gear.tip_roll))
     if profile.roll[-1] >= low and profile.roll[0] <= high:
         return
@@ -383,15 +347,12 @@ def with_shafts(case: Case) -> Case:
         Parts that make no shaft (E-SHAFT), with file and line.
     """
     found = {}
-    for name in MEMBERS:
+    for name in _ON_SHAFTS:
         section = getattr(case, name)
         if not section.support_shaft:
             continue
-        material = case.material
         try:
-            stiffness = _stiffness(
-                _parts(section), material.youngs_modulus, material.poisson_ratio, material.density
-            )
+            stiffness = _stiffness(_steps(section), material_of(case))
         except FemgearError as error:
             error.key = f"{name}.support_shaft"
             error.file = case.location(error.key)
@@ -402,16 +363,11 @@ def with_shafts(case: Case) -> Case:
 
 def shaft_lines(case: Case) -> tuple[str, ...]:
     """What the shafts of a case hold, in sentences, with the beam of Timoshenko beside."""
-    from femgear.fe.elasticity import Material
-    from femgear.fe.shaft import ShaftStep, timoshenko_flexibility
-
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     lines = []
-    for name in MEMBERS:
+    for name in _ON_SHAFTS:
         section = getattr(case, name)
         if section.support_shaft:
-            steps = [ShaftStep(*part) for part in _parts(section)]
-            beam = 1.0 / timoshenko_flexibility(steps, material)[0, 0]
+            beam = 1.0 / timoshenko_flexibility(_steps(section), material_of(case))[0, 0]
             lines.append(
                 f"support of the {name} from its shaft: {section.support_stiffness * 1e-6:.4g} N/um "
                 f"(as a beam {beam * 1e-6:.4g})"
@@ -419,16 +375,14 @@ def shaft_lines(case: Case) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _parts(section: SunSection | CarrierSection) -> tuple[tuple[float, float, float], ...]:
-    """Length, outer and inner diameter of every part of a shaft [m]."""
-    return tuple((one.length, one.outer_diameter, one.inner_diameter) for one in section.support_shaft)
+def material_of(case: Case) -> Material:
+    """Material of the gears of a case."""
+    return Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
 
 
-@lru_cache(maxsize=64)
-def _stiffness(parts: tuple, youngs_modulus: float, poisson_ratio: float, density: float) -> float:
-    """Support stiffness of a shaft [N/m], computed once for equal shafts."""
-    from femgear.fe.elasticity import Material
-    from femgear.fe.shaft import ShaftStep, shaft_support_stiffness
+def _steps(section: SunSection | CarrierSection) -> tuple[ShaftStep, ...]:
+    return tuple(ShaftStep(*part.model_dump().values()) for part in section.support_shaft)
 
-    steps = [ShaftStep(*part) for part in parts]
-    return shaft_support_stiffness(steps, Material(youngs_modulus, poisson_ratio, density))
+
+_stiffness = lru_cache(maxsize=64)(shaft_support_stiffness)
+"""Support stiffness of a shaft [N/m], computed once for equal shafts."""

@@ -19,13 +19,13 @@ from femgear.gears.kinematics import unheld_members
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-LEAST_TORQUE = 1e-6
+_LEAST_TORQUE = 1e-6
 """Smallest torque that is told from none [N m]."""
 
 
 def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
     """What no entry shows alone; `more` is what its train adds."""
-    checks = (_check_operation, _check_set, _check_supports, _check_numbers, check_deviation_sections)
+    checks = (_check_operation, _check_set, _check_supports, _check_numbers, _check_deviations)
     problems = [problem for check in checks for problem in check(case)] + list(more)
     return problems or list(check_published(case))
 
@@ -43,13 +43,13 @@ def _check_operation(case: Case):
         )
     if len(set(operation.speeds)) < len(operation.speeds):
         yield CaseError("a speed is given twice", code="E-DUPLICATE", key="operation.speeds")
-    if 0.0 < abs(operation.torque) < LEAST_TORQUE:
+    if 0.0 < abs(operation.torque) < _LEAST_TORQUE:
         yield CaseError(
             "the torque is too small to be told from none",
             code="E-RANGE",
             key="operation.torque",
             value=f"{operation.torque:g} N m",
-            limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
+            limit=f"0 N m, or at least {_LEAST_TORQUE:g} N m of either sign",
         )
     if not case.rigid and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
         yield CaseError(
@@ -154,7 +154,7 @@ def _check_numbers(case: Case):
         )
 
 
-def check_deviation_sections(case: Case):
+def _check_deviations(case: Case):
     """What no entry shows alone: amounts against the module, numbers of teeth and planets."""
     most = LARGEST_DEVIATION * case.sun.module
     yield from _check_planets(case)
@@ -298,9 +298,8 @@ def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False
     if not loose:
         return
     N = planetary.n_planets
-    if len(loose) > 1:
-        message = f"{N} planets cannot hold a floating sun and a floating carrier at once"
-    else:
+    message = f"{N} planets cannot hold a floating sun and a floating carrier at once"
+    if len(loose) == 1:
         angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in planetary.planet_angles[:12])
         where = f"{N} planet{'s' * (N > 1)} at {angles} deg"
         message = f"{where} cannot hold a floating {loose[0]}: their forces leave it free to move aside"

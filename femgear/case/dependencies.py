@@ -9,10 +9,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError
+from femgear.gears.kinematics import torques
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -20,61 +22,51 @@ if TYPE_CHECKING:
 Entries = Mapping[str, object]
 """Values by dotted key."""
 Result = TypeVar("Result")
+_KEPT = 4
+"""Results of every step."""
 FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"})
 """Entries that do nothing but separate flanks: no grid knows them, and derivatives reach them."""
 
 _WORDS = {"format", "title", "housing"}
 """No stage before the housing depends on them."""
-_INERT = {"mass", "inertia", "density"}
-"""Nothing static depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 """As the supports, without effect on the static solution while all members are fixed."""
+_MACHINES = {"dynamics", "motor", "brake", "planar", "operation"}
+_DYNAMIC = _WORDS | {"static.stresses", "static.members"}
+"""What decides neither modes nor response."""
 _SOLUTION = {
     f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")
 }
 """How the contact is solved, whatever the grids."""
+_HELIX = {"helical.helix_angle"}
+"""All that the transverse section of helical gears depends on."""
 
 
 def static_entries(case: Case) -> Entries:
     """Entries that decide the static solution: flanks, bodies, loads; supports only where members move."""
-    from femgear.case.case import planetary_set
-    from femgear.gears.kinematics import torques
-
-    left_out = _WORDS | {"dynamics", "motor", "brake", "planar", "operation", "static.stresses"}
-    fixed = case.static.members == "fixed"
+    left_out, parts = _WORDS | _MACHINES | {"static.stresses", "helical"}, {"mass", "inertia", "density"}
+    if case.static.members == "fixed":
+        left_out, parts = left_out | _FOUNDATION, parts | _SUPPORTS
     # whatever member the torque is given for: the flanks see that of the sun
     sun = torques(planetary_set(case), member=case.operation.input, torque=case.operation.torque).sun
-    return {"operation.torque": f"{sun:.9g} N m on the sun"} | {
-        key: value
-        for key, value in _flat(case.model_dump())
-        if not _begins(key, left_out)
-        and not (key.startswith("helical.") and key != "helical.helix_angle")
-        and key.split(".")[-1] not in _INERT
-        and not (fixed and (key in _FOUNDATION or key.split(".")[-1] in _SUPPORTS))
-    }
+    return {"operation.torque": f"{sun:.9g} N m on the sun", **_entries(case, left_out, parts, kept=_HELIX)}
 
 
 def state_entries(case: Case) -> Entries:
     """Entries that decide the loaded state of the set on its supports: of the modes, but for dynamics."""
-    return {key: value for key, value in modal_entries(case).items() if not key.startswith("dynamics.")}
+    return _entries(case, _DYNAMIC | {"operation.speeds", "dynamics"})
 
 
 def modal_entries(case: Case) -> Entries:
     """Entries that decide the modal basis: all but speeds, number of harmonics, tolerance and sensor."""
-    left_out = _WORDS | {"operation.speeds", "static.stresses", "static.members"}
     kept = {"dynamics.damping_ratio", "dynamics.up_to"}
-    return {
-        key: value
-        for key, value in _flat(case.model_dump())
-        if not _begins(key, left_out) and (key in kept or not key.startswith("dynamics."))
-    }
+    return _entries(case, _DYNAMIC | {"operation.speeds", "dynamics"}, kept=kept)
 
 
 def dynamic_entries(case: Case) -> Entries:
     """Entries that decide the periodic response: all but the sensor."""
-    left_out = _WORDS | {"static.stresses", "static.members"}
-    return {key: value for key, value in _flat(case.model_dump()) if not _begins(key, left_out)}
+    return _entries(case, _DYNAMIC)
 
 
 def compliance_entries(case: Case) -> Entries:
@@ -85,13 +77,18 @@ def compliance_entries(case: Case) -> Entries:
 
 def ring_entries(case: Case) -> Entries:
     """Entries that decide modes and compliances of the ring on its foundation, but for their number."""
-    left_out = _WORDS | _SOLUTION | {"operation", "dynamics", "motor", "brake", "planar", "carrier"}
-    parts = FLANK_ENTRIES | _SUPPORTS | {"mass", "inertia"}
+    left_out = _WORDS | _SOLUTION | _MACHINES | {"carrier", "helical"}
+    return _entries(case, left_out, FLANK_ENTRIES | _SUPPORTS | {"mass", "inertia"}, kept=_HELIX)
+
+
+def _entries(
+    case: Case, left_out: Set[str], parts: Set[str] = frozenset(), *, kept: Set[str] = frozenset()
+) -> Entries:
+    """Entries without tables and keys that are left out, but for those kept, and without parts of keys."""
     return {
         key: value
         for key, value in _flat(case.model_dump())
-        if not _begins(key, left_out)
-        and not (key.startswith("helical.") and key != "helical.helix_angle")
+        if (key in kept or not any(f"{key}.".startswith(f"{name}.") for name in left_out))
         and parts.isdisjoint(key.split("."))
     }
 
@@ -140,16 +137,9 @@ def check_entries(result: Any, kind: type, case_entries: Entries, words: str) ->
 
 
 class Steps:
-    """Results of steps that several cases share: the latest few of each step, by the entries it depends on.
+    """Results of steps that several cases share: the latest few of each, by the entries they depend on."""
 
-    Parameters
-    ----------
-    keep : int
-        Of every step.
-    """
-
-    def __init__(self, *, keep: int = 4):
-        self._keep = keep
+    def __init__(self):
         self._found: dict[str, OrderedDict[str, Any]] = {}
 
     def take(self, step: str, entries: Entries, compute: Callable[[], Result]) -> Result:
@@ -166,7 +156,7 @@ class Steps:
         key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
         if key not in found:
             found[key] = compute()
-            if len(found) > self._keep:
+            if len(found) > _KEPT:
                 found.popitem(last=False)
         found.move_to_end(key)
         return found[key]
@@ -184,11 +174,6 @@ def _flat(value: object, name: str = "") -> Iterator[tuple[str, object]]:
             yield from _flat(inner, f"{name}.{key}" if name else str(key))
     elif value is not None:
         yield name, value
-
-
-def _begins(key: str, names: set[str]) -> bool:
-    """Whether a key is one of the names or lies below one."""
-    return any(key == name or key.startswith(f"{name}.") for name in names)
 
 
 def _show(value: object) -> str:

@@ -22,7 +22,7 @@ class Section(BaseModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Reader:
+class _Reader:
     """How an entry is read and checked, and what the JSON schema says of it; stands in `Annotated`."""
 
     read: Callable[[object], object]
@@ -35,8 +35,8 @@ class Reader:
         return dict(self.schema)
 
 
-def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = False) -> Reader:
-    """Reader of a quantity given with its unit, an SI float in the model.
+def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = False) -> _Reader:
+    """_Reader of a quantity given with its unit, an SI float in the model.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = 
         return number
 
     schema = {"type": "string", "description": f"{dimension.name} with its unit, {limit}"}
-    return Reader(convert, schema)
+    return _Reader(convert, schema)
 
 
 def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
@@ -106,8 +106,8 @@ def _factor_hint(number: float, low: float, high: float, dimension: Dimension, t
 
 def Number(
     low: float, high: float, *, open_low: bool = False, open_high: bool = False, note: str = ""
-) -> Reader:
-    """Reader of a plain number (integer or float, no text, no boolean) within a window.
+) -> _Reader:
+    """_Reader of a plain number (integer or float, no text, no boolean) within a window.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def Number(
         return float(value)
 
     schema = {"type": "number", "description": f"{limit}{'; ' + note if note else ''}"}
-    return Reader(convert, schema)
+    return _Reader(convert, schema)
 
 
 PAIR, TRIPLE = (Field(min_length=count, max_length=count) for count in (2, 3))
@@ -145,18 +145,18 @@ PAIR, TRIPLE = (Field(min_length=count, max_length=count) for count in (2, 3))
 RIGID = "rigid"
 
 
-def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> Reader:
-    """Reader of a stiffness that may be the text ``"rigid"``, infinite in the model."""
+def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
+    """_Reader of a stiffness that may be the text ``"rigid"``, infinite in the model."""
     stiffness = Quantity(dimension, low, high)
 
     def rigid_too(value: object) -> object:
         return math.inf if value == RIGID else stiffness.read(value)
 
-    return Reader(rigid_too, {"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
+    return _Reader(rigid_too, {"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
 
 
-def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Reader:
-    """Reader of a whole number within a window; 27.0, "27" and true are refused.
+def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Reader:
+    """_Reader of a whole number within a window; 27.0, "27" and true are refused.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Reade
         return number
 
     schema = {"type": "integer", "minimum": -high if signed else low, "maximum": high}
-    return Reader(convert, schema)
+    return _Reader(convert, schema)
 
 
 def _one_line(value: object) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -20,7 +20,7 @@ from femgear.case.fields import described
 from femgear.case.sections import Case, RackSection
 from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, LENGTH
-from femgear.errors import CaseError, GeometryError
+from femgear.errors import CaseError, Finding, GeometryError, remark
 
 AnyCase = TypeVar("AnyCase", bound=ReadCase)
 
@@ -34,6 +34,9 @@ _DIMENSIONS = {
     "pressure_angle": ANGLE,
 }
 """Of entries whose values the refusals of gears give as SI numbers."""
+_WANTED = dict.fromkeys(("tuple_type", "list_type"), "a list")
+_WANTED |= {"bool_type": "true or false", "string_type": "a text"}
+"""What pydantic needed, by the kind of its error."""
 
 
 def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") -> list[CaseError]:
@@ -43,14 +46,9 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
     ----------
     error : ValidationError
     model : type
-        The model that was validated; its field names are the valid keys.
+        Whose field names are the valid keys.
     prefix : str
         Dotted key of the table that was validated.
-
-    Returns
-    -------
-    list of CaseError
-        With code, key, value, limit and remedy.
     """
     problems = []
     details: Any = error.errors(include_url=False)
@@ -68,14 +66,8 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
     """One error of pydantic's list."""
     kind, context, value = item["type"], item.get("ctx", {}), item.get("input")
     if kind.startswith("E-"):
-        return CaseError(
-            context["message"],
-            code=kind,
-            key=key,
-            value=context["found"],
-            limit=context["limit"],
-            remedy=context["remedy"],
-        )
+        told = {name: context[name] for name in ("limit", "remedy")}
+        return CaseError(context["message"], code=kind, key=key, value=context["found"], **told)
     if kind == "missing":
         section = _section(model, item["loc"])
         remedy = f"add it: {_description(model, item['loc'])}".removesuffix(": ")
@@ -93,18 +85,14 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
         message = f"a table is needed, not {described(value)}"
         section = f"[[{key.partition('[')[0]}]]" if key.endswith("]") else f"[{key}]"
         return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section {section}")
-    if kind in ("tuple_type", "list_type"):
-        return CaseError(f"a list is needed, not {described(value)}", code="E-TYPE", key=key, value=value)
-    if kind in ("bool_type", "string_type"):
-        wanted = "true or false" if kind == "bool_type" else "a text"
-        message = f"{wanted} is needed, not {described(value)}"
+    if kind in _WANTED:
+        message = f"{_WANTED[kind]} is needed, not {described(value)}"
         return CaseError(message, code="E-TYPE", key=key, value=value)
-    if kind == "too_long":
-        message = f"{context['actual_length']} entries are too many"
-        return CaseError(message, code="E-RANGE", key=key, limit=f"at most {context['max_length']}")
-    if kind == "too_short":
-        message = f"{context['actual_length']} entries are too few"
-        return CaseError(message, code="E-RANGE", key=key, limit=f"{context['min_length']} or more")
+    if kind in ("too_long", "too_short"):
+        many = kind == "too_long"
+        limit = f"at most {context['max_length']}" if many else f"{context['min_length']} or more"
+        message = f"{context['actual_length']} entries are too {'many' if many else 'few'}"
+        return CaseError(message, code="E-RANGE", key=key, limit=limit)
     return CaseError(f"not what is needed here: {item['msg'].lower()}", key=key, value=value)
 
 
@@ -169,6 +157,7 @@ def checked_case(
     name: str,
     *,
     check: Callable[[AnyCase], Iterable[CaseError]],
+    keys: Callable[[], type[BaseModel]] | None = None,
 ) -> AnyCase:
     """Case of the tables of a file, validated and checked as a whole.
 
@@ -177,10 +166,10 @@ def checked_case(
     model : type
     data : dict
         Tables of the file.
-    text : str
-        The file, for line numbers; empty where the text is not the user's.
-    name : str
-        Its name.
+    text, name : str
+        As for `combine`.
+    keys : callable, optional
+        ``() -> model`` whose field names are the valid keys; those of `model` when left out.
     check : callable
         ``(case) -> errors``: what no entry shows alone; an error that it raises is one of them.
 
@@ -192,7 +181,7 @@ def checked_case(
     try:
         case = model.model_validate(data)
     except ValidationError as error:
-        raise combine(translate(error, model), text, name) from None
+        raise combine(translate(error, keys() if keys else model), text, name) from None
     try:
         problems = list(check(case))
     except CaseError as error:
@@ -308,37 +297,23 @@ def _in_transverse_section(error: GeometryError, case: Case) -> None:
     error.message += ")"
 
 
-def added_material(case: Case) -> tuple[str, ...]:
-    """Warnings of reliefs and crownings with a negative amount: most are slips of the sign.
-
-    Parameters
-    ----------
-    case : Case
-    """
-    found = []
+def added_material(case: Case) -> Iterator[Finding]:
+    """Reliefs and crownings with a negative amount: most are slips of the sign."""
     for gear in ("sun", "planet", "ring"):
         for i, one in enumerate(getattr(case, gear).modifications):
             if one.kind in ("tip relief", "root relief", "profile crowning") and one.amount < 0.0:
-                found.append(
-                    f"[W-RELIEF-SIGN] {gear}.modifications[{i}].amount: a {one.kind} of "
-                    f"{one.amount * 1e6:.6g} um adds material; a positive amount takes it off (usual: 0 um "
-                    "or above)"
+                yield Finding(
+                    "W-RELIEF-SIGN",
+                    f"{gear}.modifications[{i}].amount",
+                    f"a {one.kind} of {one.amount * 1e6:.6g} um adds material",
+                    remedy="a positive amount takes it off (usual: 0 um or above)",
                 )
-    return tuple(found)
 
 
-def notices(data: dict) -> tuple[str, ...]:
-    """Remarks on what was read in a way that deserves to be said.
-
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file that was checked.
-    """
-    found = []
+def notices(data: dict) -> Iterator[Finding]:
+    """What the tables of a case file that was checked give in a way that deserves to be said."""
     if (teeth := data["ring"]["teeth"]) < 0:
-        found.append(
+        yield remark(
             f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
             "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
         )
-    return tuple(found)

@@ -38,7 +38,7 @@ from femgear.case.units import (
     TORQUE,
     TORSION,
 )
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding, remark
 
 FORMAT = 1
 """Newest format of the case file."""
@@ -372,7 +372,7 @@ def _speeds(case: Case) -> str:
     return ", ".join(shown) + (f" and {more} more" if more else "")
 
 
-def without_uncomputed(data: dict, error: CaseError) -> str | None:
+def without_uncomputed(data: dict, error: CaseError) -> Finding | None:
     """Take those published lines out of the tables of a case to which alone an error objects.
 
     Parameters
@@ -384,8 +384,8 @@ def without_uncomputed(data: dict, error: CaseError) -> str | None:
 
     Returns
     -------
-    str or None
-        What was left out, in words; None where the error is about other things too.
+    Finding or None
+        What was left out; None where the error is about other things too.
     """
     problems = getattr(error, "problems", ())
     if not problems or any(problem.code != CODE for problem in problems):
@@ -393,7 +393,7 @@ def without_uncomputed(data: dict, error: CaseError) -> str | None:
     numbers = {int(problem.key.split("[")[1].split("]")[0]) for problem in problems}
     published = data["housing"]["published"]
     data["housing"]["published"] = [e for i, e in enumerate(published) if i not in numbers]
-    return (
+    return remark(
         f"{len(numbers)} of {len(published)} entries housing.published are left out: their speed or harmonic "
         "is not computed"
     )

@@ -1,7 +1,7 @@
 """CSV files that a case names: two columns, numbers with their units in the heading.
 
-`read_columns` reads any such file, `embedded` one beside the case file. `embed_profiles` puts the points of
-measured profiles in the place of their files: they are read once and kept inside the case.
+`read_columns` reads any such file. `embed_points` puts the points of one in its place in the case, and
+`embed_profiles` those of all measured profiles: they are read once and kept inside the case.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import PurePath
-from typing import Any
 
 from femgear.case import text
 from femgear.case.deviations import MOST_POINTS
@@ -53,7 +53,7 @@ class Columns:
 
     def problem(self, message: str, line: int, *, value=None, limit=None, remedy: str) -> CaseError:
         """A refusal (E-FILE) that names the file and its line."""
-        return _problem(message, self.name, line, value=value, limit=limit, remedy=remedy)
+        return _problem(self.name, line, message, value=value, limit=limit, remedy=remedy)
 
 
 def read_columns(
@@ -86,17 +86,17 @@ def read_columns(
     count = max(len(lines) - 1, 0)
     if count < least:
         limit = f"a heading, and {least} or more under it"
-        raise _problem(f"{count or 'no'} points", name, None, limit=limit, remedy=remedy)
+        raise _problem(name, None, f"{count or 'no'} points", limit=limit, remedy=remedy)
     if count > most:
         words = f"{count} points are too many"
-        raise _problem(words, name, None, limit=f"{most} points", remedy="give it at fewer points")
+        raise _problem(name, None, words, limit=f"{most} points", remedy="give it at fewer points")
     divider = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    table = [(i, _cells(line, divider)) for i, line in lines]
-    factors = _heading(table[0][1], dimensions, name, table[0][0], remedy)
-    comma = divider != "," and any("," in cell for _, cells in table[1:] for cell in cells)
-    rows = [_row(cells, list(factors), divider, comma, name, i) for i, cells in table[1:]]
+    (first, heading), *table = ((i, _cells(line, divider)) for i, line in lines)
+    factors = _heading(heading, dimensions, partial(_problem, name, first), remedy)
+    comma = divider != "," and any("," in cell for _, cells in table for cell in cells)
+    rows = [_row(cells, list(factors), divider, comma, partial(_problem, name, i)) for i, cells in table]
     values = {title: [row[k] * factor for row in rows] for k, (title, factor) in enumerate(factors.items())}
-    return Columns(name, values, [i for i, _ in table[1:]], table[0][0])
+    return Columns(name, values, [i for i, _ in table], first)
 
 
 def _text(path) -> str:
@@ -118,23 +118,22 @@ def _cells(line: str, divider: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _heading(cells, dimensions, name: str, line: int, remedy: str) -> dict[str, float]:
+def _heading(cells, dimensions, problem: Callable[..., CaseError], remedy: str) -> dict[str, float]:
     """Titles of the columns and the SI values of their units."""
     found = {}
     for cell in cells:
         match = _HEADING.fullmatch(cell)
         title = " ".join(match["name"].lower().replace("_", " ").split()) if match else ""
         if match is None or title not in dimensions:
-            words = "a column has no known name with its unit"
-            raise _problem(words, name, line, value=cell, remedy=remedy)
+            raise problem("a column has no known name with its unit", value=cell, remedy=remedy)
         try:
             found[title] = to_si(f"1 {match['unit']}", dimensions[title])
         except CaseError as error:
             swapped = any(_has(match["unit"], d) for d in dimensions.values() if d is not dimensions[title])
             words = "the units of the two columns seem to be swapped" if swapped else remedy
-            raise _problem(error.message, name, line, value=cell, remedy=words) from None
+            raise problem(error.message, value=cell, remedy=words) from None
     if len(cells) != 2 or len(found) != 2:
-        raise _problem(f"the columns are {', '.join(cells)}", name, line, limit="two", remedy=remedy)
+        raise problem(f"the columns are {', '.join(cells)}", limit="two", remedy=remedy)
     return found
 
 
@@ -147,25 +146,23 @@ def _has(unit: str, dimension: Dimension) -> bool:
     return True
 
 
-def _row(cells, titles: list[str], divider: str, comma: bool, name: str, line: int) -> tuple[float, float]:
-    """Numbers of a line; with decimal commas anywhere in the file a point would be of thousands."""
+def _row(cells, titles: list[str], divider: str, comma: bool, problem: Callable[..., CaseError]):
+    """Two numbers of a line; with decimal commas anywhere in the file a point would be of thousands."""
     if len(cells) != 2:
         remedy = f"every line needs a {titles[0]} and a {titles[1]}, divided as the heading is"
         if divider == "," and len(cells) > 2:
             semicolon = any(";" in cell for cell in cells)
             remedy = "divide the heading by a semicolon as well" if semicolon else _COMMAS
         count = f"{len(cells)} {'entry' if len(cells) == 1 else 'entries'}"
-        raise _problem(f"{count} in a line", name, line, limit="2", remedy=remedy)
-    return _number(cells[0], divider, comma, name, line), _number(cells[1], divider, comma, name, line)
+        raise problem(f"{count} in a line", limit="2", remedy=remedy)
+    return [_number(cell, divider, comma, problem) for cell in cells]
 
 
-def _number(cell: str, divider: str, comma: bool, name: str, line: int) -> float:
+def _number(cell: str, divider: str, comma: bool, problem: Callable[..., CaseError]) -> float:
     """A finite number, with a decimal comma where the file has them."""
     if comma and "." in cell:
-        raise _problem(
-            "decimal commas and points in one file", name, line, value=cell, limit="one of them",
-            remedy="write decimal commas throughout or decimal points throughout, and none for thousands",
-        )  # fmt: skip
+        remedy = "write decimal commas throughout or decimal points throughout, and none for thousands"
+        raise problem("decimal commas and points in one file", value=cell, limit="one of them", remedy=remedy)
     try:
         value = float(cell.replace(",", ".") if comma else cell) if cell.isascii() else math.nan
     except ValueError:
@@ -173,44 +170,72 @@ def _number(cell: str, divider: str, comma: bool, name: str, line: int) -> float
     # underscores and words such as nan are numbers to Python alone
     if not math.isfinite(value) or "_" in cell:
         remedy = _COMMAS if divider == "," and "," in cell else "write numbers such as 120, 1.5 or 2.4e3"
-        raise _problem("not a finite number", name, line, value=cell, remedy=remedy)
+        raise problem("not a finite number", value=cell, remedy=remedy)
     return value
 
 
-def _problem(message: str, name: str, line: int | None, *, value=None, limit=None, remedy: str) -> CaseError:
+def _problem(name: str, line: int | None, message: str, *, value=None, limit=None, remedy: str) -> CaseError:
     file = f"{name}:{line}" if line else name
     return CaseError(message, code="E-FILE", file=file, value=value, limit=limit, remedy=remedy)
 
 
-def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
-    """What `read` finds in a file beside the case file or below.
+def embed_points(
+    data: dict,
+    entry: str,
+    name: str,
+    *,
+    read: Callable[[str], Mapping[str, list[float]]],
+    units: Mapping[str, str],
+    plain: Callable[[dict], bool],
+) -> dict[str, str]:
+    """Put the points of every ``file`` of a list of tables in its place.
 
     Parameters
     ----------
-    file : str
-        Relative to the folder of the case file.
+    data : dict
+        Tables of a case file; modified.
+    entry : str
+        Dotted key of the list, such as ``"sun.modifications"``.
     name : str
-        Of the case file.
-    key : str
-        Of the entry, for messages.
+        Of the case file: files lie in its folder or below.
     read : callable
-        Takes the path.
+        ``(path) -> SI values by entry``.
+    units : mapping of str to str
+        SI unit of each entry.
+    plain : callable
+        ``(table) -> bool``: others contradict themselves, stay as they are, and are refused with the others.
+
+    Returns
+    -------
+    dict of str to str
+        The files by the key of their table, such as ``"sun.modifications[0]"``.
 
     Raises
     ------
     CaseError
         A path that leads out of the folder (E-FILE), and what `read` raises, with the key.
     """
+    section, _, last = entry.partition(".")
+    tables, found = data.get(section), {}
+    tables = tables.get(last) if isinstance(tables, dict) else None
+    for i, table in enumerate(tables if isinstance(tables, list) else ()):
+        if isinstance(table, dict) and isinstance(table.get("file"), str) and plain(table):
+            key, file = f"{entry}[{i}]", table.pop("file")
+            points = _embedded(file, name, f"{key}.file", read)
+            table |= {
+                one: [f"{value:.13g} {units[one]}" for value in values] for one, values in points.items()
+            }
+            found[key] = text.printable(file)
+    return found
+
+
+def _embedded(file: str, name: str, key: str, read: Callable[[str], Mapping[str, list[float]]]):
+    """What `read` finds in a file beside the case file or below."""
     path = PurePath(file)
     if path.is_absolute() or ".." in path.parts or not path.parts:
-        raise CaseError(
-            "the file must lie in the folder of the case or below",
-            code="E-FILE",
-            key=key,
-            value=text.printable(file),
-            file=name or None,
-            remedy="copy it there and name it relative to the case file",
-        )
+        message = "the file must lie in the folder of the case or below"
+        shown, remedy = text.printable(file), "copy it there and name it relative to the case file"
+        raise CaseError(message, code="E-FILE", key=key, value=shown, file=name or None, remedy=remedy)
     try:
         return read(os.path.join(os.path.dirname(name), file))
     except CaseError as error:
@@ -218,50 +243,16 @@ def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
         raise
 
 
-def embed_points(
-    table: dict, name: str, key: str, read: Callable[[str], Any], units: Mapping[str, str]
-) -> str:
-    """Put the points of the ``file`` of a table, read as SI values by entry, in its place; the file's name.
-
-    `name` and `key` are those of the case file and of the table in it; refusals as of `embedded`.
-    """
-    file = table.pop("file")
-    for entry, values in embedded(file, name, f"{key}.file", read).items():
-        table[entry] = [f"{value:.13g} {units[entry]}" for value in values]
-    return text.printable(file)
-
-
 def embed_profiles(data: dict, name: str) -> dict[str, str]:
-    """Put the points of every ``file`` of a measured profile in its place.
+    """Put the points of every ``file`` of a measured profile in its place; see `embed_points`."""
 
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file; modified.
-    name : str
-        Name of the case file: files are looked for in its folder and below.
+    def plain(table: dict) -> bool:
+        return table.get("kind") == "measured profile" and "deviations" not in table
 
-    Returns
-    -------
-    dict of str to str
-        The files by the key of their modification, such as ``"sun.modifications[0]"``.
-
-    Raises
-    ------
-    CaseError
-        As `read_profile`, or a path that leads out of the folder (E-FILE).
-    """
     found = {}
     for gear in ("sun", "planet", "ring"):
-        section = data.get(gear)
-        tables = section.get("modifications") if isinstance(section, dict) else None
-        for i, table in enumerate(tables if isinstance(tables, list) else ()):
-            if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
-                continue
-            if table.get("kind") != "measured profile" or "deviations" in table:
-                continue
-            key = f"{gear}.modifications[{i}]"
-            found[key] = embed_points(table, name, key, read_profile, _PROFILE_UNITS)
+        entry = f"{gear}.modifications"
+        found |= embed_points(data, entry, name, read=read_profile, units=_PROFILE_UNITS, plain=plain)
     return found
 
 

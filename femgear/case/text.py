@@ -7,13 +7,14 @@ import os
 import re
 import stat
 import tomllib
+from html import escape
 
 from pydantic import BaseModel, PrivateAttr
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 
-MAX_BYTES = 1_000_000
-MAX_DEPTH = 32
+_MAX_BYTES = 1_000_000
+_MAX_DEPTH = 32
 """Levels of tables and lists."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -31,7 +32,7 @@ def read_text(path: str | os.PathLike) -> str:
     Raises
     ------
     CaseError
-        ``E-FILE``: missing, unreadable, not a regular file, empty or over `MAX_BYTES`.
+        ``E-FILE``: missing, unreadable, not a regular file, empty or over `_MAX_BYTES`.
         ``E-FILE-ENC``: not UTF-8, with the offset of the first wrong byte.
     """
     name = printable(os.fsdecode(path))
@@ -45,13 +46,13 @@ def read_text(path: str | os.PathLike) -> str:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise CaseError("not a regular file", code="E-FILE", file=name, remedy="name a TOML file")
         with open(descriptor, "rb", closefd=False) as stream:
-            data = stream.read(MAX_BYTES + 1)
+            data = stream.read(_MAX_BYTES + 1)
     except OSError as error:
         raise CaseError(f"cannot read the file: {error.strerror}", code="E-FILE", file=name) from error
     finally:
         os.close(descriptor)
-    if len(data) > MAX_BYTES:
-        raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{MAX_BYTES} bytes")
+    if len(data) > _MAX_BYTES:
+        raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{_MAX_BYTES} bytes")
     if not data.strip():
         raise CaseError("the file is empty", code="E-FILE", file=name)
     try:
@@ -81,8 +82,8 @@ def parse(text: str, name: str) -> dict:
     Raises
     ------
     CaseError
-        ``E-TOML`` (syntax, with line and column), ``E-TOML`` (with both lines), ``E-TOML``,
-        ``E-FINITE`` (with keys and lines).
+        ``E-TOML``: syntax, with line and column; a key given twice, with both lines; nested too deeply.
+        ``E-FINITE``, with keys and lines.
     """
     if _LONG_KEY.search(text):
         raise _too_deep(name)
@@ -121,7 +122,7 @@ def _check_tree(data: dict, name: str) -> dict[str, float]:
     infinite, pending = {}, [("", data, 1)]
     while pending:
         key, value, depth = pending.pop()
-        if depth > MAX_DEPTH:
+        if depth > _MAX_DEPTH:
             raise _too_deep(name)
         if isinstance(value, dict):
             prefix = f"{key}." if key else ""
@@ -135,7 +136,7 @@ def _check_tree(data: dict, name: str) -> dict[str, float]:
 
 def _too_deep(name: str) -> CaseError:
     return CaseError(
-        "tables or lists are nested too deeply", code="E-TOML", file=name, limit=f"{MAX_DEPTH} levels"
+        "tables or lists are nested too deeply", code="E-TOML", file=name, limit=f"{_MAX_DEPTH} levels"
     )
 
 
@@ -243,12 +244,12 @@ def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
         It is too long for a case file (E-FILE).
     """
     text = write(data)
-    if len(text.encode()) > MAX_BYTES:
+    if len(text.encode()) > _MAX_BYTES:
         raise CaseError(
             f"the case is too long with the points of its {points}",
             code="E-FILE",
             value=f"{len(text.encode())} bytes",
-            limit=f"{MAX_BYTES} bytes",
+            limit=f"{_MAX_BYTES} bytes",
             remedy=remedy,
             file=name or None,
         )
@@ -302,7 +303,7 @@ class ReadCase(BaseModel):
     _source: str = PrivateAttr(default="")
     _lines: str = PrivateAttr(default="")
     _name: str = PrivateAttr(default="")
-    _notices: tuple[str, ...] = PrivateAttr(default=())
+    _notices: tuple[Finding, ...] = PrivateAttr(default=())
     _profile_files: dict[str, str] = PrivateAttr(default_factory=dict)
 
     def read_from(self, text: str, lines: str, name: str, *, notices=(), profile_files=None) -> None:
@@ -316,7 +317,7 @@ class ReadCase(BaseModel):
             Text of the user, for line numbers; empty where he wrote none.
         name : str
             Of the file.
-        notices : sequence of str
+        notices : sequence of Finding
         profile_files : dict of str to str, optional
         """
         self._source, self._lines, self._name = text, lines, name
@@ -333,8 +334,6 @@ class ReadCase(BaseModel):
 
     def _repr_html_(self) -> str:
         """The text of the case, for notebooks."""
-        from html import escape
-
         return f"<details><summary>{escape(repr(self))}</summary><pre>{escape(self._source)}</pre></details>"
 
     @property
@@ -359,7 +358,7 @@ class ReadCase(BaseModel):
         return self._profile_files
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Finding, ...]:
         """Remarks on how the file was read."""
         return self._notices
 

@@ -89,7 +89,7 @@ def to_si(text: str, dimension: Dimension) -> float:
     number, unit = float(match[1]), " ".join(match[2].split())
     if not unit:
         raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=text, remedy=example)
-    factor = _factor(unit, dimension, text)
+    factor = _factor(unit, dimension, text, example)
     inverse = round(1 / factor)
     # 51/1000 is 0.051 to the last digit, 51*0.001 is not.
     value = number / inverse if abs(inverse * factor - 1) < 1e-12 else number * factor
@@ -98,9 +98,8 @@ def to_si(text: str, dimension: Dimension) -> float:
     return value
 
 
-def _factor(unit: str, dimension: Dimension, text: str) -> float:
+def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
     """SI value of one ``unit``, refused unless it has the dimension."""
-    example = f'write it as in "{dimension.show(dimension.scale)}"'
     if len(unit) > 60 or not _UNIT.fullmatch(unit):
         raise CaseError(
             f"{unit[:60]!a} is not a product of units",

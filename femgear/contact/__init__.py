@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from femgear.contact.assembly import (
@@ -53,28 +54,13 @@ __all__ = [
     "walk_mesh_cycle",
 ]
 
-_HOME = {
-    "assembly": ("ContactProblem", "MeshWindows", "assemble_contact", "in_windows", "mesh_windows"),
-    "bodies": ("Bodies", "Sectors", "make_bodies", "make_sectors"),
-    "cycle": ("CycleOptions", "MeshCycle", "walk_mesh_cycle"),
-    "flank_pairs": ("loaded_image", "mirrored_set"),
-    "loaded_period": ("LoadedPeriod", "loaded_period"),
-    "root_stress": ("RootStresses", "root_ranges", "root_stress_cycle"),
-    "solve": ("ContactState", "mesh_tangent_matrix", "solve_contact", "tangent_stiffness"),
-    "supports": ("RIGID", "Supports", "moving_members"),
-    "tooth_loads": ("deformed_set", "load_spectrum", "loaded_teeth"),
-}
+_MODULES = "solve supports flank_pairs bodies assembly cycle tooth_loads root_stress loaded_period".split()
 
 
-def __getattr__(name: str) -> Any:
-    """Public names are imported when they are first asked for: the solver needs scipy.linalg."""
-    from importlib import import_module
-
-    for module, names in _HOME.items():
-        if name in names:
-            return getattr(import_module(f"femgear.contact.{module}"), name)
+def __getattr__(name: str) -> object:
+    """Public names are imported when they are first asked for, from the first module that has them."""
+    for module in _MODULES if name in __all__ else ():
+        found = import_module(f"femgear.contact.{module}")
+        if hasattr(found, name):
+            return getattr(found, name)
     raise AttributeError(f"module 'femgear.contact' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})

@@ -10,18 +10,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from femgear.contact.bodies import station_weights
+from femgear.contact.bodies import Bodies, FlankCompliance, station_weights
 from femgear.contact.flank_pairs import (
     BACK_SIDE,
     DRIVE_SIDE,
     LEFT,
     RIGHT,
     FlankPair,
-    FlankSide,
     admissible_arcs,
     flank_side,
     mesh_pairs,
@@ -31,14 +30,12 @@ from femgear.contact.flank_pairs import (
     side_teeth,
 )
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
+from femgear.contact.supports import MovingMembers
 from femgear.errors import ContactError
-
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies, FlankCompliance
-    from femgear.contact.supports import MovingMembers
-    from femgear.fe.elasticity import Material
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.planetary import PlanetarySet
+from femgear.fe.elasticity import Material
+from femgear.gears.deviations import SetDeviations
+from femgear.gears.kinematics import rotation_approach
+from femgear.gears.planetary import PlanetarySet
 
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
 WIDTH = 3.2
@@ -94,7 +91,7 @@ class MeshWindows(Windows):
     ----------
     n_planets : int
     tooth : (2, meshes, pairs) int array
-        Tooth numbers on gear 1 and gear 2 during the first mesh period.
+        Tooth numbers on gear 1 and gear 2 in the first mesh period.
     turns : (P,) int array
         Mesh periods passed at each position; one of the record's periods has one number.
     local : (2, 4, cells, cells) array
@@ -144,10 +141,21 @@ class MeshWindows(Windows):
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """``gap + H p - G q >= 0, p >= 0``, with the place of every candidate.
+    """``gap + H p - G q >= 0, p >= 0`` of n candidates and m motions, with the place of every candidate.
 
-    ``H`` is the compliance of the gears; ``supports`` (2N, 2N) that of sprung members between the meshes,
-    which `compliance` adds to every pair of candidates.
+    Parameters
+    ----------
+    n_planets : int
+    H : (n, n) array
+        Compliance of the gears [m/N].
+    gap, area : (n,) arrays
+        Separations [m], and areas of the pressure cells [m^2].
+    G : (n, m) array
+        Approach per unit motion.
+    supports : (2N, 2N) or, with back flanks, (4N, 4N) array
+        Compliance of sprung members between the meshes [m/N], part of `compliance`.
+    mesh, pair, cell : (n,) int arrays
+    position : int
     """
 
     n_planets: int
@@ -169,10 +177,11 @@ class ContactProblem:
         return self.H + self.supports[np.ix_(self.mesh, self.mesh)]
 
     def warm_start(self, other: ContactProblem, active: np.ndarray) -> np.ndarray:
-        """Active candidates of another position, matched by mesh, pair and cell."""
+        """Active candidates of another position, matched by mesh, pair and cell; what follows them stays."""
         key = (self.mesh * 1000 + self.pair) * 1000 + self.cell
         other_key = (other.mesh * 1000 + other.pair) * 1000 + other.cell
-        return np.isin(key, other_key[active])
+        cells = len(other_key)
+        return np.concatenate([np.isin(key, other_key[active[:cells]]), active[cells:]])
 
     def touches_window_end(self, active: np.ndarray, setup: MeshWindows) -> bool:
         """Whether a contact ends where its window ends, other than at an end of a flank."""
@@ -208,12 +217,10 @@ def mesh_windows(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-    bodies : Bodies
-    share : float
-        Mesh force that sizes the windows [N].
-    nearest : float
-        Pairs are candidates whose separation exceeds that of the nearest pair of their mesh by less [m].
+    planetary_set, bodies : PlanetarySet, Bodies
+    share, nearest : float
+        Mesh force that sizes the windows [N]; pairs are candidates whose separation exceeds that of the
+        nearest pair of their mesh by less than `nearest` [m].
     positions : int or (P,) array
         Number of equidistant positions in one mesh period, or the positions themselves [mesh periods].
     contact : {"profile", "line_of_action"}
@@ -231,10 +238,10 @@ def mesh_windows(
     widths = [WIDTH * _contact_half_width(pair, line_load, bodies.material) for pair in pairs]
     found, teeth = [], []
     for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
-        side = flank_side(planetary_set, direction)
-        zeta, tooth = _tooth_pairs(planetary_set, pairs, side, tau - turns)
+        phase, clearance = flank_side(planetary_set, direction)
+        zeta, tooth = _tooth_pairs(planetary_set, pairs, phase, direction, tau - turns)
         shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
-        shift += side.clearance[:, None, None]
+        shift += clearance[:, None, None]
         for kind, rows in enumerate((slice(0, N), slice(N, 2 * N))):
             options = {
                 "width": widths[kind],
@@ -264,7 +271,7 @@ def in_windows(
     Raises
     ------
     ContactError
-        E-CONTACT
+        E-CONTACT: no windows contain the contact.
     """
     for _ in range(8):
         found, *wider = attempt(share, nearest)
@@ -309,7 +316,7 @@ def windows(
     Parameters
     ----------
     pair : FlankPair
-    zeta : array
+    zeta : (...) array
         Path coordinates [m].
     width : float
         Width of a window [m].
@@ -357,14 +364,10 @@ def windows(
 
 
 def cell_edges(cells: int) -> np.ndarray:
-    """Cell edges as fractions of a window: inside a flank, at its low end, at its high end, at both.
+    """Cell edges (4, cells + 1) as parts of a window: inside a flank, at its low end, its high end, both.
 
     Where flanks end they meet at an angle: a light load is carried within some micrometres of the corner, so
     that the cells there shrink to ``1 / cells^2`` of the window.
-
-    Returns
-    -------
-    (4, cells + 1) array
     """
     t = np.linspace(0.0, 1.0, cells + 1)
     return np.stack([t, t**2, 1.0 - (1.0 - t) ** 2, np.sin(0.5 * np.pi * t) ** 2])
@@ -390,7 +393,15 @@ def assemble_contact(
     """Assemble the complementarity problem of all meshes at one position.
 
     The motions are those of the planets and of the sun, as arcs on their base circles [m], positive in the
-    direction in which the sun drives, and then the free motions of `members`.
+    direction in which the sun drives, and then the free motions of `members` [m].
+
+    Parameters
+    ----------
+    setup, bodies : MeshWindows, Bodies
+    position : int
+        Index of the position in `setup`.
+    members : MovingMembers, optional
+        Without them all axes are fixed.
     """
     N = setup.n_planets
     mesh, pair = np.nonzero(setup.near[:, position])
@@ -426,17 +437,7 @@ def assemble_contact(
     )
 
 
-def rotation_approach(n_planets: int) -> np.ndarray:
-    """Approach of the flanks per unit base-circle arc of each planet and of the sun, shape (2N, N + 1)."""
-    N = n_planets
-    approach = np.zeros((2 * N, N + 1))
-    approach[:N, :N] = -np.eye(N)
-    approach[N:, :N] = np.eye(N)
-    approach[:N, N] = 1.0
-    return approach
-
-
-def _tooth_pairs(planetary_set, pairs, side: FlankSide, passed) -> tuple[np.ndarray, np.ndarray]:
+def _tooth_pairs(planetary_set, pairs, phase, direction, passed) -> tuple[np.ndarray, np.ndarray]:
     """Path coordinates (2N, P, pairs) [m] and teeth (2, 2N, pairs) of all pairs that may come near.
 
     `passed` (P,) are the positions less the mesh periods passed.
@@ -444,11 +445,11 @@ def _tooth_pairs(planetary_set, pairs, side: FlankSide, passed) -> tuple[np.ndar
     pitch = planetary_set.sun.base_pitch
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
-    passed = side.direction * passed
-    lowest = np.floor(begin - side.phase - np.ceil(passed.max())).astype(int) - 1
+    passed = direction * passed
+    lowest = np.floor(begin - phase - np.ceil(passed.max())).astype(int) - 1
     index = lowest[:, None] + np.arange(int(np.ceil(end - begin)) + 4)
-    zeta = pitch * (passed[None, :, None] + side.phase[:, None, None] + index[:, None, :])
-    return zeta, side_teeth(planetary_set, index, side.direction)
+    zeta = pitch * (passed[None, :, None] + phase[:, None, None] + index[:, None, :])
+    return zeta, side_teeth(planetary_set, index, direction)
 
 
 def _contact_half_width(pair: FlankPair, line_load: float, material: Material) -> float:
@@ -508,16 +509,14 @@ def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> n
     sun_side = mesh % (2 * N) < N
     left, right = np.where(back, RIGHT, LEFT), np.where(back, LEFT, RIGHT)
     everything = np.arange(n)
-    sun = everything[sun_side]
-    _add_body(S, bodies.sun, setup, position, mesh, pair, sun, np.zeros(len(sun), int), left[sun])
-    for planet in range(N):
-        members = everything[mesh % N == planet]
-        is_ring = ~sun_side[members]
-        # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-        gear, side = np.where(is_ring, 0, 1), np.where(is_ring, right[members], left[members])
-        _add_body(S, bodies.planet, setup, position, mesh, pair, members, gear, side)
-    ring = everything[~sun_side]
-    _add_body(S, bodies.ring, setup, position, mesh, pair, ring, np.ones(len(ring), int), left[ring])
+    on_bodies = [(bodies.sun, everything[sun_side], 0, left)]
+    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
+    gear, side = np.where(sun_side, 1, 0), np.where(sun_side, left, right)
+    on_bodies += [(bodies.planet, everything[mesh % N == planet], gear, side) for planet in range(N)]
+    on_bodies.append((bodies.ring, everything[~sun_side], 1, left))
+    for body, members, gear, side in on_bodies:
+        own = np.broadcast_to(gear, mesh.shape)[members]
+        _add_body(S, body, setup, position, mesh, pair, members, own, side[members])
     return S
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from femgear.contact.flank_pairs import LEFT, RIGHT, mesh_pairs
 from femgear.contact.local_compliance import TipCorner, depth_displacement, tip_corner
 from femgear.errors import CaseError
 from femgear.fe.compliance import (
+    SectorSchur,
     condense_sector,
     directional,
     interpolation,
@@ -30,15 +31,12 @@ from femgear.fe.compliance import (
     split_sector,
     tooth_compliance,
 )
-from femgear.fe.elasticity import tangential_stress
-from femgear.gears.gear import tooth_thickness
-
-if TYPE_CHECKING:
-    from femgear.fe.compliance import SectorSchur
-    from femgear.fe.elasticity import BoundaryStress, Material
-    from femgear.fe.grid import Grid
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+from femgear.fe.elasticity import BoundaryStress, Material, stiffness, tangential_stress
+from femgear.fe.grid import Grid, mirror
+from femgear.fe.meshing import mesh_outlines
+from femgear.gears.gear import Gear, tooth_thickness
+from femgear.gears.planetary import PlanetarySet
+from femgear.gears.tooth import half_sector
 
 # external gears are slender along the axis only; the ring's rim is thin and free at its faces
 TEETH_STATE = "plane strain"
@@ -64,32 +62,22 @@ class Sectors:
 
 
 @dataclass(frozen=True)
-class FlankStations:
-    """Nodes of the left flank with their inward normals, ordered by roll length."""
+class _FlankStations:
+    """Nodes of the left flank, ordered by roll length."""
 
-    nodes: np.ndarray
-    roll: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
+    nodes: np.ndarray  # (n,)
+    roll: np.ndarray  # (n,) [m]
+    points: np.ndarray  # (n, 2) [m]
+    normals: np.ndarray  # (n, 2) inward unit normals
 
 
 @dataclass(frozen=True)
 class ObservedRoot:
-    """Root of a tooth seen by the same factorisation as its flanks; the sectors are not tied yet.
+    """Root of a tooth seen by the same factorisation as its flanks; the sectors are not tied yet."""
 
-    Parameters
-    ----------
-    along : BoundaryStress
-        Functionals of the tangential stress along the root of the left flank.
-    stations : FlankStations
-        Where the loads act.
-    schur : SectorSchur
-        Sector with these loads and observations, those of the cuts themselves included.
-    """
-
-    along: BoundaryStress
-    stations: FlankStations
-    schur: SectorSchur
+    along: BoundaryStress  # functionals of the tangential stress along the root of the left flank
+    stations: _FlankStations  # where the loads act
+    schur: SectorSchur  # sector with these loads and observations, those of the cuts themselves included
 
 
 @dataclass(frozen=True)
@@ -148,8 +136,7 @@ def make_sectors(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-    material : Material
+    planetary_set, material : PlanetarySet, Material
     flank_elements : int
         Element edges along a flank.
     refine : float
@@ -157,11 +144,6 @@ def make_sectors(
     cache : path, optional
         Folder of generated grids.
     """
-    from femgear.fe.elasticity import stiffness
-    from femgear.fe.grid import mirror
-    from femgear.fe.meshing import mesh_outlines
-    from femgear.gears.tooth import half_sector
-
     gears = (planetary_set.sun, planetary_set.planet, planetary_set.ring)
     halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in gears]
     grids = mesh_outlines(halves, cache=cache)
@@ -181,11 +163,10 @@ def make_bodies(
 
     Parameters
     ----------
-    sectors : Sectors
-    material : Material
+    sectors, material : Sectors, Material
     depth : float, optional
         Largest depth at which body and half plane are joined [m].
-    ring_foundation : sparse matrix, optional
+    ring_foundation : (2n, 2n) sparse matrix, optional
         Stiffness of an elastic foundation of the ring, which then is not held [N/m].
     """
     # the ring's roots need a solution of their own: its sector is not of one plane state, see `root_stress`
@@ -200,14 +181,7 @@ def make_bodies(
 
 
 def with_ring(bodies: Bodies, sectors: Sectors, *, depth: float | None, ring_foundation=None) -> Bodies:
-    """Exchange the ring: held at its outer surface, or on an elastic foundation.
-
-    Parameters
-    ----------
-    bodies, sectors : Bodies, Sectors
-    depth, ring_foundation
-        As for `make_bodies`.
-    """
+    """Exchange the ring: held at its outer surface, or on a foundation; arguments as for `make_bodies`."""
     return replace(bodies, ring=_ring_compliance(sectors.ring, bodies.material, depth, ring_foundation))
 
 
@@ -227,8 +201,7 @@ def flank_compliance(
     ----------
     grid : Grid
         Mirror-symmetric sector with boundaries ``flank_left``, ``cut_left``, ``cut_right`` and `held`.
-    gear : Gear
-    material : Material
+    gear, material : Gear, Material
     stiffness : (2n, 2n) sparse matrix
         Stiffness of the sector [N/m].
     held : str
@@ -253,8 +226,8 @@ def flank_compliance(
     return replace(found, root=root)
 
 
-def flank_stations(grid: Grid, gear: Gear) -> FlankStations:
-    """Vertices of the left flank, shape (n,), with inward unit normals, shape (n, 2)."""
+def flank_stations(grid: Grid, gear: Gear) -> _FlankStations:
+    """Find the vertices of the left flank with their inward unit normals."""
     nodes = np.unique(np.asarray(grid.boundaries["flank_left"])[:, :2])
     points = np.asarray(grid.points)[nodes]
     order = np.argsort(np.hypot(*points.T))
@@ -265,30 +238,20 @@ def flank_stations(grid: Grid, gear: Gear) -> FlankStations:
     outward = np.arctan2(points[:, 1], points[:, 0]) + np.pi / 2 - sign * pressure_angle
     normals = -np.column_stack([np.cos(outward), np.sin(outward)])
     roll = gear.base_radius * np.tan(pressure_angle)
-    return FlankStations(nodes, roll, points, normals)
+    return _FlankStations(nodes, roll, points, normals)
 
 
 def joining_depth(gear: Gear, radius, depth: float | None) -> np.ndarray:
-    """Joining depth under flank points [m]: a quarter of the module, less where the tooth is thin.
+    """Joining depth (n,) [m] under flank points at radii (n,) [m].
 
-    Parameters
-    ----------
-    gear : Gear
-    radius : (n,) array
-        [m].
-    depth : float, optional
-        Upper limit instead of a quarter of the module [m].
-
-    Returns
-    -------
-    (n,) array
-        At most 0.3 of the tooth thickness at each radius, so that twice the depth stays in the tooth.
+    A quarter of the module or the `depth` [m] given, at most 0.3 of the tooth thickness at each radius,
+    so that twice the depth stays in the tooth.
     """
     limit = 0.25 * gear.module if depth is None else depth
     return np.minimum(limit, 0.3 * tooth_thickness(gear, radius))
 
 
-def flank_load_columns(grid: Grid, stations: FlankStations) -> np.ndarray:
+def flank_load_columns(grid: Grid, stations: _FlankStations) -> np.ndarray:
     """Unit inward normal nodal forces at the stations, shape (2 n_nodes, n)."""
     loads = np.zeros((2 * len(grid.points), len(stations.nodes)))
     column = np.arange(len(stations.nodes))
@@ -337,14 +300,14 @@ def station_weights(roll, stations):
 
     Parameters
     ----------
-    roll : array of any shape
+    roll : (...) array
         Roll lengths [m]; values outside the stations are extrapolated by at most half a spacing.
     stations : (n,) array
+        Roll lengths [m].
 
     Returns
     -------
-    index : integer array, shape (..., 4)
-    weight : array, shape (..., 4)
+    index, weight : (..., 4) arrays
     """
     step = (stations[-1] - stations[0]) / (len(stations) - 1)
     position = np.clip((np.asarray(roll) - stations[0]) / step, -0.5, len(stations) - 0.5)
@@ -435,7 +398,7 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> 
     )
 
 
-def _check_depth(depth: float | None, stations: FlankStations) -> None:
+def _check_depth(depth: float | None, stations: _FlankStations) -> None:
     """Under half an element below a nodal load the finite-element field is still that of the single node."""
     spacing = float(np.linalg.norm(np.diff(stations.points, axis=0), axis=1).max())
     if depth is not None and not depth >= 0.5 * spacing:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +22,8 @@ from femgear.contact.assembly import (
     equal_cells,
     in_windows,
     mesh_windows,
-    rotation_approach,
 )
+from femgear.contact.bodies import Bodies
 from femgear.contact.flank_pairs import loaded_image
 from femgear.contact.solve import ContactState, mesh_tangent_matrix, tangent_stiffness
 from femgear.contact.supports import (
@@ -37,11 +37,9 @@ from femgear.contact.supports import (
     solve_position,
 )
 from femgear.errors import ContactError
-
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.deviations import SetDeviations
+from femgear.gears.kinematics import rotation_approach
+from femgear.gears.planetary import PlanetarySet
 
 LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""
@@ -90,10 +88,8 @@ class MeshCycle:
         by the motions of their gears, deviations included [m].
     sun_arc : (P,) array
         Rotation of the sun behind the unloaded, exact set, as an arc on its base circle [m].
-    force : (2N, P) array
-        Force on the drive flanks of the mesh, torque over base radius [N].
-    back_force : (2N, P) array
-        Force on its back flanks [N]; zero where they were not looked at.
+    force, back_force : (2N, P) arrays
+        Force on the drive and on the back flanks of the mesh, torque over base radius [N].
     stiffness : (2N, P) array
         Tangent mesh stiffness dF/d delta at constant loads of the other meshes [N/m].
     tooth_load : (2N, T, P) array
@@ -104,13 +100,10 @@ class MeshCycle:
     tooth : (2, 2N, T) int array
         Tooth numbers of the pairs on gear 1 and gear 2 in the first mesh period, see
         `femgear.contact.flank_pairs`.
-    back_tooth_load : (2N, T, P) array
-        Load of each tooth pair on the back flanks [N]; the T places are those of the back side's own pairs.
-        This and the next two are zero where back flanks were not looked at.
-    back_path : (2N, T, P) array
-        Path coordinate of these pairs [m], on the line of action of the back flanks: it falls with the
-        position, and grows towards the tip of gear 1 as that of the drive flanks does (with a negative
-        torque, both towards its root).
+    back_tooth_load, back_path : (2N, T, P) arrays
+        The same of the back flanks' own pairs [N], [m]: the path coordinate falls with the position, and
+        grows towards the tip of gear 1 as that of the drive flanks does (with a negative torque, both towards
+        its root). All of the back flanks is zero where they were not looked at.
     back_tooth : (2, 2N, T) int array
         Their tooth numbers, counted as those of `tooth`.
     bearing_force : (N, 2, P) array
@@ -122,9 +115,8 @@ class MeshCycle:
         Whether a contact of the mesh reaches a tip corner or the start of the involute.
     open_planets : (N, P) bool array
         Planets that carry nothing.
-    residual : (P,) array
-        Largest relative violation of the contact conditions and of equilibrium.
-    iterations : (P,) int array
+    residual, iterations : (P,) arrays
+        Largest relative violation of the contact conditions and of equilibrium, and linear solutions.
     member_motion : (m, P) array
         Displacement of the axes of floating or sprung members [m], named by `member_names`; that of a planet
         is measured from its pin. Inside the clearance of its bearing the place of a planet that carries
@@ -214,16 +206,9 @@ class MeshCycle:
 
 
 _PRESSURES = ("pressure", "pressure_offset", "pressure_centre")
+_OVER_MESHES = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
 _AXES = {
-    "mt": (
-        "deflection",
-        "force",
-        "back_force",
-        "stiffness",
-        "max_pressure",
-        "edge_contact",
-        "held_stiffness",
-    ),
+    "mt": (*_OVER_MESHES, "held_stiffness"),
     "mst": ("tooth_load", "path", "back_tooth_load", "back_path", "pressure_centre"),
     "gms": ("tooth", "back_tooth"),
     "t": ("sun_arc", "residual", "iterations"),
@@ -316,9 +301,7 @@ def cycle_without_load(
     Parameters
     ----------
     n_planets : int
-    position : (P,) array
-        [mesh periods].
-    periods, contact
+    position, periods, contact
         As in `MeshCycle`.
     options : CycleOptions, optional
         Whether there are pressures, and in how many cells.
@@ -387,7 +370,7 @@ class _Walk:
         found, previous, overflow, missed, unknowns = [], None, False, 0.0, 0
         for p in range(len(empty.position)):
             problem = assemble_contact(setup, self.bodies, p, self.members)
-            start = None if previous is None else _warm_start(problem, *previous)
+            start = None if previous is None else problem.warm_start(*previous)
             H, gap, G = problem.compliance, problem.gap, problem.G
             state, active = solve_position(H, gap, G, load, self.springs, start=start)
             previous = problem, active
@@ -441,12 +424,6 @@ class _Walk:
         )
 
 
-def _warm_start(problem: ContactProblem, previous: ContactProblem, active) -> np.ndarray:
-    """Cells that touched at the previous position, and the same springs of the bearings."""
-    cells = len(previous.gap)
-    return np.concatenate([problem.warm_start(previous, active[:cells]), active[cells:]])
-
-
 def _at_position(
     problem: ContactProblem, state: ContactState, setup: MeshWindows, members: MovingMembers, pressures: bool
 ) -> dict[str, Any]:
@@ -456,7 +433,6 @@ def _at_position(
         raise ContactError(
             f"the contact solution at position {p} violates its conditions by {state.residual:.2g}",
             code="E-CONTACT",
-            value=state.residual,
             limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
             remedy="look for stiffnesses, clearances or separations of very different size",
         )

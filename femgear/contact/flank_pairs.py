@@ -19,24 +19,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import ContactError
 from femgear.gears.deviations import (
+    SetDeviations,
     body_separation,
     mirrored_deviations,
     profile_separation,
     tooth_separation,
 )
-from femgear.gears.gear import working_half_angles
+from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
-
-if TYPE_CHECKING:
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 LEFT, RIGHT = 0, 1
 """Flanks of a tooth."""
@@ -146,6 +142,7 @@ def admissible_arcs(pair: FlankPair, zeta):
     ----------
     pair : FlankPair
     zeta : array
+        Path coordinates [m].
 
     Returns
     -------
@@ -184,9 +181,7 @@ def acting_flanks(n_planets: int) -> tuple[list, list, list]:
 
 
 def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the teeth of gear 1 and gear 2, (2N, pairs) each, of the tooth pairs `index` (2N, pairs).
-
-    They are counted in each body's frame.
+    """Find the teeth of gear 1 and gear 2, (2N, pairs) each, that make up the pairs `index` (2N, pairs).
 
     A pair of mesh j with index i touches at the pitch point when the position is ``-(phase_j + i)``; the
     tooth is then at the planet's angle, less its half thickness, which fixes its place on the body.
@@ -196,8 +191,7 @@ def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.nd
     turns = np.asarray(s.mesh_phases)[:, None] + index
     sun = psi[:, None] / s.sun.pitch_angle + turns[:N] - s.mesh_phases[0]
     ring = psi[:, None] / s.ring.pitch_angle - (turns[N:] - s.mesh_phases[N])
-    sun_side = working_half_angles(s.sun, s.planet, s.working_pressure_angle_sun_planet)[1]
-    ring_side = working_half_angles(s.planet, s.ring, s.working_pressure_angle_planet_ring)[0]
+    (_, sun_side), (ring_side, _) = s.half_angles
     first = np.asarray(s.mesh_phases)[:N, None]
     planet_sun = -(turns[:N] - first)
     planet_ring = (sun_side + ring_side - np.pi) / s.planet.pitch_angle - (turns[N:] - first)
@@ -212,35 +206,19 @@ def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.nd
     return first_gear, second_gear
 
 
-@dataclass(frozen=True)
-class FlankSide:
-    """One side of all 2N meshes.
+def flank_side(planetary_set: PlanetarySet, direction: float) -> tuple[np.ndarray, np.ndarray]:
+    """Phases (2N,) and clearances (2N,) [m] of all meshes on the drive (+1) or back (-1) side.
 
-    Parameters
-    ----------
-    direction : float
-        +1 where the path coordinate grows with the position, -1 on the back side.
-    phase : (2N,) array
-        Mesh phases of this side.
-    clearance : (2N,) array
-        Separation of this side when the drive flanks just touch: zero, or the backlash [m].
+    The clearance is the separation of that side when the drive flanks just touch: zero, or the backlash.
     """
-
-    direction: float
-    phase: np.ndarray
-    clearance: np.ndarray
-
-
-def flank_side(planetary_set: PlanetarySet, direction: float) -> FlankSide:
-    """Phases and clearances of all meshes on the drive (+1) or back (-1) side."""
     s, N = planetary_set, planetary_set.n_planets
     if direction > 0:
-        return FlankSide(direction, np.asarray(s.mesh_phases), np.zeros(2 * N))
+        return np.asarray(s.mesh_phases), np.zeros(2 * N)
     mirrored, order = mirrored_set(s)
     phase = np.empty(2 * N)
     phase[np.concatenate([order, order + N])] = mirrored.mesh_phases
     phase += _mirrored_position(s, mirrored)
-    return FlankSide(direction, phase, np.repeat([s.backlash_sun_planet, s.backlash_planet_ring], N))
+    return phase, np.repeat([s.backlash_sun_planet, s.backlash_planet_ring], N)
 
 
 def side_teeth(planetary_set: PlanetarySet, index: np.ndarray, direction: float):
@@ -269,14 +247,10 @@ def side_teeth(planetary_set: PlanetarySet, index: np.ndarray, direction: float)
 
 
 def mirrored_set(planetary_set: PlanetarySet) -> tuple[PlanetarySet, np.ndarray]:
-    """Mirror a set: as it is seen from behind, and the place of each of its planets in the original one.
+    """Mirror a set: as it is seen from behind, and the places ``order`` of its planets in the original one.
 
-    Returns
-    -------
-    PlanetarySet
-        Planet angles counted the other way round, ascending from the first planet.
-    order : (N,) int array
-        Mirrored planet ``i`` is original planet ``order[i]``.
+    Planet angles are counted the other way round, ascending from the first planet; mirrored planet ``i`` is
+    original planet ``order[i]``.
     """
     angles = np.asarray(planetary_set.planet_angles)
     turned = np.mod(angles[0] - angles, 2 * np.pi)
@@ -302,7 +276,7 @@ def loaded_image(
     -------
     PlanetarySet
     order : (N,) int array
-        Its planet ``i`` is planet ``order[i]`` of the given set.
+        See `mirrored_set`.
     deviations : SetDeviations or None
         As the returned set has them.
     """
@@ -321,10 +295,7 @@ def profile_form(
 
     `kind` is 0 for the sun-planet and 1 for the planet-ring meshes.
     """
-    # on the back side a planet meets sun and ring with its other flanks
-    planet = "planet_sun_side" if (kind == 0) != back else "planet_ring_side"
-    forms = (planet, "ring" if kind else "sun")
-    if deviations is None or not any(getattr(deviations, name).modifications for name in forms):
+    if deviations is None or not any(form.modifications for form in deviations.mesh_forms(kind, back)):
         return None
     return lambda roll_1, roll_2: profile_separation(
         deviations, planetary_set, kind, roll_1, roll_2, back=back
@@ -334,7 +305,7 @@ def profile_form(
 def pair_separations(
     planetary_set: PlanetarySet, deviations: SetDeviations | None, tooth, turns, tau, *, back: bool
 ) -> np.ndarray:
-    """Separations of whole tooth pairs by errors of pitch and position [m], shape (2N, P, pairs).
+    """Compute the separations of whole tooth pairs by errors of pitch and position [m], (2N, P, pairs).
 
     Parameters
     ----------
@@ -369,6 +340,7 @@ def tooth_steps(mesh, gear, n_planets: int):
 
 
 def _roll(gear: Gear, radius: float) -> float:
+    """Roll length [m] of a radius [m], zero inside the base circle."""
     return float(np.sqrt(max(radius**2 - gear.base_radius**2, 0.0)))
 
 

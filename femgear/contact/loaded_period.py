@@ -10,20 +10,17 @@ computed once and the equal planets are equal to rounding.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import gcd
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.interpolate import Akima1DInterpolator
 
-from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.bodies import Bodies
+from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.supports import RIGID, Supports
-
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies
-    from femgear.contact.cycle import MeshCycle
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.deviations import SetDeviations
+from femgear.gears.planetary import PlanetarySet
 
 SHORTEST = 2.0**-13
 """Mesh periods in which a jump is enclosed."""
@@ -45,14 +42,8 @@ class LoadedPeriod:
     ----------
     position : (P,) array
         In mesh periods, ascending from 0 and denser near jumps.
-    deflection : (2N, P) array
-        Static transmission error of every mesh, as in `MeshCycle` [m].
-    force : (2N, P) array
-        Force on the drive flanks [N].
-    stiffness : (2N, P) array
-        Tangent stiffness at constant loads of the other meshes [N/m].
-    held_stiffness : (2N, P) array
-        The same with the ring held at its outer surface [N/m].
+    deflection, force, stiffness, held_stiffness : (2N, P) arrays
+        As in `MeshCycle` [m], [N], [N/m].
     held_compliance : (2N, 2N) array
         Mean over the period of the tangent compliance between the meshes through their common bodies, the
         ring held, supports left out [m/N].
@@ -71,8 +62,6 @@ class LoadedPeriod:
         Between jumps by cubics (Akima's, modified): straight lines would make harmonics of their own, images
         of the low ones beside the number of positions.
         """
-        from scipy.interpolate import Akima1DInterpolator
-
         at, values, tau = np.arange(count) / count, getattr(self, name), self.position
         found = np.array([np.interp(at, tau, row, period=1.0) for row in values])
         for piece, place in self._smooth_pieces():
@@ -97,7 +86,7 @@ class LoadedPeriod:
 
 
 def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | None = None) -> int:
-    """Number of rotations that map the planets, with their errors, onto one another."""
+    """Count the rotations that map the planets, with their errors, onto one another."""
     symmetry, N = planetary_set.rotations, planetary_set.n_planets
     if deviations is None:
         return symmetry
@@ -121,22 +110,20 @@ def loaded_period(
     supports: Supports = RIGID,
     progress: Callable[[int, int], None] | None = None,
 ) -> LoadedPeriod:
-    """Loaded state over one mesh period for errors that stand still in the frame of the carrier.
+    """Compute the loaded state over one mesh period for errors that stand still in the carrier's frame.
 
     Parameters
     ----------
-    planetary_set, bodies, held_bodies, contact, deviations, supports
+    planetary_set, bodies, contact, deviations, supports
         As for `walk_mesh_cycle`.
+    held_bodies : Bodies
+        See `CycleOptions`.
     sun_torque : float
         Of either sign [N m].
     positions : int
         Positions over the period at least; more come where the stiffness jumps or is steep.
     progress : callable, optional
         Called with (positions done, positions).
-
-    Returns
-    -------
-    LoadedPeriod
 
     Raises
     ------
@@ -147,7 +134,7 @@ def loaded_period(
     parts = symmetry // gcd(symmetry, planetary_set.sun.teeth)
     first = -(-positions // parts)
 
-    def solved(tau) -> _Record:
+    def solved(tau) -> dict[str, np.ndarray]:
         cycle = walk_mesh_cycle(
             planetary_set,
             bodies,
@@ -163,51 +150,38 @@ def loaded_period(
     # the end of the part is there to see jumps before it, and then left out
     record = solved(np.arange(first + 1) / (first * parts))
     while len(gaps := _unresolved(record)):
-        middle = 0.5 * (record.position[gaps] + record.position[gaps + 1])
-        record = _merged(record, solved(middle))
+        middle = solved(0.5 * (record["position"][gaps] + record["position"][gaps + 1]))
+        order = np.argsort(np.concatenate([record["position"], middle["position"]]), kind="stable")
+        record = {name: np.concatenate([record[name], middle[name]], axis=-1)[..., order] for name in record}
     return _whole_period(planetary_set, record, symmetry, parts)
 
 
-@dataclass(frozen=True)
-class _Record:
-    """Positions with what is wanted there, and the tooth pairs that carry; arrays end with the positions."""
-
-    position: np.ndarray
-    deflection: np.ndarray
-    force: np.ndarray
-    stiffness: np.ndarray
-    held_stiffness: np.ndarray
-    compliance: np.ndarray
-    loaded: np.ndarray
+_OVER_POSITIONS = ("position", "deflection", "force", "stiffness", "held_stiffness", "held_compliance")
 
 
-def _record(cycle: MeshCycle, base_pitch: float) -> _Record:
-    """What is wanted of a walk; a tooth pair is known by its place on the path at position zero."""
+def _record(cycle: MeshCycle, base_pitch: float) -> dict[str, np.ndarray]:
+    """What is wanted of a walk, and the tooth pairs ``loaded``; all arrays end with the positions.
+
+    A tooth pair is known by its place on the path at position zero.
+    """
     place = np.rint((cycle.path / base_pitch - cycle.position) * 1e6)
     loaded = np.empty(len(cycle.position), object)
     for p in range(len(cycle.position)):
         mesh, pair = np.nonzero(cycle.tooth_load[..., p] > 0)
         loaded[p] = frozenset(zip(mesh.tolist(), place[mesh, pair, p].tolist(), strict=True))
-    return _Record(
-        position=cycle.position,
-        deflection=cycle.deflection,
-        force=cycle.force,
-        stiffness=cycle.stiffness,
-        held_stiffness=np.asarray(cycle.held_stiffness),
-        compliance=np.asarray(cycle.held_compliance),
-        loaded=loaded,
-    )
+    return {name: np.asarray(getattr(cycle, name)) for name in _OVER_POSITIONS} | {"loaded": loaded}
 
 
-def _unresolved(record: _Record) -> np.ndarray:
+def _unresolved(record: dict[str, np.ndarray]) -> np.ndarray:
     """Numbers of the intervals that need a position in their middle."""
-    largest = record.stiffness.max(axis=1, initial=0.0)[:, None]
-    k = record.stiffness / np.where(largest > 0.0, largest, 1.0)
-    gap = np.diff(record.position)
+    stiffness, deflection, loaded = record["stiffness"], record["deflection"], record["loaded"]
+    largest = stiffness.max(axis=1, initial=0.0)[:, None]
+    k = stiffness / np.where(largest > 0.0, largest, 1.0)
+    gap = np.diff(record["position"])
     steep = (np.abs(np.diff(k)) > STEEP).any(axis=0)
-    other = record.loaded[1:] != record.loaded[:-1]
-    moving = max(np.ptp(record.deflection, axis=1).max(), _STILL * np.abs(record.deflection).max())
-    shown = np.concatenate([k, record.deflection / (moving or 1.0)])
+    other = loaded[1:] != loaded[:-1]
+    moving = max(np.ptp(deflection, axis=1).max(), _STILL * np.abs(deflection).max())
+    shown = np.concatenate([k, deflection / (moving or 1.0)])
     # what a straight line misses in the middle of a gap, from the curvature at its ends; none across jumps
     slope = np.diff(shown) / gap
     bend = np.zeros(shown.shape)
@@ -218,16 +192,7 @@ def _unresolved(record: _Record) -> np.ndarray:
     return np.flatnonzero(((steep | other) & (gap > SHORTEST)) | ((missed > MISSED) & (gap > SMOOTHEST)))
 
 
-def _merged(one: _Record, two: _Record) -> _Record:
-    order = np.argsort(np.concatenate([one.position, two.position]), kind="stable")
-    parts = {
-        f.name: np.concatenate([getattr(one, f.name), getattr(two, f.name)], axis=-1)[..., order]
-        for f in fields(_Record)
-    }
-    return _Record(**parts)
-
-
-def _whole_period(planetary_set, record: _Record, symmetry: int, parts: int) -> LoadedPeriod:
+def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> LoadedPeriod:
     """The period from one of its `parts`: later parts are the first one with the planets moved on.
 
     A planet that is ahead by the angle psi goes through the same states ``z_sun psi / 2 pi`` mesh periods
@@ -239,21 +204,22 @@ def _whole_period(planetary_set, record: _Record, symmetry: int, parts: int) -> 
     # planets that are in the same state at all times take that of the first of them
     first = np.arange(N) % (ahead * parts)
     step = pow(planetary_set.sun.teeth // common, -1, parts) if parts > 1 else 0
-    shown = record.position < (1.0 - 1e-12) / parts
-    mean_of = _mean_weights(record.position[shown], 1.0 / parts)
-    compliance = record.compliance[..., shown] @ mean_of
-    names = ("deflection", "force", "stiffness", "held_stiffness")
-    position, rows, mean = [], [], np.zeros((2 * N, 2 * N))
+    shown = record["position"] < (1.0 - 1e-12) / parts
+    tau = record["position"][shown]
+    compliance = record["held_compliance"][..., shown] @ _mean_weights(tau, 1.0 / parts)
+    names, mean = ("deflection", "force", "stiffness", "held_stiffness"), np.zeros((2 * N, 2 * N))
+    values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
-        planet = first[(np.arange(N) - ahead * (step * part % parts)) % N]
-        mesh = np.concatenate([planet, planet + N])
-        position.append(record.position[shown] + part / parts)
-        rows.append([getattr(record, name)[mesh][:, shown] for name in names])
-        moved = np.concatenate([(np.arange(N) - ahead * (step * part % parts)) % N + s for s in (0, N)])
-        mean += compliance[np.ix_(moved, moved)] / parts
-    joined = (np.concatenate(values, axis=1) for values in zip(*rows, strict=True))
-    found = dict(zip(names, joined, strict=True))
-    return LoadedPeriod(position=np.concatenate(position), held_compliance=mean, **found)
+        moved = (np.arange(N) - ahead * (step * part % parts)) % N
+        for name in names:
+            values[name].append(record[name][np.concatenate([first[moved], first[moved] + N])][:, shown])
+        meshes = np.concatenate([moved, moved + N])
+        mean += compliance[np.ix_(meshes, meshes)] / parts
+    return LoadedPeriod(
+        position=np.concatenate([tau + part / parts for part in range(parts)]),
+        held_compliance=mean,
+        **{name: np.concatenate(parts_of, axis=1) for name, parts_of in values.items()},
+    )
 
 
 def _mean_weights(position: np.ndarray, period: float) -> np.ndarray:

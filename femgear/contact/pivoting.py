@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
+from scipy.optimize import nnls
 
 from femgear.errors import ContactError
 
@@ -121,10 +122,6 @@ def solve_step(problem: Problem, active: np.ndarray) -> Step:
     ----------
     problem : Problem
     active : (n,) bool array
-
-    Returns
-    -------
-    Step
 
     Raises
     ------
@@ -243,8 +240,6 @@ def _least_motion(arms, gaps):
     deepest = -gaps.min(initial=0.0)
     if deepest <= 0:
         return np.zeros(k), None
-    from scipy.optimize import nnls
-
     rows = np.column_stack([-arms, -gaps / deepest])
     rows /= np.linalg.norm(rows, axis=1)[:, None]
     target = np.append(np.zeros(k), 1.0)

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,61 +26,45 @@ from femgear.contact.bodies import (
     station_weights,
     with_cut,
 )
+from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks
 from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
 from femgear.fe.compliance import condense_sector, tooth_compliance
-from femgear.fe.elasticity import stiffness
-
-if TYPE_CHECKING:
-    from femgear.contact.cycle import MeshCycle
-    from femgear.fe.elasticity import Material
-    from femgear.fe.grid import Grid
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+from femgear.fe.elasticity import Material, stiffness
+from femgear.fe.grid import Grid
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import PlanetarySet
 
 LOADED, BACK = 0, 1
 """Root of the loaded flank and of the back flank in `RootCycle.stress`."""
 
 
 @dataclass(frozen=True)
-class RootStress:
+class _RootStress:
     """Tangential stress along the tooth roots of one gear per unit flank load.
 
     The root of a flank runs from the end of the flank along the fillet and the root arc to the middle of
-    the gap.
-
-    Parameters
-    ----------
-    roll : (n,) array
-        Roll lengths of the flank stations [m].
-    arc : (m,) array
-        Arc length of the root points from the end of the flank [m].
-    points : (m, 2) array
-        Root points of the left flank in the tooth frame [m].
-    slope : (m,) array
-        Angle between the tangent of the root and the centreline of the tooth [rad], 0 to pi/2; the
-        critical section of ISO 6336-3 is where it is 30 deg (60 deg for internal gears).
-    influence : (teeth, 2 m, 2 n) array
-        ``influence[k, a, b]``: stress at root point ``a`` of tooth ``i`` per unit inward normal force at
-        station ``b`` of tooth ``i - k`` [Pa/N], positive in tension; the left flank first, then the right.
+    the gap. ``influence[k, a, b]`` is the stress at root point ``a`` of tooth ``i`` per unit inward normal
+    force at station ``b`` of tooth ``i - k``, positive in tension; the left flank first, then the right.
+    The critical section of ISO 6336-3 is where the slope is 30 deg (60 deg for internal gears).
     """
 
-    roll: np.ndarray
-    arc: np.ndarray
-    points: np.ndarray
-    slope: np.ndarray
-    influence: np.ndarray
+    roll: np.ndarray  # (n,) roll lengths of the flank stations [m]
+    arc: np.ndarray  # (m,) arc length of the root points from the end of the flank [m]
+    points: np.ndarray  # (m, 2) root points of the left flank in the tooth frame [m]
+    slope: np.ndarray  # (m,) between the tangent of the root and the centreline of the tooth, 0 .. pi/2 [rad]
+    influence: np.ndarray  # (teeth, 2 m, 2 n) [Pa/N]
 
 
 @dataclass(frozen=True)
 class RootStresses:
     """Root stress influences of the three kinds of gears."""
 
-    sun: RootStress
-    planet: RootStress
-    ring: RootStress
+    sun: _RootStress
+    planet: _RootStress
+    ring: _RootStress
 
-    def of_bodies(self, n_planets: int) -> list[tuple[str, RootStress, list]]:
+    def of_bodies(self, n_planets: int) -> list[tuple[str, _RootStress, list]]:
         """Kind, influence and drive flanks (mesh, gear of the pair, side) of every body of a set."""
         sun, planets, ring = acting_flanks(n_planets)
         on_planets = [("planet", self.planet, acting) for acting in planets]
@@ -89,22 +72,12 @@ class RootStresses:
 
 
 @dataclass(frozen=True)
-class RootHistory:
-    """One tooth on its way through one mesh.
+class _RootHistory:
+    """One tooth on its way through one mesh."""
 
-    Parameters
-    ----------
-    path : (S,) array
-        Path coordinate of its tooth pair in base pitches, 0 at the pitch point.
-    load : (S,) array
-        [N]
-    stress : (S, 2, m) array
-        Along the roots of the loaded and of the back flank [Pa].
-    """
-
-    path: np.ndarray
-    load: np.ndarray
-    stress: np.ndarray
+    path: np.ndarray  # (S,) path coordinate of its tooth pair in base pitches, 0 at the pitch point
+    load: np.ndarray  # (S,) [N]
+    stress: np.ndarray  # (S, 2, m) along the roots of the loaded and of the back flank [Pa]
 
 
 @dataclass(frozen=True)
@@ -118,19 +91,16 @@ class RootCycle:
     ----------
     kind : str
         ``"sun"``, ``"planet"`` or ``"ring"``.
-    mesh : int
-    gear : int
-        0 or 1: first or second gear of the mesh.
+    mesh, gear : int
+        Mesh, and 0 or 1 for its first or second gear.
     path : (T, P) array
         Path coordinate of the tooth pair of each slot in base pitches, 0 at the pitch point.
     load : (T, P) array
         On the drive flank [N].
     stress : (T, P, 2, m) array
         Tangential stress along the root of the loaded flank (0) and of the back flank (1) [Pa].
-    arc : (m,) array
-        Arc length from the end of the flank [m].
-    slope : (m,) array
-        See `RootStress`.
+    arc, slope : (m,) arrays
+        Arc length from the end of the flank [m], and angle between root and centreline of the tooth [rad].
     periods : int
         Mesh periods in the P positions.
     """
@@ -151,11 +121,6 @@ class RootCycle:
         return self.stress[:, :, LOADED].max(axis=-1)
 
     @property
-    def compression(self) -> np.ndarray:
-        """Lowest stress along the root of the back flank, shape (T, P) [Pa]."""
-        return self.stress[:, :, BACK].min(axis=-1)
-
-    @property
     def worst(self) -> tuple[int, int, int]:
         """Slot, position and root point of the largest stress in the root of the loaded flank."""
         loaded, tension = self.stress[:, :, LOADED], self.tension
@@ -166,7 +131,7 @@ class RootCycle:
         slot, position = int(slot[k]), int(position[k])
         return slot, position, int(loaded[slot, position].argmax())
 
-    def history(self, start: int | None = None) -> RootHistory:
+    def history(self, start: int | None = None) -> _RootHistory:
         """Follow one tooth from slot to slot through the mesh.
 
         Parameters
@@ -182,7 +147,7 @@ class RootCycle:
         each = positions // self.periods
         slot = np.repeat(np.arange(slots), each)
         position = (start + slot) % self.periods * each + np.tile(np.arange(each), slots)
-        return RootHistory(self.path[slot, position], self.load[slot, position], self.stress[slot, position])
+        return _RootHistory(self.path[slot, position], self.load[slot, position], self.stress[slot, position])
 
 
 @dataclass(frozen=True)
@@ -229,7 +194,7 @@ def root_stress(
     held: str | None = "rim",
     support=None,
     state: str = "plane strain",
-) -> RootStress:
+) -> _RootStress:
     """Compute the root stress influence of a whole gear from the grid of one sector.
 
     The whole sector has one plane state: the stresses of a plane body under given forces do not depend on
@@ -241,8 +206,7 @@ def root_stress(
     grid : Grid
         Mirror-symmetric sector with boundaries ``flank_left``, ``fillet_left``, ``cut_left``, ``cut_right``
         and `held`.
-    gear : Gear
-    material : Material
+    gear, material : Gear, Material
     held : str, optional
         Boundary that cannot move; None when `support` holds the body.
     support : (2n, 2n) sparse matrix, optional
@@ -253,7 +217,7 @@ def root_stress(
     Raises
     ------
     GridError
-        When the body can move freely or the root is not one chain of edges.
+        E-GRID-FREE: the body can move freely.
     """
     along = root_functionals(grid, gear, material, state=state)
     matrix = stiffness(grid, material, state=state, thickness=gear.face_width)
@@ -269,14 +233,14 @@ def root_stress(
     return observed_root_stress(gear, ObservedRoot(along, stations, with_cut(schur, grid, held, along)))
 
 
-def observed_root_stress(gear: Gear, root: ObservedRoot) -> RootStress:
+def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:
     """Compute the root stress influence of a whole gear from what was observed with its flank compliance.
 
     Parameters
     ----------
     gear : Gear
     root : ObservedRoot
-        Of one sector of that gear, `bodies.flank_compliance` with ``root_state``.
+        Of one sector of that gear, see `bodies.flank_compliance`.
     """
     along, stations = root.along, root.stations
     order = slice(None, None, -1 if gear.internal else 1)
@@ -286,7 +250,7 @@ def observed_root_stress(gear: Gear, root: ObservedRoot) -> RootStress:
     end, beside = (n - 1, n - 2) if gear.internal else (0, 1)
     for side in (LEFT, RIGHT):
         influence[0, side, 0, side, end] = influence[0, side, 0, side, beside]
-    return RootStress(
+    return _RootStress(
         roll=stations.roll,
         arc=np.abs(along.arc - along.arc[order][0])[order],
         points=along.points[order],
@@ -302,8 +266,7 @@ def root_stress_cycle(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-    roots : RootStresses
+    planetary_set, roots : PlanetarySet, RootStresses
     cycle : MeshCycle
         Of that set. The load of a tooth pair acts at its point on the line of action.
     reverse : bool
@@ -337,9 +300,7 @@ def root_ranges(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-    roots : RootStresses
-    teeth : LoadedTeeth
+    planetary_set, roots, teeth : PlanetarySet, RootStresses, LoadedTeeth
     closes : bool
         Whether the record repeats after its end: every tooth then meets every state that tooth numbers and
         periods without a common divisor allow. Otherwise each tooth has what the record shows of it.
@@ -358,16 +319,15 @@ def root_ranges(
 
 
 def body_stress(
-    planetary_set: PlanetarySet, root: RootStress, acting, teeth: LoadedTeeth, samples, numbers
+    planetary_set: PlanetarySet, root: _RootStress, acting, teeth: LoadedTeeth, samples, numbers
 ) -> np.ndarray:
     """Superpose the root stress of some teeth of one body at some positions.
 
     Parameters
     ----------
     planetary_set : PlanetarySet
-    root : RootStress
-    acting : list of (mesh, gear, side)
-        The drive flanks of the body; the other flanks in the same meshes are its back flanks.
+    root, acting
+        Of the body, see `RootStresses.of_bodies`.
     teeth : LoadedTeeth
     samples : (p,) int array
         Positions of the record.
@@ -398,7 +358,7 @@ def _station_forces(roll, load, stations) -> np.ndarray:
     return forces
 
 
-def _root_cycle(planetary_set, kind, root: RootStress, cycle: MeshCycle, target, stress) -> RootCycle:
+def _root_cycle(planetary_set, kind, root: _RootStress, cycle: MeshCycle, target, stress) -> RootCycle:
     """Root cycle of one mesh (mesh, gear, side) from the stress (T, 2 m, P) of the teeth in its slots."""
     mesh, gear, side = target
     stress = stress.reshape(len(stress), 2, -1, len(cycle.position)).transpose(0, 3, 1, 2)
@@ -425,7 +385,7 @@ def _slots(teeth, kind) -> np.ndarray:
     return np.concatenate([teeth[:1] - step, teeth, teeth[-1:] + step])
 
 
-def _body_ranges(planetary_set, kind, root: RootStress, acting, teeth: LoadedTeeth, closes):
+def _body_ranges(planetary_set, kind, root: _RootStress, acting, teeth: LoadedTeeth, closes):
     """Ranges of the roots of the acting flanks of one body."""
     z, m = len(root.influence), len(root.arc)
     # with every period the sun's teeth go on to the next higher place, those of planets and ring back

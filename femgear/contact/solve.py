@@ -80,10 +80,6 @@ def solve_contact(H, gap, G, load, *, start=None, max_steps=200) -> ContactState
     max_steps : int, optional
         Bound on the steps of each stage, after the last of which the general solver daqp takes over.
 
-    Returns
-    -------
-    ContactState
-
     Raises
     ------
     ContactError
@@ -199,6 +195,7 @@ def _checked(H, gap, G, load):
 
 
 def _scaled(H, gap, G, load) -> Problem:
+    """The problem over its mean compliance and the largest arms of its motions."""
     compliance = float(np.trace(H)) / len(gap) if len(gap) else 1.0
     arm = np.abs(G).max(axis=0, initial=0.0)
     arm[arm == 0] = 1.0

@@ -17,16 +17,13 @@ planetary gears using an extended harmonic balance approach", NREL/CP-5000-55355
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.contact.solve import ContactState, solve_contact
 from femgear.errors import ContactError
-from femgear.gears.kinematics import mesh_normals, unheld_members
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.kinematics import MEMBERS, member_approach, mesh_normals, unheld_members
+from femgear.gears.planetary import PlanetarySet
 
 SPRINGS = 120
 """One-sided springs of a planet bearing with clearance: even, so that they are their own mirror image.
@@ -48,7 +45,7 @@ class Supports:
     planet : float, optional
         Bearing between each planet and its pin on the carrier; a planet cannot float.
     planet_clearance : float
-        Radial clearance of these bearings [m]; see `BearingSprings`.
+        Radial clearance of these bearings [m], not of rigid ones; see `bearing_springs`.
     """
 
     sun: float | None = None
@@ -56,34 +53,6 @@ class Supports:
     planet: float | None = None
     ring: float | None = None
     planet_clearance: float = 0.0
-
-    def __post_init__(self):
-        for name in ("sun", "carrier", "planet", "ring"):
-            value = getattr(self, name)
-            if value is not None and not (value >= 0 and np.isfinite(value)):
-                raise ContactError(
-                    f"the support of the {name} has a stiffness of {value} N/m",
-                    code="E-SUPPORT",
-                    limit="None (rigid), 0 N/m (floating) or above",
-                )
-        if self.planet == 0.0:
-            raise ContactError("a planet without bearing has no place", code="E-SUPPORT", limit="above 0 N/m")
-        clearance = self.planet_clearance
-        if not (clearance >= 0 and np.isfinite(clearance)):
-            raise ContactError(
-                f"the planet bearings have a radial clearance of {clearance} m",
-                code="E-SUPPORT",
-                value=clearance,
-                limit="0 m or above",
-            )
-        if clearance and self.planet is None:
-            raise ContactError(
-                f"rigid planet bearings with a clearance of {clearance} m",
-                code="E-SUPPORT",
-                value=clearance,
-                limit="a stiffness of the planet bearings above 0 N/m where they have clearance",
-                remedy="give Supports.planet, or no clearance",
-            )
 
 
 RIGID = Supports()
@@ -125,10 +94,8 @@ class BearingSprings:
 
     Parameters
     ----------
-    clearance : float
-        Radial [m].
-    compliance : float
-        Of one spring [m/N].
+    clearance, compliance : float
+        Radial clearance [m], and compliance of one spring [m/N].
     arms : (N n, m) array
         Approach of planet and pin at each of the n springs around every pin per unit free motion, in the
         order of `MovingMembers.names` without sprung motions.
@@ -149,7 +116,7 @@ def moving_members(
     ContactError
         E-MECHANISM: members float that the planets cannot hold.
     """
-    floating = [name for name in ("sun", "carrier", "ring") if getattr(supports, name) == 0.0]
+    floating = [name for name in MEMBERS if getattr(supports, name) == 0.0]
     loose = unheld_members(planetary_set, floating, both_flanks=both_flanks)
     if loose:
         planets = planetary_set.n_planets
@@ -192,11 +159,8 @@ def solve_position(
 
     Parameters
     ----------
-    H, gap, G
-        Compliance (n, n) [m/N], separations (n,) [m] and approach (n, m) of the pressure cells, as for
-        `solve_contact`.
-    load : (m,) array
-        External load on the motions [N].
+    H, gap, G, load
+        Of the pressure cells and all motions, as for `solve_contact`.
     springs : BearingSprings, optional
         Of the bearings; their motions are the last columns of ``G``.
     start : bool array, optional
@@ -255,26 +219,12 @@ def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
 
 def _one_side(planetary_set: PlanetarySet, supports: Supports, back: bool) -> MovingMembers:
     """Motions and their approach (2N, m) on one side of the teeth."""
-    N = planetary_set.n_planets
-    # forces of the sun on the planets, and of the planets on the ring
-    on_planet, on_ring = np.split(mesh_normals(planetary_set, back=back), 2)
-    zero = np.zeros((N, 2))
-    moved = [
-        ("sun", supports.sun, np.vstack([on_planet, zero])),
-        ("carrier", supports.carrier, np.vstack([-on_planet, on_ring])),
-        ("ring", supports.ring, np.vstack([zero, -on_ring])),
-    ]
+    N, motions = planetary_set.n_planets, member_approach(planetary_set, back=back)
+    moved = [(name, getattr(supports, name), motions[name]) for name in MEMBERS]
     # with clearance the springs of the bearing are candidates of the contact problem instead
     bearing = 0.0 if supports.planet_clearance else supports.planet
-    for n in range(N if supports.planet is not None else 0):
-        own = np.arange(N)[:, None] == n
-        moved.append(
-            (
-                f"planet {n + 1}",
-                bearing,
-                np.vstack([np.where(own, -on_planet, 0.0), np.where(own, on_ring, 0.0)]),
-            )
-        )
+    planet = np.arange(2 * N)[:, None] % N
+    moved += [(f"planet {n + 1}", bearing, np.where(planet == n, motions["carrier"], 0.0)) for n in range(N)]
     found = [(name, value, effect) for name, value, effect in moved if value is not None]
     return MovingMembers(
         names=tuple(f"{name}: {axis}" for name, _, _ in found for axis in "xy"),

@@ -8,46 +8,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.bodies import flank_load_columns, flank_stations
+from femgear.contact.bodies import Sector, Sectors, flank_load_columns, flank_stations
+from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import acting_flanks, mesh_pairs, tooth_steps
 from femgear.fe.compliance import cyclic_displacement, mirror_nodes, mirrored_columns
 from femgear.gears.kinematics import orientations
-
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Sector, Sectors
-    from femgear.contact.cycle import MeshCycle
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 LOAD_BINS = 20
 
 
 @dataclass(frozen=True)
-class ToothLoad:
-    """Load of one tooth pair on one of its gears.
+class _ToothLoad:
+    """Load of one tooth pair on one of its gears."""
 
-    Parameters
-    ----------
-    tooth : int
-        Tooth number in the first mesh period.
-    step : int
-        Change of the tooth number from one mesh period to the next.
-    flank : int
-        LEFT or RIGHT.
-    roll : (P,) array
-        Roll length of the contact on this gear [m].
-    load : (P,) array
-        [N]; at its point on the line of action.
-    """
-
-    tooth: int
-    step: int
-    flank: int
-    roll: np.ndarray
-    load: np.ndarray
+    tooth: int  # number in the first mesh period
+    step: int  # change of that number from one mesh period to the next
+    flank: int  # LEFT or RIGHT
+    roll: np.ndarray  # (P,) roll length of the contact on this gear [m]
+    load: np.ndarray  # (P,) at its point on the line of action [N]
 
 
 @dataclass(frozen=True)
@@ -59,7 +41,8 @@ class LoadedTeeth:
     load, path : (2N, T, P) arrays
         Of the drive flanks [N], [m]; positions in the order of the cycle.
     tooth : (2, 2N, T) int array
-    back_load, back_path, back_tooth
+        See `MeshCycle`.
+    back_load, back_path, back_tooth : arrays
         The same of the back flanks.
     turn : (P,) int array
         Whole mesh periods passed at every position.
@@ -79,26 +62,19 @@ class LoadedTeeth:
     periods: int
     reverse: bool
 
-    def on_body(self, planetary_set: PlanetarySet, acting) -> Iterator[ToothLoad]:
-        """Tooth pairs that load one body.
-
-        Parameters
-        ----------
-        planetary_set : PlanetarySet
-        acting : list of (mesh, gear, side)
-            The drive flanks of the body, see `acting_flanks`; the other flanks in the same meshes are its
-            back flanks.
-        """
+    def on_body(self, planetary_set: PlanetarySet, acting) -> Iterator[_ToothLoad]:
+        """Tooth pairs that load one body with the drive flanks `acting`, see `acting_flanks`."""
         pairs, N = mesh_pairs(planetary_set), planetary_set.n_planets
         for mesh, gear, side in acting:
             for flank, loads, paths, numbers in (
                 (side, self.load, self.path, self.tooth),
+                # the other flanks in the same meshes are its back flanks
                 (1 - side, self.back_load, self.back_path, self.back_tooth),
             ):
                 for load, path, tooth in zip(loads[mesh], paths[mesh], numbers[gear, mesh], strict=True):
                     if load.any():
                         roll = pairs[int(mesh >= N)].roll_on(gear, path)
-                        yield ToothLoad(int(tooth), int(tooth_steps(mesh, gear, N)), flank, roll, load)
+                        yield _ToothLoad(int(tooth), int(tooth_steps(mesh, gear, N)), flank, roll, load)
 
     @property
     def each(self) -> int:
@@ -118,10 +94,9 @@ class LoadSpectrum:
     ----------
     edges : (B + 1,) array
         Limits of the load classes [N].
-    time : (2N, B) array
-        Share of the time under load that a tooth spends in each class [1].
-    engagements : (2N, B) array
-        Share of the engagements whose largest load lies in each class [1].
+    time, engagements : (2N, B) arrays
+        Share of the time under load that a tooth spends in each class, and of the engagements whose largest
+        load lies in it [1].
     cycles : (2N, 2) array
         Load cycles of the flank that gear 1 or gear 2 has in this mesh, per turn of the gear against the
         carrier [1]: of the sun and the ring those with all planets.
@@ -137,27 +112,14 @@ class LoadSpectrum:
 
 
 @dataclass(frozen=True)
-class DeformedBody:
-    """One gear in the frame of the set: where its sector 0 is turned to and how every sector moves.
-
-    Parameters
-    ----------
-    name : str
-    kind : str
-        ``"sun"``, ``"planet"`` or ``"ring"``.
-    centre : (2,) array
-        [m].
-    angle : float
-        Angle of the centreline of sector 0 [rad].
-    displacement : (count, n, 2) array
-        Of every node of every sector, in the frame of that sector [m].
-    """
+class _DeformedBody:
+    """One gear in the frame of the set: where its sector 0 is turned to and how every sector moves."""
 
     name: str
-    kind: str
-    centre: np.ndarray
-    angle: float
-    displacement: np.ndarray
+    kind: str  # "sun", "planet" or "ring"
+    centre: np.ndarray  # (2,) [m]
+    angle: float  # of the centreline of sector 0 [rad]
+    displacement: np.ndarray  # (count, n, 2) of every node of every sector, in the frame of that sector [m]
 
 
 def loaded_teeth(cycle: MeshCycle, *, reverse: bool) -> LoadedTeeth:
@@ -206,7 +168,7 @@ def load_spectrum(teeth: LoadedTeeth, *, closes: bool = True) -> LoadSpectrum:
 
 def deformed_set(
     planetary_set: PlanetarySet, sectors: Sectors, cycle: MeshCycle, *, position: int = 0
-) -> tuple[DeformedBody, ...]:
+) -> tuple[_DeformedBody, ...]:
     """Compute the elastic displacement of sun, planets and ring, each held as in the static problem.
 
     The load of each tooth pair acts at its point on the line of action; the half-plane indentation, a few
@@ -232,7 +194,7 @@ def deformed_set(
         bodies.append((f"planet {n + 1}", "planet", sectors.planet, centre, at.planets[n], on_planets[n]))
     bodies.append(("ring", "ring", sectors.ring, np.zeros(2), at.ring, on_ring))
     return tuple(
-        DeformedBody(name, kind, centre, float(angle), _displacement(teeth, s, sector, acting, position))
+        _DeformedBody(name, kind, centre, float(angle), _displacement(teeth, s, sector, acting, position))
         for name, kind, sector, centre, angle, acting in bodies
     )
 

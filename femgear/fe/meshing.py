@@ -44,7 +44,7 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
     Parameters
     ----------
     outline : Outline
-        Or any object with ``curves`` and ``interfaces`` of the same form.
+        Or any object with the same fields [m].
     cache : path, optional
         Folder in which grids are kept under the hash of their content; None to keep nothing. Where it cannot
         be written there is a warning.
@@ -57,8 +57,8 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
     Raises
     ------
     GridError
-        When the outline is not usable, too large, not meshed in time, when Gmsh or one of its system
-        libraries is missing, or when an element is inverted.
+        The outline is not usable, too large (E-GRID), not meshed in time, Gmsh or one of its system
+        libraries is missing (E-GRID-GMSH), or an element is inverted (E-GRID).
     """
     plan = check_outline(outline)
     expected = estimate_elements(plan)
@@ -66,7 +66,6 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
         raise GridError(
             f"the grid would have about {expected:.3g} elements",
             code="E-GRID",
-            value=f"{expected:.3g}",
             limit=f"at most {MAX_ELEMENTS}",
             remedy="use fewer points along the outline",
         )
@@ -74,6 +73,7 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
 
 
 def _mesh_cached(plan: Plan, folder: Path) -> Grid:
+    """The grid of a plan from the folder, or made and kept there."""
     path = folder / f"{_content_hash(plan)}.msh"
     if os.path.exists(path):
         try:
@@ -85,18 +85,14 @@ def _mesh_cached(plan: Plan, folder: Path) -> Grid:
         folder.mkdir(parents=True, exist_ok=True)
         write_grid(path, grid)
     except (OSError, StorageError) as error:
-        _warn_uncached(folder, error)
+        cause = error if isinstance(error, OSError) else error.__cause__
+        reason = "no folder" if folder.exists() and not folder.is_dir() else getattr(cause, "strerror", error)
+        warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
     return grid
 
 
-def _warn_uncached(folder, error):
-    """Say that grids are not kept; the same text is shown once."""
-    cause = error if isinstance(error, OSError) else error.__cause__
-    reason = "no folder" if folder.exists() and not folder.is_dir() else getattr(cause, "strerror", error)
-    warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
-
-
 def _check_cached(grid: Grid, plan: Plan) -> Grid:
+    """The grid from a file, refused where it is not that of the plan."""
     check_grid(grid)
     same = set(grid.regions) == set(plan.faces) and np.array_equal(
         grid.points[: len(plan.points)], plan.points
@@ -124,6 +120,7 @@ def mesh_outlines(outlines, *, cache: Path | None = None) -> tuple[Grid, ...]:
 
 
 def _content_hash(plan: Plan) -> str:
+    """Name of the grid in a cache: hash of the plan and of what makes the grid."""
     try:
         gmsh = metadata.version("gmsh")
     except metadata.PackageNotFoundError as error:
@@ -136,6 +133,7 @@ def _content_hash(plan: Plan) -> str:
 
 
 def _mesh_plan(plan: Plan) -> Grid:
+    """A new grid of a plan, checked."""
     result = _run_gmsh(plan)
     points = np.vstack([plan.points, result["points"][len(plan.points) :]])
     grid = _second_order(plan, points, result["triangles"], result["face"])
@@ -144,6 +142,7 @@ def _mesh_plan(plan: Plan) -> Grid:
 
 
 def _run_gmsh(plan: Plan) -> dict[str, np.ndarray]:
+    """Points [m], triangles and their faces as the process of Gmsh returns them."""
     # Gmsh works with absolute tolerances: hand it an outline of unit size at the origin, with rounding
     # errors removed so that they do not decide between equally good triangulations
     centre, size = plan.points.mean(axis=0), plan.size
@@ -178,6 +177,7 @@ def _run_gmsh(plan: Plan) -> dict[str, np.ndarray]:
 
 
 def _worker_error(done):
+    """Refusal with the last words of the process of Gmsh."""
     text = " ".join(done.stderr.split())[-400:]
     if done.returncode == 3:
         return _library_error(text)
@@ -185,6 +185,7 @@ def _worker_error(done):
 
 
 def _library_error(text):
+    """Refusal of a Gmsh that cannot be loaded, with the package to install."""
     library = re.search(r"(lib[A-Za-z]+)[-.\d]*\.so", text)
     remedy = "install it with: pip install gmsh"
     if library:

@@ -1,10 +1,11 @@
-"""Outlines of plane bodies: the data, the checks before meshing, and the faces that interfaces make."""
+"""Outlines of plane bodies: the data, the checks before meshing, and the parts that interfaces make."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from femgear.errors import GridError
 
@@ -37,10 +38,22 @@ class Outline:
 class Plan:
     """A checked outline, ready for a mesh generator.
 
-    ``points`` (n, 2) corners; ``segments`` (s, 2) corner numbers, the boundary first and
-    counter-clockwise; ``mids`` (s, 2) their mid-side points; ``names`` (s,) curve of each segment;
-    ``loops``: each face as its segments counter-clockwise, numbered from 1, negative when reversed;
-    ``faces``: the name of each face.
+    Parameters
+    ----------
+    points : (n, 2) array
+        Corners [m].
+    segments : (s, 2) int array
+        Their corner numbers, those of the boundary first and counter-clockwise.
+    mids : (s, 2) array
+        Their mid-side points [m].
+    names : (s,) tuple of str
+        Curve of each segment.
+    n_boundary : int
+        Segments of the boundary.
+    loops : tuple of int arrays
+        Segments of each part counter-clockwise, numbered from 1, negative when reversed.
+    faces : tuple of str
+        Names of the parts.
     """
 
     points: np.ndarray
@@ -58,7 +71,7 @@ class Plan:
 
 
 def check_outline(outline) -> Plan:
-    """Check an outline and find the faces into which its interfaces split it.
+    """Check an outline and find the parts into which its interfaces split it.
 
     Parameters
     ----------
@@ -68,83 +81,52 @@ def check_outline(outline) -> Plan:
     Raises
     ------
     GridError
-        ``E-GRID``, ``-SHAPE``, ``-OPEN``, ``-CLOSE-POINTS``, ``-CROSSING``, ``-AREA``, ``-CLOCKWISE``,
-        ``-INTERFACE``, ``-REGION`` or ``-COUNT``, with the coordinates of what is wrong.
+        E-GRID: points that are not finite or coincide, curves that cross, no area, a clockwise boundary,
+        interfaces that do not divide the body, or too many segments.
     """
     curves = [(name, _curve(name, points)) for name, points in outline.curves]
     inner = [(name, _curve(name, points)) for name, points in outline.interfaces]
-    if not curves:
-        raise GridError("the outline has no curves", code="E-GRID")
     every = np.vstack([points for _, points in curves])
     size = np.ptp(every, axis=0).max()
     if not size > 0:
         raise GridError("all points of the outline coincide", code="E-GRID")
-    _check_closed(curves, size)
     points, segments, mids, names = _join(curves, inner, size)
     n_boundary = sum(len(p) // 2 for _, p in curves)
     if len(segments) > MAX_SEGMENTS:
-        raise GridError(
-            f"the outline has {len(segments)} segments", code="E-GRID", limit=f"at most {MAX_SEGMENTS}"
-        )
+        limit = f"at most {MAX_SEGMENTS}"
+        raise GridError(f"the outline has {len(segments)} segments", code="E-GRID", limit=limit)
     _check_distinct(points, size)
     _check_crossing(points, segments, names, size)
-    area = _check_area(points[segments[:n_boundary, 0]], size)
-    loops = _faces(points, segments, n_boundary, area, names)
+    _check_area(points[segments[:n_boundary, 0]], size)
+    loops = _faces(segments, n_boundary, inner)
     faces = _name_faces(points, segments, loops, tuple(outline.regions))
     return Plan(points, segments, mids, names, n_boundary, loops, faces)
 
 
 def _curve(name, points):
+    """Points of a curve as an array, refused where one is not finite."""
     points = np.asarray(points, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3 or len(points) % 2 == 0:
-        raise GridError(
-            f"the curve {name!r} is an array of shape {points.shape}",
-            code="E-GRID",
-            key=name,
-            limit="(2k + 1, 2) with k >= 1: corners at even rows, mid-side points at odd rows",
-        )
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
-        raise GridError(
-            f"point {bad[0]} of the curve {name!r} is ({points[bad[0], 0]}, {points[bad[0], 1]})",
-            code="E-GRID",
-            key=name,
-            limit="finite coordinates",
-        )
+        x, y = points[bad[0]]
+        message = f"point {bad[0]} of the curve {name!r} is ({x}, {y})"
+        raise GridError(message, code="E-GRID", key=name, limit="finite coordinates")
     return points
 
 
-def _check_closed(curves, size):
-    for (name, points), (following, after) in zip(curves, curves[1:] + curves[:1]):
-        gap = np.abs(points[-1] - after[0]).max()
-        if gap > CLOSE * size:
-            raise GridError(
-                f"the curve {name!r} ends {gap:.3e} m from the start of {following!r}",
-                code="E-GRID",
-                limit="each curve starts where the one before ends, the first where the last ends",
-            )
-
-
 def _join(curves, inner, size):
-    corners = [points[0:-1:2] for _, points in curves]
-    points = np.vstack(corners)
+    """Corners, segments, mid-side points and names of all curves; corners of interfaces join those there."""
+    points = np.vstack([points[0:-1:2] for _, points in curves])
     number = np.arange(len(points))
     segments = [np.stack([number, np.roll(number, -1)], axis=1)]
     mids = [p[1::2] for _, p in curves + inner]
     names = [name for name, p in curves + inner for _ in range(len(p) // 2)]
-    for name, curve in inner:
+    for _, curve in inner:
         chain = []
-        for i, corner in enumerate(curve[0::2]):
+        for corner in curve[0::2]:
             distance = np.abs(points - corner).max(axis=1)
             nearest = int(distance.argmin())
             if distance[nearest] > CLOSE * size:
-                if i in (0, len(curve) // 2):
-                    raise GridError(
-                        f"the interface {name!r} ends at ({corner[0]:.9g}, {corner[1]:.9g}) m, "
-                        f"{distance[nearest]:.3e} m from the nearest corner",
-                        code="E-GRID",
-                        key=name,
-                    )
                 nearest = len(points)
                 points = np.vstack([points, corner])
             chain.append(nearest)
@@ -153,8 +135,7 @@ def _join(curves, inner, size):
 
 
 def _check_distinct(points, size):
-    from scipy.spatial import KDTree
-
+    """Refuse corners that coincide."""
     pairs = KDTree(points).query_pairs(CLOSE * size, output_type="ndarray")
     if len(pairs):
         a, b = points[pairs[0]]
@@ -162,7 +143,6 @@ def _check_distinct(points, size):
             f"{len(pairs)} pairs of corners coincide, the first at ({a[0]:.9g}, {a[1]:.9g}) m, "
             f"{np.hypot(*(a - b)):.3e} m apart",
             code="E-GRID",
-            limit=f"at least {CLOSE * size:.3e} m between any two corners",
         )
 
 
@@ -203,93 +183,52 @@ def _side(a, b, c, size):
 
 
 def _check_area(polygon, size):
-    area = _area(polygon)
-    if abs(area) < 1e-6 * size**2:
-        raise GridError(
-            f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit",
-            code="E-GRID",
-        )
-    if area < 0:
-        raise GridError(
-            "the outline runs clockwise",
-            code="E-GRID",
-            limit="counter-clockwise, the body on the left",
-            remedy="reverse the order of the curves and of the points of each",
-        )
-    return area
-
-
-def _area(polygon):
+    """Refuse a boundary without area, or one that runs clockwise."""
     x, y = (polygon - polygon.mean(axis=0)).T
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    if abs(area) < 1e-6 * size**2:
+        message = f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit"
+        raise GridError(message, code="E-GRID")
+    if area < 0:
+        limit = "counter-clockwise, the body on the left"
+        raise GridError("the outline runs clockwise", code="E-GRID", limit=limit)
 
 
-def _faces(points, segments, n_boundary, area, names):
-    """Bounded faces of the planar graph; half-edge 2s runs along segment s, 2s + 1 against it."""
-    start = segments.ravel()
-    end = segments[:, ::-1].ravel()
-    direction = points[end] - points[start]
-    angle = np.arctan2(direction[:, 1], direction[:, 0])
-    order = np.lexsort((angle, start))
-    # cyclic predecessor, by angle, among the half-edges that leave the same corner
-    group_first = np.searchsorted(start[order], start[order], side="left")
-    group_last = np.searchsorted(start[order], start[order], side="right") - 1
-    position = np.arange(len(order))
-    before = np.where(position == group_first, group_last, position - 1)
-    clockwise = np.empty(len(order), dtype=int)
-    clockwise[order] = order[before]
-    following = clockwise[np.arange(len(start)) ^ 1]
-    owner = np.full(len(start), -1)
-    loops = []
-    for first in range(len(start)):
-        if owner[first] >= 0:
-            continue
-        loop, edge = [], first
-        while owner[edge] < 0:
-            owner[edge] = len(loops)
-            loop.append(edge)
-            edge = following[edge]
-        loops.append(np.array(loop))
-    dangling = np.flatnonzero(owner[0::2] == owner[1::2])
-    if len(dangling):
-        raise GridError(
-            f"the interface {names[dangling[0]]!r} does not separate two parts of the body",
-            code="E-GRID",
-            key=names[dangling[0]],
-        )
-    inside = [loop for loop in loops if _area(points[start[loop]]) > 0]
-    total = sum(_area(points[start[loop]]) for loop in inside)
-    if abs(total - area) > 1e-9 * area:
-        raise GridError(
-            f"the interfaces do not divide the body: the parts add up to {total / area:.6f} of its area",
-            code="E-GRID",
-            limit="interfaces inside the body that start and end on its boundary",
-        )
-    return tuple(np.where(loop % 2 == 0, loop // 2 + 1, -(loop // 2 + 1)) for loop in inside)
+def _faces(segments, n_boundary, inner):
+    """Parts of the body as segments counter-clockwise, numbered from 1 and negative when reversed."""
+    loops, used = [np.arange(1, n_boundary + 1)], n_boundary
+    for name, curve in inner:
+        chain = used + 1 + np.arange(len(curve) // 2)
+        used = chain[-1]
+        ends = segments[chain[0] - 1, 0], segments[chain[-1] - 1, 1]
+        for number, loop in enumerate(loops):
+            starts = np.where(loop > 0, segments[np.abs(loop) - 1, 0], segments[np.abs(loop) - 1, 1])
+            if not np.isin(ends, starts).all():
+                continue
+            first, last = (int(np.flatnonzero(starts == end)[0]) for end in ends)
+            if first > last:
+                first, last, chain = last, first, -chain[::-1]
+            loops[number] = np.concatenate([loop[:first], chain, loop[last:]])
+            loops.append(np.concatenate([loop[first:last], -chain[::-1]]))
+            break
+        else:
+            message = f"the interface {name!r} does not end at two corners of one part of the body"
+            raise GridError(message, code="E-GRID", key=name)
+    return tuple(loops)
 
 
 def _name_faces(points, segments, loops, regions):
+    """Names of the parts, each by the one region whose point lies in it."""
     if not regions and len(loops) == 1:
         return ("body",)
-    faces = [""] * len(loops)
-    for region, inside in regions:
-        at = np.array(inside, dtype=float).reshape(1, 2)
-        holders = [k for k, loop in enumerate(loops) if _contains(points, segments[np.abs(loop) - 1], at)[0]]
-        if len(holders) != 1 or faces[holders[0]]:
-            where = "outside the body" if not holders else f"in the region {faces[holders[0]]!r}"
-            raise GridError(
-                f"the point ({at[0, 0]:.9g}, {at[0, 1]:.9g}) m of the region {region!r} lies {where}",
-                code="E-GRID",
-                key=region,
-            )
-        faces[holders[0]] = region
-    if "" in faces or len(set(faces)) != len(faces):
-        raise GridError(
-            f"the interfaces make {len(loops)} parts, the regions {[r for r, _ in regions]} name "
-            f"{len(set(faces) - {''})} of them",
-            code="E-GRID",
-            remedy="give Outline.regions one entry for each part",
-        )
+    faces = []
+    for loop in loops:
+        own = segments[np.abs(loop) - 1]
+        names = [name for name, point in regions if _contains(points, own, np.array([point]))[0]]
+        if len(names) != 1:
+            message = f"a part of the outline holds the points of the regions {names}"
+            raise GridError(message, code="E-GRID", limit="one region for each part")
+        faces += names
     return tuple(faces)
 
 

@@ -8,14 +8,13 @@ for each number ``n`` of nodal diameters (Thomas 1979), whose nodal diameter is 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femgear.fe.compliance import cut_rotation, solve_interior, split_sector
-
-if TYPE_CHECKING:
-    from femgear.fe.grid import Grid
+from femgear.fe.grid import Grid
 
 
 @dataclass(frozen=True)
@@ -67,20 +66,19 @@ class CyclicModes:
 
 
 @dataclass(frozen=True)
-class SectorBasis:
-    """Craig-Bampton basis of one sector: ``u = constraint @ u_cut + interior @ eta``."""
+class _SectorBasis:
+    """Craig-Bampton basis ``u = vectors @ (u_cut, eta)`` of one of ``count`` sectors, and its matrices."""
 
-    stiffness_cut: np.ndarray
-    stiffness_interior: np.ndarray
-    mass: np.ndarray
-    constraint: np.ndarray
-    interior: np.ndarray
-    rotation: np.ndarray
+    count: int
+    stiffness_cut: np.ndarray  # (2 nb, 2 nb) [N/m], right cut first
+    stiffness_interior: np.ndarray  # (nv, nv)
+    mass: np.ndarray  # (2 nb + nv, 2 nb + nv)
+    vectors: np.ndarray  # (2n, 2 nb + nv)
 
 
 def sector_basis(
     grid: Grid, stiffness, mass, *, count: int, loads: np.ndarray, interior_modes: int = 16
-) -> SectorBasis:
+) -> _SectorBasis:
     """Reduce one sector to its cuts, `interior_modes` fixed-interface modes and the static load shapes.
 
     Parameters
@@ -88,13 +86,12 @@ def sector_basis(
     grid : Grid
         Sector with boundaries ``cut_left`` and ``cut_right``.
     stiffness, mass : (2n, 2n) sparse matrices
-        A foundation, if any, is part of `stiffness`.
+        [N/m], [kg]; a foundation, if any, is part of `stiffness`.
     count : int
+        Number of sectors.
     loads : (2n, m) array
         Load functionals; they must not act on the cuts.
     """
-    from scipy.sparse.linalg import LinearOperator, eigsh
-
     inner, right, left = parts = split_sector(grid, None)
     cut = np.concatenate([right, left])
     stiffness, mass = stiffness.tocsc(), mass.tocsc()
@@ -112,27 +109,25 @@ def sector_basis(
     full_c[inner], full_c[cut] = constraint, np.eye(len(cut))
     full_i = np.zeros((stiffness.shape[0], interior.shape[1]))
     full_i[inner] = interior
-    basis = np.hstack([full_c, full_i])
-    reduced_mass = basis.T @ (mass @ basis)
-    return SectorBasis(
+    vectors = np.hstack([full_c, full_i])
+    reduced_mass = vectors.T @ (mass @ vectors)
+    return _SectorBasis(
+        count=count,
         stiffness_cut=solution.schur,
         stiffness_interior=interior.T @ (K_ii @ interior),
         mass=0.5 * (reduced_mass + reduced_mass.T),
-        constraint=full_c,
-        interior=full_i,
-        rotation=cut_rotation(count, len(right)),
+        vectors=vectors,
     )
 
 
 def cyclic_modes(
-    basis: SectorBasis, *, count, nodal_diameters, loads, outputs, max_frequency, static_correction=True
+    basis: _SectorBasis, *, nodal_diameters, loads, outputs, max_frequency, static_correction=True
 ) -> CyclicModes:
-    """Modes up to `max_frequency` [Hz] for each nodal diameter, with the static shape of the loads appended.
+    """Compute the modes up to a frequency for each nodal diameter, and the static shape of the loads.
 
     Parameters
     ----------
-    basis : SectorBasis
-    count : int
+    basis : as of `sector_basis`
     nodal_diameters : iterable of int
     loads, outputs : (2n, m) arrays
         Functionals of the sector's nodal displacements.
@@ -141,30 +136,27 @@ def cyclic_modes(
     static_correction : bool
         Append the part of the static response to the loads that the kept modes miss.
     """
-    recovery = np.hstack([basis.constraint, basis.interior])
-    on_basis = recovery.T @ loads
+    on_basis = basis.vectors.T @ loads
     found = [
-        _one_diameter(basis, count, int(n), on_basis, max_frequency, static_correction)
-        for n in nodal_diameters
+        _one_diameter(basis, int(n), on_basis, max_frequency, static_correction) for n in nodal_diameters
     ]
     reduced = np.hstack([vectors for _, vectors in found])
     return CyclicModes(
-        count=count,
+        count=basis.count,
         nodal_diameter=np.concatenate([np.full(len(f), n) for (f, _), n in zip(found, nodal_diameters)]),
         frequency=np.concatenate([f for f, _ in found]),
         load=reduced.T @ on_basis,
-        output=reduced.T @ (recovery.T @ outputs),
+        output=reduced.T @ (basis.vectors.T @ outputs),
         reduced=reduced,
-        recovery=recovery,
+        recovery=basis.vectors,
     )
 
 
-def _one_diameter(basis: SectorBasis, count, n, loads, max_frequency, static_correction):
-    from scipy.linalg import eigh
-
-    nb, nv = len(basis.rotation), basis.interior.shape[1]
+def _one_diameter(basis: _SectorBasis, n, loads, max_frequency, static_correction):
+    """Frequencies (m,) [Hz] and shapes (k, m) in the basis of all modes with n nodal diameters."""
+    count, nb, nv = basis.count, len(basis.stiffness_cut) // 2, len(basis.stiffness_interior)
     phase = np.exp(2j * np.pi * n / count)
-    tie = np.vstack([np.eye(nb), phase * basis.rotation])
+    tie = np.vstack([np.eye(nb), phase * cut_rotation(count, nb)])
     K = np.zeros((nb + nv, nb + nv), complex)
     K[:nb, :nb] = tie.conj().T @ basis.stiffness_cut @ tie
     K[nb:, nb:] = basis.stiffness_interior

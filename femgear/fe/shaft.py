@@ -13,8 +13,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.sparse import block_array, csc_array
+from scipy.sparse.linalg import splu
 
 from femgear.errors import GeometryError
+from femgear.fe.elasticity import basis, node_of_dof
+from femgear.fe.meshing import mesh_outline
+from femgear.fe.outline import Outline
 
 ACROSS = 4  # element edges across the thinnest wall
 MAX_EDGES = 5000  # around the half section
@@ -26,9 +31,7 @@ class ShaftStep:
 
     Parameters
     ----------
-    length : float
-        [m]
-    outer_diameter, inner_diameter : float
+    length, outer_diameter, inner_diameter : float
         [m]; a bore of zero is a solid shaft.
 
     Raises
@@ -43,14 +46,9 @@ class ShaftStep:
 
     def __post_init__(self):
         numbers = (self.length, self.outer_diameter, self.inner_diameter)
-        if not (
-            np.isfinite(numbers).all() and self.length > 0 and 0 <= self.inner_diameter < self.outer_diameter
-        ):
-            raise GeometryError(
-                f"a part of a shaft {numbers}",
-                code="E-SHAFT",
-                limit="length > 0, 0 <= inner < outer diameter",
-            )
+        if not (self.length > 0 and 0 <= self.inner_diameter < self.outer_diameter < math.inf):
+            limit = "length > 0, 0 <= inner < outer diameter"
+            raise GeometryError(f"a part of a shaft {numbers}", code="E-SHAFT", limit=limit)
 
     @property
     def area(self) -> float:
@@ -91,7 +89,7 @@ def timoshenko_flexibility(steps: Sequence[ShaftStep], material) -> np.ndarray:
 
 
 def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1.0) -> np.ndarray:
-    """As `timoshenko_flexibility`, of the solid body, its end face rigidly coupled to the centre node.
+    """Compute what `timoshenko_flexibility` does, of the solid body with its end face rigidly coupled.
 
     Parameters
     ----------
@@ -109,13 +107,8 @@ def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1
     Raises
     ------
     GeometryError
-        No parts, or neighbours that do not touch (E-SHAFT).
-    GridError
+        No parts, neighbours that do not touch, or walls too thin for their length (E-SHAFT).
     """
-    from scipy.sparse.linalg import splu
-
-    from femgear.fe.meshing import mesh_outline
-
     grid = mesh_outline(_half_section(steps, refine))
     K, size = _stiffness(grid, material), 3 * grid.n_nodes
     face, held = (np.unique(grid.boundaries[name]) for name in ("coupled", "held"))
@@ -133,17 +126,12 @@ def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1
 
 
 def shaft_support_stiffness(steps: Sequence[ShaftStep], material, *, refine: float = 1.0) -> float:
-    """Radial stiffness K = F/X of the centre node of the coupled end face, which may tilt [N/m].
-
-    Arguments and errors as for `shaft_flexibility`.
-    """
+    """Radial stiffness K = F/X [N/m] of the coupled end face, which may tilt; see `shaft_flexibility`."""
     return float(1.0 / shaft_flexibility(steps, material, refine=refine)[0, 0])
 
 
 def _half_section(steps, refine):
-    """Outline in the half plane (r, z) with the end faces ``held`` (z = 0) and ``coupled``."""
-    from femgear.fe.outline import Outline
-
+    """Outline in the half plane (r, z) [m] with the end faces ``held`` (z = 0) and ``coupled``."""
     if not steps:
         raise GeometryError("a shaft without parts", code="E-SHAFT", limit="one part or more")
     for one, other in pairwise(steps):
@@ -154,12 +142,12 @@ def _half_section(steps, refine):
     z = np.concatenate([[0.0], np.cumsum([step.length for step in steps])])
     around = 2.0 * z[-1] + sum(step.outer_diameter - step.inner_diameter for step in steps)
     if around / size > MAX_EDGES:
-        thinnest = ACROSS * refine * around / MAX_EDGES
         raise GeometryError(
             f"the thinnest wall of the shaft is {1e3 * wall:.4g} mm on a length of {1e3 * z[-1]:.4g} mm",
-            code="E-SHAFT", limit=f"walls of {1e3 * thinnest:.3g} mm or more on this length",
+            code="E-SHAFT",
+            limit=f"walls of {1e3 * ACROSS * refine * around / MAX_EDGES:.3g} mm or more on this length",
             remedy="give a smaller inner diameter: a shell this thin is not resolved by elements across it",
-        )  # fmt: skip
+        )
     outer, inner = [], []
     for k, step in enumerate(steps):
         outer += [(0.5 * step.outer_diameter, z[k]), (0.5 * step.outer_diameter, z[k + 1])]
@@ -186,10 +174,7 @@ def _divided(corners, size):
 
 def _stiffness(grid, material):
     """Stiffness (3n, 3n) of the first harmonic around the axis, coordinates (U, V, W) node by node."""
-    from scipy.sparse import block_array, csc_array
     from skfem import BilinearForm
-
-    from femgear.fe.elasticity import basis, node_of_dof
 
     scalar = basis(grid, order=5)
     nodes = node_of_dof(grid, scalar)
@@ -224,8 +209,6 @@ def _stiffness(grid, material):
 
 def _free_shapes(grid, face, held):
     """Displacements (3n, m) of the coordinates that are not prescribed; on the axis V = -U and W = 0."""
-    from scipy.sparse import csc_array
-
     n, r = grid.n_nodes, grid.points[:, 0]
     taken = np.zeros(n, bool)
     taken[face] = taken[held] = True

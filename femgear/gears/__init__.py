@@ -1,4 +1,4 @@
-"""Gears: exact teeth, planetary sets, their kinematics, phases and deviations (NumPy alone)."""
+"""Gears: exact teeth, planetary sets, their kinematics, phases and deviations."""
 
 from femgear.gears.checks import check_set
 from femgear.gears.deviations import (

@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import GeometryWarning, half_thickness_angle, tooth_thickness, working_half_angles
-from femgear.gears.planetary import BACKLASH_TOLERANCE, assembly_positions
+from femgear.gears.gear import (
+    Gear,
+    GeometryWarning,
+    half_thickness_angle,
+    tooth_thickness,
+    working_half_angles,
+)
+from femgear.gears.planetary import BACKLASH_TOLERANCE, PlanetarySet, assembly_positions
 from femgear.gears.profile import inv, pressure_angle_at, undercut_shift
-
-if TYPE_CHECKING:
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
 
 FILLET_TOLERANCE = 1e-4
 """Overlap of a tip corner with a root fillet, in modules, that is warned about instead of refused."""
@@ -66,6 +67,7 @@ def tip_clearances(planetary: PlanetarySet) -> dict[str, float]:
 
 
 def _planets(s: PlanetarySet):
+    """Warn of sets with one or two planets."""
     if s.n_planets < 3:
         yield GeometryWarning(
             "W-PLANETS",
@@ -78,6 +80,7 @@ def _planets(s: PlanetarySet):
 
 
 def _neighbours(s: PlanetarySet):
+    """Refuse planets that overlap, and warn where little room is left between them."""
     if s.n_planets == 1:
         return
     angles = (*s.planet_angles, s.planet_angles[0] + 2.0 * math.pi)
@@ -107,6 +110,7 @@ def _neighbours(s: PlanetarySet):
 
 
 def _backlash(s: PlanetarySet):
+    """Refuse flanks that overlap, and warn of much play."""
     module = s.sun.module
     for mesh, value, gear in (
         ("sun-planet", s.backlash_sun_planet, s.sun),
@@ -133,6 +137,7 @@ def _backlash(s: PlanetarySet):
 
 
 def _clearances(s: PlanetarySet):
+    """Refuse tips that run into roots, and warn of small clearances."""
     for name, value in tip_clearances(s).items():
         gear = name.split()[0]
         if value < 0.0:
@@ -155,6 +160,7 @@ def _clearances(s: PlanetarySet):
 
 
 def _contact_ratios(s: PlanetarySet):
+    """Refuse contact ratios below one, and warn of those below 1.2."""
     for mesh, value in (
         ("sun-planet", s.contact_ratio_sun_planet),
         ("planet-ring", s.contact_ratio_planet_ring),
@@ -179,6 +185,7 @@ def _contact_ratios(s: PlanetarySet):
 
 
 def _single_gears(s: PlanetarySet):
+    """Warn of undercut, thin tips and thin rims."""
     for gear in (s.sun, s.planet, s.ring):
         if gear.undercut:
             yield GeometryWarning(

@@ -16,18 +16,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import GeometryError
-from femgear.gears.gear import GeometryWarning
+from femgear.gears.gear import Gear, GeometryWarning
 from femgear.gears.kinematics import mesh_normals, orientations
-from femgear.gears.modifications import LARGEST_DEVIATION, FlankForm, check_flank, form_deviation
-
-if TYPE_CHECKING:
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.modifications import FlankForm, check_flank, form_deviation
+from femgear.gears.planetary import PlanetarySet
 
 LONGEST_RECORD = 256
 """Mesh periods that a record spans at most unless told otherwise."""
@@ -77,7 +72,7 @@ class Ovality:
 
 @dataclass(frozen=True, eq=False)
 class SetDeviations:
-    """All deviations of a set with N planets; see the module for numbering and signs.
+    """All deviations of a set with N planets; the module tells numbering and signs.
 
     Parameters
     ----------
@@ -124,6 +119,14 @@ class SetDeviations:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
+    def mesh_forms(self, kind: int, back: bool) -> tuple[FlankForm, FlankForm]:
+        """Modifications of gear 1 and gear 2 in the sun-planet (0) or planet-ring (1) meshes.
+
+        On the back side a planet meets sun and ring with its other flanks.
+        """
+        planet = self.planet_sun_side if (kind == 0) != back else self.planet_ring_side
+        return (self.sun, planet) if kind == 0 else (planet, self.ring)
+
     @property
     def ideal(self) -> bool:
         """Whether nothing here separates a loaded flank."""
@@ -159,7 +162,7 @@ def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:
 
 
 def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarray:
-    """Displacement (z,) of every tooth along the base circle [m], counter-clockwise positive.
+    """Compute the displacement (z,) of every tooth along the base circle [m], counter-clockwise positive.
 
     Parameters
     ----------
@@ -182,32 +185,26 @@ def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarr
 def profile_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, kind: int, roll_1, roll_2, *, back: bool = False
 ):
-    """Separation of two flanks by their modifications.
+    """Compute the separation [m] of two flanks by their modifications.
 
     Parameters
     ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
+    deviations, planetary_set : SetDeviations, PlanetarySet
     kind : int
         0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
     roll_1, roll_2 : arrays that broadcast
         Roll lengths of the facing points on gear 1 and gear 2 [m].
     back : bool
         The other flanks of the teeth; those of a planet are its ring side in the mesh with the sun.
-
-    Returns
-    -------
-    array
-        [m]
     """
-    d, s = deviations, planetary_set
-    planet = d.planet_sun_side if (kind == 0) != back else d.planet_ring_side
-    one, two = ((d.sun, s.sun), (planet, s.planet)) if kind == 0 else ((planet, s.planet), (d.ring, s.ring))
-    return form_deviation(*one, roll_1) + form_deviation(*two, roll_2)
+    s = planetary_set
+    one, two = deviations.mesh_forms(kind, back)
+    gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
+    return form_deviation(one, gears[0], roll_1) + form_deviation(two, gears[1], roll_2)
 
 
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):
-    """Separation of the loaded flanks of two teeth by their pitch deviations.
+    """Compute the separation [m] of the loaded flanks of two teeth by their pitch deviations.
 
     Parameters
     ----------
@@ -218,11 +215,6 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
         Numbers of the teeth on gear 1 and gear 2, taken modulo the tooth numbers.
     back : bool
         The other flanks of the teeth: a tooth of sun or ring moves as a whole.
-
-    Returns
-    -------
-    array
-        [m]
     """
     d, N = deviations, len(deviations.planet_pitch)
     planets = d.planet_pitch if (mesh < N) != back else d.planet_ring_side_pitch
@@ -234,12 +226,11 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
 def body_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, position, *, back: bool = False
 ) -> np.ndarray:
-    """Separation of every mesh by displaced bodies: runouts, pin errors, ovality, planet thickness.
+    """Compute the separation of every mesh by runouts, pin errors, ovality and planet thickness.
 
     Parameters
     ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
+    deviations, planetary_set : SetDeviations, PlanetarySet
     position : (P,) array
         tau, as a fraction of mesh periods; may exceed 1.
     back : bool
@@ -299,7 +290,7 @@ def _oval(ovality: Ovality, psi: np.ndarray, ring_angle: np.ndarray) -> np.ndarr
 def common_period(
     deviations: SetDeviations, planetary_set: PlanetarySet, *, limit: int = LONGEST_RECORD
 ) -> tuple[int, str]:
-    """Number of mesh periods after which everything repeats.
+    """Find the number of mesh periods after which everything repeats.
 
     A member whose teeth or whose axis deviate repeats after the mesh periods of its own turn against the
     carrier, one a tooth, or after an integer part of it if the deviations repeat earlier; all together after
@@ -308,8 +299,7 @@ def common_period(
 
     Parameters
     ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
+    deviations, planetary_set : SetDeviations, PlanetarySet
     limit : int
         Most mesh periods wanted. Beyond it the record is one turn of the carrier against the ring, z_r mesh
         periods, or the limit when even that is too long; it then does not close.
@@ -339,6 +329,7 @@ def common_period(
 
 
 def _own_periods(d: SetDeviations, s: PlanetarySet):
+    """Name and number of mesh periods after which the deviations of every kind of body repeat."""
     yield "sun", math.lcm(_repeat(d.sun_pitch), s.sun.teeth if d.sun_runout.amplitude else 1)
     planets = [
         math.lcm(_repeat(one), _repeat(two), s.planet.teeth if runout.amplitude else 1)
@@ -362,7 +353,7 @@ def _repeat(values: np.ndarray) -> int:
 def mirrored_deviations(
     deviations: SetDeviations, planetary_set: PlanetarySet, mirrored: PlanetarySet, order
 ) -> SetDeviations:
-    """Deviations as the mirror image of the set has them, for a torque that loads the other flanks.
+    """Find the deviations that the mirror image of the set has, for a torque that loads the other flanks.
 
     The image is taken at the line through the first planet, with the sun where it was and the play of all
     meshes taken up the other way. The sun then drives the right flanks of the planets, here the ring side;
@@ -411,11 +402,12 @@ def _turned(values: np.ndarray, first: int) -> np.ndarray:
 
 
 def _reflected(runout: Runout, axis: float) -> Runout:
+    """Runout in the mirror image at half the angle `axis` [rad]."""
     return replace(runout, phase=axis - runout.phase)
 
 
 def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[GeometryWarning, ...]:
-    """Refuse deviations that do not belong to the set, and list what deserves a warning.
+    """Refuse modifications that together are not plausible, and list what deserves a warning.
 
     Returns
     -------
@@ -426,13 +418,9 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
     Raises
     ------
     GeometryError
-        E-MODIFICATION (arrays of another length than the teeth or planets, numbers that are not finite or
-        exceed 0.2 modules, modifications of a flank that do so together), E-MODIFICATION (see
-        `modifications.check_form`).
+        E-MODIFICATION: modifications of a flank that together exceed 0.2 modules.
     """
     d, s = deviations, planetary_set
-    _check_lengths(d, s)
-    _check_amounts(d, s.sun.module)
     found: list[GeometryWarning] = []
     for flank, form, gear in (
         ("sun", d.sun, s.sun),
@@ -445,7 +433,7 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
 
 
 def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[float, float]:
-    """Lower bounds of the play that the deviations leave, along the line of action [m].
+    """Find lower bounds of the play that the deviations leave, along the line of action [m].
 
     Positions are sampled over the common period; pitch deviations and profiles enter with their extremes, as
     if the worst teeth met.
@@ -482,12 +470,14 @@ def _worst(d: SetDeviations, s: PlanetarySet, *, back: bool) -> np.ndarray:
 
 
 def _thickest(d: SetDeviations, s: PlanetarySet, kind: int, *, back: bool) -> float:
+    """Smallest separation [m] of any points of the flanks of one kind of mesh."""
     gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
     rolls = [np.linspace(gear.form_roll, gear.tip_roll, 101) for gear in gears]
     return float(profile_separation(d, s, kind, rolls[0][:, None], rolls[1][None, :], back=back).min())
 
 
 def _wedging(d: SetDeviations, s: PlanetarySet):
+    """Warn where the deviations may use up the play (W-WEDGING)."""
     if d.ideal and not (d.planet_thickness.any() or d.sun_thickness or d.ring_thickness):
         return
     single, whole = least_play(d, s)
@@ -503,55 +493,3 @@ def _wedging(d: SetDeviations, s: PlanetarySet):
             least,
             "play of 0 um or more",
         )
-
-
-def _check_lengths(d: SetDeviations, s: PlanetarySet) -> None:
-    N = s.n_planets
-    wanted = {
-        "sun_pitch": (s.sun.teeth,),
-        "planet_pitch": (N, s.planet.teeth),
-        "planet_ring_side_pitch": (N, s.planet.teeth),
-        "ring_pitch": (s.ring.teeth,),
-        "pin_errors": (N, 2),
-        "planet_thickness": (N,),
-    }
-    for name, shape in wanted.items():
-        if getattr(d, name).shape != shape:
-            _refuse(f"{name} has the shape {getattr(d, name).shape}", name, str(shape))
-    if len(d.planet_runout) != N:
-        _refuse(f"{len(d.planet_runout)} runouts for {N} planets", "planet_runout", f"{N} runouts")
-    n = d.ovality.nodal_diameter
-    if n < 1 or n != int(n):
-        _refuse(f"an ovality with {n} nodal diameters", "ovality", "1, 2, 3, ...")
-
-
-def _check_amounts(d: SetDeviations, module: float) -> None:
-    most = LARGEST_DEVIATION * module
-    runouts = (d.sun_runout, d.ring_runout, d.carrier_runout, *d.planet_runout, d.ovality)
-    phases = [runout.phase for runout in runouts]
-    if not all(map(math.isfinite, phases)):
-        _refuse("a phase of a runout or an ovality is not finite", "phase", "finite")
-    amounts = {
-        "sun_pitch": d.sun_pitch,
-        "planet_pitch": d.planet_pitch,
-        "planet_ring_side_pitch": d.planet_ring_side_pitch,
-        "ring_pitch": d.ring_pitch,
-        "pin_errors": d.pin_errors,
-        "thickness": np.array([d.sun_thickness, d.ring_thickness, *d.planet_thickness]),
-        "runout": np.array([runout.amplitude for runout in runouts]),
-    }
-    for name, values in amounts.items():
-        largest = np.abs(values).max(initial=0.0)
-        if not largest <= most:
-            limit = f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.1f} um"
-            _refuse(f"{name} of {largest * 1e6:.6g} um is not plausible", name, limit)
-
-
-def _refuse(message: str, key: str, limit: str):
-    raise GeometryError(
-        message,
-        code="E-MODIFICATION",
-        key=key,
-        limit=limit,
-        remedy="lengths are in metres, angles in radians",
-    )

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Integral
 
 import numpy as np
 
-from femgear.errors import GeometryError
+from femgear.errors import Finding, GeometryError
 from femgear.gears.profile import (
     ISO_53_C,
     BasicRack,
@@ -32,27 +33,24 @@ PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
 
 
 @dataclass(frozen=True)
-class GeometryWarning:
-    """Something that works but deserves a look.
+class GeometryWarning(Finding):
+    """A finding on gears, with the number that drew it.
 
     Parameters
     ----------
-    code, key, message : str
-        Stable identifier, entry of the case file, and a sentence with the numbers.
+    code, key, text : str
+        As of `femgear.errors.Finding`.
     value : float
         The number that drew the warning.
     limit : str
         What would not be warned about.
     """
 
-    code: str
-    key: str
-    message: str
     value: float
     limit: str
 
     def __str__(self) -> str:
-        return f"[{self.code}] {self.key}: {self.message} (usual: {self.limit})"
+        return f"{super().__str__()} (usual: {self.limit})"
 
 
 @dataclass(frozen=True)
@@ -72,8 +70,7 @@ class Gear:
         [m]
     rim_radius : float
         Bore radius of an external, outer radius of an internal gear [m].
-    internal : bool
-    rack : BasicRack
+    internal, rack : bool, BasicRack
     cutter : PinionCutter, optional
         For internal gears; None takes the cutter of `cutter_of`.
     tip_diameter, root_diameter : float, optional
@@ -296,7 +293,6 @@ def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
 def _check_gear(gear: Gear) -> None:
     """Refuse a gear that cannot be made; see the errors of `Gear`."""
     _check_numbers(gear)
-    _check_rack(gear)
     _check_circles(gear)
     _check_tool(gear)
     _check_flank(gear)
@@ -304,40 +300,35 @@ def _check_gear(gear: Gear) -> None:
 
 def _check_numbers(gear: Gear) -> None:
     """Types and ranges of the plain entries."""
-    if not is_whole(gear.teeth):
-        _refuse(
-            gear,
-            "teeth",
-            f"the number of teeth is {gear.teeth!r}, not a whole number",
-            code="E-TEETH",
-            value=gear.teeth,
-            limit=f"whole number {TEETH_RANGE[0]} .. {TEETH_RANGE[1]}",
-            remedy="give a whole number of teeth",
-        )
-    object.__setattr__(gear, "teeth", operator.index(gear.teeth))
     unit_hint = "lengths are in m and angles in rad here: check the unit of the value"
+    shift_hint = "profile shifts are in modules, not in mm"
+    rack_hint = "ISO 53 profile C has addendum 1, dedendum 1.25 and root_radius 0.25"
+    circle_hint = "leave it out to take that of the basic rack"
     limits = (
         ("teeth", "E-TEETH", *TEETH_RANGE, "", "larger gears would take hours: use fewer teeth"),
         ("module", "E-GEOMETRY", *MODULE_RANGE, " m", unit_hint),
         ("pressure_angle", "E-GEOMETRY", *PRESSURE_ANGLE_RANGE, " rad", unit_hint),
-        ("profile_shift", "E-SHIFT", -5.0, 5.0, " modules", "profile shifts are in modules, not in mm"),
+        ("profile_shift", "E-SHIFT", -5.0, 5.0, " modules", shift_hint),
         ("face_width", "E-GEOMETRY", 1e-6, 10.0, " m", unit_hint),
         ("rim_radius", "E-RIM", 1e-6, 1000.0, " m", unit_hint),
         ("thickness_allowance", "E-ALLOWANCE", 0.0, gear.module, " m", "an allowance thins the tooth"),
+        ("rack.addendum", "E-CUTTER", 0.05, 3.0, " modules", rack_hint),
+        ("rack.dedendum", "E-CUTTER", 0.05, 3.0, " modules", rack_hint),
+        ("rack.root_radius", "E-CUTTER", 0.0, 3.0, " modules", rack_hint),
+        ("tip_diameter", "E-TIP", 1e-6, 2000.0, " m", circle_hint),
+        ("root_diameter", "E-TIP", 1e-6, 2000.0, " m", circle_hint),
     )
     for entry, code, low, high, unit, remedy in limits:
-        value = getattr(gear, entry)
-        if not _within(value, low, high):
-            name = {"rim_radius": "outer_radius" if gear.internal else "bore_radius"}.get(entry, entry)
-            _refuse(
-                gear,
-                name,
-                f"{name.replace('_', ' ')} {value}{unit} is outside {low:.6g} .. {high:.6g}{unit}",
-                code=code,
-                value=value,
-                limit=f"{low:.6g} .. {high:.6g}{unit}",
-                remedy=remedy,
-            )
+        value = operator.attrgetter(entry)(gear)
+        broken = entry == "teeth" and not is_whole(value)
+        if value is None or (_within(value, low, high) and not broken):
+            continue
+        name = {"rim_radius": "outer_radius" if gear.internal else "bore_radius"}.get(entry, entry)
+        limit = f"{low:.6g} .. {high:.6g}{unit}"
+        message = f"{re.sub('[._]', ' ', name)} {value!r}{unit} is "
+        message += f"no whole number in {limit}" if broken else f"outside {limit}"
+        _refuse(gear, name, message, code=code, value=value, limit=limit, remedy=remedy)
+    object.__setattr__(gear, "teeth", operator.index(gear.teeth))
 
 
 def is_whole(value) -> bool:
@@ -346,34 +337,8 @@ def is_whole(value) -> bool:
 
 
 def _within(value, low: float, high: float) -> bool:
-    return isinstance(value, float | int | np.floating) and bool(low <= value <= high)
-
-
-def _check_rack(gear: Gear) -> None:
-    for entry, low in (("addendum", 0.05), ("dedendum", 0.05), ("root_radius", 0.0)):
-        value = getattr(gear.rack, entry)
-        if not _within(value, low, 3.0):
-            _refuse(
-                gear,
-                f"rack.{entry}",
-                f"basic rack with {entry.replace('_', ' ')} {value} modules",
-                code="E-CUTTER",
-                value=value,
-                limit=f"{low:g} .. 3 modules",
-                remedy="ISO 53 profile C has addendum 1, dedendum 1.25 and root_radius 0.25",
-            )
-    for entry in ("tip_diameter", "root_diameter"):
-        value = getattr(gear, entry)
-        if value is not None and not _within(value, 1e-6, 2000.0):
-            _refuse(
-                gear,
-                entry,
-                f"{entry.replace('_', ' ')} {value} m",
-                code="E-TIP",
-                value=value,
-                limit="a positive length",
-                remedy="leave it out to take that of the basic rack",
-            )
+    """Whether a value is a number between two limits."""
+    return isinstance(value, float | int | np.integer | np.floating) and bool(low <= value <= high)
 
 
 def _check_circles(gear: Gear) -> None:
@@ -386,7 +351,6 @@ def _check_circles(gear: Gear) -> None:
             "tip_diameter",
             f"tip radius {tip * 1e3:.4f} mm and root radius {root * 1e3:.4f} mm leave no tooth",
             code="E-TIP",
-            value=2.0 * tip,
             limit=f"tip diameter {'<' if gear.internal else '>'} {2e3 * root:.4f} mm",
             remedy="correct the tip or root diameter",
         )
@@ -397,7 +361,6 @@ def _check_circles(gear: Gear) -> None:
             f"the rim is {sign * (root - rim) * 1e3:.4f} mm thick: root radius {root * 1e3:.4f} mm, "
             f"{'outer' if gear.internal else 'bore'} radius {rim * 1e3:.4f} mm",
             code="E-RIM",
-            value=rim,
             limit=f"{'>' if gear.internal else '<'} {root * 1e3:.4f} mm",
             remedy="enlarge the outer radius" if gear.internal else "reduce the bore radius",
         )
@@ -408,7 +371,6 @@ def _check_circles(gear: Gear) -> None:
             f"the tip circle (radius {tip * 1e3:.4f} mm) lies inside the base circle "
             f"({gear.base_radius * 1e3:.4f} mm), where there is no involute",
             code="E-TIP",
-            value=2.0 * tip,
             limit=f"tip diameter > {2e3 * gear.base_radius:.4f} mm",
             remedy="give a larger tip_diameter, more teeth or a larger profile shift",
         )
@@ -441,7 +403,6 @@ def _check_cutter(gear: Gear) -> None:
             "cutter_teeth",
             f"a cutter of {cutter.teeth!r} teeth cannot generate an internal gear of {gear.teeth} teeth",
             code="E-CUTTER",
-            value=cutter.teeth,
             limit=f"whole number 5 .. {gear.teeth - 5}",
             remedy="choose a smaller cutter; 30 teeth, or 12 fewer than the gear, is the default",
         )
@@ -454,7 +415,6 @@ def _check_cutter(gear: Gear) -> None:
             f"a cutter of {cutter.teeth} teeth with shift {cutter.profile_shift:.4f} finds no working "
             f"pressure angle for a flank shifted by {gear.profile_shift:.4f}",
             code="E-CUTTER",
-            value=gear.profile_shift,
             limit="inv(alpha_w0) >= 0 between cutter and gear",
             remedy="increase the profile shift, or take a cutter with fewer teeth or a smaller shift",
         )
@@ -465,7 +425,6 @@ def _check_cutter(gear: Gear) -> None:
             f"the rounding of the cutter's tip is centred at {tool.centre_radius * 1e3:.4f} mm, inside the "
             f"cutter's base circle of {tool.cutter_base_radius * 1e3:.4f} mm",
             code="E-CUTTER",
-            value=cutter.teeth,
             limit="tip radius - rounding > base radius of the cutter",
             remedy="choose a cutter with more teeth, or a smaller root_radius",
         )
@@ -478,7 +437,6 @@ def _check_cutter(gear: Gear) -> None:
             f"a cutter of {cutter.teeth} teeth has no involute for the flank below {least * 1e3:.4f} mm; the "
             f"tip circle is at {gear.tip_radius * 1e3:.4f} mm",
             code="E-CUTTER",
-            value=cutter.teeth,
             limit=f"tip radius >= {least * 1e3:.4f} mm",
             remedy="choose a cutter with more teeth or enlarge the tip diameter",
         )
@@ -505,7 +463,6 @@ def _check_flank(gear: Gear) -> None:
             f"the tooth is pointed below its tip circle: thickness {2e3 * half * gear.tip_radius:.4f} mm at "
             f"the tip radius {gear.tip_radius * 1e3:.4f} mm",
             code="E-POINTED",
-            value=gear.profile_shift,
             limit="tip thickness > 0",
             remedy="change the profile shift or give a tip_diameter that cuts the point off",
         )
@@ -517,13 +474,18 @@ def _check_flank(gear: Gear) -> None:
             f"no involute is left between the fillet (radius {gear.form_radius * 1e3:.4f} mm) and the tip "
             f"(radius {gear.tip_radius * 1e3:.4f} mm)",
             code="E-TIP",
-            value=2.0 * gear.tip_radius,
             limit=f"tip radius {'<' if gear.internal else '>'} {gear.form_radius * 1e3:.4f} mm",
             remedy="correct the tip or root diameter, the dedendum or the profile shift",
         )
 
 
-def _refuse(gear: Gear, entry: str, message: str, *, code: str, value, limit: str | None, remedy: str):
+def _refuse(gear: Gear, entry: str, message: str, *, code: str, value=None, limit: str | None, remedy: str):
+    """Refuse a gear for an entry of the case, whose value is by default that of the gear."""
+    if value is None and entry == "cutter_teeth":
+        value = cutter_of(gear).teeth
+    elif value is None:
+        values = {"tip_diameter": 2.0 * gear.tip_radius, "profile_shift": gear.profile_shift}
+        value = values.get(entry, gear.rim_radius)
     key = entry if entry.startswith("rack.") else f"{gear.name}.{entry}"
     raise GeometryError(
         f"{gear.name}: {message}", code=code, key=key, value=value, limit=limit, remedy=remedy

@@ -9,18 +9,14 @@ drives and no flank stops. A member that floats alone must not slide past all fl
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import nnls
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import working_half_angles
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 MEMBERS = ("sun", "carrier", "ring")
 TOLERANCE = 1e-9
@@ -68,8 +64,7 @@ def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations
     """
     s = planetary
     psi, phase = s.planet_angles, s.mesh_phases.tolist()
-    eta_s, eta_p = working_half_angles(s.sun, s.planet, s.working_pressure_angle_sun_planet)
-    _, eta_r = working_half_angles(s.planet, s.ring, s.working_pressure_angle_planet_ring)
+    (eta_s, eta_p), (_, eta_r) = s.half_angles
     pitch_p = s.planet.pitch_angle
     planets = tuple(psi[n] + math.pi - eta_p - (position + phase[n]) * pitch_p for n in range(s.n_planets))
     return Orientations(
@@ -82,6 +77,9 @@ def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations
 def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> Speeds:
     """Speeds of every body from one driven and one held member (Willis).
 
+    ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)``; the mesh frequency is
+    ``|w_s - w_c| z_s / (2 pi)``.
+
     Parameters
     ----------
     planetary : PlanetarySet
@@ -90,25 +88,19 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
     speed : float
         Absolute speed of the driven member [rad/s].
 
-    Returns
-    -------
-    Speeds
-        ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)``; the mesh frequency is
-        ``|w_s - w_c| z_s / (2 pi)``.
-
     Raises
     ------
     GeometryError
-        Not one input and one fixed member (E-MECHANISM), or a speed that is not finite.
+        E-MECHANISM: one member is both driven and held.
     """
-    for member in (input, fixed):
-        if member not in MEMBERS:
-            _refuse_mechanism(f"{member!r} is no member that can be driven or held", member)
     if input == fixed:
-        _refuse_mechanism(f"the {input} is both driven and held, which leaves two members free", input)
-    if not math.isfinite(speed):
         raise GeometryError(
-            f"a speed of {speed} rad/s", code="E-RANGE", key="operation.speeds", value=speed, limit="finite"
+            f"the {input} is both driven and held, which leaves two members free",
+            code="E-MECHANISM",
+            key="operation.fixed",
+            value=input,
+            limit="one driven, one held and one output member out of sun, carrier and ring",
+            remedy='for example input = "sun", fixed = "ring"',
         )
     zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
     known = {input: speed, fixed: 0.0}
@@ -127,36 +119,14 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
 
 
 def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
-    """External torques [N m] on sun, ring and carrier from that on one of them, without losses.
+    """External torques [N m] on sun, ring and carrier from that on one `member` of them, without losses.
 
     ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``.
-
-    Raises
-    ------
-    GeometryError
-        Unknown member (E-MECHANISM) or a torque that is not finite (E-RANGE).
     """
-    if member not in MEMBERS:
-        _refuse_mechanism(f"the torque acts on {member!r}", member)
-    if not math.isfinite(torque):
-        raise GeometryError(
-            f"a torque of {torque} N m", code="E-RANGE", key="operation.torque", value=torque, limit="finite"
-        )
     ratio = planetary.ring.teeth / planetary.sun.teeth
     share = {"sun": 1.0, "ring": ratio, "carrier": -(1.0 + ratio)}
     sun = torque / share[member]
     return Torques(sun=sun, ring=sun * share["ring"], carrier=sun * share["carrier"])
-
-
-def _refuse_mechanism(message: str, value: str):
-    raise GeometryError(
-        message,
-        code="E-MECHANISM",
-        key="operation.fixed",
-        value=value,
-        limit="one driven, one held and one output member out of sun, carrier and ring",
-        remedy='for example input = "sun", fixed = "ring"',
-    )
 
 
 def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarray:
@@ -176,10 +146,30 @@ def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarr
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
+def rotation_approach(n_planets: int) -> np.ndarray:
+    """Approach of the drive flanks per unit base-circle arc of each planet and of the sun, (2N, N + 1)."""
+    N = n_planets
+    return np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
+
+
+def member_approach(planetary_set: PlanetarySet, *, back: bool = False) -> dict[str, np.ndarray]:
+    """Approach (2N, 2) of the flanks of every mesh per unit motion of sun, carrier and ring along x and y.
+
+    `back` is for the back flanks, as in `mesh_normals`.
+    """
+    on_planet, on_ring = np.split(mesh_normals(planetary_set, back=back), 2)
+    zero = np.zeros(on_planet.shape)
+    return {
+        "sun": np.vstack([on_planet, zero]),
+        "carrier": np.vstack([-on_planet, on_ring]),
+        "ring": np.vstack([zero, -on_ring]),
+    }
+
+
 def unheld_members(
     planetary_set: PlanetarySet, floating: Sequence[str], *, both_flanks: bool = False
 ) -> tuple[str, ...]:
-    """Members that float without being held by the planets.
+    """Find the members that float without being held by the planets.
 
     Parameters
     ----------
@@ -195,8 +185,6 @@ def unheld_members(
         The first member that the planets cannot hold though the others stand still; all of `floating` when
         they can hold each but not all at once; empty when everything is held.
     """
-    if not floating:
-        return ()
     for name in floating:
         if not _held(planetary_set, (name,), both_flanks):
             return (name,)
@@ -208,26 +196,15 @@ def unheld_members(
 
 def _held(s: PlanetarySet, floating: tuple[str, ...], both_flanks: bool) -> bool:
     """Whether forces of the flanks keep the members in equilibrium, and a single one from sliding."""
-    from scipy.optimize import nnls
-
-    approach = np.vstack([_approach(s, floating, back) for back in (False, True)[: 1 + both_flanks]])
+    turns = rotation_approach(s.n_planets)
+    approach = []
+    for back in (False, True)[: 1 + both_flanks]:
+        motions = member_approach(s, back=back)
+        approach.append(np.hstack([-turns if back else turns, *(motions[name] for name in floating)]))
+    approach = np.vstack(approach)
     slides = np.linalg.matrix_rank(approach, tol=TOLERANCE) < approach.shape[1]
     if len(floating) == 1 and slides:
         return False
     load = np.zeros(approach.shape[1])
     load[s.n_planets] = 1.0  # the torque of the sun, which everything else must pass on
     return bool(nnls(approach.T, load)[1] < TOLERANCE)
-
-
-def _approach(s: PlanetarySet, floating: tuple[str, ...], back: bool) -> np.ndarray:
-    """Approach (2N, N + 1 + 2m) of the flanks per rotation of planets and sun and motion of the members."""
-    N, side = s.n_planets, -1.0 if back else 1.0
-    normals, zero = mesh_normals(s, back=back), np.zeros((N, 2))
-    on_planet, on_ring = normals[:N], normals[N:]
-    turns = np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
-    motions = {
-        "sun": np.vstack([on_planet, zero]),
-        "carrier": np.vstack([-on_planet, on_ring]),
-        "ring": np.vstack([zero, -on_ring]),
-    }
-    return np.hstack([side * turns, *(motions[name] for name in floating)])

@@ -19,16 +19,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import TEETH_RANGE, is_whole
-from femgear.gears.planetary import assembly_positions, check_angles
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angles
 
 CONVENTIONS = ("rotation", "printed")
 KINDS = ("in-phase", "counter-phased", "sequentially phased", "unequally phased")
@@ -78,6 +74,7 @@ class MeshPhasing:
 
     @property
     def n_planets(self) -> int:
+        """N"""
         return len(self.positions)
 
     @property
@@ -131,7 +128,7 @@ def mesh_phasing(
     convention: str = "rotation",
     lag: float = 0.0,
 ) -> MeshPhasing:
-    """Phases of planets at given angles.
+    """Find the phases of planets at given angles.
 
     Parameters
     ----------
@@ -147,7 +144,8 @@ def mesh_phasing(
         Angles at which the planets do not assemble (E-ASSEMBLY, with the nearest that do), no angles
         (E-RANGE), or other numbers that describe no set (E-RANGE).
     """
-    angles = _angles(planet_angles)
+    angles = tuple(float(angle) for angle in planet_angles)
+    check_angles(angles)
     MeshPhasing(sun_teeth, ring_teeth, (0,), rotation, flank, convention, lag)
     positions = assembly_positions(sun_teeth, ring_teeth, angles)
     return MeshPhasing(sun_teeth, ring_teeth, positions, rotation, flank, convention, lag)
@@ -156,7 +154,7 @@ def mesh_phasing(
 def phasing_of_set(
     planetary_set: PlanetarySet, *, rotation: int = 1, flank: int = 1, convention: str = "rotation"
 ) -> MeshPhasing:
-    """Phases of a geared set, the lag of its planets from the real thickness of their teeth.
+    """Find the phases of a geared set, the lag of its planets from the real thickness of their teeth.
 
     Parameters
     ----------
@@ -164,13 +162,10 @@ def phasing_of_set(
     rotation, flank, convention
         See `MeshPhasing`.
     """
-    s = planetary_set
-    phases = s.mesh_phases
+    s, phases = planetary_set, planetary_set.mesh_phases
+    options = {"rotation": rotation, "flank": flank, "convention": convention}
     lag = float(np.mod(phases[0] - phases[s.n_planets], 1.0))
-    return mesh_phasing(
-        s.sun.teeth, s.ring.teeth, s.planet_angles,
-        rotation=rotation, flank=flank, convention=convention, lag=lag,
-    )  # fmt: skip
+    return mesh_phasing(s.sun.teeth, s.ring.teeth, s.planet_angles, lag=lag, **options)
 
 
 def standard_lag(planet_teeth: int) -> float:
@@ -185,10 +180,8 @@ def standard_lag(planet_teeth: int) -> float:
         No whole number of teeth that a gear can have (E-RANGE).
     """
     if not is_whole(planet_teeth) or not TEETH_RANGE[0] <= planet_teeth <= TEETH_RANGE[1]:
-        raise GeometryError(
-            f"the lag of a planet with {planet_teeth!r} teeth", code="E-RANGE", value=planet_teeth,
-            limit=f"a whole number, {TEETH_RANGE[0]} to {TEETH_RANGE[1]}",
-        )  # fmt: skip
+        limit = f"a whole number, {TEETH_RANGE[0]} to {TEETH_RANGE[1]}"
+        raise GeometryError(f"the lag of a planet with {planet_teeth!r} teeth", code="E-RANGE", limit=limit)
     return 0.5 * ((planet_teeth - 1) % 2)
 
 
@@ -198,7 +191,7 @@ def phase_factors(phasing: MeshPhasing, harmonics) -> np.ndarray:
 
 
 def planet_sums(turns, positions, teeth_sum, harmonics, orders) -> np.ndarray:
-    """Means over the planets of ``exp(2 pi i h gamma_n) exp(i q psi_n)``, for one set or many.
+    """Compute means over the planets of ``exp(2 pi i h gamma_n) exp(i q psi_n)``, for one set or many.
 
     Order q = 0 adds up torques and thrusts, q = +-1 lateral forces and tilting moments (the two senses of
     their whirl), any q the motion ``exp(i q psi_n)`` of the planets. With equal spacing the mean is 1 where
@@ -206,12 +199,10 @@ def planet_sums(turns, positions, teeth_sum, harmonics, orders) -> np.ndarray:
 
     Parameters
     ----------
-    turns : (...) int array
-        Periods by which the phase grows over one turn, see `MeshPhasing.turns`.
+    turns, teeth_sum : (...) int arrays
+        Periods by which the phase grows over one turn, and Z; see `MeshPhasing`.
     positions : (..., N) int array
-    teeth_sum : (...) int array
-    harmonics : (H,) int array
-    orders : (Q,) int array
+    harmonics, orders : (H,), (Q,) int arrays
 
     Returns
     -------
@@ -344,13 +335,10 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
 
 def check_harmonics(harmonics) -> np.ndarray:
     """Harmonics as whole numbers from 1, (H,); refuses others (E-HARMONICS)."""
-    harmonics = list(harmonics) if isinstance(harmonics, range) else harmonics
     found = np.atleast_1d(np.asarray(harmonics))
     if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
-        raise GeometryError(
-            f"harmonics {harmonics!r} of the mesh frequency", code="E-HARMONICS",
-            limit="whole numbers from 1", remedy="for instance range(1, 7)",
-        )  # fmt: skip
+        message = f"harmonics {harmonics!r} of the mesh frequency"
+        raise GeometryError(message, code="E-HARMONICS", limit="whole numbers from 1")
     return found.astype(np.int64)
 
 
@@ -361,12 +349,8 @@ def _planet_resultants(phasing: MeshPhasing, harmonics: np.ndarray) -> np.ndarra
     a planet of one hand feels opposite thrusts from sun and ring, which tilt it.
     """
     between = (phasing.phases[phasing.n_planets :] - phasing.phases[: phasing.n_planets]) * np.pi
-    sums, differences = (
-        np.abs(np.cos(np.outer(harmonics, between))),
-        np.abs(np.sin(np.outer(harmonics, between))),
-    )
-    order = (differences, sums, differences, differences, sums)
-    table = np.stack(order, axis=-1)
+    sums, differences = (np.abs(f(np.outer(harmonics, between))) for f in (np.cos, np.sin))
+    table = np.stack([differences, sums, differences, differences, sums], axis=-1)
     return np.where(table < ZERO, 0.0, table)
 
 
@@ -385,19 +369,8 @@ def _mode_shares(factors: np.ndarray, psi: np.ndarray, size: np.ndarray) -> np.n
     return np.where(shares < ZERO, 0.0, shares)
 
 
-def _angles(planet_angles) -> tuple[float, ...]:
-    try:
-        angles = tuple(float(a) for a in planet_angles)
-    except (TypeError, ValueError):
-        raise GeometryError(
-            f"planet angles {planet_angles!r}", code="E-RANGE", key="set.planet_angles",
-            limit="a sequence of numbers [rad], one a planet", remedy="for instance equal_planet_angles(3)",
-        ) from None  # fmt: skip
-    check_angles(angles)
-    return angles
-
-
 def _check_phasing(phasing: MeshPhasing) -> None:
+    """Refuse numbers that describe no set (E-RANGE)."""
     p, problem = phasing, None
     whole = (*p.positions, p.sun_teeth, p.ring_teeth, p.rotation, p.flank)
     if not all(is_whole(value) for value in whole):
@@ -414,7 +387,7 @@ def _check_phasing(phasing: MeshPhasing) -> None:
         problem = f"rotation {p.rotation} and flank {p.flank}, allowed 1 or -1"
     elif p.convention not in CONVENTIONS:
         problem = f"the convention {p.convention!r}, allowed {' or '.join(CONVENTIONS)}"
-    elif not isinstance(p.lag, int | float | np.number) or not math.isfinite(p.lag):
+    elif not math.isfinite(p.lag):
         problem = f"a lag of {p.lag!r} periods, allowed: a finite number"
     if problem:
         raise GeometryError(f"mesh phases of {problem}", code="E-RANGE", remedy="see MeshPhasing")

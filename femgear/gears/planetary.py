@@ -32,6 +32,7 @@ class PlanetarySet:
     Parameters
     ----------
     sun, planet, ring : Gear
+        Of one module and pressure angle; the ring is internal.
     centre_distance : float
         Sun (and ring) to planet [m].
     planet_angles : tuple of float
@@ -40,8 +41,8 @@ class PlanetarySet:
     Raises
     ------
     GeometryError
-        Numbers that describe no set (E-RANGE, E-GEOMETRY, E-CENTRE-DISTANCE); whether it
-        can be assembled and run is told by `checks.check_set`.
+        Numbers that describe no set (E-RANGE, E-CENTRE-DISTANCE); whether it can be assembled and run is
+        told by `checks.check_set`.
     """
 
     sun: Gear
@@ -56,13 +57,13 @@ class PlanetarySet:
             gear = getattr(self, name)
             if gear.name != name:
                 object.__setattr__(self, name, replace(gear, name=name))
-        _check_roles(self)
         check_angles(self.planet_angles)
         # both raise when the base circles would overlap
         _ = self.working_pressure_angle_sun_planet, self.working_pressure_angle_planet_ring
 
     @property
     def n_planets(self) -> int:
+        """N"""
         return len(self.planet_angles)
 
     @property
@@ -119,6 +120,14 @@ class PlanetarySet:
         planet, ring = self.planet.base_radius * tangent, self.ring.base_radius * tangent
         start = max(self.ring.tip_roll - ring, _undercut_roll(self.planet) - planet)
         return start, self.planet.tip_roll - planet
+
+    @property
+    def half_angles(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Half-thickness angles [rad] on the working pitch circles: of sun and planet, of planet and ring."""
+        return (
+            working_half_angles(self.sun, self.planet, self.working_pressure_angle_sun_planet),
+            working_half_angles(self.planet, self.ring, self.working_pressure_angle_planet_ring),
+        )
 
     @property
     def backlash_sun_planet(self) -> float:
@@ -181,7 +190,7 @@ def close_set(
     centre_distance: float | None = None,
     find: tuple[str, ...] = (),
 ) -> PlanetarySet:
-    """Planetary set whose two meshes run at one centre distance.
+    """Make the planetary set whose two meshes run at one centre distance.
 
     Parameters
     ----------
@@ -212,8 +221,9 @@ def close_set(
         x_planet = x_ring - difference if "sun" in find else total - x_sun
     x_sun = total - x_planet if "sun" in find else x_sun
     x_ring = difference + x_planet if "ring" in find else x_ring
-    gears = _shifted(sun, x_sun), _shifted(planet, x_planet), _shifted(ring, x_ring)
-    return PlanetarySet(*gears, centre_distance, planet_angles)
+    shifts = ((sun, x_sun), (planet, x_planet), (ring, x_ring))
+    gears = [gear if x == gear.profile_shift else replace(gear, profile_shift=x) for gear, x in shifts]
+    return PlanetarySet(gears[0], gears[1], gears[2], centre_distance, planet_angles)
 
 
 def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:
@@ -223,7 +233,7 @@ def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, in
 
 
 def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
-    """Spur gears of the normal section: one planet, whole tooth numbers next to ``z / cos^3(beta)``.
+    """Make spur gears of the normal section: one planet, whole tooth numbers next to ``z / cos^3(beta)``.
 
     The normal section cuts the reference cylinder in an ellipse with the radius of curvature
     ``r / cos^2(beta)`` at the tooth (G. Niemann and H. Winter, Maschinenelemente, vol. 2, section 21.3).
@@ -253,6 +263,7 @@ def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
 
 
 def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
+    """Virtual gear of some teeth in the normal section, see `virtual_set`."""
     factor = math.cos(helix_angle)
     rack, module = gear.rack, gear.module * factor
     radius = 0.5 * module * teeth
@@ -270,11 +281,7 @@ def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
         # replaced below, once the root circle is known
         rim_radius=2.0 * radius if gear.internal else 0.2 * radius,
         internal=gear.internal,
-        rack=BasicRack(
-            addendum=rack.addendum / factor,
-            dedendum=rack.dedendum / factor,
-            root_radius=rack.root_radius / factor,
-        ),
+        rack=BasicRack(rack.addendum / factor, rack.dedendum / factor, rack.root_radius / factor),
         tip_diameter=moved(gear.tip_diameter),
         root_diameter=moved(gear.root_diameter),
         thickness_allowance=gear.thickness_allowance * factor,
@@ -428,31 +435,6 @@ def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...
     return tuple(round(t) for t in turns)
 
 
-def _check_roles(planetary: PlanetarySet) -> None:
-    """Refuse gears that cannot be sun, planet and ring of one set (E-GEOMETRY)."""
-    sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
-    for gear, internal in ((sun, False), (planet, False), (ring, True)):
-        if gear.internal is not internal:
-            raise GeometryError(
-                f"the {gear.name} is {'an external' if internal else 'an internal'} gear",
-                code="E-GEOMETRY",
-                key=f"{gear.name}.internal",
-                value=gear.internal,
-                limit="sun and planet external, ring internal",
-            )
-        for entry in ("module", "pressure_angle"):
-            mine, suns = getattr(gear, entry), getattr(sun, entry)
-            if abs(mine - suns) > 1e-12 * suns:
-                raise GeometryError(
-                    f"{entry.replace('_', ' ')} of the {gear.name} is {mine:.6g}, of the sun {suns:.6g}",
-                    code="E-GEOMETRY",
-                    key=f"{gear.name}.{entry}",
-                    value=mine,
-                    limit=f"{suns:.6g}",
-                    remedy="gears that mesh share module and pressure angle",
-                )
-
-
 def _undercut_roll(gear: Gear) -> float:
     """Roll length [m] where an undercut flank ends, minus infinity without undercut."""
     return gear.form_roll if gear.undercut else -math.inf
@@ -477,20 +459,12 @@ def _planet_lag(planetary: PlanetarySet) -> float:
     The planet tooth that touches the sun is centred at psi + pi - eta_ps, the one that touches the ring at
     psi + eta_pr; the planet turns by one pitch a period.
     """
-    _, eta_ps = working_half_angles(
-        planetary.sun, planetary.planet, planetary.working_pressure_angle_sun_planet
-    )
-    eta_pr, _ = working_half_angles(
-        planetary.planet, planetary.ring, planetary.working_pressure_angle_planet_ring
-    )
+    (_, eta_ps), (eta_pr, _) = planetary.half_angles
     return (math.pi - eta_ps - eta_pr) / planetary.planet.pitch_angle
 
 
-def _shifted(gear: Gear, shift: float) -> Gear:
-    return gear if shift == gear.profile_shift else replace(gear, profile_shift=shift)
-
-
 def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -> float:
+    """Centre distance [m] at which the given shifts run without play, see `close_set`."""
     first, second = zero_backlash_distance(sun, planet), zero_backlash_distance(planet, ring)
     if find:
         return second if find == ("sun",) else first
@@ -502,7 +476,6 @@ def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -
             f"{sun.teeth + 2 * planet.teeth}, ring {ring.teeth})",
             code="E-COAXIAL",
             key="set.centre_distance",
-            value=None,
             limit="one centre distance for both meshes",
             remedy="give centre_distance and let the profile shifts of sun or ring be found",
         )
@@ -510,11 +483,10 @@ def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -
 
 
 def _check_find(find: tuple[str, ...], centre_distance: float | None) -> None:
-    allowed = {frozenset(), frozenset(("sun",)), frozenset(("ring",))}
-    if centre_distance is not None:
-        allowed |= {frozenset(p) for p in (("sun", "ring"), ("sun", "planet"), ("planet", "ring"))}
+    """Refuse shifts that the conditions of two meshes do not determine (E-SHIFT)."""
     free = centre_distance is None
-    if frozenset(find) not in allowed or len(set(find)) != len(find):
+    some = set(find) <= ({"sun", "ring"} if free else {"sun", "planet", "ring"}) and find != ("planet",)
+    if not some or len(set(find)) != len(find) or len(find) > (1 if free else 2):
         raise GeometryError(
             f"the profile shifts of {', '.join(find)} cannot be found {'without' if free else 'from'} a "
             "centre distance: two meshes give two conditions",

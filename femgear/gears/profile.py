@@ -37,16 +37,9 @@ _TANGENT_SERIES = (
 
 
 def inv(angle) -> Any:
-    """Involute function ``tan(angle) - angle`` (ISO 21771, eq. 9).
+    """Involute function ``tan(angle) - angle`` [rad] (ISO 21771, eq. 9).
 
-    Parameters
-    ----------
-    angle : float or array
-        Pressure angle [rad], ``|angle| < pi/2``.
-
-    Returns
-    -------
-    float or array [rad]
+    The pressure angle [rad], float or array, lies between ``-pi/2`` and ``pi/2``.
     """
     a = np.asarray(angle, dtype=float)
     # the difference loses digits below 0.15 rad, where these terms of the series are exact to rounding
@@ -59,28 +52,23 @@ def _plain(value: np.ndarray) -> Any:
 
 
 def arcinv(value) -> Any:
-    """Angle whose involute is ``value``; inverse of `inv` to double precision.
+    """Pressure angle [rad] in [0, pi/2) whose involute is `value`, inverse of `inv` to double precision.
 
     Parameters
     ----------
     value : float or array
         ``inv(angle)`` [rad], >= 0.
 
-    Returns
-    -------
-    float or array [rad], in [0, pi/2)
-
     Raises
     ------
     GeometryError
-        Negative or not finite value: no such flank point.
+        Negative or not finite value: no such flank point (E-GEOMETRY).
     """
     v = np.asarray(value, dtype=float)
     if not np.all(np.isfinite(v)) or np.any(v < 0.0):
         raise GeometryError(
             f"no pressure angle has the involute {float(np.min(v)):.6g} rad",
             code="E-GEOMETRY",
-            value=float(np.min(v)),
             limit="inv(angle) >= 0",
             remedy="increase the sum of the profile shifts or the centre distance",
         )
@@ -143,13 +131,7 @@ def overlap_ratio(face_width: float, normal_module: float, helix_angle: float) -
 
 @dataclass(frozen=True)
 class BasicRack:
-    """Basic rack in modules; the defaults are profile C of ISO 53 (1.25 deep, rounding 0.25).
-
-    Parameters
-    ----------
-    addendum, dedendum, root_radius : float
-        Tooth addendum, tooth dedendum and fillet radius of the basic rack, divided by the module.
-    """
+    """Basic rack: addendum, dedendum and fillet radius in modules; the defaults are profile C of ISO 53."""
 
     addendum: float = 1.0
     dedendum: float = 1.25
@@ -184,11 +166,7 @@ def transverse_rack(rack: BasicRack, helix_angle: float) -> BasicRack:
     the transverse section; the circle in its place keeps the radius of the normal section.
     """
     factor = math.cos(helix_angle)
-    return BasicRack(
-        addendum=rack.addendum * factor,
-        dedendum=rack.dedendum * factor,
-        root_radius=rack.root_radius * factor,
-    )
+    return BasicRack(rack.addendum * factor, rack.dedendum * factor, rack.root_radius * factor)
 
 
 @dataclass(frozen=True)
@@ -276,17 +254,10 @@ class CutterTip:
         return self.centre_angle if self.centre_radius > self.cutter_base_radius else -1.0
 
     def fillet_point(self, theta) -> tuple[np.ndarray, np.ndarray]:
-        """Radius [m] and angle [rad] in the gear frame of fillet points.
+        """Radius [m] and angle [rad] in the gear frame of fillet points, from the law of gearing.
 
-        Parameters
-        ----------
-        theta : float or array
-            Direction of the normal [rad], 0 at the root circle .. `end_angle` at the flank.
-
-        Returns
-        -------
-        radius, angle : arrays of the shape of `theta`
-            From the law of gearing (Litvin, Gear Geometry and Applied Theory, ch. 6).
+        The direction `theta` [rad] of the normal, float or array, is 0 at the root circle and `end_angle` at
+        the flank (Litvin, Gear Geometry and Applied Theory, ch. 6).
         """
         theta = np.asarray(theta, dtype=float)
         r = self.cutter_pitch_radius

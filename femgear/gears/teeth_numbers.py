@@ -26,20 +26,16 @@ class ToothChoices:
     ----------
     teeth : (C, 3) int array
         Sun, planet, ring.
-    ratio : (C,) array
-        ``1 + z_r / z_s``: sun over carrier with the ring held.
-    ratio_change : (C,) array
-        Relative to that of the wanted teeth.
+    ratio, ratio_change : (C,) arrays
+        ``1 + z_r / z_s``, sun over carrier with the ring held; relative change against the wanted teeth.
     closure : (C,) int array
         ``z_r - z_s - 2 z_p``; what is not zero is left to profile shifts.
     positions : (C, N) int array
         Assembly positions nearest to equal spacing, multiples of ``2 pi / (z_s + z_r)``.
     equally_spaced : (C,) bool array
         Whether ``(z_s + z_r) / N`` is whole.
-    kind : (C, H) int array
-        Indices of `phasing.KINDS` for the harmonics 1 to H.
-    cyclic : (C, H) int array
-        mod(h z_s, N); -1 for unequal spacing.
+    kind, cyclic : (C, H) int arrays
+        Indices of `phasing.KINDS` for the harmonics 1 to H, and mod(h z_s, N), -1 for unequal spacing.
     sums : (C, H, 2) array
         Shares of the mesh forces that add up to torque (and thrust), and to lateral force (and tilting
         moment), 0 to 1.
@@ -93,7 +89,7 @@ def neighbouring_teeth(
     harmonics: int = 4,
     fitting: bool = True,
 ) -> ToothChoices:
-    """All tooth numbers within a distance of the wanted ones, the wanted ones among them.
+    """Find all tooth numbers within a distance of the wanted ones, the wanted ones among them.
 
     Conditions of assembly, coaxial gears and neighbouring planets: H. W. Mueller, Epicyclic Drive Trains
     (Wayne State University Press, 1982). Unshifted teeth are taken for the room between planets, at the
@@ -158,11 +154,9 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     sun, ring, found = phasing.sun_teeth, phasing.ring_teeth, []
     teeth, misfit = f"{sun}/{planet_teeth}/{ring}", ring - sun - 2 * planet_teeth
     if abs(misfit) > _CLOSURE * (sun + planet_teeth):
-        raise GeometryError(
-            f"{teeth}: z_r - z_s - 2 z_p = {misfit}, more than profile shifts can take up", code="E-CHOICE",
-            key="planet teeth", value=planet_teeth,
-            limit=f"{_CLOSURE:.0%} of z_s + z_p", remedy=f"{(ring - sun) // 2} teeth close this set",
-        )  # fmt: skip
+        message = f"{teeth}: z_r - z_s - 2 z_p = {misfit}, more than profile shifts can take up"
+        limit, remedy = f"{_CLOSURE:.0%} of z_s + z_p", f"{(ring - sun) // 2} teeth close this set"
+        raise GeometryError(message, code="E-CHOICE", key="planet teeth", limit=limit, remedy=remedy)
     if abs(misfit) > 1:
         found.append(
             f"z_r - z_s - 2 z_p = {misfit}: profile shifts of about {abs(misfit) / 2:g} times the module"
@@ -170,17 +164,16 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     places = np.array([phasing.positions])
     room = float(_room(np.array([[sun, planet_teeth, ring]]), places, np.array([sun + ring]))[0])
     if room < -_OVERLAP:
-        raise GeometryError(
-            f"{phasing.n_planets} planets of {teeth} overlap by {-room:.4g} modules", code="E-NEIGHBOURS",
-            value=phasing.n_planets, limit="room between the tips of neighbours",
-            remedy="use fewer planets, or fewer teeth on the planets",
-        )  # fmt: skip
+        message = f"{phasing.n_planets} planets of {teeth} overlap by {-room:.4g} modules"
+        remedy = "use fewer planets, or fewer teeth on the planets"
+        raise GeometryError(message, code="E-NEIGHBOURS", remedy=remedy)
     if room <= 0.0:
         found.append(f"unshifted planets overlap by {-room:.3g} modules")
     return tuple(found)
 
 
 def _described(teeth, ratio, change, planets: int, harmonics) -> ToothChoices:
+    """What `ToothChoices` tells of some teeth (C, 3) and their ratios (C,)."""
     sun, planet, ring = teeth.T
     total = sun + ring
     n = np.arange(planets)
@@ -217,22 +210,19 @@ def _room(teeth, positions, total) -> np.ndarray:
 
 
 def _check(wanted, distance, ratio_tolerance, closure, harmonics) -> None:
-    low, high = TEETH_RANGE
+    """Refuse arguments of `neighbouring_teeth` that are out of range (E-CHOICE)."""
     numbers = {"distance": (distance, 0, DISTANCE_LIMIT), "closure": (closure, 0, 10)}
     numbers["harmonics"] = (harmonics, 1, 100)
-    numbers |= {f"{name} teeth": (z, low, high) for name, z in zip(("sun", "planet", "ring"), wanted)}
+    numbers |= {f"{name} teeth": (z, *TEETH_RANGE) for name, z in zip(("sun", "planet", "ring"), wanted)}
     for name, (value, least, most) in numbers.items():
         if not is_whole(value) or not least <= value <= most:
-            raise GeometryError(
-                f"neighbouring tooth numbers with {name} {value!r}", code="E-CHOICE", key=name,
-                value=value, limit=f"a whole number, {least} to {most}",
-            )  # fmt: skip
+            message, limit = (
+                f"neighbouring tooth numbers with {name} {value!r}",
+                f"a whole number, {least} to {most}",
+            )
+            raise GeometryError(message, code="E-CHOICE", key=name, limit=limit)
     if not (math.isfinite(ratio_tolerance) and ratio_tolerance >= 0.0):
-        raise GeometryError(
-            f"a ratio tolerance of {ratio_tolerance}", code="E-CHOICE", value=ratio_tolerance, limit=">= 0"
-        )
+        raise GeometryError(f"a ratio tolerance of {ratio_tolerance}", code="E-CHOICE", limit=">= 0")
     if wanted[2] <= wanted[1]:
-        raise GeometryError(
-            f"a ring of {wanted[2]} teeth around planets of {wanted[1]}", code="E-CHOICE",
-            value=wanted[2], limit="more ring than planet teeth",
-        )  # fmt: skip
+        message = f"a ring of {wanted[2]} teeth around planets of {wanted[1]}"
+        raise GeometryError(message, code="E-CHOICE", limit="more ring than planet teeth")

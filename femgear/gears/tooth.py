@@ -57,23 +57,21 @@ class HalfSector:
 
 
 def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) -> HalfSector:
-    """Boundary of the half sector of a gear, graded from flank and fillet to the rim.
+    """Make the boundary of the half sector of a gear, graded from flank and fillet to the rim.
 
     Parameters
     ----------
     gear : Gear
     flank_elements : int
-        Element edges along the flank, uniform in roll angle, before `refine`.
+        Element edges along the flank, 2 or more, uniform in roll angle, before `refine`.
     refine : float
-        Divides every spacing, that of the flank included.
+        Divides every spacing, that of the flank included; positive.
 
     Raises
     ------
     GeometryError
-        Less than 2 flank elements or a factor that is not positive (E-RANGE), a body so deep that more than
-        400 nodes, times `refine`, would lie on a cut (E-GRID).
+        A body so deep that more than 400 nodes, times `refine`, would lie on a cut (E-GRID).
     """
-    _check_sizes(flank_elements, refine)
     count = max(2, round(flank_elements * refine))
     sizes = _Sizes(unit=gear.module / refine, growth=GROWTH / refine)
     rolls = np.linspace(gear.tip_roll, _flank_end_roll(gear, count), 2 * count + 1)
@@ -128,19 +126,8 @@ class _Sizes:
         return out
 
 
-def _check_sizes(flank_elements: int, refine: float) -> None:
-    if not (flank_elements >= 2 and math.isfinite(refine) and 0.05 <= refine <= 100.0):
-        raise GeometryError(
-            f"{flank_elements} flank elements with refinement {refine:.6g} give no usable outline",
-            code="E-RANGE",
-            key="static.flank_elements",
-            value=flank_elements,
-            limit="at least 2 elements, refinement 0.05 .. 100",
-            remedy="24 elements and refinement 1 are the default",
-        )
-
-
 def _arc(radius: float, start: float, end: float, fractions: np.ndarray) -> np.ndarray:
+    """Points (n, 2) [m] of an arc about the origin at fractions (n,) of the way between two angles [rad]."""
     angle = start + (end - start) * fractions
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
 
@@ -267,7 +254,6 @@ def _check_cost(gear: Gear, cut_nodes: int, sizes: _Sizes) -> None:
         f"{1e3 * gear.rim_radius:.6g} mm: its sector would have {cut_nodes} nodes on each cut",
         code="E-GRID",
         key=f"{gear.name}.{word}_radius",
-        value=f"{1e3 * gear.rim_radius:.6g} mm",
         limit=f"at most {limit} nodes",
         remedy=f"give a {size} {word} radius: material this far from the teeth hardly moves",
     )
@@ -310,6 +296,7 @@ def _inside(gear: Gear, split: np.ndarray) -> tuple[tuple[str, tuple[float, floa
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:
+    """The array in one piece that cannot be changed."""
     out = np.ascontiguousarray(array)
     out.setflags(write=False)
     return out

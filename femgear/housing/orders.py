@@ -6,12 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError
-from femgear.housing.sensor import SensorLines, check_teeth, read_only
+from femgear.errors import CaseError, checked_count
+from femgear.housing.sensor import ReadOnlyArrays, SensorLines
+
+_FLOOR = -60.0
+"""Level [dB] under the strongest line below which lines are left out."""
 
 
 @dataclass(frozen=True)
-class OrderSpectrum:
+class OrderSpectrum(ReadOnlyArrays):
     """Single-sided spectrum over carrier orders: ``x = Re sum_k value[k] exp(i order[k] theta)``.
 
     Parameters
@@ -27,9 +30,6 @@ class OrderSpectrum:
     order: np.ndarray
     value: np.ndarray
     revolutions: int = 1
-
-    def __post_init__(self):
-        read_only(self, "order", "value")
 
     @property
     def amplitude(self) -> np.ndarray:
@@ -47,7 +47,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Lobes:
+class Lobes(ReadOnlyArrays):
     """Lobes of an envelope, one carrier revolution or several.
 
     Parameters
@@ -70,12 +70,9 @@ class Lobes:
     threshold: float
     per_revolution: float
 
-    def __post_init__(self):
-        read_only(self, "position", "height", "prominence")
-
 
 @dataclass(frozen=True)
-class BandAnalysis:
+class BandAnalysis(ReadOnlyArrays):
     """What is heard around one mesh harmonic at one speed.
 
     Parameters
@@ -99,9 +96,6 @@ class BandAnalysis:
     signal: np.ndarray
     envelope: np.ndarray
     lobes: Lobes
-
-    def __post_init__(self):
-        read_only(self, "signal", "envelope")
 
 
 def order_spectrum(signal, *, revolutions: int = 1) -> OrderSpectrum:
@@ -176,35 +170,20 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
     return OrderSpectrum(spectrum.order, np.where(inside, spectrum.value, 0), spectrum.revolutions)
 
 
-def analytic_signal(spectrum: OrderSpectrum, *, samples: int | None = None) -> np.ndarray:
+def analytic_signal(spectrum: OrderSpectrum) -> np.ndarray:
     """Compute the analytic signal sum_k value[k] exp(i order[k] theta); its modulus is the envelope.
 
     Parameters
     ----------
     spectrum : OrderSpectrum
-    samples : int, optional
-        Samples over the record, more than twice the number of lines; default four times.
+        Values of shape (..., n_orders).
 
     Returns
     -------
-    (..., samples) complex array
-
-    Raises
-    ------
-    CaseError
-        ``E-HARMONICS`` for too few samples.
+    (..., 4 n_orders) complex array
+        Samples over the record.
     """
-    lines = spectrum.value.shape[-1]
-    count = 4 * lines if samples is None else samples
-    if count < 2 * lines - 1:
-        raise CaseError(
-            f"{count} samples cannot carry {lines} lines",
-            code="E-HARMONICS",
-            key="samples",
-            value=count,
-            limit=f"at least {2 * lines - 1}",
-            remedy="ask for more samples",
-        )
+    count = 4 * spectrum.value.shape[-1]
     return np.fft.ifft(spectrum.value, count, axis=-1) * count
 
 
@@ -256,10 +235,8 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int =
     )
 
 
-def dominant_lines(
-    spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6, floor: float = -60.0
-) -> tuple[Line, ...]:
-    """List the strongest lines with orders low..high of one spectrum, strongest first.
+def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6) -> tuple[Line, ...]:
+    """List the strongest lines with orders low..high of one spectrum, strongest first, down to -60 dB.
 
     Parameters
     ----------
@@ -269,8 +246,6 @@ def dominant_lines(
         Carrier orders, both included.
     count : int
         Largest number of lines.
-    floor : float
-        Level [dB] under the strongest below which lines are left out.
 
     Returns
     -------
@@ -293,7 +268,7 @@ def dominant_lines(
     strongest = amplitude.max()
     # stable, so that equal lines come in ascending order
     ranking = np.argsort(-amplitude, kind="stable")[:count]
-    keep = [k for k in ranking if strongest > 0 and amplitude[k] >= strongest * 10 ** (floor / 20)]
+    keep = [k for k in ranking if strongest > 0 and amplitude[k] >= strongest * 10 ** (_FLOOR / 20)]
     return tuple(
         Line(float(spectrum.order[k]), float(amplitude[k]), float(20 * np.log10(amplitude[k] / strongest)))
         for k in keep
@@ -306,7 +281,6 @@ def analyse_band(
     harmonic: int,
     *,
     half_width: int | None = None,
-    threshold: float = 0.1,
     count: int = 6,
 ) -> BandAnalysis:
     """Analyse the band around a mesh harmonic: dominant lines, envelope and lobes of the signal.
@@ -321,8 +295,6 @@ def analyse_band(
         Mesh harmonic, 1 upwards.
     half_width : int, optional
         Orders on either side; default (z_ring - 1) // 2, so that bands do not overlap.
-    threshold : float
-        Prominence threshold of the lobes, see `count_lobes`.
     count : int
         Largest number of lines listed.
 
@@ -335,11 +307,11 @@ def analyse_band(
     CaseError
         ``E-TEETH``, ``E-RANGE``, ``E-SHAPE``.
     """
-    check_teeth(z_ring)
+    checked_count(z_ring, "ring teeth", code="E-TEETH")
     half_width = (z_ring - 1) // 2 if half_width is None else half_width
     low, high = harmonic * z_ring - half_width, harmonic * z_ring + half_width
     lines = dominant_lines(spectrum, low=low, high=high, count=count)
     analytic = analytic_signal(band_pass(spectrum, low, high))
     envelope = np.abs(analytic)
-    lobes = count_lobes(envelope, threshold=threshold, revolutions=spectrum.revolutions)
+    lobes = count_lobes(envelope, revolutions=spectrum.revolutions)
     return BandAnalysis(harmonic, low, high, lines, np.real(analytic), envelope, lobes)

@@ -34,15 +34,26 @@ Kahraman (2009), only the nearest planet of N is heard.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_count
+
+
+class ReadOnlyArrays:
+    """Frozen dataclass that keeps read-only copies of its arrays."""
+
+    def __post_init__(self):
+        for one in fields(self):  # type: ignore[arg-type]
+            if one.type == "np.ndarray":
+                array = np.array(getattr(self, one.name))
+                array.setflags(write=False)
+                object.__setattr__(self, one.name, array)
 
 
 @dataclass(frozen=True)
-class SensorLines:
+class SensorLines(ReadOnlyArrays):
     """Lines that a fixed sensor hears: ``u(t) = Re sum_k displacement[k] exp(i k base_speed t)``.
 
     Parameters
@@ -68,9 +79,6 @@ class SensorLines:
     z_ring: int
     method: str
 
-    def __post_init__(self):
-        read_only(self, "order", "displacement", "base_speed")
-
     @property
     def frequency(self) -> np.ndarray:
         """Frequency of every line [Hz], shape (..., n_orders)."""
@@ -87,7 +95,7 @@ class SensorLines:
 
 
 @dataclass(frozen=True)
-class HousingSignal:
+class HousingSignal(ReadOnlyArrays):
     """Time signal of a fixed sensor over one revolution of the carrier (end point excluded).
 
     Parameters
@@ -112,9 +120,6 @@ class HousingSignal:
     acceleration: np.ndarray
     sensor_angle: float
     method: str
-
-    def __post_init__(self):
-        read_only(self, "revolution", "seconds", "displacement", "acceleration")
 
 
 def fixed_sensor_lines(
@@ -201,7 +206,7 @@ def heaviside_linear_lines(
         As `fixed_sensor_lines`, and ``E-SYMMETRY`` for less than 3 points.
     """
     field, n = _checked_field(field)
-    _check_points(points)
+    points = checked_count(points, "points", code="E-SYMMETRY", least=3)
     direction, base_speed = _motion(field, z_ring, carrier_speed, mesh_frequency)
     top = _top_order(field, z_ring, max_order)
     away = _checked_angle(sensor_angle) - _checked_angle(first_point)
@@ -216,42 +221,16 @@ def heaviside_linear_lines(
     return SensorLines(np.arange(top + 1), lines, base_speed, float(sensor_angle), int(z_ring), method)
 
 
-def fixed_sensor_signal(lines: SensorLines, *, samples: int | None = None) -> HousingSignal:
+def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
     """Synthesise displacement and acceleration over one carrier revolution by inverse FFT of the lines.
 
-    Parameters
-    ----------
-    lines : SensorLines
-        From `fixed_sensor_lines` or `heaviside_linear_lines`.
-    samples : int, optional
-        Number of samples, more than twice the highest order; default: at least four times the highest
-        order and a whole number a mesh period.
-
-    Returns
-    -------
-    HousingSignal
-
-    Raises
-    ------
-    CaseError
-        ``E-HARMONICS`` for too few samples.
+    There are at least four samples a period of the highest order, and a whole number of them a mesh period.
     """
-    top = int(lines.order[-1])
-    count = lines.z_ring * -(-4 * top // lines.z_ring) if samples is None else samples
-    if count <= 2 * top:
-        raise CaseError(
-            f"{count} samples cannot carry {top} carrier orders",
-            code="E-HARMONICS",
-            key="samples",
-            value=count,
-            limit=f"more than {2 * top} samples a carrier revolution",
-            remedy="ask for more samples or lower max_order",
-        )
+    count = lines.z_ring * -(-4 * int(lines.order[-1]) // lines.z_ring)
     revolution = np.arange(count) / count
-    seconds = 2 * np.pi * revolution / lines.base_speed[..., None]
     return HousingSignal(
         revolution,
-        seconds,
+        2 * np.pi * revolution / lines.base_speed[..., None],
         _synthesised(lines.displacement, count),
         _synthesised(lines.acceleration, count),
         lines.sensor_angle,
@@ -307,8 +286,8 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
 
 
 def _motion(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> tuple[int, np.ndarray]:
-    """Direction +1, 0 or -1 of the carrier and the speed that orders count (...) [rad/s], always positive."""
-    check_teeth(z_ring)
+    """Find the direction +1, 0 or -1 of the carrier and the speed that orders count (...) [rad/s]."""
+    checked_count(z_ring, "ring teeth", code="E-TEETH")
     speed = np.asarray(carrier_speed, dtype=float)
     direction = np.unique(np.sign(speed))
     if speed.shape != field.shape[:-2] or not np.all(np.isfinite(speed)) or direction.size != 1:
@@ -344,23 +323,15 @@ def _motion(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> tu
 
 
 def _top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
-    """Highest carrier order of the lines: as asked for, or that of the highest component."""
+    """Choose the highest carrier order of the lines: as asked for, or that of the highest component."""
+    if max_order is not None:
+        return checked_count(max_order, "carrier orders", code="E-HARMONICS")
     harmonics, n_max = field.shape[-2] - 1, field.shape[-1] // 2
-    top = max((harmonics + 1) * z_ring, harmonics * z_ring + n_max) if max_order is None else max_order
-    if top != int(top) or top < 1:
-        raise CaseError(
-            f"{max_order} is not a highest carrier order",
-            code="E-HARMONICS",
-            key="max_order",
-            value=max_order,
-            limit="a positive integer",
-            remedy="leave it out for (H + 1) z_ring",
-        )
-    return int(top)
+    return max((harmonics + 1) * z_ring, harmonics * z_ring + n_max)
 
 
 def _checked_field(field) -> tuple[np.ndarray, np.ndarray]:
-    """The field as a complex array and its circumferential orders n = -n_max..n_max."""
+    """Check the field, and tell its circumferential orders n = -n_max..n_max."""
     field = np.asarray(field, dtype=complex)
     if field.ndim < 2 or field.size == 0 or field.shape[-1] % 2 == 0 or not np.all(np.isfinite(field)):
         raise CaseError(
@@ -374,12 +345,11 @@ def _checked_field(field) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _checked_angle(angle: float) -> float:
-    """A finite angle [rad]."""
+    """Refuse an angle [rad] that is not finite."""
     if not np.isfinite(angle):
         raise CaseError(
             f"the angle {angle} is not a number of radians",
             code="E-RANGE",
-            key="housing.sensor_angle",
             value=angle,
             limit="a finite angle",
             remedy="give an angle such as 0.5",
@@ -387,42 +357,8 @@ def _checked_angle(angle: float) -> float:
     return float(angle)
 
 
-def _check_points(points: int) -> None:
-    """Refuse a number of points that cannot describe a ring."""
-    if points != int(points) or points < 3:
-        raise CaseError(
-            f"{points} points do not describe a ring",
-            code="E-SYMMETRY",
-            key="housing.points",
-            value=points,
-            limit="an integer of at least 3, more than twice the largest nodal diameter that matters",
-            remedy="use 54 or more, a multiple of the number of planets",
-        )
-
-
-def check_teeth(z_ring: int) -> None:
-    """Refuse a number of ring teeth that gives no mesh order (E-TEETH)."""
-    if z_ring != int(z_ring) or z_ring < 1:
-        raise CaseError(
-            f"{z_ring} ring teeth do not give a mesh order",
-            code="E-TEETH",
-            key="ring.teeth",
-            value=z_ring,
-            limit="a positive integer",
-            remedy="give the number of teeth of the ring",
-        )
-
-
-def read_only(obj, *names: str) -> None:
-    """Replace the named fields of a frozen dataclass by read-only arrays of their own."""
-    for name in names:
-        array = np.array(getattr(obj, name))
-        array.setflags(write=False)
-        object.__setattr__(obj, name, array)
-
-
 def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> np.ndarray:
-    """Two-sided lines -top..top: every component added at order h z_ring - direction n."""
+    """Collect two-sided lines -top..top: every component added at order h z_ring - direction n."""
     n_max = heard.shape[-1] // 2
     two_sided = np.zeros((*heard.shape[:-2], 2 * top + 1), dtype=complex)
     if direction == 0:
@@ -438,7 +374,7 @@ def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> n
 
 
 def _folded(two_sided: np.ndarray) -> np.ndarray:
-    """Single-sided amplitudes of Re sum_k c_k exp(i k x): c_k + conj(c_-k), real at order 0."""
+    """Fold to single-sided amplitudes of Re sum_k c_k exp(i k x): c_k + conj(c_-k), real at order 0."""
     top = two_sided.shape[-1] // 2
     lines = two_sided[..., top:] + np.conj(two_sided[..., top::-1])
     lines[..., 0] = np.real(two_sided[..., top])
@@ -446,7 +382,7 @@ def _folded(two_sided: np.ndarray) -> np.ndarray:
 
 
 def _sampled_components(field: np.ndarray, n: np.ndarray, points: int, first_point: float) -> np.ndarray:
-    """Components that P points tell apart: sum over all n of one residue modulo P, phase at point 0."""
+    """Find the components that P points tell apart: sums over one residue of n modulo P, phase at point 0."""
     at_first = field * np.exp(1j * n * first_point)
     sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
     for residue in np.unique(n % points):
@@ -457,7 +393,7 @@ def _sampled_components(field: np.ndarray, n: np.ndarray, points: int, first_poi
 def _interpolated_orders(
     sampled: np.ndarray, z_ring: int, direction: int, top: int, away: float
 ) -> np.ndarray:
-    """Two-sided lines -top..top of the linear interpolation: components and all their images."""
+    """Collect two-sided lines -top..top of the linear interpolation: components and all their images."""
     points = sampled.shape[-1]
     order = np.arange(-top, top + 1)
     two_sided = np.zeros((*sampled.shape[:-2], order.size), dtype=complex)
@@ -468,7 +404,7 @@ def _interpolated_orders(
 
 
 def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray:
-    """Value of the linear interpolation at the angle `away` from point 0."""
+    """Evaluate the linear interpolation at the angle `away` from point 0."""
     at_points = np.fft.ifft(sampled, axis=-1) * points
     place = away * points / (2 * np.pi)
     i = int(np.floor(place))
@@ -476,14 +412,14 @@ def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray
 
 
 def _synthesised(lines: np.ndarray, samples: int) -> np.ndarray:
-    """Re sum_k lines[k] exp(2 pi i k t), t in equal steps of one revolution."""
+    """Sum Re sum_k lines[k] exp(2 pi i k t), t in equal steps of one revolution."""
     spectrum = lines * (samples / 2)
     spectrum[..., 0] *= 2
     return np.fft.irfft(spectrum, samples, axis=-1)
 
 
 def _window_components(n: np.ndarray, width: float) -> np.ndarray:
-    """Fourier components c_n of the window on the circle."""
+    """Compute the Fourier components c_n of the window on the circle."""
     v = n * width / (2 * np.pi)
     # sinc(v)/(1 - v^2) = (sinc(v - 1) + sinc(v + 1))/2 + sinc(v): no division at |v| = 1
     return width / (4 * np.pi) * (np.sinc(v) + (np.sinc(v - 1) + np.sinc(v + 1)) / 2)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
-    """Figures of the stages whose data are there, and of the case; returns the names of the files."""
+    """Write the figures of the stages whose data are there, and of the case; returns the file names."""
     figures = {}
     for stage in _drawn(train, drawn):
         figures |= stage.draw(drawn)
@@ -22,7 +22,7 @@ def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
 
 
 def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
-    """Figures of the stages whose data are there, in their order, and of the case."""
+    """List the figures of the stages whose data are there, in their order, and of the case."""
     figures, names = train.figures(), [*(s.name for s in train.stages if s.name in drawn.data), ""]
     return [figures[name] for name in names if name in figures]
 
@@ -30,7 +30,7 @@ def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
 def write_pictures(
     folder: Path, train: Train, drawn: Drawn, *, progress: Progress | None = None
 ) -> list[str]:
-    """Everything that a run shows; returns the names of the files.
+    """Write everything that a run shows; returns the names of the files.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def write_report(train: Train, results: Results) -> Path:
 
 
 def page(train: Train, results: Results) -> str:
-    """The page as text; see `write_report`."""
+    """Make the page as text; see `write_report`."""
     case = results.case
     pictures, skipped = _pictures(train, results)
     title, *geometry = train.describe(case)
@@ -112,33 +112,34 @@ def page(train: Train, results: Results) -> str:
 
 
 def _lead(results: Results) -> str:
-    """Version, stages, and whether the run came to its end."""
+    """Tell version, stages, and whether the run came to its end."""
     stages = ", ".join(results.stages) or "nothing"
     state = "" if results.manifest.complete else "; the run did not come to its end"
     return f"femgear {results.manifest.versions.get('femgear', '')}: {stages}{state}"
 
 
 def _contents(sections, numbers, pictures) -> str:
-    """Links to the sections that there are."""
+    """Link to the sections that there are."""
     shown = [name for name in sections if name in numbers or any(p.section == name for p in pictures)]
     links = [("gears", "Gears"), *((_anchor(name), name) for name in shown), ("provenance", "Provenance")]
     return "<nav>" + " ".join(f'<a href="#{key}">{escape(text)}</a>' for key, text in links) + "</nav>\n"
 
 
 def _anchor(name: str) -> str:
-    """Name of a section in links."""
+    """Name a section in links."""
     return name.lower().replace(" ", "-")
 
 
 def _warnings(warnings) -> str:
-    """List of all warnings, empty without any."""
+    """List all warnings."""
     if not warnings:
         return ""
-    return '<ul class="warnings">\n' + "".join(f"<li>{escape(text)}</li>\n" for text in warnings) + "</ul>\n"
+    items = "".join(f"<li>{escape(str(warning))}</li>\n" for warning in warnings)
+    return '<ul class="warnings">\n' + items + "</ul>\n"
 
 
 def _section(name: str, numbers, pictures, train: Train, results: Results) -> str:
-    """Tables and pictures of a stage, empty without any."""
+    """Show tables and pictures of a stage, nothing without any."""
     blocks = [numbers[name]] if name in numbers else []
     for stage in train.stages:
         if stage.title == name and stage.name in results.stages:
@@ -151,7 +152,7 @@ def _section(name: str, numbers, pictures, train: Train, results: Results) -> st
 
 
 def _table(block: Block, *, heading: bool = True) -> str:
-    """A table with its notes."""
+    """Show a table with its notes."""
     title = f"<h3>{escape(block.title)}</h3>\n" if heading else ""
     header = "".join(f"<th>{escape(text)}</th>" for text in block.header)
     rows = "".join(
@@ -166,7 +167,7 @@ def _table(block: Block, *, heading: bool = True) -> str:
 
 
 def _figure(picture: Picture) -> str:
-    """A picture with its caption, embedded."""
+    """Embed a picture with its caption."""
     data = base64.b64encode(picture.data).decode("ascii")
     caption = escape(picture.caption)
     return (
@@ -176,7 +177,7 @@ def _figure(picture: Picture) -> str:
 
 
 def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]:
-    """Pictures that the manifest names, in the order of the captions, and what was left out."""
+    """Read the pictures that the manifest names, in the order of the captions, and what was left out."""
     found, skipped = [], []
     for name, digest in results.manifest.files.items():
         path = results.folder / name
@@ -199,7 +200,7 @@ def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]
 
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
-    """Place in the order, section and caption of a picture from its file name."""
+    """Find place in the order, section and caption of a picture from its file name."""
     figures = train.figures()
     captions = [
         (stage.title, *one)
@@ -215,7 +216,7 @@ def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
 
 
 def _provenance(results: Results, numbers) -> str:
-    """Time, versions, checksums, and the case as run."""
+    """Show time, versions, checksums, and the case as run."""
     manifest = results.manifest
     versions = Block("Versions", ("", "version"), tuple(manifest.versions.items()))
     files = tuple((name, digest) for name, digest in manifest.files.items() if name != "report.html")

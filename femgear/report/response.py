@@ -1,4 +1,4 @@
-"""Figures of modes and periodic responses: mode shapes, spectra of the transmission error, sweeps over speed.
+"""Figures of modes and periodic responses: shapes, Campbell diagram, transmission errors, sweeps over speed.
 
 They draw datasets of results, of whatever train; helpers for figures over the mesh period stand beside them.
 """
@@ -27,6 +27,7 @@ from femgear.report.style import (
     new_figure,
     periodic,
     rpm,
+    xy,
 )
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ _CIRCLE = np.linspace(0.0, 2 * np.pi, 241)
 def mode_shapes(
     modes: xr.Dataset, planetary_set: PlanetarySet, *, shown: Sequence[int] | None = None, scale: float = 0.16
 ) -> Figure:
-    """Bodies and outer ring surface in their undeformed (grey) and displaced positions.
+    """Draw bodies and outer ring surface in their undeformed (grey) and displaced positions.
 
     Parameters
     ----------
@@ -59,10 +60,6 @@ def mode_shapes(
         Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
     scale : float
         Largest displacement as a share of the ring's outer radius.
-
-    Returns
-    -------
-    Figure
     """
     frequency = modes["frequency"].values
     elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
@@ -80,7 +77,7 @@ def mode_shapes(
 
 
 def _draw_mode(ax, modes, planetary_set, mode, scale):
-    """One mode: bodies with a spoke each, the carrier by its pins, the ring by its outer surface."""
+    """Draw one mode: bodies with a spoke each, the carrier by its pins, the ring by its outer surface."""
     shape = dict(zip((str(name) for name in modes["dof"].values), modes["shape"].values[:, mode]))
     outer = planetary_set.ring.rim_radius
     ring = _ring_radial(modes, mode)
@@ -91,11 +88,11 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
         largest = max(largest, np.hypot(x, y), abs(turn) * radius)
     factor = scale * outer / largest if largest > 0 else 0.0
     circle = np.exp(1j * _CIRCLE)
-    ax.plot(*_xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
+    ax.plot(*xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
     rigid = _motion(shape, "ring")
     shift, turn = factor * (rigid[0] + 1j * rigid[1]), factor * rigid[2]
     ax.plot(
-        *_xy((outer + factor * ring) * circle + shift),
+        *xy((outer + factor * ring) * circle + shift),
         color=BLACK,
         linewidth=1.8,
         label="ring, outer surface",
@@ -103,8 +100,8 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
     if "ring: rotation" in shape:
         # a rigid ring shows its rotation by a mark in its rim
         mark = np.array([0.9, 1.0]) * outer
-        ax.plot(*_xy(1j * mark), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
+        ax.plot(*xy(1j * mark), color="0.8", linewidth=1.0)
+        ax.plot(*xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
     for name, (centre, radius, colour, text) in bodies.items():
         x, y, turn = _motion(shape, name)
         moved = centre + factor * (x + 1j * y)
@@ -112,11 +109,11 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
         if name == "carrier":
             _draw_carrier(ax, planetary_set, moved, factor * turn, colour)
             continue
-        ax.plot(*_xy(centre + radius * circle), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(moved + radius * circle), color=colour, linewidth=1.6, label=text)
+        ax.plot(*xy(centre + radius * circle), color="0.8", linewidth=1.0)
+        ax.plot(*xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
+        ax.plot(*xy(moved + radius * circle), color=colour, linewidth=1.6, label=text)
         ax.plot(
-            *_xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
+            *xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
         )
     span = 1.24 * outer
     ax.set_xlim(-span, span)
@@ -127,16 +124,16 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
 
 
 def _draw_carrier(ax, planetary_set, moved, turn, colour):
-    """Displaced pins, each joined to the centre of the carrier."""
+    """Draw displaced pins, each joined to the centre of the carrier."""
     pins = planetary_set.centre_distance * np.exp(1j * np.asarray(planetary_set.planet_angles, float))
     pins = moved + pins * np.exp(1j * turn)
     for pin in pins:
-        ax.plot(*_xy(np.array([moved, pin])), color=colour, linewidth=1.2, linestyle="--", label="carrier")
-    ax.plot(*_xy(pins), "o", color=colour, markersize=3)
+        ax.plot(*xy(np.array([moved, pin])), color=colour, linewidth=1.2, linestyle="--", label="carrier")
+    ax.plot(*xy(pins), "o", color=colour, markersize=3)
 
 
 def _bodies(planetary_set):
-    """Centre, radius, colour and legend of every rigid body."""
+    """Tell centre, radius, colour and legend of every rigid body."""
     bodies = {"carrier": (0j, planetary_set.centre_distance, GREEN, "carrier")}
     bodies["sun"] = (0j, planetary_set.sun.reference_radius, VERMILION, "sun")
     for n, angle in enumerate(planetary_set.planet_angles):
@@ -146,12 +143,12 @@ def _bodies(planetary_set):
 
 
 def _motion(shape, name):
-    """Displacement and rotation of a body in a mode; zero where it does not move."""
+    """Find displacement and rotation of a body in a mode; zero where it does not move."""
     return tuple(float(shape.get(f"{name}: {axis}", 0.0)) for axis in ("x", "y", "rotation"))
 
 
 def _ring_radial(modes, mode):
-    """Radial displacement of the outer surface at the angles of `_CIRCLE`."""
+    """Compute the radial displacement of the outer surface at the angles of `_CIRCLE`."""
     if "ring_shape_real" not in modes:
         return np.zeros_like(_CIRCLE)
     n = modes["circumferential"].values
@@ -159,22 +156,45 @@ def _ring_radial(modes, mode):
     return (np.exp(1j * np.outer(_CIRCLE, n)) @ value).real
 
 
-def _xy(points):
-    """Coordinates of complex points."""
-    return points.real, points.imag
+def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str) -> Figure:
+    """Draw natural frequencies over the speed with lines of excitation: a Campbell diagram.
+
+    Parameters
+    ----------
+    speed : (p,) array
+        In `speed_unit`.
+    frequency : (p, m) array
+        [Hz]
+    orders : (k,) array
+        Slopes of the lines [Hz per unit of speed].
+    order_names : sequence of str
+    critical : sequence of (speed, frequency)
+        Intersections to mark.
+    speed_unit : str
+    """
+    figure, (ax,) = new_figure(height=5.4)
+    for one in np.transpose(frequency):
+        ax.plot(speed, one, linewidth=1.6, color=BLUE, label="mode")
+    for i, (order, text) in enumerate(zip(orders, order_names)):
+        dash = (0, (6, 2) + (1, 2) * i)
+        ax.plot(speed, order * speed, color=GREY, linewidth=1.2, linestyle=dash, label=text)
+    if len(critical):
+        at = np.asarray(critical, float).T
+        ax.plot(*at, "o", color=BLACK, markerfacecolor="none", markersize=7, label="critical speed")
+    ax.set_xlim(np.min(speed), np.max(speed))
+    ax.set_ylim(0, 1.05 * np.nanmax(frequency))
+    label(ax, f"speed [{speed_unit}]", "natural frequency [Hz]")
+    legend_below(figure, columns=4)
+    return figure
 
 
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
-    """Amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
+    """Draw the amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
 
     Parameters
     ----------
     dynamics : xarray.Dataset
         With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m].
-
-    Returns
-    -------
-    Figure
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -210,7 +230,7 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
 
 
 def _bars(ax, h, amplitude, index: int, count: int, text: str) -> None:
-    """Bars of one mesh beside those of the others."""
+    """Draw bars of one mesh beside those of the others."""
     width = 0.8 / count
     ax.bar(
         h + (index - (count - 1) / 2) * width,
@@ -225,23 +245,19 @@ def _bars(ax, h, amplitude, index: int, count: int, text: str) -> None:
 
 
 def _dots(ax, h, amplitude, floor, index: int, text: str) -> None:
-    """Lines of one mesh as markers on thin stems: many bars would merge."""
+    """Draw lines of one mesh as markers on thin stems: many bars would merge."""
     colour = COLOURS[index % len(COLOURS)]
     ax.vlines(h, floor, amplitude, color=colour, linewidth=0.5, alpha=0.5)
     ax.plot(h, amplitude, MARKERS[index % len(MARKERS)], color=colour, markersize=3.5, label=text)
 
 
 def speed_sweep(dynamics: xr.Dataset) -> Figure:
-    """RMS of the fluctuating transmission error over the speed, and what the solver says about each speed.
+    """Draw the RMS of the fluctuating transmission error over the speed, and what the solver says of it.
 
     Parameters
     ----------
     dynamics : xarray.Dataset
         With ``dte_real``, ``dte_imag``, ``spectral_radius``, ``floquet_multiplier`` and ``converged``.
-
-    Returns
-    -------
-    Figure
     """
     figure, (top, bottom) = new_figure(rows=2, height=7.0, sharex=True)
     order = np.argsort(dynamics["speed"].values)
@@ -284,7 +300,7 @@ def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
 
 
 def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
-    """Highest harmonic of the mesh frequency that excites: by ``excitation_limit`` [Hz] where it is known."""
+    """Find the highest harmonic of the mesh frequency that excites, by ``excitation_limit`` [Hz] if known."""
     highest = int(dynamics["harmonic"].values.max())
     if "excitation_limit" not in dynamics:
         return highest
@@ -294,12 +310,12 @@ def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
 
 
 def fine_positions(harmonics: int) -> np.ndarray:
-    """Positions of one mesh period, enough for a curve of so many harmonics."""
+    """Choose positions of one mesh period, enough for a curve of so many harmonics."""
     return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
 
 
 def name_kinds(ax, dynamics: xr.Dataset) -> None:
-    """Legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
+    """Add legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
     known = "excitation" if "excitation_limit" in dynamics else "response"
     for text, look in (
         ("dynamic (thick)", {"linewidth": 2.0}),
@@ -310,14 +326,14 @@ def name_kinds(ax, dynamics: xr.Dataset) -> None:
 
 
 def draw_static(ax, at, values, harmonics: int, position, style) -> None:
-    """Static transmission error [m] less its mean: the whole record pale, its first harmonics thin."""
+    """Draw the static transmission error [m] less its mean: whole record pale, first harmonics thin."""
     at, whole, part = _fluctuation(at, values, harmonics, position)
     ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
     ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
 
 
 def _fluctuation(at, values, harmonics: int, position):
-    """A record of one period less its mean, closed, and the sum of its first harmonics at `position`.
+    """Reduce a record of one period by its mean, and sum its first harmonics at `position`.
 
     The record is linear between its positions, which may be closer where it is steep. Harmonics of such a
     curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
@@ -331,7 +347,7 @@ def _fluctuation(at, values, harmonics: int, position):
 
 
 def panels(count: int):
-    """Figure with `count` axes of one vertical scale, two in a row."""
+    """Make a figure with `count` axes of one vertical scale, two in a row."""
     rows, columns = -(-count // 2), min(count, 2)
     figure, axes = new_figure(
         rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=0.8 + 3.6 * rows, sharey=True
@@ -342,11 +358,11 @@ def panels(count: int):
 
 
 def shown_speeds(data: xr.Dataset) -> list[int]:
-    """Indices of the speeds that get pictures of their own: all of a few, else first, middle and last."""
+    """Choose the speeds that get pictures of their own: all of a few, else first, middle and last."""
     n = data.sizes["speed"]
     return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
 
 
 def some_speeds(count: int, limit: int = 4) -> list[int]:
-    """Numbers of at most `limit` speeds, spread evenly."""
+    """Choose at most `limit` speeds, spread evenly."""
     return sorted({round(i) for i in np.linspace(0, count - 1, min(count, limit))})

@@ -1,8 +1,7 @@
-"""Pictures, animations and VTK grids of whole bodies, drawn by PyVista without a screen.
+"""Grids of whole bodies with their displacements, as VTU and as pictures drawn by PyVista without a screen.
 
 `assemble_set` and `ring_modes_grid` make grids with displacement fields, `write_vtu` writes them,
-`deformed_picture` draws one. `animate_operating_deflection` shows the ring's deflection while the carrier
-turns past a fixed sensor. PyVista is loaded late, by `load_pyvista`, and only where it can draw.
+`deformed_picture` draws one. PyVista is loaded late, by `load_pyvista`, and only where it can draw.
 """
 
 from __future__ import annotations
@@ -19,36 +18,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.errors import CaseError, FemgearError
-from femgear.gears.kinematics import orientations
-from femgear.gears.tooth import half_sector
+from femgear.fe.grid import Grid, copy_nodes, rotated_copies
 from femgear.storage.files import replace_file
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from femgear.fe.grid import Grid
     from femgear.fe.reduction import CyclicModes
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
 
 _QUADRATIC_TRIANGLE = 22  # VTK_QUADRATIC_TRIANGLE: corners, then the middles of 01, 12, 20
 _SPLIT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 """Corners of the four flat triangles of a quadratic one."""
-_SECONDS = 6.0
-"""Length of an animation."""
 _OUTLINE = {
     "boundary_edges": True,
     "feature_edges": False,
     "manifold_edges": False,
     "non_manifold_edges": False,
 }
-# elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
-_FLANK, _COARSE = 10, 0.4
-_SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
+_LARGEST = 0.03
+"""Largest displacement of a picture as a share of the largest radius."""
 
 
 def load_pyvista():
-    """PyVista, ready to draw without a screen.
+    """Load PyVista, ready to draw without a screen.
 
     Returns
     -------
@@ -61,22 +53,21 @@ def load_pyvista():
         end the process without a word.
     """
     if sys.platform.startswith("linux"):
-        if _loads("libEGL.so.1"):
-            os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        else:
+        if not _loads("libEGL.so.1"):
             raise FemgearError(
                 "pictures of grids need the system library libEGL.so.1, which is not installed",
                 code="E-SYSTEM-LIBRARY",
                 value="libEGL.so.1",
                 remedy="apt-get install -y --no-install-recommends libegl1 libgl1 (Debian, Ubuntu)",
             )
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     import pyvista
 
     return pyvista
 
 
 def _loads(library: str) -> bool:
-    """Whether the machine has a system library."""
+    """Tell whether the machine has a system library."""
     try:
         ctypes.CDLL(library)
     except OSError:
@@ -106,7 +97,7 @@ class Body:
 
 
 def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, displacement=None) -> Body:
-    """A body from a grid that is turned about its origin, then moved to its place in the set.
+    """Place a grid in the set: turned about its origin, then moved.
 
     Parameters
     ----------
@@ -119,10 +110,6 @@ def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, disp
         [rad]
     displacement : (n, 2) array, optional
         In the frame of the grid [m]; turned along.
-
-    Returns
-    -------
-    Body
     """
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, s], [-s, c]])
@@ -130,31 +117,16 @@ def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, disp
     return Body(name, grid.points @ turn + np.asarray(centre, float), grid.triangles, moved)
 
 
-def assemble_set(bodies: Sequence[Body | tuple]) -> pv.UnstructuredGrid:
-    """All bodies in one grid of VTK quadratic triangles.
-
-    Parameters
-    ----------
-    bodies : sequence of Body
-        Plain tuples of the same order are taken as well.
+def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
+    """Assemble all bodies in one grid of VTK quadratic triangles.
 
     Returns
     -------
     pyvista.UnstructuredGrid
         Point data ``displacement`` [m] (3 components), cell data ``body`` (number), and the
         number of every body as field data under its name.
-
-    Raises
-    ------
-    CaseError
-        When there is no body, or arrays do not fit together.
     """
     pv = load_pyvista()
-    bodies = tuple(body if isinstance(body, Body) else Body(*body) for body in bodies)
-    if not len(bodies) > 0:
-        raise CaseError("a scene needs at least one body", code="E-SHAPE")
-    for body in bodies:
-        _check_body(body)
     start = np.cumsum([0] + [len(body.points) for body in bodies])
     points, displacement = np.zeros((start[-1], 3)), np.zeros((start[-1], 3), np.float32)
     for body, first in zip(bodies, start):
@@ -171,25 +143,8 @@ def assemble_set(bodies: Sequence[Body | tuple]) -> pv.UnstructuredGrid:
     return grid
 
 
-def _check_body(body: Body) -> None:
-    """Refuse a body whose arrays do not fit together."""
-    points, triangles = np.asarray(body.points), np.asarray(body.triangles)
-    fits = points.ndim == 2 and points.shape[1] == 2 and triangles.ndim == 2 and triangles.shape[1] == 6
-    fits = fits and len(points) > 0 and len(triangles) > 0
-    fits = fits and 0 <= triangles.min() and triangles.max() < len(points)
-    displacement = points if body.displacement is None else np.asarray(body.displacement)
-    fits = fits and displacement.shape == points.shape
-    if not fits:
-        raise CaseError(
-            f"body {body.name!r}: points {points.shape}, triangles {triangles.shape} and displacement "
-            f"{displacement.shape} do not fit together",
-            code="E-SHAPE",
-            limit="(n, 2), (m, 6) with node numbers below n, (n, 2)",
-        )
-
-
 def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> pv.UnstructuredGrid:
-    """The whole ring with one displacement field a mode.
+    """Assemble the whole ring with one displacement field a mode.
 
     Parameters
     ----------
@@ -204,71 +159,40 @@ def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> p
     pyvista.UnstructuredGrid
         Point data ``"mode 5, n = 3, 2600 Hz"`` and so on (3 components).
     """
-    from femgear.fe.grid import copy_nodes, rotated_copies
-
     whole, numbers = rotated_copies(sector, modes.count), copy_nodes(sector, modes.count)
     grid = assemble_set([Body("ring", whole.points, whole.triangles)])
     del grid.point_data["displacement"]
     for mode in shown:
         field = np.zeros((whole.n_nodes, 3), np.float32)
-        field[:, :2] = cyclic_field(modes.shape[:, mode], int(modes.nodal_diameter[mode]), numbers)
+        turns = 2j * np.pi * modes.nodal_diameter[mode] * np.arange(modes.count) / modes.count
+        wave = np.exp(turns)[:, None, None] * modes.shape[:, mode].reshape(-1, 2)
+        field[:, :2] = whole_field(wave.real, numbers)
         name = f"mode {mode}, n = {modes.nodal_diameter[mode]}, {modes.frequency[mode]:.0f} Hz"
         grid.point_data[name] = field / (np.abs(field).max() or 1.0)
     return grid
 
 
-def cyclic_field(shape, nodal_diameter: int, numbers: np.ndarray, *, phase: float = 0.0) -> np.ndarray:
-    """Displacement of a whole cyclic body from that of one sector, ``Re(U e^{i(n k 2 pi/count + phase)})``.
+def whole_field(sectors: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Turn the displacements of all sectors of a body to their places.
 
     Parameters
     ----------
-    shape : (2 n_nodes,) complex array
-        Of the first sector, in its own frame: x and y of every node in turn.
-    nodal_diameter : int
+    sectors : (count, n_nodes, 2) array
+        Of every sector in the frame of the first.
     numbers : (count, n_nodes) int array
-        Nodes of the whole body; see `fe.grid.copy_nodes`.
-    phase : float
-        [rad]
+        Nodes of the whole body; see `femgear.fe.grid.copy_nodes`.
 
     Returns
     -------
     (n, 2) array
+        In the unit of `sectors`.
     """
-    count = len(numbers)
-    local = np.asarray(shape).reshape(-1, 2)
+    angle = 2 * np.pi * np.arange(len(numbers))[:, None] / len(numbers)
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = sectors[..., 0], sectors[..., 1]
     field = np.zeros((numbers.max() + 1, 2))
-    for k in range(count - 1, -1, -1):
-        angle = 2 * np.pi * k / count
-        x, y = (local * np.exp(1j * (nodal_diameter * angle + phase))).real.T
-        c, s = np.cos(angle), np.sin(angle)
-        field[numbers[k]] = np.column_stack([c * x - s * y, s * x + c * y])
+    field[numbers] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
     return field
-
-
-def polar_curve(values, *, radius: float, height: float) -> pv.PolyData:
-    """A periodic function around a circle as a closed curve, for display beside the grids.
-
-    Parameters
-    ----------
-    values : (n,) array
-        Equally spaced over one turn, first value at angle 0; stored as point data ``value``.
-    radius : float
-        Radius of the value zero [m].
-    height : float
-        Radial distance that the largest absolute value takes [m].
-
-    Returns
-    -------
-    pyvista.PolyData
-    """
-    pv = load_pyvista()
-    values = np.asarray(values, float)
-    angle = 2 * np.pi * np.arange(len(values)) / len(values)
-    r = radius + height * values / (np.abs(values).max(initial=0.0) or 1.0)
-    points = np.column_stack([r * np.cos(angle), r * np.sin(angle), np.zeros(len(values))])
-    curve = pv.PolyData(points, lines=np.concatenate([[len(values) + 1], np.arange(len(values)), [0]]))
-    curve.point_data["value"] = values
-    return curve
 
 
 def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
@@ -291,13 +215,12 @@ def deformed_picture(
     path: str | os.PathLike,
     *,
     field: str = "displacement",
-    scale: float | None = None,
     title: str = "",
     colour_label: str = "displacement [µm]",
     colour_factor: float = 1e6,
     size: int = 900,
 ) -> float:
-    """Picture of a deformed grid seen from above, coloured by the size of the displacement.
+    """Draw a deformed grid seen from above, coloured by the size of the displacement.
 
     Parameters
     ----------
@@ -307,8 +230,6 @@ def deformed_picture(
         PNG file.
     field : str
         Point data of the displacement.
-    scale : float, optional
-        Magnification; when omitted, the largest displacement takes 3 % of the largest radius.
     title : str
     colour_label : str
         What the colours mean, with the unit.
@@ -320,34 +241,23 @@ def deformed_picture(
     Returns
     -------
     float
-        The magnification.
+        The magnification, with which the largest displacement takes 3 % of the largest radius.
 
     Raises
     ------
-    CaseError
-        When the grid has no such field.
     FemgearError
         See `load_pyvista`.
     StorageError
         When the file cannot be written.
     """
-    pv = load_pyvista()
-    if field not in grid.point_data:
-        raise CaseError(
-            f"the grid has no field {field!r}", code="E-SHAPE", limit=", ".join(grid.point_data) or "none"
-        )
     u = np.asarray(grid.point_data[field])
-    length = np.linalg.norm(u, axis=1)
-    radius = np.abs(grid.points).max()
-    if scale is None:
-        scale = float(0.03 * radius / length.max()) if length.max() > 0 else 1.0
-    surface = linear_surface(grid)
+    length, radius = np.linalg.norm(u, axis=1), np.abs(grid.points).max()
+    scale = float(_LARGEST * radius / length.max()) if length.max() > 0 else 1.0
+    surface = _linear_surface(grid)
     rest = surface.extract_feature_edges(**_OUTLINE)
     surface.points = grid.points + scale * u
-    surface.point_data.clear()
     surface.point_data[colour_label] = colour_factor * length
-    plotter = pv.Plotter(off_screen=True, window_size=[size, size])
-    plotter.enable_anti_aliasing("ssaa")
+    plotter = new_plotter(size)
     plotter.add_mesh(rest, color="#A0A0A0", line_width=1.0, lighting=False)
     add_coloured(plotter, surface, colour_label, size, cmap="cividis")
     plotter.add_mesh(surface.extract_feature_edges(**_OUTLINE), color="black", line_width=1.2, lighting=False)
@@ -357,14 +267,20 @@ def deformed_picture(
         add_text(plotter, text.strip(), size)
     look_down(plotter, radius * 1.1)
     write_png(plotter, path)
-    return float(scale)
+    return scale
 
 
-def linear_surface(grid: pv.UnstructuredGrid) -> pv.PolyData:
-    """Every quadratic triangle as four flat ones on the same points."""
-    pv = load_pyvista()
+def new_plotter(size: int) -> pv.Plotter:
+    """Make a plotter of `size` by `size` pixels without a screen, with smooth edges."""
+    plotter = load_pyvista().Plotter(off_screen=True, window_size=[size, size])
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
+
+
+def _linear_surface(grid: pv.UnstructuredGrid) -> pv.PolyData:
+    """Split every quadratic triangle into four flat ones on the same points."""
     cells = grid.cells.reshape(-1, 7)[:, 1:]
-    return pv.PolyData.from_regular_faces(np.array(grid.points), cells[:, _SPLIT].reshape(-1, 3))
+    return load_pyvista().PolyData.from_regular_faces(np.array(grid.points), cells[:, _SPLIT].reshape(-1, 3))
 
 
 def add_coloured(
@@ -377,7 +293,7 @@ def add_coloured(
     limits=None,
     colours: int = 256,
 ) -> None:
-    """A mesh coloured by its point data `text`, with a colour bar of that title under the scene."""
+    """Add a mesh coloured by its point data `text`, with a colour bar of that title under the scene."""
     plotter.add_mesh(
         mesh,
         scalars=text,
@@ -399,33 +315,35 @@ def add_coloured(
             "color": "black",
         },
     )
-    points = _font(size)
     # Arial is about half as wide as high; text is placed by its lower left corner in pixels
-    left = 0.5 * size - 0.42 * points * len(text)
+    left = 0.5 * size - 0.42 * _font(size) * len(text)
+    _add_text_at(plotter, text, (left, 0.012 * size), size, "bar title")
+
+
+def add_text(plotter: pv.Plotter, text: str, size: int) -> None:
+    """Add text in the upper left corner of a picture of so many pixels."""
+    top = size - 2.6 * _font(size) * (1 + text.count("\n")) - 0.01 * size
+    _add_text_at(plotter, text, (0.02 * size, top), size, "title")
+
+
+def _add_text_at(plotter: pv.Plotter, text: str, place: tuple[float, float], size: int, name: str) -> None:
+    """Add text with its lower left corner at a place in pixels."""
     write: Any = plotter.add_text  # its size need not be whole
-    write(text, position=(left, 0.012 * size), font_size=points, color="black", name="bar title")
-
-
-def add_text(plotter: pv.Plotter, text: str, size: int, *, name: str = "title") -> None:
-    """Text in the upper left corner; a second call with the same name replaces it."""
-    points = _font(size)
-    top = size - 2.6 * points * (1 + text.count("\n")) - 0.01 * size
-    write: Any = plotter.add_text  # its size need not be whole
-    write(text, position=(0.02 * size, top), font_size=points, color="black", name=name)
-
-
-def rounded(value: float) -> str:
-    """Two significant figures, without an exponent."""
-    return f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
+    write(text, position=place, font_size=_font(size), color="black", name=name)
 
 
 def _font(size: int) -> float:
-    """Size of the letters of a picture of so many pixels."""
+    """Choose the size of the letters of a picture of so many pixels."""
     return max(size / 75, 7.0)
 
 
+def rounded(value: float) -> str:
+    """Round to two significant figures, without an exponent."""
+    return f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
+
+
 def look_down(plotter: pv.Plotter, half_height: float) -> None:
-    """Parallel view on the plane of the set, with room for title and colour bar."""
+    """Set a parallel view on the plane of the set [m], with room for title and colour bar."""
     view: Any = plotter  # its methods have decorators that hide what they take
     view.set_background("white")
     view.view_xy()
@@ -449,264 +367,3 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
     iio.imwrite(stream, image, extension=".png")
     data = stream.getvalue()
     replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
-
-
-def animate_operating_deflection(
-    path: str | os.PathLike,
-    planetary_set: PlanetarySet,
-    *,
-    radial: np.ndarray,
-    tangential: np.ndarray | None = None,
-    sensor_angle: float = 0.0,
-    clockwise: bool = False,
-    title: str = "",
-    frames: int = 48,
-    size: int = 480,
-) -> int:
-    """Animate one revolution of the carrier, six seconds; every frame is a true instant of the motion.
-
-    The mean deflection, which turns with the carrier, is left out; the largest displacement takes 9 % of the
-    outer radius.
-
-    The number of frames is adjusted so that the meshes, seen frame by frame, pass slowly through a few
-    cycles, as under a stroboscope (see `strobe_frames`).
-
-    Parameters
-    ----------
-    path : path-like
-        ``.gif`` (or ``.mp4`` where imageio-ffmpeg is installed).
-    planetary_set : PlanetarySet
-    radial, tangential : (H + 1, 2 n_max + 1) complex arrays
-        Components of the outer surface's displacement [m]:
-        ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier.
-    sensor_angle : float
-        Place of the fixed sensor on the housing [rad].
-    clockwise : bool
-        Whether the carrier turns clockwise.
-    title : str
-    frames : int
-        Number of frames wished for.
-    size : int
-        Width and height in pixels.
-
-    Returns
-    -------
-    int
-        Number of frames written.
-
-    Raises
-    ------
-    CaseError
-        Components of unequal or even-sized shape, or a suffix that is neither .gif nor .mp4.
-    FemgearError
-        Without the OpenGL library, or without imageio-ffmpeg for .mp4.
-    StorageError
-        When the file cannot be written.
-    """
-    radial = np.asarray(radial, complex)
-    tangential = np.zeros_like(radial) if tangential is None else np.asarray(tangential, complex)
-    if radial.ndim != 2 or radial.shape[1] % 2 == 0 or radial.shape != tangential.shape:
-        raise CaseError(
-            f"components of shape {radial.shape} and {tangential.shape}",
-            code="E-SHAPE",
-            limit="(H + 1, 2 n_max + 1), equal for both directions",
-        )
-    _check_suffix(path)
-    field = _Field(radial, tangential, -1.0 if clockwise else 1.0, planetary_set.ring.teeth)
-    count = strobe_frames(planetary_set.ring.teeth, frames)
-    carrier = field.turn * 2 * np.pi * np.arange(count) / count
-    images = _draw(planetary_set, field, carrier, sensor_angle, title, size)
-    _write(path, images)
-    return count
-
-
-def strobe_frames(ring_teeth: int, wished: int) -> int:
-    """Number of frames a revolution, near the one wished for, that shows the mesh cycle in slow motion.
-
-    With ``F`` frames the mesh passes ``ring_teeth / F`` cycles from one frame to the next, of which the
-    eye sees the fraction: ``ring_teeth mod F`` apparent cycles a revolution, of about twelve frames each.
-    """
-    around = range(max(3 * wished // 4, 2), max(5 * wished // 4, 3) + 1)
-    moving = [count for count in around if ring_teeth % count]
-    if not moving:
-        return wished
-    return min(moving, key=lambda count: (abs(count / (ring_teeth % count) - 12.0), abs(count - wished)))
-
-
-def _check_suffix(path) -> None:
-    """Refuse animations that cannot be written, before they are drawn."""
-    suffix = Path(path).suffix
-    if suffix not in (".gif", ".mp4"):
-        raise CaseError("unknown kind of animation", code="E-CHOICE", value=str(path), limit=".gif or .mp4")
-    if suffix == ".mp4":
-        try:
-            import imageio_ffmpeg  # noqa: F401 # pyright: ignore[reportMissingImports]
-        except ImportError:
-            raise FemgearError(
-                "MP4 needs the package imageio-ffmpeg, which is not installed",
-                code="E-SYSTEM-LIBRARY",
-                remedy="pip install imageio-ffmpeg, or write a .gif",
-            ) from None
-
-
-@dataclass(frozen=True)
-class _Field:
-    """Deflection of the ring in the frame of the carrier, sampled by angle and instant."""
-
-    radial: np.ndarray
-    tangential: np.ndarray
-    turn: float
-    teeth: int
-    mean: bool = False
-
-    def at(self, angle: np.ndarray, carrier_angle: float) -> tuple[np.ndarray, np.ndarray]:
-        """Radial and tangential displacement [m] at housing angles, the carrier at `carrier_angle`."""
-        harmonics, n_max = self.radial.shape[0], self.radial.shape[1] // 2
-        h = np.arange(harmonics)
-        # the mesh frequency is the ring's number of teeth times the carrier's, whichever way it turns
-        time = np.exp(1j * h * self.teeth * carrier_angle * self.turn) * ((h > 0) | self.mean)
-        wave = np.exp(1j * np.outer(angle - carrier_angle, np.arange(-n_max, n_max + 1)))
-        return (wave @ (time @ self.radial)).real, (wave @ (time @ self.tangential)).real
-
-
-def _draw(planetary_set, field, carrier, sensor_angle, title, size):
-    """Frames as arrays (size, size, 3)."""
-    pv = load_pyvista()
-    outer = planetary_set.ring.rim_radius
-    corners = _ring_corners(planetary_set)
-    ring_angle = np.angle(corners)
-    around = np.linspace(0.0, 2 * np.pi, 181)
-    largest = max(np.hypot(*field.at(around, c)).max() for c in carrier)
-    colour = max(np.abs(field.at(around, c)[0]).max() for c in carrier) * 1e6 or 1.0
-    scale = 0.09 * outer / largest if largest > 0 else 1.0
-    text = "radial displacement [µm]"
-    ring = pv.PolyData.from_regular_faces(_plane(corners.ravel()), _strip_faces(*corners.shape))
-    ring.point_data[text] = np.zeros(corners.size)
-    plotter = pv.Plotter(off_screen=True, window_size=[size, size])
-    plotter.enable_anti_aliasing("ssaa")
-    plotter.add_mesh(
-        _closed_line(pv, outer * np.exp(1j * around[:-1])), color="#808080", line_width=1.0, lighting=False
-    )
-    add_coloured(plotter, ring, text, size, cmap="RdBu_r", limits=(-colour, colour), colours=21)
-    edges = [_closed_line(pv, corners[:, column]) for column in (0, -1)]
-    for edge in edges:
-        plotter.add_mesh(edge, color="#404040", line_width=1.0, lighting=False)
-    discs = _discs(pv, plotter, planetary_set)
-    _add_sensor(pv, plotter, sensor_angle, outer * 1.1, outer)
-    add_text(plotter, f"{title}\nring deflection × {rounded(scale)}, triangle: fixed sensor".strip(), size)
-    look_down(plotter, outer * 1.26)
-    images = []
-    try:
-        for angle in carrier:
-            radial, tangential = (u.reshape(corners.shape) for u in field.at(ring_angle.ravel(), angle))
-            moved = corners + scale * (radial + 1j * tangential) * np.exp(1j * ring_angle)
-            ring.points = _plane(moved.ravel())
-            ring.point_data[text] = 1e6 * radial.ravel()
-            for edge, column in zip(edges, (0, -1)):
-                edge.points = _plane(moved[:, column])
-            for (centre, turn), pairs in zip(_places(planetary_set, angle), discs):
-                for mesh, outline in pairs:
-                    mesh.points = _plane(centre + outline * np.exp(1j * turn))
-            plotter.render()
-            images.append(np.asarray(plotter.screenshot(filename=None, return_img=True))[..., :3])
-    finally:
-        plotter.close()
-    return images
-
-
-def gear_outline(gear: Gear) -> np.ndarray:
-    """Points of the exact outline of all teeth, the first centred on angle 0.
-
-    Parameters
-    ----------
-    gear : Gear
-
-    Returns
-    -------
-    (n,) complex array
-        [m], counter-clockwise: involutes with their generated fillets, tip and root circles.
-    """
-    half = half_sector(gear, flank_elements=_FLANK, refine=_COARSE)
-    parts = [half.curve(name) for name, _ in half.curves if name in ("tip", "flank", "fillet", "root")]
-    # curves of a sector run round it: those of an internal gear come towards its tooth
-    points = np.concatenate(parts)[:: -1 if gear.internal else 1]
-    points = points[:, 0] + 1j * points[:, 1]
-    points = points[np.append(True, np.abs(np.diff(points)) > 1e-9 * gear.module)]
-    # without the middles of tooth and gap, which belong to both halves
-    tooth = np.concatenate([points[:0:-1].conj(), points[:-1]])
-    return np.concatenate([tooth * np.exp(2j * np.pi * k / gear.teeth) for k in range(gear.teeth)])
-
-
-def _ring_corners(planetary_set):
-    """Points of the ring (around, across) from the teeth to the outer circle, complex."""
-    ring = planetary_set.ring
-    inner = gear_outline(ring) * np.exp(1j * orientations(planetary_set).ring)
-    # flanks are not radial, so each inner point has its outer one at its own angle
-    outer = ring.rim_radius * np.exp(1j * np.angle(inner))
-    across = np.linspace(0.0, 1.0, 3)
-    return inner[:, None] * (1 - across) + outer[:, None] * across
-
-
-def _places(planetary_set, carrier_angle):
-    """Centre and rotation of the sun and of every planet when the carrier has turned, ring held."""
-    s = planetary_set
-    # against the carrier the ring turns back by a tooth in every mesh period
-    at = orientations(s, s.ring.teeth * carrier_angle / (2.0 * np.pi))
-    centres = s.centre_distance * np.exp(1j * (np.asarray(s.planet_angles, float) + carrier_angle))
-    turns = (carrier_angle + angle for angle in at.planets)
-    return [(0j, at.sun + carrier_angle), *zip(centres, turns)]
-
-
-def _discs(pv, plotter, planetary_set):
-    """Sun and planets, with a mark each: for every body its meshes and their points in its own frame."""
-    discs = []
-    sun, planet = planetary_set.sun, planetary_set.planet
-    for gear, colour in ((sun, _SUN), *((planet, _PLANET) for _ in planetary_set.planet_angles)):
-        edge = gear_outline(gear)
-        mark = gear.root_radius * 0.8 + 0.07 * gear.root_radius * np.exp(2j * np.pi * np.arange(12) / 12)
-        discs.append([])
-        for outline, tint in ((edge, colour), (mark, _MARK)):
-            points = np.append(outline, outline.mean())
-            n = len(outline)
-            fan = np.column_stack([np.arange(n), (np.arange(n) + 1) % n, np.full(n, n)])
-            mesh = pv.PolyData.from_regular_faces(_plane(points), fan)
-            plotter.add_mesh(mesh, color=tint, lighting=False)
-            discs[-1].append((mesh, points))
-    return discs
-
-
-def _add_sensor(pv, plotter, angle, radius, size):
-    """A triangle that points at the ring from outside."""
-    direction = np.exp(1j * angle)
-    tip = radius * direction
-    points = tip + size * direction * np.array([0.0, 0.12 + 0.035j, 0.12 - 0.035j])
-    mesh = pv.PolyData.from_regular_faces(_plane(points), [[0, 1, 2]])
-    plotter.add_mesh(mesh, color=_SENSOR, lighting=False)
-
-
-def _closed_line(pv, points):
-    """Mesh of a closed line through complex points."""
-    return pv.PolyData(_plane(points), lines=[len(points) + 1, *range(len(points)), 0])
-
-
-def _strip_faces(around: int, across: int) -> np.ndarray:
-    """Triangles of a closed strip of points numbered around first, across second."""
-    i, j = np.meshgrid(np.arange(around), np.arange(across - 1), indexing="ij")
-    a, b = i * across + j, ((i + 1) % around) * across + j
-    return np.concatenate([np.stack([a, b, a + 1], -1), np.stack([a + 1, b, b + 1], -1)]).reshape(-1, 3)
-
-
-def _plane(points) -> np.ndarray:
-    """Complex points as points in space, (n, 3)."""
-    return np.column_stack([points.real, points.imag, np.zeros(len(points))])
-
-
-def _write(path, images):
-    """Write frames as GIF or MP4, whole or not at all."""
-    import imageio.v3 as iio
-
-    pace: dict[str, Any] = {"fps": max(round(len(images) / _SECONDS), 1)}
-    if Path(path).suffix == ".gif":
-        pace = {"duration": 1000.0 * _SECONDS / len(images), "loop": 0}
-    size = sum(image.nbytes for image in images) // 20
-    replace_file(path, lambda temporary: iio.imwrite(temporary, images, **pace), size=size)

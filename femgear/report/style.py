@@ -19,7 +19,7 @@ COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":")
 MARKERS = "osD^vPX*<>"
 SIZE = 11
-DPI = 120
+_DPI = 120
 _LEGEND_ROW = 0.21
 """Height of a row of the legend [in]."""
 
@@ -34,7 +34,7 @@ def new_figure(
     sharey: bool = False,
     polar: bool = False,
 ):
-    """A figure outside pyplot, and its axes as a flat list.
+    """Make a figure outside pyplot, and its axes as a flat list.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def new_figure(
 
 
 def label(ax, x: str = "", y: str = "", title: str = "") -> None:
-    """Axis labels with units, and a title."""
+    """Set axis labels with units, and a title."""
     if x:
         ax.set_xlabel(x, fontsize=SIZE)
     if y:
@@ -72,7 +72,7 @@ def label(ax, x: str = "", y: str = "", title: str = "") -> None:
 
 
 def legend_below(figure: Figure, ax=None, *, columns: int = 3) -> None:
-    """One legend under the figure, where it hides nothing; entries of equal text appear once.
+    """Add one legend under the figure, where it hides nothing; entries of equal text appear once.
 
     The figure grows by the rows beyond the third, so that many entries leave the axes their size.
     """
@@ -94,7 +94,7 @@ def legend_below(figure: Figure, ax=None, *, columns: int = 3) -> None:
 
 
 def line_style(index: int) -> dict[str, str]:
-    """Colour and dash of the line number `index`: neighbours differ in both, 28 lines in one of them."""
+    """Choose colour and dash of the line number `index`: neighbours differ in both, 28 lines in one."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
 
 
@@ -116,9 +116,9 @@ def save_figure(figure: Figure, path: str | os.PathLike) -> None:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """The figure as PNG; the same figure gives the same bytes."""
+    """Draw the figure as PNG; the same figure gives the same bytes."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
+    figure.savefig(stream, format="png", dpi=_DPI, metadata={"Software": None})
     return stream.getvalue()
 
 
@@ -166,12 +166,17 @@ def periodic(position, values):
 
 
 def excited_to(data, speed_index: int) -> str:
-    """Highest frequency of the excitation at one speed, for a title; empty where it is not known."""
+    """Write the highest frequency of the excitation at a speed, for a title; empty where it is not known."""
     if "excitation_limit" not in data:
         return ""
     return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
 
 
 def rpm(speed: float) -> str:
-    """Input speed in a title; speeds in datasets are in rpm."""
+    """Write an input speed in a title; speeds in datasets are in rpm."""
     return f"{float(speed):.6g} rpm"
+
+
+def xy(points):
+    """Split complex points into both coordinates."""
+    return points.real, points.imag

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 from femgear.report.tables import Block
 
 if TYPE_CHECKING:
+    from femgear.errors import Finding
     from femgear.storage.results import Results
     from femgear.trains.protocol import Train
 
 
 def describe_results(train: Train, results: Results) -> tuple[Block, ...]:
-    """The numbers of a run, one block a stage, and the time that each took.
+    """Tabulate the numbers of a run, one block a stage, and the time that each took.
 
     Parameters
     ----------
@@ -20,17 +21,14 @@ def describe_results(train: Train, results: Results) -> tuple[Block, ...]:
         Of the case.
     results : Results
 
-    Returns
-    -------
-    tuple of Block
     """
     blocks = [stage.describe(results) for stage in train.stages if stage.name in results.stages]
     timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
     return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
 
 
-def case_warnings(train: Train, case) -> tuple[str, ...]:
-    """What a case is allowed to be but deserves a look: sentences that begin with ``[W-...]``.
+def case_warnings(train: Train, case) -> tuple[Finding, ...]:
+    """What a case is allowed to be but deserves a look, each once.
 
     Raises
     ------
@@ -40,6 +38,6 @@ def case_warnings(train: Train, case) -> tuple[str, ...]:
     return tuple(dict.fromkeys(train.warnings(case)))
 
 
-def result_warnings(train: Train, results: Results) -> tuple[str, ...]:
-    """What the solvers say against their own results, in sentences."""
+def result_warnings(train: Train, results: Results) -> tuple[Finding, ...]:
+    """What the solvers say against their own results, each once."""
     return tuple(dict.fromkeys(train.result_warnings(results)))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from femgear.errors import Finding, remark
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,82 +40,77 @@ class Block:
     notes: tuple[str, ...] = ()
 
 
+def tabulate(
+    title: str, items: Iterable, columns: Mapping[str, Callable[[Any], str]], notes: Iterable[str] = ()
+) -> Block:
+    """Make a table with a row for every item.
+
+    Parameters
+    ----------
+    title : str
+    items : iterable
+    columns : mapping of str to callable
+        The text of an item in every column, by the name of the column.
+    notes : iterable of str
+    """
+    rows = tuple(tuple(text(item) for text in columns.values()) for item in items)
+    return Block(title, tuple(columns), rows, tuple(notes))
+
+
 def describe_modes(data: xr.Dataset) -> Block:
-    """Natural frequencies, kinds and nodal diameters of the first modes of modes.nc."""
-    shown = min(data.sizes["mode"], _MODES)
-    rows = tuple(
-        (
-            str(i + 1),
-            f"{float(data.frequency[i]):.2f}",
-            str(data.kind.values[i]),
-            "-" if data.nodal_diameter[i] < 0 else str(int(data.nodal_diameter[i])),
-        )
-        for i in range(shown)
-    )
-    notes = (
-        f"{data.sizes['mode']} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown",
-    )
-    return Block("Modes", ("mode", "frequency [Hz]", "kind", "nodal diameters"), rows, notes)
+    """Tabulate natural frequencies, kinds and nodal diameters of the first modes of modes.nc."""
+    count, shown = data.sizes["mode"], min(data.sizes["mode"], _MODES)
+    columns = {
+        "mode": lambda i: str(i + 1),
+        "frequency [Hz]": lambda i: f"{float(data.frequency[i]):.2f}",
+        "kind": lambda i: str(data.kind.values[i]),
+        "nodal diameters": lambda i: "-" if data.nodal_diameter[i] < 0 else str(int(data.nodal_diameter[i])),
+    }
+    note = f"{count} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown"
+    return tabulate("Modes", range(shown), columns, (note,))
 
 
 def describe_response(data: xr.Dataset) -> Block:
-    """Transmission error, convergence and stability at every speed of dynamics.nc."""
+    """Tabulate transmission error, convergence and stability at every speed of dynamics.nc."""
     dte = np.hypot(data.dte_real.values, data.dte_imag.values)  # speed, mesh, harmonic
     rms = np.sqrt(0.5 * (dte[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
     largest = np.abs(data.floquet_multiplier.values)
     stable = data.stable.values.astype(bool) if "stable" in data else largest < 1.0
-    # helical cases are excited by a number of harmonics
-    reach = [()] * data.sizes["speed"]
-    if "excitation_limit" in data:
-        reach = [(f"{value / 1e3:.2f}",) for value in data.excitation_limit.values]
-    rows = tuple(
-        (
-            f"{float(data.speed[i]):.2f}",
-            f"{float(data.mesh_frequency[i]):.2f}",
-            *reach[i],
-            f"{rms[i] * 1e6:.4f}",
-            str(data.method.values[i]),
-            str(int(data.iterations[i])),
-            f"{float(data.spectral_radius[i]):.4f}",
-            f"{largest[i]:.4f}",
-            "yes" if bool(data.converged[i]) else "NO",
-        )
-        for i in chosen(data.sizes["speed"])
-    )
-    header = (
-        "speed [rpm]",
-        "mesh [Hz]",
-        *(("excited up to [kHz]",) if reach[0] else ()),
-        "DTE rms [um]",
-        "method",
-        "iterations",
-        "radius",
-        "Floquet",
-        "converged",
-    )
-    notes = (
+    columns = {
+        "speed [rpm]": lambda i: f"{float(data.speed[i]):.2f}",
+        "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.2f}",
+        "excited up to [kHz]": lambda i: f"{data.excitation_limit.values[i] / 1e3:.2f}",
+        "DTE rms [um]": lambda i: f"{rms[i] * 1e6:.4f}",
+        "method": lambda i: str(data.method.values[i]),
+        "iterations": lambda i: str(int(data.iterations[i])),
+        "radius": lambda i: f"{float(data.spectral_radius[i]):.4f}",
+        "Floquet": lambda i: f"{largest[i]:.4f}",
+        "converged": lambda i: "yes" if bool(data.converged[i]) else "NO",
+    }
+    if "excitation_limit" not in data:
+        # helical cases are excited by a number of harmonics
+        del columns["excited up to [kHz]"]
+    notes = [
         "DTE rms: the largest of all meshes, without its mean; iterations, radius: of the fixed point,",
         "which contracts below 1; Floquet: largest multiplier, stable up to 1 (exactly 1 without damping)",
         f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
-    )
+    ]
     if "level_change" in data:
         change = np.abs(data.level_change.values)
-        notes += (
+        notes.append(
             f"level of the housing with excitation up to {data.attrs['compared_to'] / 1e3:.4g} kHz: "
-            f"{np.nanmax(change):.2g} dB away at most, at {int(np.isfinite(change).sum())} speeds looked at",
+            f"{np.nanmax(change):.2g} dB away at most, at {int(np.isfinite(change).sum())} speeds looked at"
         )
-    return Block("Dynamics", header, rows, notes)
+    return tabulate("Dynamics", chosen(data.sizes["speed"]), columns, notes)
 
 
 def chosen(count: int) -> Iterator[int]:
-    """All indices of a short list, the first and last of a long one."""
+    """Choose all indices of a short list, the first and last of a long one."""
     return (i for i in range(count) if count <= MANY or i < MANY // 2 or i >= count - MANY // 2)
 
 
-def response_warnings(data: xr.Dataset) -> Iterator[str]:
-    """What the solver says against the periodic responses of dynamics.nc, in sentences."""
-    if warnings := str(data.attrs.get("warnings", "")):
-        yield from (f"[{text.strip()}" for text in warnings.split("[") if text)
+def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """What the solver says against the periodic responses of dynamics.nc."""
     speed = data["speed"].values
     for bad, text in (
         (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),
@@ -122,4 +119,4 @@ def response_warnings(data: xr.Dataset) -> Iterator[str]:
         if bad.any():
             shown = ", ".join(f"{value:.6g}" for value in speed[bad][:_NAMED])
             rest = np.count_nonzero(bad) - _NAMED
-            yield f"{text} {shown} rpm{f' and {rest} more speeds' if rest > 0 else ''}"
+            yield remark(f"{text} {shown} rpm{f' and {rest} more speeds' if rest > 0 else ''}")

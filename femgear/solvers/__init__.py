@@ -3,7 +3,7 @@
 `docs/solvers.md` says which one answers which question. Names are imported when they are first asked for.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -37,17 +37,18 @@ if TYPE_CHECKING:
     from femgear.solvers.time.transient import solve_transient
 
 
-def lazy_names(package: str, names: Sequence[str], modules: Sequence[str]) -> Callable[[str], object]:
-    """Make the ``__getattr__`` of a package that finds its public names in its modules, searched in order."""
+def lazy_names(
+    package: str, modules: Mapping[str, Sequence[str]]
+) -> tuple[list[str], Callable[[str], object]]:
+    """Make ``__all__`` and ``__getattr__`` of a package whose public names stand in its modules."""
+    place = {name: module for module, names in modules.items() for name in names}
 
     def find(name: str) -> object:
-        for module in modules if name in names else ():
-            found = import_module(f"{package}.{module}")
-            if hasattr(found, name):
-                return getattr(found, name)
+        if name in place:
+            return getattr(import_module(f"{package}.{place[name]}"), name)
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
 
-    return find
+    return sorted(place), find
 
 
 __all__ = [
@@ -76,4 +77,12 @@ __all__ = [
     "sweep_response",
     "sweep_up_and_down",
 ]
-__getattr__ = lazy_names(__name__, __all__, ("continuation", "linear", "periodic", "stability", "time"))
+
+
+def __getattr__(name: str) -> object:
+    """Find a public name in the package that has it."""
+    for package in ("continuation", "linear", "periodic", "stability", "time") if name in __all__ else ():
+        found = import_module(f"{__name__}.{package}")
+        if name in found.__all__:
+            return getattr(found, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

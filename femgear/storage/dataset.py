@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.storage.files import write_text
+
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import pandas as pd
     import xarray as xr
 
     from femgear.system.rigid_bodies import RigidSet
@@ -20,7 +22,7 @@ MEMBERS = ("carrier", "ring", "sun")
 
 
 def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
-    """Dataset of entries ``(dims, values, units, long_name)``; dims are names, or one text with spaces."""
+    """Make a dataset of entries ``(dims, values, units, long_name)``; dims as names or one text."""
     import xarray as xr
 
     def made(entries):
@@ -36,59 +38,59 @@ def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
     return xr.Dataset(made(variables), coords=made(coords), attrs=attrs)
 
 
+def declared(texts: Mapping[str, tuple[str, str, str]], values: Mapping[str, Any]) -> dict[str, tuple]:
+    """Join declarations ``(dims, units, long_name)`` with values by name; what has no value is left out."""
+    return {
+        name: (dims, values[name], units, words)
+        for name, (dims, units, words) in texts.items()
+        if name in values
+    }
+
+
 def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
-    """Write the variables of a stage as CSV files, one for each set of dimensions; returns the file names.
+    """Write the variables of a stage as CSV files, one for each set of dimensions; headers carry the units.
 
     ``modes_dof_mode.csv`` holds the variables over degrees of freedom and modes, a line for each pair;
-    ``modes.csv`` holds single numbers and the attributes of the file.
-    """
-    from femgear.storage.files import write_text
-
-    names = []
-    for dims, frame in csv_tables(data).items():
-        names.append("_".join((stage, *dims)) + ".csv")
-        write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])
-    return names
-
-
-def csv_tables(data: xr.Dataset) -> dict[tuple[str, ...], pd.DataFrame]:
-    """Tables of the variables of a stage by their dimensions; headers carry the units.
+    ``modes.csv`` holds single numbers and the attributes of the file, a line for each.
 
     Returns
     -------
-    dict of tuple of str to DataFrame
-        Under ``()`` single numbers and attributes, in rows of name, value and unit.
+    list of str
+        File names.
     """
     import pandas as pd
 
-    flat = data.reset_coords()
+    flat, tables = data.reset_coords(), {}
     single = [
         *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
         *((str(name), str(value), "") for name, value in data.attrs.items()),
     ]
-    tables: dict[tuple[str, ...], pd.DataFrame] = {}
     if single:
         tables[()] = pd.DataFrame(single, columns=["name", "value", "unit"])
     for dims in dict.fromkeys(one.dims for one in flat.values() if one.dims):
         chosen = [name for name, one in flat.items() if one.dims == dims]
         frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
-        headers = {str(name): _header(flat, str(name)) for name in frame}
-        tables[tuple(map(str, dims))] = frame.rename(columns=headers)
-    return tables
+        tables[dims] = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
+    names = []
+    for dims, frame in tables.items():
+        names.append("_".join((stage, *dims)) + ".csv")
+        write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])
+    return names
 
 
 def _unit(one: xr.DataArray) -> str:
-    """Unit of a number, nothing for text."""
+    """Tell the unit of a number, nothing for text."""
     return "" if one.dtype.kind in "OUSb" else str(one.attrs.get("units", "1"))
 
 
 def _header(data: xr.Dataset, name: str) -> str:
+    """Write a name with its unit; dimensions without values of their own are numbers."""
     unit = _unit(data[name]) if name in data.variables else "1"
     return f"{name} [{unit}]" if unit else name
 
 
 def complex_entries(entries) -> dict[str, tuple]:
-    """Real and imaginary parts of entries ``(name, dims, values, units, long_name)``."""
+    """Split entries into real and imaginary parts, from ``(name, dims, values, units, long_name)``."""
     found = {}
     for name, dims, values, units, words in entries:
         found[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
@@ -97,7 +99,7 @@ def complex_entries(entries) -> dict[str, tuple]:
 
 
 def response_entries(result: Any) -> dict[str, tuple]:
-    """What is known of the periodic response at every speed: frequency, convergence, stability.
+    """List what is known of the periodic response at every speed: frequency, convergence, stability.
 
     Of any result with a response, its stability and the speeds of the members.
     """

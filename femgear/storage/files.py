@@ -11,6 +11,7 @@ import hashlib
 import os
 import re
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,9 @@ from femgear.errors import StorageError
 
 if TYPE_CHECKING:
     import xarray as xr
+
+if sys.platform != "win32":
+    import fcntl
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
@@ -63,7 +67,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
-    """Dataset of a file that `write_dataset` wrote, loaded into memory.
+    """Read a file that `write_dataset` wrote into memory.
 
     The file is walked first: links, data kept in other files, unusual types and declared sizes that the
     file cannot hold are refused before anything is read.
@@ -71,7 +75,7 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     Raises
     ------
     StorageError
-        ``E-STORAGE`` (missing, truncated, checksum), ``E-FORMAT`` (see above), ``E-FORMAT``.
+        ``E-STORAGE`` (missing, truncated, checksum), ``E-FORMAT`` (see above; of another femgear).
     """
     import xarray as xr
 
@@ -85,7 +89,7 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
         raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
     version = dataset.attrs.get("femgear_format")
-    if version is None or int(version) > FORMAT:
+    if not isinstance(version, int | np.integer) or version > FORMAT:
         raise StorageError(
             "not written by this version of femgear",
             code="E-FORMAT",
@@ -141,13 +145,13 @@ def write_text(text: str, path: str | os.PathLike) -> None:
 
 
 def checksum(path: str | os.PathLike) -> str:
-    """SHA-256 of a file."""
+    """Compute the SHA-256 of a file."""
     with storage_errors(path), open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def checked_name(name: str) -> str:
-    """``name`` if every file system takes it as one plain file name, else refused.
+    """Refuse a name that some file system does not take as one plain file name.
 
     Raises
     ------
@@ -165,7 +169,7 @@ def checked_name(name: str) -> str:
 
 
 def is_safe_path(name: str) -> bool:
-    """Whether a relative path stays in its folder and has plain names only."""
+    """Tell whether a relative path stays in its folder and has plain names only."""
     path = Path(name)
     return (
         bool(path.parts)
@@ -186,15 +190,38 @@ def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
     StorageError
         ``E-LOCKED``: another process, or another block of this one, holds it.
     """
+    if sys.platform == "win32":
+        yield
+        return
     path = Path(path)
     with storage_errors(path):
-        descriptor = _locked(path)
+        # whoever held it before may have removed the file that was opened
+        while (descriptor := _locked(path)) is None:
+            pass
     try:
         yield
     finally:
         path.unlink(missing_ok=True)
-        if descriptor is not None:
+        os.close(descriptor)
+
+
+def _locked(path: Path) -> int | None:
+    """Open and lock a file; nothing where the path names another file by now."""
+    descriptor, held = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644), False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        held = path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor))
+    except BlockingIOError:
+        raise StorageError(
+            "another run is writing into this folder",
+            code="E-LOCKED",
+            file=str(path.parent),
+            remedy="wait until it has ended, or name another folder",
+        ) from None
+    finally:
+        if not held:
             os.close(descriptor)
+    return descriptor if held else None
 
 
 @contextlib.contextmanager
@@ -207,7 +234,7 @@ def storage_errors(path: str | os.PathLike) -> Iterator[None]:
 
 
 def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
-    """The `StorageError` that says what an `OSError` says, ``E-DISK-FULL`` or ``E-STORAGE``."""
+    """Say what an `OSError` says in a `StorageError`, ``E-DISK-FULL`` or ``E-STORAGE``."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
     return StorageError(
         error.strerror or str(error),
@@ -217,33 +244,8 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
     )
 
 
-def _locked(path: Path) -> int | None:
-    try:
-        import fcntl
-    except ImportError:
-        return None
-    while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # whoever held it before may have removed the file that is open here
-            if path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor)):
-                return descriptor
-        except BlockingIOError:
-            os.close(descriptor)
-            raise StorageError(
-                "another run is writing into this folder",
-                code="E-LOCKED",
-                file=str(path.parent),
-                remedy="wait until it has ended, or name another folder",
-            ) from None
-        except BaseException:
-            os.close(descriptor)
-            raise
-        os.close(descriptor)
-
-
 def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path: str | os.PathLike) -> None:
+    """Refuse a variable of a type that no file holds, or without unit or text."""
     if variable.dtype.kind not in "fiubOUS":
         raise StorageError(
             f"{name} has the type {variable.dtype}",
@@ -258,40 +260,33 @@ def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path:
 
 
 def _refuse_hostile(path: str | os.PathLike) -> None:
-    """Walk an HDF5 file and refuse what points out of it or cannot be in it."""
+    """Refuse an HDF5 file that points out of itself or holds what no result has (groups among it)."""
     import h5py
 
-    size = os.path.getsize(path)
-    declared, pending = 0, []
+    size, declared = os.path.getsize(path), 0
     with h5py.File(path, "r") as file:
-        pending.append(file)
-        while pending:
-            group = pending.pop()
-            for name in group:
-                if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-                    raise _hostile(path, name, "is a link")
-                item = group.get(name)
-                if isinstance(item, h5py.Group):
-                    # results have no groups, so a group that holds itself cannot be walked for ever
-                    raise _hostile(path, name, "is a group")
-                if not isinstance(item, h5py.Dataset):
-                    raise _hostile(path, name, "is a named type")
-                if item.external or item.is_virtual:
-                    raise _hostile(path, name, "keeps its data in other files")
-                if not _is_plain(item.dtype):
-                    raise _hostile(path, name, f"has the type {item.dtype}")
-                declared += item.size * item.dtype.itemsize
+        for name in file:
+            plain = isinstance(file.get(name, getlink=True), h5py.HardLink)
+            item = file.get(name) if plain else None
+            if not isinstance(item, h5py.Dataset):
+                raise _hostile(path, name, "is a link, a group or a named type")
+            if item.external or item.is_virtual:
+                raise _hostile(path, name, "keeps its data in other files")
+            if not _is_plain(item.dtype):
+                raise _hostile(path, name, f"has the type {item.dtype}")
+            declared += item.size * item.dtype.itemsize
     if declared > 4 * size + _MARGIN:
         raise _hostile(path, None, f"declares {declared:.3g} bytes in a file of {size}")
 
 
 def _is_plain(dtype: np.dtype) -> bool:
-    """Whether a type is a number, a truth value or a text."""
+    """Tell whether a type is a number, a truth value or a text."""
     import h5py
 
     return dtype.kind in "fiubS" or (dtype.kind == "O" and h5py.check_string_dtype(dtype) is not None)
 
 
 def _hostile(path: str | os.PathLike, name: str | None, what: str) -> StorageError:
+    """Make the refusal of a file, or of a name in it."""
     message = f"{name!a} {what}" if name else f"the file {what}"
     return StorageError(message, code="E-FORMAT", file=os.fspath(path), remedy="do not use this file")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import ItemsView, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -18,41 +18,21 @@ from femgear.storage.files import exclusive_lock, storage_errors
 
 FORMAT = 1
 """Of journals."""
+# what a journal with another entry of the header was written for
+_WRITTEN = {
+    "format": "by another version of femgear",
+    "femgear": "by another version of femgear",
+    "case": "for another case",
+    "keys": "for other design variables",
+}
 
 
 class Journal:
-    """Records by key, in memory and, with a file, on disk. Use `open_journal`.
+    """Records by key, in memory and, where `open_journal` made it, on disk."""
 
-    Parameters
-    ----------
-    path : path, optional
-        Without one nothing is kept on disk.
-    header : dict
-        First line of the file.
-
-    Raises
-    ------
-    StorageError
-        E-JOURNAL: the file has another header, or is no journal.
-    """
-
-    def __init__(self, path: Path | None = None, header: Mapping[str, object] | None = None):
+    def __init__(self, path: Path | None = None, stream: BinaryIO | None = None):
         self._records: dict[str, dict] = {}
-        self._file: tuple[Path, BinaryIO] | None = None
-        if path is not None:
-            with storage_errors(path):
-                self._file = path, open(path, "a+b")
-            try:
-                self._read(path, self._file[1], dict(header or {}))
-            except BaseException:
-                self.close()
-                raise
-
-    def __len__(self) -> int:
-        return len(self._records)
-
-    def __contains__(self, key: str) -> bool:
-        return key in self._records
+        self._path, self._stream = path, stream
 
     def get(self, key: str) -> dict | None:
         """Record of a key, or None."""
@@ -67,22 +47,15 @@ class Journal:
         self._records[key] = dict(record)
         self._write({"key": key, "record": self._records[key]})
 
-    def close(self) -> None:
-        """Close the file, if there is one."""
-        if self._file is not None:
-            self._file[1].close()
-            self._file = None
-
     def _write(self, line: dict) -> None:
         """Append a line and force it out."""
-        if self._file is None:
+        if self._path is None or self._stream is None:
             return
-        path, stream = self._file
-        with storage_errors(path):
+        with storage_errors(self._path):
             # a number that is not finite is no JSON, and no result either
-            stream.write(json.dumps(line, allow_nan=False).encode() + b"\n")
-            stream.flush()
-            os.fsync(stream.fileno())
+            self._stream.write(json.dumps(line, allow_nan=False).encode() + b"\n")
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
 
     def _read(self, path: Path, stream: BinaryIO, header: dict) -> None:
         """Take what the file holds; a line that a killed process left half written is cut off."""
@@ -90,17 +63,24 @@ class Journal:
             stream.seek(0)
             text = stream.read()
         whole = text.rfind(b"\n") + 1
-        lines = text[:whole].splitlines()
+        lines = [_line(line, path, number) for number, line in enumerate(text[:whole].splitlines(), 1)]
         # a file without a whole line is either the beginning of this header or none of ours
         if not lines and not json.dumps(header).encode().startswith(text):
             raise _broken(path, 1)
-        if lines:
-            _check(_line(lines[0], path, 1), header, path)
+        for name, expected in header.items():
+            if lines and lines[0].get(name) != expected:
+                raise StorageError(
+                    f"the journal was written {_WRITTEN[name]}",
+                    code="E-JOURNAL",
+                    file=str(path),
+                    value=lines[0].get(name),
+                    limit=str(expected),
+                    remedy="name a new file, or remove this one",
+                )
         for number, line in enumerate(lines[1:], 2):
-            entry = _line(line, path, number)
-            if not (isinstance(entry.get("key"), str) and isinstance(entry.get("record"), dict)):
+            if not (isinstance(line.get("key"), str) and isinstance(line.get("record"), dict)):
                 raise _broken(path, number)
-            self._records[entry["key"]] = entry["record"]
+            self._records[line["key"]] = line["record"]
         if whole < len(text):
             with storage_errors(path):
                 stream.truncate(whole)
@@ -112,7 +92,7 @@ class Journal:
 def open_journal(
     path: str | os.PathLike | None, *, version: str, case: str, keys: tuple[str, ...]
 ) -> Iterator[Journal]:
-    """A journal for a case and its design variables; while it is open no other process writes into it.
+    """Open the journal of a case and its design variables; meanwhile no other process writes into it.
 
     Parameters
     ----------
@@ -138,12 +118,17 @@ def open_journal(
     header = {"format": FORMAT, "femgear": version, "case": case, "keys": list(keys)}
     with storage_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-    with exclusive_lock(path.with_name(f".{path.name}.lock")), closing(Journal(path, header)) as journal:
-        yield journal
+    with exclusive_lock(path.with_name(f".{path.name}.lock")):
+        with storage_errors(path):
+            stream = open(path, "a+b")
+        with stream:
+            journal = Journal(path, stream)
+            journal._read(path, stream, header)
+            yield journal
 
 
 def _line(text: bytes, path: Path, number: int) -> dict:
-    """One JSON line."""
+    """Read one line, a table in JSON."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):
@@ -154,29 +139,10 @@ def _line(text: bytes, path: Path, number: int) -> dict:
 
 
 def _broken(path: Path, number: int) -> StorageError:
+    """Make the refusal of a line."""
     return StorageError(
         f"line {number} is no entry of a journal",
         code="E-JOURNAL",
         file=str(path),
         remedy="name a new file; this one is not changed",
     )
-
-
-def _check(found: dict, header: dict, path: Path) -> None:
-    """Refuse a journal whose header is not the expected one."""
-    words = {
-        "format": "by another version of femgear",
-        "femgear": "by another version of femgear",
-        "case": "for another case",
-        "keys": "for other design variables",
-    }
-    for name, expected in header.items():
-        if found.get(name) != expected:
-            raise StorageError(
-                f"the journal was written {words[name]}",
-                code="E-JOURNAL",
-                file=str(path),
-                value=found.get(name),
-                limit=str(expected),
-                remedy="name a new file, or remove this one",
-            )

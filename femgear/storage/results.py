@@ -8,12 +8,15 @@ from __future__ import annotations
 import json
 import math
 import os
+import platform
 import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
+from html import escape
+from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -39,6 +42,9 @@ CASE, LOCK = "case.toml", ".lock"
 RUNNING, FINISHED = ".running", ".finished"
 
 
+_LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
+
+
 @dataclass(frozen=True)
 class Manifest:
     """What a run wrote.
@@ -55,15 +61,13 @@ class Manifest:
         What each stage says about its convergence.
     versions : mapping of str to str
         femgear and the libraries that computed.
-    format : int
     """
 
     complete: bool
     files: Mapping[str, str] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
-    convergence: Mapping[str, object] = field(default_factory=dict)
+    convergence: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
-    format: int = FORMAT
 
     def __post_init__(self):
         for name in ("files", "timings", "convergence", "versions"):
@@ -111,8 +115,6 @@ class Results:
 
     def _repr_html_(self) -> str:
         """Stages with their variables, for notebooks."""
-        from html import escape
-
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{escape(', '.join(map(str, self[name].data_vars)))}</td>"
             f"<td>{self.manifest.timings.get(name, 0.0):.2f} s</td></tr>"
@@ -126,6 +128,7 @@ class Results:
         return tuple(name.removesuffix(".nc") for name in self.manifest.files if name.endswith(".nc"))
 
     def _checked(self, name: str) -> Path:
+        """Path of a file of the run that is there and unchanged."""
         path = self.folder / name
         if name not in self.manifest.files:
             _refuse_incomplete(self)
@@ -148,26 +151,7 @@ class Results:
 def results_of(
     folder: str | os.PathLike, read_case: Callable[[Path], Any], *, partial: bool = True
 ) -> Results:
-    """Results of a run; of an interrupted one those stages that are complete, with a warning.
-
-    Parameters
-    ----------
-    folder : path-like
-    read_case : callable
-        ``(path) -> case``; `femgear.open_results` reads those of every train.
-    partial : bool
-        Accept the results of an interrupted run.
-
-    Returns
-    -------
-    Results
-
-    Raises
-    ------
-    StorageError
-        No folder, no manifest, a broken one or one of a newer femgear. ``E-RESULTS-INCOMPLETE``: an
-        interrupted run and not ``partial``.
-    """
+    """Open the results of a run, whose case ``read_case(path)`` reads; see `femgear.open_results`."""
     folder = Path(folder)
     _refuse_missing(folder)
     results = Results(folder, read_manifest(folder), read_case)
@@ -180,7 +164,7 @@ def results_of(
 
 @contextmanager
 def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Path]:
-    """Folder for a run to write into, locked; old results stay until the new ones are complete.
+    """Lock a folder for a run to write into; old results stay until the new ones are complete.
 
     A run that replaces results is given a folder inside, whose files take their place at the end; should it
     fail or be interrupted, the old ones are as they were.
@@ -225,12 +209,12 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
 
 
 def folder_lock(folder: str | os.PathLike):
-    """Context in which this process alone writes into a results folder.
+    """Lock a results folder: in this context no other process writes into it (readers need no lock).
 
     Raises
     ------
     StorageError
-        ``E-LOCKED`` while another run holds the folder (readers need no lock); no such folder.
+        ``E-LOCKED`` while another run holds the folder; ``E-RESULTS-MISSING``: no such folder.
     """
     _refuse_missing(Path(folder))
     return exclusive_lock(Path(folder) / LOCK)
@@ -242,7 +226,7 @@ def prepare_output(folder: str | os.PathLike) -> Path:
     Parameters
     ----------
     folder : path-like
-        Created where it does not exist (its last name must be safe, see `checked_name`).
+        As of `run_folder`.
 
     Returns
     -------
@@ -269,7 +253,7 @@ def prepare_output(folder: str | os.PathLike) -> Path:
         _refuse_changed(folder, manifest)
         with storage_errors(folder):
             _remove_unchanged(folder, manifest.files)
-    write_manifest(folder, Manifest(complete=False))
+    _write_manifest(folder, Manifest(complete=False))
     return folder
 
 
@@ -281,29 +265,7 @@ def record(
     convergence: Mapping[str, object],
     complete: bool = False,
 ) -> Manifest:
-    """Write the manifest of what a run has written so far; see `finish`.
-
-    Parameters
-    ----------
-    complete : bool
-        Whether the run came to its end.
-    """
-    files = {name: checksum(Path(folder) / name) for name in names}
-    manifest = Manifest(
-        complete=complete, files=files, timings=timings, convergence=convergence, versions=versions()
-    )
-    write_manifest(folder, manifest)
-    return manifest
-
-
-def finish(
-    folder: str | os.PathLike,
-    names: list[str],
-    *,
-    timings: Mapping[str, float],
-    convergence: Mapping[str, object],
-) -> Manifest:
-    """Write the manifest of a run that came to its end.
+    """Write the manifest of what a run has written so far.
 
     Parameters
     ----------
@@ -314,80 +276,65 @@ def finish(
         Seconds a stage.
     convergence : mapping
         Numbers, texts, arrays and tables of these; numbers that are not finite are stored as null.
+    complete : bool
+        Whether the run came to its end.
     """
-    return record(folder, names, timings=timings, convergence=convergence, complete=True)
+    files = {name: checksum(Path(folder) / name) for name in names}
+    versions = {"femgear": __version__, "python": platform.python_version()}
+    versions |= {name: version(name) for name in _LIBRARIES}
+    manifest = Manifest(complete, files, timings, convergence, versions)
+    _write_manifest(folder, manifest)
+    return manifest
+
+
+finish = partial(record, complete=True)
+"""`record` of a run that came to its end."""
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:
-    """Manifest of a results folder.
+    """Read the manifest of a results folder.
 
     Raises
     ------
     StorageError
-        Missing, not a femgear manifest, of a newer format, or naming files outside the folder.
+        ``E-FORMAT``: missing, not a femgear manifest, of a newer format, or naming files outside the folder.
     """
     path = Path(folder) / MANIFEST
-    remedy = "name a folder that femgear run wrote"
     with storage_errors(path):
-        if not path.is_file() or path.stat().st_size > 10_000_000:
-            raise StorageError(
-                "no manifest of reasonable size", code="E-FORMAT", file=str(path), remedy=remedy
-            )
-        text = path.read_bytes()
+        text = path.read_bytes() if path.is_file() and path.stat().st_size <= 10_000_000 else b""
     try:
         data = json.loads(text)
-        version = data.pop("femgear_format")
+        written = data.pop("femgear_format")
+        if type(written) is not int or not 1 <= written <= FORMAT:
+            raise StorageError(
+                "written by another version of femgear",
+                code="E-FORMAT",
+                file=str(path),
+                value=written,
+                limit=f"1 to {FORMAT}",
+            )
+        manifest = Manifest(**data)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
-        raise StorageError("not a femgear manifest", code="E-FORMAT", file=str(path), remedy=remedy) from None
-    if type(version) is not int or not 1 <= version <= FORMAT:
         raise StorageError(
-            "written by another version of femgear",
+            "no femgear manifest of reasonable size",
             code="E-FORMAT",
             file=str(path),
-            value=version,
-            limit=f"1 to {FORMAT}",
-        )
-    try:
-        manifest = Manifest(format=version, **data)
-    except (TypeError, ValueError):
-        raise StorageError("not a femgear manifest", code="E-FORMAT", file=str(path), remedy=remedy) from None
+            remedy="name a folder that femgear run wrote",
+        ) from None
     for name in manifest.files:
         if not is_safe_path(name):
             raise StorageError("names a file outside the folder", code="E-FORMAT", file=str(path), value=name)
     return manifest
 
 
-def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
+def _write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
     """Write ``manifest.json``; the last file of a run."""
-    data = {
-        "femgear_format": manifest.format,
-        "complete": manifest.complete,
-        "files": dict(manifest.files),
-        "timings": dict(manifest.timings),
-        "convergence": _plain(dict(manifest.convergence)),
-        "versions": dict(manifest.versions),
-    }
+    data = _plain({"femgear_format": FORMAT, **vars(manifest)})
     write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
 
 
-def verify(folder: str | os.PathLike) -> tuple[str, ...]:
-    """Files of the manifest that are missing or changed."""
-    folder = Path(folder)
-    files = read_manifest(folder).files
-    return tuple(n for n, digest in files.items() if _differs(folder / n, digest))
-
-
-def versions() -> dict[str, str]:
-    """Versions of femgear, Python and the libraries that compute."""
-    import platform
-    from importlib.metadata import version
-
-    libraries = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
-    return {"femgear": __version__, "python": platform.python_version(), **{n: version(n) for n in libraries}}
-
-
 def _plain(value: Any) -> object:
-    """JSON value of nested tables, lists, arrays and numbers."""
+    """Turn nested tables, lists, arrays and numbers into a JSON value."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):
@@ -397,16 +344,14 @@ def _plain(value: Any) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _differs(path: Path, digest: str) -> bool:
-    return not path.is_file() or checksum(path) != digest
-
-
 def _refuse_missing(folder: Path) -> None:
+    """Refuse a folder that is not there."""
     if not folder.is_dir():
         raise StorageError("no such results folder", code="E-RESULTS-MISSING", file=str(folder))
 
 
 def _refuse_incomplete(results: Results) -> None:
+    """Refuse the results of an interrupted run."""
     if results.manifest.complete:
         return
     folder = results.folder
@@ -421,9 +366,8 @@ def _refuse_incomplete(results: Results) -> None:
 
 def _refuse_changed(folder: Path, manifest: Manifest) -> None:
     """Refuse to replace results in which somebody has changed a file."""
-    changed = [
-        n for n, digest in manifest.files.items() if (folder / n).exists() and _differs(folder / n, digest)
-    ]
+    found = [name for name in manifest.files if (folder / name).exists()]
+    changed = [name for name in found if not _is_unchanged(folder / name, manifest.files[name])]
     if changed:
         raise StorageError(
             f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
@@ -434,11 +378,13 @@ def _refuse_changed(folder: Path, manifest: Manifest) -> None:
 
 
 def _interrupted(results: Results) -> str:
+    """Tell how far an interrupted run came."""
     stages = f"after: {', '.join(results.stages)}" if results.stages else "before a stage was complete"
     return f"the run was interrupted {stages}"
 
 
 def _is_complete(folder: Path) -> bool:
+    """Tell whether a folder holds the results of a run that came to its end."""
     return (folder / MANIFEST).is_file() and read_manifest(folder).complete
 
 
@@ -476,15 +422,22 @@ def _publish(folder: Path) -> None:
 
 
 def _remove_tree(path: Path) -> None:
+    """Remove a folder with all that it holds, where there is one."""
     with storage_errors(path):
         if path.is_dir():
             shutil.rmtree(path)
 
 
 def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
+    """Remove those of some files that are as the run wrote them."""
     for name, digest in files.items():
         path = folder / name
         # a link inside the folder must not lead the removal out of it
         inside = path.resolve() == folder.resolve() / name
-        if inside and path.is_file() and checksum(path) == digest:
+        if inside and _is_unchanged(path, digest):
             path.unlink()
+
+
+def _is_unchanged(path: Path, digest: str) -> bool:
+    """Tell whether a file is there and has the checksum of the manifest."""
+    return path.is_file() and checksum(path) == digest

@@ -23,8 +23,7 @@ from femgear.study.search import (
     samples_of,
     start_at,
 )
-from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Progress
+from femgear.trains.protocol import Progress, one_blas_thread
 
 _SMALL = 0.01
 """Share of the sum in the scalar objective; without it points that are better in one alone would tie."""

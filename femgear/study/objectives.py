@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -18,7 +18,9 @@ from femgear.case.case import planetary_set
 from femgear.case.dependencies import Steps, static_entries
 from femgear.case.sections import Case
 from femgear.case.units import ACCELERATION, SPEED, TORQUE, Dimension, to_si
+from femgear.contact.root_stress import LOADED
 from femgear.errors import CaseError
+from femgear.gears.gear import tooth_thickness
 from femgear.trains.elastic import stages as elastic_stages
 from femgear.trains.reading import with_value
 from femgear.trains.static import stages as static_stages
@@ -30,16 +32,15 @@ if TYPE_CHECKING:
     from femgear.trains.static.results import StaticResult, StressResult
 
 Mesh = Literal["largest", "overall", "sun-planet", "planet-ring"]
-MeshKind = Literal["sun-planet", "planet-ring"]
-GearName = Literal["sun", "planet", "ring"]
+_MeshKind = Literal["sun-planet", "planet-ring"]
+_GearName = Literal["sun", "planet", "ring"]
 Range = tuple[float, float, int]
 """First and last input speed [rad/s] and number of speeds."""
 Speeds = tuple[str, str]
 """First and last speed of the input, with their units."""
-MICROMETRES = Dimension("a length", "m", "um", 1e-6)
-FORCE = Dimension("a force", "N", "N", 1.0)
-LEVEL = ACCELERATION
-STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
+_MICROMETRES = Dimension("a length", "m", "um", 1e-6)
+_FORCE = Dimension("a force", "N", "N", 1.0)
+_STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
 NUMBER = Dimension("a number", "1", "1", 1.0)
 STAGES = ("gears", "static", "stress", "dynamics", "housing")
 """In the order of their effort."""
@@ -206,13 +207,13 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
 
     def compute(variant: Variant) -> float:
         cycle = variant.static(value).cycle
-        return peak_to_peak(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2))
+        return _peak_to_peak(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2))
 
     where = "" if value is None else f" at {TORQUE.show(value)}"
-    return Quantity(f"STE peak to peak, {mesh}{where}", MICROMETRES, "static", compute, signal, value)
+    return Quantity(f"STE peak to peak, {mesh}{where}", _MICROMETRES, "static", compute, signal, value)
 
 
-def peak_to_peak(signals: np.ndarray) -> float:
+def _peak_to_peak(signals: np.ndarray) -> float:
     """Largest peak to peak of the rows."""
     return float(np.ptp(signals, axis=1).max())
 
@@ -223,7 +224,6 @@ def mesh_force(
     *,
     speeds: int = 51,
     part: Literal["dynamic", "peak"] = "dynamic",
-    mesh: Literal["all", "sun-planet", "planet-ring"] = "all",
 ) -> Quantity:
     """Largest mesh force over a range of input speeds, over time and meshes [N].
 
@@ -238,24 +238,14 @@ def mesh_force(
         Number of equidistant speeds.
     part : {"dynamic", "peak"}
         Largest deviation from the mean, or largest force.
-    mesh : {"all", "sun-planet", "planet-ring"}
     """
     at = _range(first, last, speeds)
     of_mean = _chosen(part, {"dynamic": True, "peak": False}, "part")
-    rows = {
-        "all": lambda n: slice(None),
-        "sun-planet": lambda n: slice(n),
-        "planet-ring": lambda n: slice(n, None),
-    }
-    take = _chosen(mesh, rows, "mesh")
 
     def compute(variant: Variant) -> float:
-        force = variant.response(at).force
-        chosen = force[:, take(force.shape[1] // 2)]
-        return float(forces_over_time(chosen, dynamic=of_mean).max())
+        return float(forces_over_time(variant.response(at).force, dynamic=of_mean).max())
 
-    which = "" if mesh == "all" else f", {mesh}"
-    return Quantity(f"{part} mesh force{which}, {_words(at)}", FORCE, "dynamics", compute)
+    return Quantity(f"{part} mesh force, {_words(at)}", _FORCE, "dynamics", compute)
 
 
 def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
@@ -293,21 +283,19 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     def compute(variant: Variant) -> float:
         return float(np.abs(variant.housing(at).exact.acceleration).max())
 
-    return Quantity(f"housing level, {_words(at)}", LEVEL, "housing", compute)
+    return Quantity(f"housing level, {_words(at)}", ACCELERATION, "housing", compute)
 
 
-def contact_ratio(mesh: MeshKind) -> Quantity:
+def contact_ratio(mesh: _MeshKind) -> Quantity:
     """Transverse contact ratio, from the tip circles."""
     names = {"sun-planet": "contact_ratio_sun_planet", "planet-ring": "contact_ratio_planet_ring"}
     name = _chosen(mesh, names, "mesh")
     return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", lambda v: float(getattr(v.gears, name)))
 
 
-def tip_thickness(gear: GearName) -> Quantity:
+def tip_thickness(gear: _GearName) -> Quantity:
     """Thickness of the teeth on the tip circle, in modules."""
-    from femgear.gears.gear import tooth_thickness
-
-    name = _chosen(gear, {g: g for g in get_args(GearName)}, "gear")
+    name = _chosen(gear, {g: g for g in get_args(_GearName)}, "gear")
 
     def compute(variant: Variant) -> float:
         found = getattr(variant.gears, name)
@@ -319,14 +307,12 @@ def tip_thickness(gear: GearName) -> Quantity:
 def contact_pressure() -> Quantity:
     """Largest contact pressure away from the ends of the flanks [Pa]."""
     return Quantity(
-        "contact pressure", STRESS, "static", lambda v: float(v.static().cycle.max_pressure.max())
+        "contact pressure", _STRESS, "static", lambda v: float(v.static().cycle.max_pressure.max())
     )
 
 
-def root_stress(gear: GearName) -> Quantity:
+def root_stress(gear: _GearName) -> Quantity:
     """Largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
-    from femgear.contact.root_stress import LOADED
-
     places = {"sun": ((0, 0),), "planet": ((0, 1), (1, 0)), "ring": ((1, 1),)}
     wanted = _chosen(gear, places, "gear")
 
@@ -336,7 +322,7 @@ def root_stress(gear: GearName) -> Quantity:
         chosen = [roots[2 * mesh + i] for k, i in wanted for mesh in range(k * n, (k + 1) * n)]
         return max(float(root.stress[:, :, LOADED].max()) for root in chosen)
 
-    return Quantity(f"root stress, {gear}", STRESS, "stress", compute)
+    return Quantity(f"root stress, {gear}", _STRESS, "stress", compute)
 
 
 def _chosen(value, table: dict, key: str):
@@ -368,30 +354,28 @@ def _words(at: Range) -> str:
     return f"{at[0] / SPEED.scale:.6g} to {SPEED.show(at[1])} ({at[2]} speeds)"
 
 
-_WORDS: dict[str, Callable[[str | None, Speeds | None], Quantity]] = {
-    "ste": lambda torque, _: transmission_error("largest", torque=torque),
-    "ste overall": lambda torque, _: transmission_error("overall", torque=torque),
-    "ste sun-planet": lambda torque, _: transmission_error("sun-planet", torque=torque),
-    "ste planet-ring": lambda torque, _: transmission_error("planet-ring", torque=torque),
-    "mesh force": lambda _, speeds: mesh_force(*_given(speeds, "mesh force")),
-    "peak mesh force": lambda _, speeds: mesh_force(*_given(speeds, "peak mesh force"), part="peak"),
-    "housing": lambda _, speeds: housing_level(*_given(speeds, "housing")),
-    **{f"contact ratio {mesh}": lambda *_, mesh=mesh: contact_ratio(mesh) for mesh in get_args(MeshKind)},
-    **{f"tip thickness {gear}": lambda *_, gear=gear: tip_thickness(gear) for gear in get_args(GearName)},
-    "contact pressure": lambda *_: contact_pressure(),
-    **{f"root stress {gear}": lambda *_, gear=gear: root_stress(gear) for gear in get_args(GearName)},
+_WORDS: dict[str, Callable[..., Quantity]] = {
+    "ste": transmission_error,
+    **{f"ste {mesh}": partial(transmission_error, mesh) for mesh in get_args(Mesh)[1:]},
+    "mesh force": mesh_force,
+    "peak mesh force": partial(mesh_force, part="peak"),
+    "housing": housing_level,
+    **{f"contact ratio {mesh}": partial(contact_ratio, mesh) for mesh in get_args(_MeshKind)},
+    **{f"tip thickness {gear}": partial(tip_thickness, gear) for gear in get_args(_GearName)},
+    "contact pressure": contact_pressure,
+    **{f"root stress {gear}": partial(root_stress, gear) for gear in get_args(_GearName)},
 }
+_OVER_SPEEDS = ("mesh force", "peak mesh force", "housing")
+"""Quantities that take the first and the last speed."""
 NAMES = tuple(_WORDS)
 
 
-def named_quantity(words: str, *, torque: str | None = None, speeds: Speeds | None = None) -> Quantity:
+def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
     """Quantity of some words, one of `NAMES`.
 
     Parameters
     ----------
     words : str
-    torque : str, optional
-        Of transmission errors, on the input; that of the case when left out.
     speeds : (str, str), optional
         First and last speed of the input, for mesh forces and housing levels.
 
@@ -400,22 +384,15 @@ def named_quantity(words: str, *, torque: str | None = None, speeds: Speeds | No
     CaseError
         E-OBJECTIVE: no such quantity, or no speeds for one that needs them.
     """
-    try:
-        make = _WORDS[" ".join(words.split()).lower()]
-    except KeyError:
+    name = " ".join(words.split()).lower()
+    if name not in _WORDS:
         raise CaseError(
             "no such quantity", code="E-OBJECTIVE", key="objective", value=words, limit=", ".join(NAMES)
-        ) from None
-    return make(torque, speeds)
-
-
-def _given(speeds: Speeds | None, words: str) -> Speeds:
-    """The speeds, refused where they are left out."""
-    if speeds is None:
-        raise CaseError(
-            f"{words} is found over a range of speeds",
-            code="E-OBJECTIVE",
-            key="speeds",
-            remedy='give two speeds of the input, "1000 rpm" and "3500 rpm"',
         )
-    return speeds
+    if name not in _OVER_SPEEDS:
+        return _WORDS[name]()
+    if speeds is None:
+        remedy = 'give two speeds of the input, "1000 rpm" and "3500 rpm"'
+        message = f"{name} is found over a range of speeds"
+        raise CaseError(message, code="E-OBJECTIVE", key="speeds", remedy=remedy)
+    return _WORDS[name](*speeds)

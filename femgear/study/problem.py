@@ -21,14 +21,14 @@ from femgear.case.sections import Case
 from femgear.case.units import LENGTH, Dimension, to_si
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
-from femgear.study.objectives import NUMBER, Quantity, named_quantity
+from femgear.study.objectives import NUMBER, Quantity, Speeds, named_quantity
 from femgear.trains.reading import with_values
 
 Vector = Sequence[float] | np.ndarray
 """Values of the design variables in their units, (n,)."""
 Point = tuple[object, ...]
 """Values of the design variables as the case file holds them; empty for the case as it is."""
-DEFAULT_TOLERANCE = 0.1
+_DEFAULT_TOLERANCE = 0.1
 """Over the range of the variable."""
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 _DIGITS = 9
@@ -161,7 +161,7 @@ class Variable:
         if self.integer:
             return 1.0
         if given is None:
-            return DEFAULT_TOLERANCE * (high - low)
+            return _DEFAULT_TOLERANCE * (high - low)
         if isinstance(given, str) and given.strip().endswith("%"):
             share = split(given.strip()[:-1], self.name)[0] / 100.0
             # a share of nothing would be no tolerance
@@ -187,7 +187,7 @@ def split(value: object, key: str) -> tuple[float, str]:
     return number, unit
 
 
-def current(case: Case, variable: Variable) -> float | None:
+def _current(case: Case, variable: Variable) -> float | None:
     """Value that the case has now, in the unit of the variable; None where its file leaves the entry out."""
     table: Any = case_text.parse(case.source, case.name)
     for part in re.findall(r"\[(\d+)\]|([^.\[\]]+)", variable.keys[0]):
@@ -203,19 +203,13 @@ def start_point(case: Case, variables: Sequence[Variable]) -> np.ndarray:
     found = []
     for variable in variables:
         low, high = variable.bounds
-        value = current(case, variable)
+        value = _current(case, variable)
         found.append(0.5 * (low + high) if value is None else min(max(value, low), high))
     return np.array(found)
 
 
-def check_variables(case: Case, variables: Sequence[Variable]) -> None:
-    """Refuse variables that the case file does not know, or whose bounds it refuses.
-
-    Raises
-    ------
-    CaseError
-        E-VARIABLE: none, or one key twice; what `femgear.with_value` refuses.
-    """
+def _check_variables(case: Case, variables: Sequence[Variable]) -> None:
+    """Refuse variables that the case file does not know, keys given twice, and bounds that it refuses."""
     keys = [key for variable in variables for key in variable.keys]
     twice = sorted({key for key in keys if keys.count(key) > 1})
     if not keys or twice:
@@ -307,7 +301,7 @@ class Problem:
     def __post_init__(self):
         for name in ("variables", "also", "limits"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        check_variables(self.case, self.variables)
+        _check_variables(self.case, self.variables)
 
     @property
     def reported(self) -> tuple[Quantity, ...]:
@@ -325,19 +319,19 @@ class Problem:
         return tuple(variable.text(float(value)) for variable, value in zip(self.variables, x, strict=True))
 
 
-def parse_limit(text: str, **options) -> Limit:
-    """Limit of words such as ``"root stress sun <= 300 MPa"``; options as for `named_quantity`.
+def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
+    """Limit of words such as ``"root stress sun <= 300 MPa"``; speeds as for `named_quantity`.
 
     Raises
     ------
     CaseError
-        E-OBJECTIVE: no such text; E-OBJECTIVE; E-UNIT.
+        E-OBJECTIVE: no limit, no such quantity, or no number; E-UNIT.
     """
     match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text, re.DOTALL)
     if not match:
         example = '"contact ratio sun-planet >= 1.3" or "root stress sun <= 300 MPa"'
         raise CaseError("not a limit", code="E-OBJECTIVE", key="--limit", value=text, limit=example)
-    quantity = named_quantity(match[1], **options)
+    quantity = named_quantity(match[1], speeds=speeds)
     if quantity.dimension is NUMBER:
         bound = _number(match[3])
         if not isinstance(bound, float):
@@ -378,9 +372,7 @@ def _number(text: str) -> str | float:
         return text
 
 
-def tip_reliefs(
-    case: Case, *, largest: str | None = None, tolerance: str = "1 um", places: str = "0.1 mm"
-) -> tuple[Case, tuple[Variable, ...]]:
+def tip_reliefs(case: Case, *, largest: str | None = None) -> tuple[Case, tuple[Variable, ...]]:
     """The case with one more linear tip relief on every loaded flank; amounts and starts are the variables.
 
     Sun and ring have one each, planets one for the flank that touches the sun and one for that which touches
@@ -390,11 +382,9 @@ def tip_reliefs(
     Parameters
     ----------
     case : Case
-        Its modifications stay.
+        Its modifications stay; amounts get a tolerance of 1 um, diameters one of 0.1 mm.
     largest : str, optional
         Largest amount, with its unit; a hundredth of the module when left out.
-    tolerance, places : str
-        Tolerances of amounts and of diameters.
 
     Raises
     ------
@@ -428,8 +418,8 @@ def tip_reliefs(
         case = with_values(case, {f"{gear.name}.modifications": [*_tables(case, gear.name), table]})
         key = f"{gear.name}.modifications[{number}]"
         variables += [
-            Variable(f"{key}.amount", "0 um", f"{1e6 * most:.6g} um", tolerance=tolerance),
-            Variable(f"{key}.start_diameter", low, high, tolerance=places),
+            Variable(f"{key}.amount", "0 um", f"{1e6 * most:.6g} um", tolerance="1 um"),
+            Variable(f"{key}.start_diameter", low, high, tolerance="0.1 mm"),
         ]
     return case, tuple(variables)
 

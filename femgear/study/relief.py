@@ -5,9 +5,6 @@ constant under that torque (S. L. Harris, "Dynamic loads on the teeth of spur ge
 `harris_map` computes it over torque, `relief_grid` over amount and length of the relief, `optimise_relief`
 finds the least peak to peak at one torque and says whether it is a minimum. All of them start from
 `design_basis`: what the variants of a design share.
-
-Amount, length, pin and pitch errors are parameters of the deviations as well: functions of one number that
-return deviations, for `femgear.study.sensitivity`.
 """
 
 from __future__ import annotations
@@ -16,9 +13,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import minimize
 
 from femgear.case.case import planetary_set, set_deviations
 from femgear.contact.cycle import walk_mesh_cycle
@@ -28,7 +26,7 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.kinematics import torques
 from femgear.gears.modifications import FlankForm, TipRelief
-from femgear.threads import one_blas_thread
+from femgear.trains.protocol import one_blas_thread
 from femgear.trains.static.stages import flank_compliances, static_supports
 
 if TYPE_CHECKING:
@@ -36,14 +34,12 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
 
-LARGEST_LENGTH = 1.3
+_LARGEST_LENGTH = 1.3
 """Longest relief in lengths of two-pair contact; longer ones reach the pitch point of common sets."""
 AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
 """Steps [m] of the points around the optimum, of amount and of length along the path of contact."""
-SMALLEST_GAIN = 1e-4
+_SMALLEST_GAIN = 1e-4
 """Gain [um] under which a neighbour counts as no better."""
-Parameter = Callable[[float], SetDeviations]
-"""Deviations for a value of one parameter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +63,24 @@ class DesignBasis:
     deviations: SetDeviations | None = None
 
     def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
-        """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,)."""
+        """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,).
+
+        Raises
+        ------
+        CaseError
+            E-TORQUE: no torque; E-SUPPORT: bearings with clearance.
+        """
+        if not (np.isfinite(sun_torque) and sun_torque):
+            raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
+        if clearance := self.supports.planet_clearance:
+            raise CaseError(
+                "derivatives and the load sharing of samples know no clearance of the planet bearings",
+                code="E-SUPPORT",
+                key="planet.bearing_clearance",
+                value=f"{clearance * 1e6:.6g} um",
+                limit="0 um",
+                remedy='set it to zero, or solve single cases with static.members = "elastic"',
+            )
         gears, order, deviations = loaded_image(self.gears, sun_torque, self.deviations)
         return replace(self, gears=gears, deviations=deviations), order
 
@@ -124,12 +137,12 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
     CaseError
         E-RANGE: a length outside 0.05 to 1.3.
     """
-    if not 0.05 <= length <= LARGEST_LENGTH:
+    if not 0.05 <= length <= _LARGEST_LENGTH:
         raise CaseError(
             f"a relief of {length} lengths of two-pair contact is not plausible",
             code="E-RANGE",
             value=length,
-            limit=f"0.05 to {LARGEST_LENGTH}",
+            limit=f"0.05 to {_LARGEST_LENGTH}",
         )
     pair = mesh_pairs(planetary_set)[0]
     begin, end = pair.path
@@ -179,7 +192,7 @@ def with_tip_relief(
 
 
 def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: float, back: bool) -> str:
-    """Tables of a case file for the tip relief of `relief.with_tip_relief`, to be pasted at its end."""
+    """Tables of a case file for the tip relief of `with_tip_relief`, to be pasted at its end."""
     side = "ring side" if back else "sun side"
     lines = []
     for gear, start, flank in zip((gears.sun, gears.planet), relief_starts(gears, length=length), ("", side)):
@@ -189,93 +202,6 @@ def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: 
         lines += [f'amount = "{amount * 1e6:.3f} um"', f'start_diameter = "{diameter:.5f} mm"']
         lines += [f"power = {power:g}", ""]
     return "\n".join(lines)
-
-
-def relief_amount(deviations, planetary_set: PlanetarySet, *, length: float, **options) -> Parameter:
-    """Amount [m] of the tip relief of `with_tip_relief`; options are its ``power`` and ``back``."""
-    return lambda value: with_tip_relief(deviations, planetary_set, amount=value, length=length, **options)
-
-
-def relief_length(deviations, planetary_set: PlanetarySet, *, amount: float, **options) -> Parameter:
-    """Length of the same relief along the path of contact, in lengths of two-pair contact."""
-    return lambda value: with_tip_relief(deviations, planetary_set, amount=amount, length=value, **options)
-
-
-def pin_error(
-    deviations: SetDeviations, *, planet: int, direction: Literal["radial", "tangential"]
-) -> Parameter:
-    """Displacement [m] of one planet's axis, on top of the deviations.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planet : int
-        1 to N.
-    direction : {"radial", "tangential"}
-        Outwards and counter-clockwise positive.
-
-    Raises
-    ------
-    CaseError
-        E-RANGE: no such planet or direction.
-    """
-    N = len(deviations.pin_errors)
-    ways = ("radial", "tangential")
-    if not 1 <= planet <= N or direction not in ways:
-        raise CaseError(
-            "no such pin error", code="E-RANGE", value=(planet, direction), limit=f"1 to {N}, {ways}"
-        )
-    unit = np.zeros((N, 2))
-    unit[planet - 1, ways.index(direction)] = 1.0
-    return lambda value: replace(deviations, pin_errors=deviations.pin_errors + value * unit)
-
-
-def tooth_pitch_error(
-    deviations: SetDeviations,
-    planetary_set: PlanetarySet,
-    *,
-    gear: Literal["sun", "planet", "ring"],
-    tooth: int,
-    planet: int = 1,
-) -> Parameter:
-    """Displacement [m] of one tooth along the reference circle, counter-clockwise, on top of the deviations.
-
-    As one entry of ``cumulative_pitch`` of the case file: the tooth moves as a whole, its left flank towards
-    its mate and its right flank away from it; along the line of action by r_b/r of that.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
-    gear : {"sun", "planet", "ring"}
-    tooth : int
-        Counter-clockwise from 0, see `gears.deviations`.
-    planet : int
-        Which of them, 1 to N.
-
-    Raises
-    ------
-    CaseError
-        E-RANGE: no such gear, tooth or planet.
-    """
-    s, names = planetary_set, ("sun", "planet", "ring")
-    found = getattr(s, gear) if gear in names else None
-    if found is None or not 0 <= tooth < found.teeth or not 1 <= planet <= s.n_planets:
-        limit = "a tooth 0 to z - 1 of sun, planet 1 to N or ring"
-        raise CaseError("no such tooth", code="E-RANGE", value=(gear, planet, tooth), limit=limit)
-    along = found.base_radius / found.reference_radius
-    place = (planet - 1, tooth) if gear == "planet" else tooth
-    signs = (
-        {"planet_pitch": -1.0, "planet_ring_side_pitch": 1.0} if gear == "planet" else {f"{gear}_pitch": -1.0}
-    )
-
-    def variant(value: float) -> SetDeviations:
-        arrays = {name: np.array(getattr(deviations, name)) for name in signs}
-        for name, sign in signs.items():
-            arrays[name][place] += sign * along * value
-        return replace(deviations, **arrays)
-
-    return variant
 
 
 @dataclass(frozen=True, eq=False)
@@ -555,7 +481,7 @@ def optimise_relief(
         evaluations=len(known),
         amount_slopes=slopes[0],
         length_slopes=(slopes[1][0] * 1e-6 / unit, slopes[1][1] * 1e-6 / unit),
-        minimum=min(around.values()) >= value - SMALLEST_GAIN,
+        minimum=min(around.values()) >= value - _SMALLEST_GAIN,
     )
 
 
@@ -571,8 +497,6 @@ def _frame(grid: ReliefGrid, t: int):
 
 def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]):
     """Simplex and neighbours in turn: the best point, its value, the values of its neighbours by place."""
-    from scipy.optimize import minimize
-
     point, size = start, np.maximum(sizes, step)
     while True:
         # the simplex has to lie within the bounds
@@ -588,7 +512,7 @@ def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]
         )
         around = {place: peak(place) for place in _neighbours(found.x, bounds, step)}
         best = min(around, key=around.__getitem__)
-        if around[best] >= found.fun - SMALLEST_GAIN or left() <= 0:
+        if around[best] >= found.fun - _SMALLEST_GAIN or left() <= 0:
             return found.x, float(found.fun), around
         point, size = np.array(best), 2.0 * step
 

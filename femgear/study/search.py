@@ -1,8 +1,8 @@
 """Search for the best design within the bounds and limits of a problem.
 
 `minimise` goes from samples of the design space to a local finish, by descents with derivatives (`descend`)
-where the objective has them, else by SciPy's optimisers. `describe` and the rows beside it put an optimum
-into words.
+where the objective has them, else by SciPy's optimisers. `comparison_rows`, `tolerance_rows` and `verdict`
+put an optimum into words.
 
 A descent of a peak to peak goes by linear programs in a trust region: with ``y(x)`` the transmission error at
 all positions, ``max y - min y`` is the least ``t`` with ``high - low <= t`` and ``low <= y_p <= high``. Every
@@ -23,6 +23,8 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
+from scipy.optimize import differential_evolution, linprog, minimize
+from scipy.stats.qmc import LatinHypercube
 
 from femgear.case.case import set_deviations
 from femgear.case.dependencies import FLANK_ENTRIES
@@ -32,8 +34,7 @@ from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Toleran
 from femgear.study.problem import Point, Problem, Variable, Vector, start_point
 from femgear.study.relief import DesignBasis
 from femgear.study.sensitivity import linearise, sensitivity
-from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Progress
+from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_values
 from femgear.trains.static.stages import static_supports
 
@@ -45,6 +46,8 @@ _STEP = 1e-4
 """Half the difference of separations, over the range of the variable: their round-off is 1e-12 of that."""
 _SMALLEST, _LEAST = 1e-4, 1e-5
 """Box, over the ranges, and gain, over the objective of the case, at which a descent ends."""
+_MOST_STEPS = 60
+"""Of a descent."""
 
 
 @dataclass(frozen=True)
@@ -158,8 +161,15 @@ class Optimum:
         return 1.0 - self.after[name] / before if before else math.nan
 
     def summary(self) -> str:
-        """Before and after, values of the variables, and what their tolerances cost."""
-        return describe(self)
+        """Before and after, values of the variables, what their tolerances cost, and how it was found."""
+        lines = [
+            f"{name}: {before} -> {after} ({change})" for name, before, after, change in comparison_rows(self)
+        ]
+        lines += [f"{key} = {value}" for key, value in self.values.items()]
+        lines += [f"at a bound: {name}" for name in self.at_bounds]
+        for name, tolerance, less, more in tolerance_rows(self):
+            lines.append(f"{name} off by {tolerance}: {less} less, {more} more")
+        return "\n".join([*lines, verdict(self)])
 
 
 @one_blas_thread()
@@ -267,14 +277,11 @@ def _descents(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple
         away = _HOP * (high - low) * random.standard_normal(len(low))
         descend(run, np.clip(run.best[0] + away, low, high))
     # with a small box: linear programs from another side of the same corner
-    ended = descend(run, run.best[0], radius=0.05)
-    return ended.converged, ended.message
+    return descend(run, run.best[0], radius=0.05)
 
 
 def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple[bool, str]:
     """Differential evolution, then the simplex."""
-    from scipy.optimize import differential_evolution
-
     problem, count = run.problem, options.sample_count(run.problem)
     integral = np.array([variable.integer for variable in problem.variables])
     population = np.vstack([x0, samples_of(problem, max(count, 5) - 2, options.seed)])
@@ -338,8 +345,6 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
 
 def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
     """Middle of the bounds, and a Latin hypercube of ``count`` points."""
-    from scipy.stats.qmc import LatinHypercube
-
     low, high = problem.bounds.T
     spread = LatinHypercube(len(low), rng=seed).random(max(count, 1))
     return low + (high - low) * np.vstack([np.full(len(low), 0.5), spread])
@@ -364,8 +369,6 @@ def polish(
     rounds : int
         Simplexes one after the other.
     """
-    from scipy.optimize import minimize
-
     low, high = run.problem.bounds.T
     width, n = high - low, len(low)
     unit = [(0.0, 1.0)] * n
@@ -404,29 +407,6 @@ def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
     )
 
 
-@dataclass(frozen=True)
-class Descent:
-    """End of a search.
-
-    Parameters
-    ----------
-    x : (n,) array
-        In the units of the variables.
-    cost : float
-        See `Evaluations.cost`.
-    steps : int
-    converged : bool
-        Whether no step within the smallest box lowers the linearised objective any more.
-    message : str
-    """
-
-    x: np.ndarray
-    cost: float
-    steps: int
-    converged: bool
-    message: str
-
-
 def has_derivatives(problem: Problem) -> bool:
     """Whether the objective is a transmission error and all variables are deviations of the flanks alone."""
     case = problem.case
@@ -437,7 +417,7 @@ def has_derivatives(problem: Problem) -> bool:
     return bool(sided and clear and deviations and not any(v.integer for v in problem.variables))
 
 
-def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15, max_steps: int = 60) -> Descent:
+def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) -> tuple[bool, str]:
     """Minimum of a transmission error from a start, by successive linear programs.
 
     Parameters
@@ -448,30 +428,32 @@ def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15, ma
         In the units of the variables.
     radius : float
         Half the first box, over the ranges of the variables.
-    max_steps : int
 
     Returns
     -------
-    Descent
+    bool
+        Whether no step within the smallest box lowers the linearised objective any more.
+    str
+        How the descent ended; its points are those of the evaluations.
     """
     problem = evaluations.problem
     low, high = problem.bounds.T
     scale = evaluations.scale(problem.objective)
     x, cost = np.array(start, float), evaluations.cost(start)
-    for step in range(max_steps):
+    for _ in range(_MOST_STEPS):
         try:
             value, slopes = signals(evaluations, x)
         except StorageError:
             raise
         except FemgearError as error:
-            return Descent(x, cost, step, False, f"no derivatives: {error.message}")
+            return False, f"no derivatives: {error.message}"
         while True:
             move, promised = _linear_program(value / scale, slopes / scale, x, low, high, radius)
             # the linearisation is that of the same contact problem: its value is the cost
             gain = float(np.ptp(value, axis=1).max()) / scale - promised
             if radius < _SMALLEST or gain < _LEAST:
                 ended = "no linearised descent" if gain < _LEAST else "the smallest steps gain nothing"
-                return Descent(x, cost, step, True, ended)
+                return True, ended
             # a bound may be missed by rounding
             trial = np.clip(x + move, low, high)
             new = evaluations.cost(trial)
@@ -483,13 +465,11 @@ def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15, ma
             if ratio > 0.01:
                 x, cost = trial, new
                 break
-    return Descent(x, cost, max_steps, False, f"{max_steps} steps were not enough")
+    return False, f"{_MOST_STEPS} steps were not enough"
 
 
 def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndarray, float]:
     """Step within the box, and the largest peak to peak that the linearisation promises there."""
-    from scipy.optimize import linprog
-
     n, (K, P) = len(x), value.shape
     width = high - low
     # unknowns: n moves over their ranges, K highs, K lows, t
@@ -564,18 +544,6 @@ def _deviations(case: Case, variable: Variable):
         return set_deviations(with_values(case, dict.fromkeys(variable.keys, text)))
 
     return variant
-
-
-def describe(found: Optimum) -> str:
-    """Before and after, values of the variables, what their tolerances cost, and how it was found."""
-    lines = [
-        f"{name}: {before} -> {after} ({change})" for name, before, after, change in comparison_rows(found)
-    ]
-    lines += [f"{key} = {value}" for key, value in found.values.items()]
-    lines += [f"at a bound: {name}" for name in found.at_bounds]
-    for name, tolerance, less, more in tolerance_rows(found):
-        lines.append(f"{name} off by {tolerance}: {less} less, {more} more")
-    return "\n".join([*lines, verdict(found)])
 
 
 def comparison_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:

@@ -14,17 +14,17 @@ every cell (the adjoint of a linear system: M. B. Giles, N. A. Pierce, Flow, Tur
 2000, 393-415). The chain rule goes on through the separations, which cost no contact solution.
 
 What these derivatives are not: cells change sides at the rims of the contacts, where pressures vanish, so
-over a finite step the exact function bends away from them. Extremes over positions and planets have kinks,
-see `peak_to_peak_slopes`.
+over a finite step the exact function bends away from them. Extremes over positions and planets have kinks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import cho_solve
 
 from femgear.contact.assembly import (
     ROUGH_STIFFNESS,
@@ -48,36 +48,26 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
-from femgear.study.relief import DesignBasis, pin_error
-from femgear.threads import one_blas_thread
+from femgear.study.relief import DesignBasis
+from femgear.trains.protocol import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 
 @dataclass(frozen=True, eq=False)
-class TouchingCells:
-    """All M loaded cells of the record, position after position, in the numbering of the solved set.
+class _TouchingCells:
+    """All M loaded cells of the record, position after position, in the numbering of the solved set."""
 
-    Parameters
-    ----------
-    at : (M,) int array
-        Which of the positions.
-    mesh : (M,) int array
-    roll_1, roll_2 : (M,) arrays
-        Roll lengths on gear 1 and gear 2 [m].
-    tooth_1, tooth_2 : (M,) int arrays
-        Tooth numbers.
-    weight : (M, 2N) array
-        ``Z = H_AA^-1 J``: load of the cell per unit approach of every mesh [N/m].
-    """
-
+    # number of the position, number of the mesh, (M,)
     at: np.ndarray
     mesh: np.ndarray
+    # roll lengths [m] and tooth numbers on gear 1 and gear 2, (M,)
     roll_1: np.ndarray
     roll_2: np.ndarray
     tooth_1: np.ndarray
     tooth_2: np.ndarray
+    # Z = H_AA^-1 J, load of the cell per unit approach of every mesh [N/m], (M, 2N)
     weight: np.ndarray
 
 
@@ -101,7 +91,7 @@ class LinearContact:
         Transmission error from sun to ring [m].
     deflection, force : (2N, P) arrays
         Of every mesh, in the original order [m], [N].
-    touching : TouchingCells
+    touching : _TouchingCells
     arc_response : (P, 2N) array
         Of the transmission error to ``v = Z^T d gap`` [m/N].
     deflection_response, force_response : (P, 2N, 2N) arrays
@@ -119,7 +109,7 @@ class LinearContact:
     sun_arc: np.ndarray
     deflection: np.ndarray
     force: np.ndarray
-    touching: TouchingCells
+    touching: _TouchingCells
     arc_response: np.ndarray
     deflection_response: np.ndarray
     force_response: np.ndarray
@@ -133,7 +123,7 @@ class LinearContact:
     @property
     def mesh_rows(self) -> np.ndarray:
         """Meshes of the solved set in the order of the original, (2N,)."""
-        return original_rows(self.order)
+        return _original_rows(self.order)
 
     @property
     def share(self) -> np.ndarray:
@@ -141,7 +131,7 @@ class LinearContact:
         return self.force[: self.original.n_planets] / self.load
 
 
-def original_rows(order) -> np.ndarray:
+def _original_rows(order) -> np.ndarray:
     """Meshes of the solved set in the order of the original, (2N,)."""
     back = np.argsort(order)
     return np.concatenate([back, back + len(back)])
@@ -156,7 +146,6 @@ def linearise(
     periods: int = 1,
     only=None,
     contact: str = "profile",
-    cells: int = 36,
 ) -> LinearContact:
     """Contact of all drive flanks and what it answers to small separations of any cell.
 
@@ -170,7 +159,7 @@ def linearise(
         Positions in a mesh period, and mesh periods in the record.
     only : sequence of int, optional
         Numbers of the positions wanted; all of the record when left out.
-    contact, cells
+    contact : {"profile", "line_of_action"}
         As for `contact.cycle.walk_mesh_cycle`.
 
     Returns
@@ -184,16 +173,19 @@ def linearise(
     ContactError
         As `contact.cycle.walk_mesh_cycle`.
     """
-    chosen = _chosen(basis, sun_torque, positions * periods, only)
     solved, order = basis.loaded(sun_torque)
+    record = positions * periods
+    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
+    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
+        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
     position, numbers = cycle_positions(positions, periods=periods), chosen
     if sun_torque < 0:
         # the mirror image turns the other way and ends at position zero
         position, numbers = -position[::-1], len(position) - 1 - chosen
     load = abs(sun_torque) / solved.gears.sun.base_radius
-    options = {"positions": position, "contact": contact, "cells": cells}
+    options = {"positions": position, "contact": contact, "cells": 36}
     setup, answers = _solve(solved, load, numbers, options)
-    rows = original_rows(order)
+    rows = _original_rows(order)
     stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}
     return LinearContact(
         original=basis.gears,
@@ -211,24 +203,6 @@ def linearise(
         force_response=stacked["force_response"],
         residual=float(stacked["residual"].max()),
     )
-
-
-def _chosen(basis: DesignBasis, sun_torque: float, record: int, only) -> np.ndarray:
-    """Numbers of the positions wanted of a record; what `linearise` cannot represent is refused."""
-    if not (np.isfinite(sun_torque) and sun_torque):
-        raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
-    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
-    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
-        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
-    if basis.supports.planet_clearance:
-        raise CaseError(
-            "bearings with clearance have no derivative here",
-            code="E-SUPPORT",
-            key="planet.bearing_clearance",
-            value=basis.supports.planet_clearance,
-            limit="0 m",
-        )
-    return chosen
 
 
 def _solve(solved: DesignBasis, load: float, numbers, options):
@@ -259,8 +233,6 @@ def _solve(solved: DesignBasis, load: float, numbers, options):
 
 def _answer(problem, state, members) -> dict:
     """Solution of one position and its linear answer to separations of the touching cells."""
-    from scipy.linalg import cho_solve
-
     N, active = problem.n_planets, np.flatnonzero(state.active)
     of_mesh = problem.mesh[active, None] == np.arange(2 * N)
     lower = factor(problem.compliance[np.ix_(active, active)])
@@ -286,7 +258,7 @@ def _answer(problem, state, members) -> dict:
     }
 
 
-def _touching(solved: PlanetarySet, setup, numbers, cells) -> TouchingCells:
+def _touching(solved: PlanetarySet, setup, numbers, cells) -> _TouchingCells:
     """Where all loaded cells lie on their teeth."""
     N = solved.n_planets
     at = np.repeat(np.arange(len(cells)), [len(c[0]) for c in cells])
@@ -307,7 +279,7 @@ def _touching(solved: PlanetarySet, setup, numbers, cells) -> TouchingCells:
         arc = setup.roll[0][here][:, 0] ** 2 / twice + place_in_window * width
         roll_1[rows] = np.sqrt(twice * arc)
         roll_2[rows] = separation(contact, setup.zeta[here], roll_1[rows])[1]
-    return TouchingCells(at, mesh, roll_1, roll_2, tooth_1, tooth_2, weight)
+    return _TouchingCells(at, mesh, roll_1, roll_2, tooth_1, tooth_2, weight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,8 +314,7 @@ def sensitivity(
     linear : LinearContact
         Of the set with the deviations ``variant(value)``.
     variant : callable
-        Deviations (of the set as it is, not mirrored) for a value of the parameter, as those of
-        `femgear.study.relief`.
+        Deviations (of the set as it is, not mirrored) for a value of the parameter.
     value : float
     step : float
         The separations are differentiated centrally over twice this; exact where they are linear in the
@@ -367,7 +338,7 @@ def sensitivity(
             mirrored_deviations(deviations, linear.original, linear.solved, linear.order)
             for deviations in (low, high)
         )
-    change = (separations(linear, high) - separations(linear, low)) / (2.0 * step)
+    change = (_separations(linear, high) - _separations(linear, low)) / (2.0 * step)
     return _sensitivity(linear, change)
 
 
@@ -386,7 +357,7 @@ def _sensitivity(linear: LinearContact, change: np.ndarray) -> Sensitivity:
     )
 
 
-def separations(linear: LinearContact, deviations: SetDeviations) -> np.ndarray:
+def _separations(linear: LinearContact, deviations: SetDeviations) -> np.ndarray:
     """What deviations of the solved set add to the separations of the touching cells, (M,) [m]."""
     s, t, N = linear.solved, linear.touching, linear.solved.n_planets
     total = body_separation(deviations, s, linear.solved_position)[t.mesh, t.at]
@@ -406,65 +377,11 @@ def pin_sensitivities(linear: LinearContact) -> np.ndarray:
     so these derivatives hold beside any other deviations.
     """
     ideal, N = no_deviations(linear.original), linear.original.n_planets
-    found = [
-        [
-            sensitivity(linear, pin_error(ideal, planet=n + 1, direction=way), 0.0, step=1e-6).share
-            for way in ("radial", "tangential")
-        ]
-        for n in range(N)
-    ]
-    return np.moveaxis(np.array(found), 2, 0)
+    found = []
+    for unit in np.eye(2 * N).reshape(2 * N, N, 2):
 
+        def variant(value: float, unit=unit) -> SetDeviations:
+            return replace(ideal, pin_errors=value * unit)
 
-def peak_to_peak_slopes(signal, change, *, step: float) -> tuple[float, float]:
-    """Left and right derivative of a peak to peak value.
-
-    The largest and the smallest of linear functions are convex and concave, so the peak to peak of
-    ``signal + x change`` is convex in x and piecewise straight: its one-sided slopes are those of the
-    positions that hold the extremes (J. M. Danskin, SIAM J. Appl. Math. 14, 1966). They differ where two
-    positions share an extreme, as at the optimum of a relief; left is then below zero, right above. Over a
-    finite step both are secants, which count positions that become the extreme one within it. Between the
-    positions of the record the extreme may lie a little higher.
-
-    Parameters
-    ----------
-    signal : (P,) or (K, P) array
-        Of several signals the largest peak to peak counts.
-    change : array of the same shape
-        Derivative of every value per unit of the parameter.
-    step : float
-        Of the parameter to either side.
-
-    Returns
-    -------
-    left, right : float
-        Per unit of the parameter, left at most right.
-    """
-    return _slopes(lambda y: float(np.ptp(np.atleast_2d(y), axis=1).max()), signal, change, step)
-
-
-def sharing_factor_slopes(share, change, *, step: float) -> tuple[float, float]:
-    """Left and right derivative of the load sharing factor K_gamma = N max share.
-
-    It has a kink where planets share the largest load, as those of an ideal set do: then both slopes
-    point upwards, left below zero and right above. See `peak_to_peak_slopes`.
-
-    Parameters
-    ----------
-    share : (N, P) array
-        Shares at one position or at several.
-    change : (N, P) array
-        Derivative of every share per unit of the parameter.
-    step : float
-        Of the parameter to either side.
-    """
-    return _slopes(lambda y: len(y) * float(y.max()), share, change, step)
-
-
-def _slopes(function, values, change, step):
-    """Secants of a function of the values to the left and to the right."""
-    values, change = np.asarray(values, float), np.asarray(change, float)
-    if not (np.isfinite(step) and step > 0):
-        raise CaseError("a slope needs a step", code="E-RANGE", value=step, limit="over 0")
-    here = function(values)
-    return (here - function(values - step * change)) / step, (function(values + step * change) - here) / step
+        found.append(sensitivity(linear, variant, 0.0, step=1e-6).share)
+    return np.moveaxis(np.array(found).reshape(N, 2, N, -1), 2, 0)

@@ -13,28 +13,28 @@ again with one unknown a planet. What is lost is the change of C with the loads,
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from femgear.contact.assembly import ROUGH_STIFFNESS, assemble_contact, in_windows, mesh_windows
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.solve import solve_contact
-from femgear.contact.supports import Supports, moving_members
+from femgear.contact.supports import moving_members
 from femgear.errors import CaseError, ContactError
 from femgear.gears.deviations import no_deviations
 from femgear.gears.kinematics import mesh_normals
 from femgear.study.relief import DesignBasis
-from femgear.threads import one_blas_thread
+from femgear.trains.protocol import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-SOFTEST = 1e-10
+_SOFTEST = 1e-10
 """Spring on every motion, over the stiffness of a planet: it holds motions that no loaded planet holds."""
-MOST_SAMPLES = 1_000_000
+_MOST_SAMPLES = 1_000_000
 """Of one call."""
 
 
@@ -79,7 +79,6 @@ def sharing_model(
     positions: int = 8,
     contact: str = "profile",
     loads: int = 40,
-    progress: Callable[[int, int], None] | None = None,
 ) -> SharingModel:
     """Load-deflection curves of all planets at one position, from the contact problem at several loads.
 
@@ -95,8 +94,6 @@ def sharing_model(
         As for `contact.cycle.walk_mesh_cycle`.
     loads : int
         Points of a curve.
-    progress : callable, optional
-        Called with (loads done, loads).
 
     Returns
     -------
@@ -109,8 +106,9 @@ def sharing_model(
         E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
     ContactError
     """
-    _check_request(basis.supports, sun_torque, position, positions)
     solved, order = basis.loaded(sun_torque)
+    if not 0 <= position < positions:
+        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {positions - 1}")
     N, load = solved.gears.n_planets, abs(sun_torque) / solved.gears.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
     force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
@@ -118,8 +116,6 @@ def sharing_model(
     deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
     for k, one in enumerate(force):
         deflection[:, k], coupling[k] = _paths(solved, max(one, 1e-9 * load), at, contact)
-        if progress is not None:
-            progress(k + 1, len(force))
     mean = int(np.abs(force - load / N).argmin())
     between = coupling[mean]
     change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
@@ -135,26 +131,9 @@ def sharing_model(
         deflection=deflection[back],
         coupling=between[np.ix_(back, back)],
         approach=np.column_stack([np.ones(N), free])[back],
-        pin=(pin_directions(solved.gears) * mirror)[back],
+        pin=(_pin_directions(solved.gears) * mirror)[back],
         coupling_change=float(change),
     )
-
-
-def _check_request(supports: Supports, sun_torque: float, position: int, positions: int) -> None:
-    """Refuse what `sharing_model` cannot represent."""
-    if not (np.isfinite(sun_torque) and sun_torque):
-        raise CaseError("without torque there is nothing to share", code="E-TORQUE", value=sun_torque)
-    if not 0 <= position < positions:
-        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {positions - 1}")
-    if supports.planet_clearance:
-        raise CaseError(
-            "the load sharing of samples knows no clearance of the planet bearings",
-            code="E-SUPPORT",
-            key="planet.bearing_clearance",
-            value=f"{supports.planet_clearance * 1e6:.6g} um",
-            limit="0 um",
-            remedy='set it to zero, or solve single cases with static.members = "elastic"',
-        )
 
 
 def _paths(solved: DesignBasis, force: float, position: float, contact: str):
@@ -183,7 +162,7 @@ def _paths(solved: DesignBasis, force: float, position: float, contact: str):
     return state.motions[:N] + state.motions[N:], between
 
 
-def pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
+def _pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
     """Separation of every path per unit radial and tangential displacement of its pin, (N, 2).
 
     ``(n_sp - n_pr) . u`` with the normals of `gears.kinematics.mesh_normals`.
@@ -213,9 +192,12 @@ def pin_samples(n_planets: int, *, samples: int, radial: float, tangential: floa
     CaseError
         E-RANGE: no samples or more than a million, negative deviations.
     """
-    if not 1 <= samples <= MOST_SAMPLES:
+    if not 1 <= samples <= _MOST_SAMPLES:
         raise CaseError(
-            "the number of samples is not usable", code="E-RANGE", value=samples, limit=f"1 to {MOST_SAMPLES}"
+            "the number of samples is not usable",
+            code="E-RANGE",
+            value=samples,
+            limit=f"1 to {_MOST_SAMPLES}",
         )
     scale = np.array([radial, tangential], float)
     if not (np.isfinite(scale).all() and (scale >= 0).all()):
@@ -231,8 +213,6 @@ class Sharing:
     ----------
     share : (S, N) array
         Shares in the sun's torque.
-    motions : (S, 1 + m) array
-        Rotation of the sun as an arc, and free motions [m].
     residual : float
         Largest violation: separation of loaded planets over the largest deflection, imbalance and overlap
         likewise.
@@ -241,7 +221,6 @@ class Sharing:
     """
 
     share: np.ndarray
-    motions: np.ndarray
     residual: float
     one_by_one: int
 
@@ -309,7 +288,7 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
             code="E-CONTACT",
             limit="1e-6",
         )
-    return Sharing(forces / model.load, motions, residual, len(left))
+    return Sharing(forces / model.load, residual, len(left))
 
 
 @dataclass(frozen=True)
@@ -322,8 +301,6 @@ class _Curves:
 
     @classmethod
     def of(cls, model: SharingModel) -> _Curves:
-        from scipy.interpolate import PchipInterpolator
-
         if not np.all(np.diff(model.deflection, axis=1) > 0):
             raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
         found = [PchipInterpolator(model.force, row) for row in model.deflection]
@@ -348,7 +325,7 @@ def _newton(model, curves, separation, forces, active):
     matrix[:, np.arange(N), np.arange(N)] += slope / unit
     matrix[:, :N, N:] = -G
     matrix[:, N:, :N] = G.T
-    matrix[:, np.arange(N, N + m), np.arange(N, N + m)] = SOFTEST
+    matrix[:, np.arange(N, N + m), np.arange(N, N + m)] = _SOFTEST
     right = np.zeros((S, N + m))
     right[:, :N] = (slope * forces - value - separation) / unit
     right[:, N] = model.load

@@ -19,18 +19,17 @@ from textwrap import fill
 import numpy as np
 
 from femgear.case.sections import Case
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.storage.files import storage_errors, write_text
 from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
-from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Progress
+from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_value
 
-LARGEST = 100_000
+_LARGEST = 100_000
 """Combinations at most."""
-MANY = 1000
+_MANY = 1000
 """Combinations from which their time is estimated and said."""
 JOURNAL, TABLE, FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 """Files of a sweep."""
@@ -112,7 +111,7 @@ def sweep(
         E-VARIABLE: nothing to compute, or too much; values that the case file refuses.
     """
     keys, quantities = tuple(over), tuple(quantities)
-    count = check_sweep(case, over, quantities)
+    count = _check_sweep(case, over, quantities)
     points = tuple(itertools.product(*over.values()))
     table, errors = np.full((count, len(quantities)), np.nan), []
     keyed, warned = [(key,) for key in keys], False
@@ -126,21 +125,21 @@ def sweep(
                 errors.append(f"[{failure.error['code']}] {failure}")
             if progress is not None:
                 progress("cases", i + 1, count)
-            if count >= MANY and i < count - 1 and not warned and designs.computed == _TIMED:
+            if count >= _MANY and i < count - 1 and not warned and designs.computed == _TIMED:
                 warned = True
                 _warn_of_time(count - i - 1, designs.seconds / _TIMED)
         seconds = designs.seconds / max(designs.computed, 1)
         return Sweep(keys, points, quantities, table, tuple(errors), designs.computed, seconds)
 
 
-def check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity]) -> int:
+def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity]) -> int:
     """Number of cases; what `sweep` refuses is refused."""
     count = math.prod(len(values) for values in over.values()) if over else 0
-    if not (0 < count <= LARGEST and quantities):
+    if not (0 < count <= _LARGEST and quantities):
         raise CaseError(
             f"{count} cases with {len(quantities)} quantities",
             code="E-VARIABLE",
-            limit=f"1 to {LARGEST} cases, at least one quantity",
+            limit=f"1 to {_LARGEST} cases, at least one quantity",
         )
     for key, values in over.items():
         if key.split(".")[0] in _WITHOUT_EFFECT:
@@ -150,18 +149,12 @@ def check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Se
             )  # fmt: skip
         for value in values:
             with_value(case, key, value)
-    check_stages(case, quantities, over)
+    _check_stages(case, quantities, over)
     return count
 
 
-def check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str] = ()) -> None:
-    """Refuse quantities that the case can never have.
-
-    Raises
-    ------
-    CaseError
-        E-NO-LOAD: what needs a torque without one; E-STAGE: a planar or helical case has no elastic ring.
-    """
+def _check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str] = ()) -> None:
+    """Refuse quantities that the case can never have: without torque, or without an elastic ring."""
     stages = {quantity.stage for quantity in quantities}
     elastic = [quantity.name for quantity in quantities if quantity.stage in ("dynamics", "housing")]
     if elastic:
@@ -179,11 +172,8 @@ def _warn_of_time(left: int, seconds: float) -> None:
     """Say on standard error how long the cases left will take, at so many seconds each."""
     total = left * seconds
     shown = f"{total / 3600.0:.1f} h" if total > 5400.0 else f"{total / 60.0:.1f} min"
-    print(
-        f"[W-SWEEP] {left} more cases of about {seconds:.2g} s each: {shown}; "
-        "an interrupted sweep goes on where it was",
-        file=sys.stderr,
-    )
+    text = f"{left} more cases of about {seconds:.2g} s each: {shown}"
+    print(Finding("W-SWEEP", "", text, remedy="an interrupted sweep goes on where it was"), file=sys.stderr)
 
 
 def parse_over(text: str) -> tuple[str, Sequence[object]]:
@@ -276,7 +266,7 @@ def sweep_into(
     if len(values) < len(over):
         raise CaseError("a key is given twice", code="E-VARIABLE", key="--over", value=", ".join(over))
     quantities = [named_quantity(words, speeds=speeds) for words in of]
-    check_sweep(case, values, quantities)
+    _check_sweep(case, values, quantities)
     with storage_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
     options = {"journal": folder / JOURNAL, "cache": cache, "progress": progress}

@@ -32,6 +32,7 @@ from femgear.system.rigid_bodies import (
     RigidSet,
     body_masses,
     flank_sign,
+    refuse,
     torque_load,
 )
 from femgear.system.system import MechanicalSystem, MeshExcitation, gear_meshes
@@ -133,9 +134,9 @@ def gear_set_system(
         bearing (E-BEARING), a carrier speed or bearings of bodies that move in space (E-RANGE).
     """
     if len(data.axes) > 3 and carrier_speed:
-        data.refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")
+        refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")
     if len(data.axes) > 3 and bearings:
-        data.refuse("bearings", tuple(bearings), "", "none of bodies that move in space")
+        refuse("bearings", tuple(bearings), "", "none of bodies that move in space")
     T, flank, kept = free_motions(data), flank_sign(data, torque), _kept(data)
     if not T.shape[1]:
         raise CaseError(
@@ -316,52 +317,11 @@ def free_motions(data: RigidSet) -> np.ndarray:
     return T[:, _kept(data)]
 
 
-def gear_set_springs(data: RigidSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the set by name, for `femgear.solvers.linear.tracking.strain_shares`.
-
-    Parameters
-    ----------
-    data : RigidSet
-    mesh_stiffness : (n_columns,) array, optional
-        Of the mesh columns [N/m]; that of the set when not given.
-
-    Returns
-    -------
-    dict of str to (columns (n, g), stiffness (g,))
-        Meshes one by one (a column a slice), planet bearings one by one, supports of the central members, in
-        [m] and [rad]; in space bearings and supports by direction: ``radial`` (two columns), ``axial``,
-        ``tilt`` (two) and ``torsional``. What is held or free has no spring.
-    """
-    T, N = free_motions(data), data.n_planets
-    k = np.asarray(data.column_stiffness if mesh_stiffness is None else mesh_stiffness, float)
-    k = k.reshape(2 * N, -1)
-    meshes = (T.T @ mesh_directions(data)).reshape(T.shape[1], 2 * N, -1)
-    springs = {name: (meshes[:, j], k[j]) for j, name in enumerate(mesh_names(N))}
-    pins = pin_directions(data)
-    for n in range(N):
-        springs |= _by_direction(data, f"bearing of planet {n + 1}", T.T @ pins[:, n], data.pin_stiffness[n])
-    axes, scale = len(data.axes), _arcs(data)
-    for row, name in enumerate(CENTRAL):
-        columns = T[axes * row : axes * (row + 1)].T / scale[row]
-        springs |= _by_direction(data, f"support of the {name}", columns, data.support_stiffness[row])
-    return springs
-
-
 def support_diagonal(data: RigidSet) -> np.ndarray:
     """Finite stiffnesses (N + 3, axes) of the supports in all coordinates, zero of the planets [N/m]."""
     diagonal = np.zeros((data.n_planets + 3, len(data.axes)))
     diagonal[:3] = data.support_stiffness / _arcs(data)[:3] ** 2
     return np.where(np.isfinite(diagonal), diagonal, 0.0)
-
-
-def _by_direction(data: RigidSet, name: str, columns: np.ndarray, stiffness: np.ndarray) -> dict:
-    """Springs by the directions of the kind of set that are finite and not zero."""
-    there = np.isfinite(stiffness) & (stiffness > 0.0)
-    return {
-        direction.format(name): (columns[:, list(places)], stiffness[list(places)])
-        for direction, places in data.directions.items()
-        if places[0] < len(stiffness) and there[places[0]]
-    }
 
 
 def _turning(data: RigidSet) -> np.ndarray:

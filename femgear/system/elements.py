@@ -303,10 +303,9 @@ class PiecewiseSprings:
         breaks, slopes = np.atleast_1d(_numbers(self.breaks, "breaks")), _numbers(self.slopes, "slopes")
         if not (np.all(np.isfinite(breaks)) and np.all(np.isfinite(slopes))):
             raise CaseError(
-                f"breaks {breaks.tolist()} with slopes {slopes.tolist()}",
-                code="E-FINITE",
+                f"breaks {breaks.tolist()} with slopes {slopes.tolist()}", code="E-FINITE",
                 limit="finite numbers",
-            )
+            )  # fmt: skip
         if len(slopes) != len(breaks) + 1 or np.any(np.diff(breaks) <= 0.0):
             raise CaseError(
                 f"{len(slopes)} slopes with breaks {breaks.tolist()}", code="E-SHAPE",
@@ -362,9 +361,8 @@ class TurningSprings:
     degree = 1
 
     def __post_init__(self):
-        columns = np.atleast_2d(np.array(self.columns))
-        stiffness = np.atleast_1d(np.array(self.stiffness, float))
-        if columns.shape != (len(stiffness), 4) or not np.issubdtype(columns.dtype, np.integer):
+        columns, stiffness = _columns(self.columns, 4), np.atleast_1d(np.array(self.stiffness, float))
+        if len(columns) != len(stiffness):
             raise CaseError(
                 f"columns {columns.tolist()} for {len(stiffness)} springs", code="E-SHAPE",
                 limit="four column numbers of W a spring",
@@ -373,9 +371,9 @@ class TurningSprings:
             raise CaseError(
                 f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-RANGE", limit="finite, 0 or more"
             )
-        for name, value in (("columns", columns), ("stiffness", stiffness)):
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+        stiffness.setflags(write=False)
+        object.__setattr__(self, "columns", columns)
+        object.__setattr__(self, "stiffness", stiffness)
 
     @property
     def reference(self) -> np.ndarray:
@@ -412,9 +410,16 @@ def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSerie
     return FourierSeries(np.array([[0.0, turned], [0.0, -1j * turned]]), orders)
 
 
-def tangent_jumps(
-    tangents: Callable[..., np.ndarray], states: np.ndarray, *, intervals: int = _INTERVALS
-) -> list[np.ndarray]:
+def coefficients_of(element: Element) -> dict[str, Series]:
+    """Coefficients of an element that repeat with the phases, by the names of its fields."""
+    return {
+        name: series
+        for name, series in vars(element).items()
+        if hasattr(series, "at") and hasattr(series, "orders")
+    }
+
+
+def tangent_jumps(tangents: Callable[..., np.ndarray], states: np.ndarray) -> list[np.ndarray]:
     """Fractions of the period, for every state, at which its tangents jump; ascending, zero left out.
 
     Tangents at equidistant instants; an interval whose change is unlike that of its neighbours is halved
@@ -426,13 +431,11 @@ def tangent_jumps(
     tangents : callable
         ``(fraction (m, s), states (m,)) -> (m, s, n, n)``, periodic in the fraction.
     states : (m,) int array
-    intervals : int
-        Number of equal intervals of the period.
     """
     states = np.asarray(states)
-    nodes = (np.arange(-1, intervals + 3) - 0.5) / intervals
+    nodes = (np.arange(-1, _INTERVALS + 3) - 0.5) / _INTERVALS
     # one interval more on both sides, for the neighbours
-    known = tangents(np.broadcast_to(nodes[1:-2], (len(states), intervals + 1)), states)
+    known = tangents(np.broadcast_to(nodes[1:-2], (len(states), _INTERVALS + 1)), states)
     size = np.abs(known).max(axis=(1, 2, 3), initial=0.0)
     change = np.diff(known, axis=1)
     around = 0.5 * (np.roll(change, 1, axis=1) + np.roll(change, -1, axis=1))
@@ -455,18 +458,9 @@ def tangent_jumps(
     return [_sorted(fractions) for fractions in found]
 
 
-def _halved(
-    tangents: Callable[..., np.ndarray],
-    states: np.ndarray,
-    size: np.ndarray,
-    row: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _halved(tangents, states, size, row, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, ...]:
     """Jumps in intervals (k,) of the rows: rows, ends and places of those that hold one."""
-    a: np.ndarray = low.copy()
-    b: np.ndarray = high.copy()
-    before: np.ndarray = np.full(len(row), np.inf)
+    a, b, before = low, high, np.full(len(row), np.inf)
     for level in range(_LAST):
         if not len(row):
             break

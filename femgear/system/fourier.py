@@ -226,6 +226,36 @@ def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> Fourier
     return FourierSeries(harmonics_of(np.atleast_2d(samples), count), orders)
 
 
+def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
+    """Tooth errors (2N, H) of one wave of each kind, shifted by the mesh phases.
+
+    Parameters
+    ----------
+    sun_planet, planet_ring : (H,) complex arrays
+        Harmonics 1 to H at phase zero [m].
+    phases : (2N,) array
+        Fractions of the mesh period, see `femgear.trains.planar.model.phased_series`.
+
+    Raises
+    ------
+    CaseError
+        An odd number of phases, values that are not finite numbers (E-SHAPE).
+    """
+    waves = [
+        np.atleast_1d(checked_numbers(wave, name, code="E-SHAPE", unit="m", kind=complex))
+        for name, wave in (("sun_planet", sun_planet), ("planet_ring", planet_ring))
+    ]
+    phases, count = checked_numbers(phases, "phases", code="E-SHAPE", unit=""), max(map(len, waves))
+    finite = all(np.all(np.isfinite(values)) for values in (*waves, phases))
+    if phases.ndim != 1 or not len(phases) or len(phases) % 2 or max(w.ndim for w in waves) > 1 or not finite:
+        raise CaseError(
+            f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
+            limit="two a planet, finite: sun-planet meshes, then planet-ring meshes",
+        )  # fmt: skip
+    table = np.repeat([np.pad(wave, (0, count - len(wave))) for wave in waves], len(phases) // 2, axis=0)
+    return table * np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
+
+
 @dataclass(frozen=True)
 class SummedSeries:
     """``sum_p parts[p]``, each with its own orders; elements take it where they take a `FourierSeries`.
@@ -268,44 +298,6 @@ class SummedSeries:
 
 Series = FourierSeries | StepSeries | SummedSeries
 """Coefficients that repeat with the phases of the base frequencies."""
-
-
-def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np.ndarray, np.ndarray]:
-    """Lines of a series at given base frequencies, ascending; lines that coincide are added.
-
-    Parameters
-    ----------
-    series : FourierSeries or SummedSeries
-    frequency : float or (n_bases,) array
-        [rad/s]
-
-    Returns
-    -------
-    line_frequency : (L,) array
-        Not negative; the mean first [rad/s].
-    amplitude : (n, L) complex array
-        ``Re sum_l A_l exp(i omega_l t)``.
-    """
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
-    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
-        raise CaseError(
-            f"base frequencies of shape {frequency.shape}", code="E-RANGE", key="frequency",
-            limit="finite numbers, one a base",
-        )  # fmt: skip
-    parts = series.parts if isinstance(series, SummedSeries) else (series,)
-    rates, lines = [np.zeros(1)], [np.zeros((len(parts[0].amplitudes), 1), complex)]
-    for part in parts:
-        base = float(np.dot(part.orders[: len(frequency)], frequency[: len(part.orders)]))
-        rate = base * np.arange(part.amplitudes.shape[1])
-        rates.append(np.abs(rate))
-        lines.append(np.where(rate < 0.0, part.amplitudes.conj(), part.amplitudes))
-    rates, lines = np.concatenate(rates), np.concatenate(lines, axis=1)
-    order = np.argsort(rates, kind="stable")
-    rates, lines = rates[order], lines[:, order]
-    first = np.flatnonzero(np.diff(rates, prepend=-np.inf) > _COINCIDE * rates.max(initial=0.0))
-    total = np.add.reduceat(lines, first, axis=1)
-    total[:, 0] = np.real(total[:, 0])
-    return rates[first], total
 
 
 def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
@@ -368,12 +360,12 @@ def distinct_lines(orders) -> np.ndarray:
     """
     orders = np.atleast_2d(np.array(orders, int))
     orders = np.vstack([np.zeros_like(orders[:1]), orders])
-    orders = np.unique(orders * mirror_sign(orders)[:, None], axis=0)
+    orders = np.unique(orders * _mirror_sign(orders)[:, None], axis=0)
     size = np.abs(orders).sum(axis=1)
     return orders[np.lexsort((*orders.T, size))]
 
 
-def mirror_sign(orders: np.ndarray) -> np.ndarray:
+def _mirror_sign(orders: np.ndarray) -> np.ndarray:
     """Sign (L,) of the last order of every line that is not zero; 1 for the mean."""
     last: np.ndarray = np.zeros(len(orders), int)
     for column in orders.T:
@@ -399,7 +391,7 @@ def checked_lines(orders) -> np.ndarray:
             f"the first line has the orders {array[0].tolist()}", code="E-HARMONICS", limit="zeros: the mean",
             remedy="build the lines with harmonic_lines, side_bands or distinct_lines",
         )  # fmt: skip
-    unique, count = np.unique(array * mirror_sign(array)[:, None], axis=0, return_counts=True)
+    unique, count = np.unique(array * _mirror_sign(array)[:, None], axis=0, return_counts=True)
     if np.any(count > 1):
         raise CaseError(
             f"the line {unique[count > 1][0].tolist()} or its mirror image is there twice",
@@ -423,8 +415,8 @@ def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _
     return float(np.sqrt(energy[size > 0.5 * size.max()].sum() / total)) if total > still else 0.0
 
 
-def coinciding_lines(orders: np.ndarray, frequency) -> tuple[int, int] | None:
-    """The first two lines whose frequencies agree to 1e-9 of the highest line, or none.
+def coincidence_note(orders: np.ndarray, frequency) -> str:
+    """What to know of a solution in which two lines have one frequency; empty where none have.
 
     Parameters
     ----------
@@ -433,22 +425,13 @@ def coinciding_lines(orders: np.ndarray, frequency) -> tuple[int, int] | None:
         [rad/s]; with a single base frequency no two lines coincide.
     """
     if orders.shape[1] < 2:
-        return None
+        return ""
     size = np.abs(orders @ np.asarray(frequency, float))
     along = np.argsort(size, kind="stable")
     near = np.flatnonzero(np.diff(size[along]) <= _COINCIDE * size.max())
     if not len(near):
-        return None
-    one, other = sorted(along[near[0] : near[0] + 2].tolist())
-    return one, other
-
-
-def coincidence_note(orders: np.ndarray, frequency) -> str:
-    """What to know of a solution in which two lines have one frequency; empty where none have."""
-    found = coinciding_lines(orders, frequency)
-    if found is None:
         return ""
-    one, other = (orders[line].tolist() for line in found)
+    one, other = orders[np.sort(along[near[0] : near[0] + 2])].tolist()
     return (
         f" Lines {one} and {other} have one frequency: only their sum is an amplitude, and its split, as of "
         "phases that are independent, converges slowly; take one base frequency and multiply the orders."

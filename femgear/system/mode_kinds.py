@@ -155,42 +155,26 @@ def class_energies(motions: SetMotions) -> np.ndarray:
     return np.array([rotational, translational, planet])
 
 
-def phase_shares(motions: SetMotions, *, signed: bool = False) -> np.ndarray:
+def phase_shares(motions: SetMotions) -> np.ndarray:
     """Shares of the cyclic harmonics in the planets' kinetic energy.
 
     Parameters
     ----------
     motions : SetMotions
-    signed : bool
-        Tells harmonic j from N - j, motion ``exp(i j psi_n)`` from ``exp(-i j psi_n)``. Real shapes hold
-        equal parts of both.
 
     Returns
     -------
-    (N // 2 + 1, m) array, or (N, m) if signed
+    (N // 2 + 1, m) array
         Harmonic 0: all planets in phase; j (with N - j): neighbours apart by the phase ``2 pi j / N``; N / 2:
         neighbours in counter-phase. At equal spacing this is the discrete Fourier transform of the local
         planet motions, and the shares add up to one. At unequal spacing the share of j is what the patterns
         ``cos j psi_n`` and ``sin j psi_n`` explain; these overlap, so that the shares can add up to more than
         one. NaN where the planets rest.
-
-    Raises
-    ------
-    CaseError
-        Signed shares of unequally spaced planets (E-SYMMETRY).
     """
     weighted, N = motions.weighted, len(motions.planet_angles)
     total = (np.abs(weighted) ** 2).sum(axis=(0, 1))
     whole = total + np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
-    if signed:
-        if not equally_spaced(motions.planet_angles):
-            raise CaseError(
-                "harmonics j and N - j cannot be told apart for planets at unequal angles", code="E-SYMMETRY",
-                limit="equal angles, in ascending order", remedy="take the shares without sign",
-            )  # fmt: skip
-        energy = (np.abs(np.fft.fft(weighted, axis=0)) ** 2).sum(axis=1) / N
-    else:
-        energy = np.array([_inside(_harmonic(motions.planet_angles, j), weighted) for j in range(N // 2 + 1)])
+    energy = np.array([_inside(_harmonic(motions.planet_angles, j), weighted) for j in range(N // 2 + 1)])
     moves = total > 1e-12 * whole
     return np.where(moves, energy / np.where(moves, total, 1.0), np.nan)
 
@@ -263,18 +247,6 @@ def named_kinds(share, frequency) -> tuple[str, ...]:
         "rigid" if f == 0.0 else CLASSES[i] if value >= PURE else "mixed"
         for f, i, value in zip(np.asarray(frequency), best, most)
     )
-
-
-def motion_planes(dofs: Sequence[str]) -> np.ndarray:
-    """Rows (k, 2) of x and y, or radial and tangential, of every body that has both, for `whirl`."""
-    place = {name: i for i, name in enumerate(dofs)}
-    planes = []
-    for first, second in (("x", "y"), ("radial", "tangential")):
-        for name, i in place.items():
-            body, _, axis = name.partition(": ")
-            if axis == first and (partner := place.get(f"{body}: {second}")) is not None:
-                planes.append((i, partner))
-    return np.array(planes, int).reshape(-1, 2)
 
 
 def equally_spaced(planet_angles) -> bool:

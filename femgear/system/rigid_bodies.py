@@ -1,23 +1,21 @@
 """Data of planetary sets of rigid bodies: bodies, supports, radii, angles, torques, refusals.
 
 Bodies have up to six motions: along x, y and z, two tilts ``w = r phi`` and the rotation ``u = r theta``.
-Those of the planar set move in their plane (E-RANGE), those of the helical set in all directions
-(E-RANGE).
+Those of the planar set move in their plane, those of the helical set in all directions.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 
 from femgear.errors import CaseError
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 CENTRAL = ("carrier", "ring", "sun")
 DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
@@ -76,11 +74,11 @@ class ContactLines:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RigidSet:
+class RigidSet(ABC):
     """Rigid bodies, the geometry of their gears and the stiffness of their meshes.
 
-    A kind of set says which of the six motions its bodies have (``axes``), and the names of the springs in
-    them (``directions``); ``meshes_optional`` allows meshes without stiffness.
+    A kind of set says which of the six motions its bodies have (``axes``); ``meshes_optional`` allows meshes
+    without stiffness.
 
     Parameters
     ----------
@@ -101,13 +99,11 @@ class RigidSet:
     Raises
     ------
     CaseError
-        Numbers that no set can have, planet angles that are none, unordered or span more than a turn, with
-        the code of the kind of set.
+        Numbers that no set can have, planet angles that are none, unordered or span more than a turn
+        (E-RANGE).
     """
 
-    code: ClassVar[str] = "E-RANGE"
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
-    directions: ClassVar[dict[str, tuple[int, ...]]] = {}
     meshes_optional: ClassVar[bool] = True
 
     sun: PlanarBody | HelicalBody
@@ -129,7 +125,7 @@ class RigidSet:
         for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
             self._keep(name, self._per_planet(name))
         for name in (*CENTRAL, "planet"):
-            check_body(name, getattr(self, name))
+            _check_body(name, getattr(self, name))
         check_set(self)
 
     @property
@@ -164,9 +160,9 @@ class RigidSet:
         return np.stack([getattr(self, name).stiffness for name in CENTRAL])
 
     @property
+    @abstractmethod
     def pin_stiffness(self) -> np.ndarray:
         """Of the planet bearings (N, d) in the first d motions of a planet [N/m, N m/rad]."""
-        raise NotImplementedError
 
     @property
     def contact_lines(self) -> ContactLines:
@@ -185,12 +181,8 @@ class RigidSet:
             (self.ring_radius - self.planet_radius) / (a * math.cos(self.pressure_angle_planet_ring)) - 1.0,
         )
 
-    def refuse(self, key: str, value, unit: str, limit: str, *, remedy: str | None = None) -> NoReturn:
-        """Refuse an entry with the code of this kind of set."""
-        refuse(key, value, unit, limit, code=self.code, remedy=remedy)
-
     def _numbers(self, key: str, dimensions: int | None = None) -> np.ndarray:
-        return numbers(key, getattr(self, key), dimensions, code=self.code)
+        return numbers(key, getattr(self, key), dimensions)
 
     def _keep(self, name: str, array: np.ndarray) -> None:
         array.setflags(write=False)
@@ -201,7 +193,7 @@ class RigidSet:
         values = self._numbers(name)
         values = np.full(self.n_planets, values.item()) if values.size == 1 else values
         if values.shape != (self.n_planets,):
-            self.refuse(name, f"{values.size} values", "", f"one number, or {self.n_planets}")
+            refuse(name, f"{values.size} values", "", f"one number, or {self.n_planets}")
         return values
 
 
@@ -214,21 +206,13 @@ class PlanarSet(RigidSet):
     planet_bearing : float or (N,) array
         Isotropic stiffness between planet and carrier [N/m]; infinite fixes the planet's axis to its pin.
 
-    Raises
-    ------
-    CaseError
-        Numbers that no set can have (E-RANGE), planet angles that are none, unordered or span more than a
-        turn (E-RANGE).
-
     Notes
     -----
     Published data are often rounded, or mix reference and working angles: radii that do not close are
     taken as they are, and `closure` tells by how much.
     """
 
-    code: ClassVar[str] = "E-RANGE"
     axes: ClassVar[tuple[int, ...]] = (0, 1, 5)
-    directions: ClassVar[dict[str, tuple[int, ...]]] = {"{}": (0, 1), "torsional {}": (2,)}
     meshes_optional: ClassVar[bool] = False
 
     planet_bearing: float | np.ndarray
@@ -238,7 +222,7 @@ class PlanarSet(RigidSet):
         self._keep("planet_bearing", self._per_planet("planet_bearing"))
         wrong = ~(self.pin_stiffness > 0.0)
         if np.any(wrong):
-            self.refuse("planet_bearing", self.pin_stiffness[wrong][0], "N/m", "above 0, or infinite")
+            refuse("planet_bearing", self.pin_stiffness[wrong][0], "N/m", "above 0, or infinite")
 
     @property
     def pin_stiffness(self) -> np.ndarray:
@@ -337,7 +321,7 @@ class HelicalBody:
     support: HelicalSupport = field(default_factory=HelicalSupport)
 
     def __post_init__(self):
-        check_body("body", self)
+        _check_body("body", self)
 
     @property
     def stiffness(self) -> np.ndarray:
@@ -373,15 +357,6 @@ def gear_geometry(s: PlanetarySet) -> dict[str, Any]:
         "pressure_angle_sun_planet": s.working_pressure_angle_sun_planet,
         "pressure_angle_planet_ring": s.working_pressure_angle_planet_ring,
     }
-
-
-def torsional_set(data: PlanarSet) -> PlanarSet:
-    """The same set with all axes held: N + 3 rotations (A. Kahraman, J. Sound Vib. 173, 1994, 125-130).
-
-    The planets' axes are then fixed to the carrier, whose rotation carries their mass.
-    """
-    held = {name: replace(getattr(data, name), support=math.inf) for name in CENTRAL}
-    return replace(data, planet_bearing=math.inf, **held)
 
 
 def torque_shares(data: RigidSet) -> dict[str, float]:
@@ -449,87 +424,81 @@ def inertia_of_reduced(reduced: float, radius: float) -> float:
     return reduced * radius**2
 
 
-def torsional_of_reduced(stiffness: float, radius: float) -> float:
-    """Torsional stiffness [N m/rad] of a stiffness ``k_u`` [N/m] that acts on ``u = r theta``."""
-    return stiffness * radius**2
-
-
 def check_set(data: RigidSet) -> None:
     """Refuse radii, pressure angles, mesh stiffnesses and planet angles."""
     for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
-        _check_positive(name, getattr(data, name), "m", code=data.code)
+        _check_positive(name, getattr(data, name), "m")
     for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
-        value = numbers(name, getattr(data, name), 0, code=data.code)
+        value = numbers(name, getattr(data, name), 0)
         if not 0.0 < value < 0.5 * math.pi:
-            data.refuse(name, value, "rad", "between 0 and pi/2", remedy="give radians")
+            refuse(name, value, "rad", "between 0 and pi/2", remedy="give radians")
     limit = "finite, 0 or more" if data.meshes_optional else "finite and above 0"
     for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
         values = getattr(data, name)
         wrong = ~np.isfinite(values) | ~((values >= 0.0) if data.meshes_optional else (values > 0.0))
         if np.any(wrong):
-            data.refuse(name, values[wrong][0], "N/m", limit)
+            refuse(name, values[wrong][0], "N/m", limit)
     psi, allowed = data.angles, "one or more, finite, ascending, within one turn"
     if not psi.size or psi.ndim != 1 or not np.all(np.isfinite(psi)):
-        data.refuse("planet_angles", psi.tolist(), "rad", allowed)
+        refuse("planet_angles", psi.tolist(), "rad", allowed)
     if np.any(np.diff(psi) < 1e-9) or np.ptp(psi) > 2.0 * math.pi - 1e-9:
         remedy = "give radians, in ascending order"
-        data.refuse("planet_angles", psi.tolist(), "rad", allowed, remedy=remedy)
+        refuse("planet_angles", psi.tolist(), "rad", allowed, remedy=remedy)
 
 
-def check_body(name: str, body: PlanarBody | HelicalBody) -> None:
+def _check_body(name: str, body: PlanarBody | HelicalBody) -> None:
     """Refuse a mass, inertia or support."""
-    code = "E-RANGE"
     for entry, unit in (("mass", "kg"), ("inertia", "kg m^2"), ("diametral_inertia", "kg m^2")):
         if hasattr(body, entry):
-            _check_positive(f"{name}.{entry}", getattr(body, entry), unit, code=code)
+            _check_positive(f"{name}.{entry}", getattr(body, entry), unit)
     remedy = "give planet_bearing of the set"
     if isinstance(body, HelicalBody):
         check_support(f"{name}.support", body.support, count=0)
         if name == "planet" and np.any(body.support.stiffness):
-            refuse("planet.support", "a planet", "", "none", code=code, remedy=remedy)
+            refuse("planet.support", "a planet", "", "none", remedy=remedy)
         return
     for entry, unit in (("support", "N/m"), ("torsional_support", "N m/rad")):
-        value = numbers(f"{name}.{entry}", getattr(body, entry), 0, code=code)
+        value = numbers(f"{name}.{entry}", getattr(body, entry), 0)
         if not value >= 0.0:
-            refuse(f"{name}.{entry}", value, unit, "0 or more, or infinite", code=code)
+            refuse(f"{name}.{entry}", value, unit, "0 or more, or infinite")
         if name == "planet" and value:
-            refuse(f"planet.{entry}", value, unit, "0", code=code, remedy=remedy)
+            refuse(f"planet.{entry}", value, unit, "0", remedy=remedy)
 
 
 def check_support(key: str, support: HelicalSupport, *, count: int | None = None) -> None:
     """Refuse stiffnesses of a support (E-RANGE): of `count` planets, of one body (0), of either (None)."""
-    code, allowed = "E-RANGE", f"one number, or {count}" if count else "one number"
+    allowed = f"one number, or {count}" if count else "one number"
     # what is no support has none of its stiffnesses
     if not all(hasattr(support, entry) for entry in DIRECTIONS):
-        refuse(key, repr(support), "", "a HelicalSupport", code=code)
+        refuse(key, repr(support), "", "a HelicalSupport")
     for entry, unit in DIRECTIONS.items():
-        values = numbers(f"{key}.{entry}", getattr(support, entry), code=code)
+        values = numbers(f"{key}.{entry}", getattr(support, entry))
         if count is not None and values.ndim and values.shape != (count,):
-            refuse(f"{key}.{entry}", f"{values.size} values", "", allowed, code=code)
+            refuse(f"{key}.{entry}", f"{values.size} values", "", allowed)
         if not np.all(values >= 0.0):
-            refuse(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite", code=code)
+            refuse(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite")
 
 
-def numbers(key: str, values, dimensions: int | None = None, *, code: str) -> np.ndarray:
+def numbers(key: str, values, dimensions: int | None = None) -> np.ndarray:
     """Values as an array of floats, of so many dimensions where they are given."""
     try:
         found = np.array(values, float)
     except (TypeError, ValueError):
-        refuse(key, repr(values), "", "a number" if dimensions == 0 else "numbers", code=code)
+        refuse(key, repr(values), "", "a number" if dimensions == 0 else "numbers")
     if dimensions is not None and found.ndim != dimensions:
-        refuse(key, f"{found.size} values", "", "one number", code=code)
+        refuse(key, f"{found.size} values", "", "one number")
     return found
 
 
-def refuse(key: str, value, unit: str, limit: str, *, code: str, remedy: str | None = None) -> NoReturn:
+def refuse(key: str, value, unit: str, limit: str, *, remedy: str | None = None) -> NoReturn:
     """Refuse an entry of a set, such as ``planet.mass``, with its value and what is allowed."""
     raise CaseError(
         f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
-        code=code, key=key, value=value, limit=limit, remedy=remedy,
+        code="E-RANGE", key=key, value=value, limit=limit, remedy=remedy,
     )  # fmt: skip
 
 
-def _check_positive(key: str, value, unit: str, *, code: str) -> None:
-    number = numbers(key, value, 0, code=code)
+def _check_positive(key: str, value, unit: str) -> None:
+    number = numbers(key, value, 0)
     if not (math.isfinite(number) and number > 0.0):
-        refuse(key, value, unit, "finite and above 0", code=code)
+        refuse(key, value, unit, "finite and above 0")

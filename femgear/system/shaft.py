@@ -104,36 +104,21 @@ class JointSprings:
     shear: float = math.inf
 
 
-def joint_springs(section: ShaftSection, length: float, *, rule: str = "exact") -> JointSprings:
-    """Springs that stand for a Timoshenko shaft.
+def joint_springs(section: ShaftSection, length: float) -> JointSprings:
+    """Springs of the joint of two links that have the static stiffness matrix of a Timoshenko shaft.
+
+    ``E I / l`` in bending, ``G J / l`` in torsion, and a joint that shears with ``12 E I / ((1 + Phi) l^3)``.
 
     Parameters
     ----------
     section : ShaftSection
     length : float
         [m]
-    rule : {"exact", "moment", "tip force", "simple span"}
-        "exact": ``E I / l`` and a joint that shears with ``12 E I / ((1 + Phi) l^3)``; this is the static
-        stiffness matrix of the beam itself. The others have no shear: "moment" is right for the tilt of
-        a tip under a moment, ``E I / l``; "tip force" for the deflection of a tip under a force,
-        ``3 E I / (4 l) / (1 + Phi / 4)``; "simple span" for the deflection under a force in the middle,
-        ``3 E I / l / (1 + Phi)``.
-
-    Notes
-    -----
-    Deflections of Timoshenko beams: tip force ``F l^3 / (3 E I) (1 + Phi / 4)``, simple span
-    ``F l^3 / (48 E I) (1 + Phi)`` (S. P. Timoshenko, Strength of Materials I, section 39). Torsion is
-    ``G J / l``.
     """
     _check_length(length)
     bending, phi = section.young * section.second_moment / length, section.shear_ratio(length)
     torsion = 2.0 * section.shear_modulus * section.second_moment / length
-    if rule == "exact":
-        return JointSprings(bending, torsion, 12.0 * bending / ((1.0 + phi) * length**2))
-    factors = {"moment": 1.0, "tip force": 0.75 / (1.0 + 0.25 * phi), "simple span": 3.0 / (1.0 + phi)}
-    if rule not in factors:
-        raise CaseError(f"no rule {rule!r}", code="E-SHAFT", key="rule", limit=f"exact, {', '.join(factors)}")
-    return JointSprings(factors[rule] * bending, torsion)
+    return JointSprings(bending, torsion, 12.0 * bending / ((1.0 + phi) * length**2))
 
 
 def joint_deflections(length: float) -> np.ndarray:

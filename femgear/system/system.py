@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from femgear.errors import CaseError, checked_numbers
-from femgear.system.elements import Element, GearMeshes, tabulated_element
+from femgear.system.elements import Element, GearMeshes, coefficients_of, tabulated_element
 from femgear.system.fourier import harmonics_of, phase_of, series_of
 
 Law = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -346,7 +346,7 @@ class NonlinearSystem:
         """Number of base frequencies that the elements and forces name."""
         orders = [force.orders for force in self.forces]
         for element in self.elements:
-            orders += [s.orders for s in vars(element).values() if hasattr(s, "orders")]
+            orders += [series.orders for series in coefficients_of(element).values()]
         return max([len(o) for o in orders if any(o)], default=1)
 
 

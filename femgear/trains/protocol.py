@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+# only libraries that are loaded can be limited to one thread, and SciPy brings a BLAS of its own
+import scipy.linalg  # noqa: F401
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from femgear.errors import CaseError
+    from femgear.errors import CaseError, Finding
     from femgear.report.tables import Block
     from femgear.storage.results import Results
 
 Progress = Callable[[str, float, float], None]
 """Called with (stage, done, total)."""
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """One BLAS thread for a block of code, or as ``@one_blas_thread()`` for a function.
+
+    Several threads gain nothing on matrices of a few hundred rows, and wait for one another for many times
+    the work as soon as other processes want the same cores.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        yield
 
 
 @dataclass(frozen=True)
@@ -139,9 +156,9 @@ class Train:
     describe : callable
         ``(case) -> blocks``: its title first, its warnings last.
     warnings : callable
-        ``(case) -> sentences``: what is allowed but deserves a look.
+        ``(case) -> findings``: what is allowed but deserves a look.
     result_warnings : callable
-        ``(Results) -> sentences``: what the solvers say against their own results.
+        ``(Results) -> findings``: what the solvers say against their own results.
     figures : callable
         ``() -> {stage: Figures}``; called when something is drawn, so that drawing libraries are loaded late.
         ``""`` are those of the case, whatever is computed of it.
@@ -154,7 +171,7 @@ class Train:
     cross_check : callable
         ``(case) -> problems``: what no entry shows alone.
     notices : callable
-        ``(tables) -> sentences``: what was read in a way that deserves to be said.
+        ``(tables) -> findings``: what was read in a way that deserves to be said.
     """
 
     name: str
@@ -162,14 +179,14 @@ class Train:
     model: type
     stages: tuple[Stage, ...]
     describe: Callable[[Any], tuple[Block, ...]]
-    warnings: Callable[[Any], Iterable[str]]
-    result_warnings: Callable[[Results], Iterable[str]] = lambda results: ()
+    warnings: Callable[[Any], Iterable[Finding]]
+    result_warnings: Callable[[Results], Iterable[Finding]] = lambda results: ()
     figures: Callable[[], Mapping[str, Figures]] = dict
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
     section: str = ""
     own_file: OwnFile | None = None
     cross_check: Callable[[Any], Iterable[CaseError]] = lambda case: ()
-    notices: Callable[[dict], Iterable[str]] = lambda data: ()
+    notices: Callable[[dict], Iterable[Finding]] = lambda data: ()
 
     def stage(self, name: str) -> Stage | None:
         """The stage of a name, None where the train has none of it."""

@@ -14,17 +14,17 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from pydantic import ValidationError, create_model
+from pydantic import create_model
 
 from femgear.case import text as case_text
 from femgear.case.case import with_shafts
 from femgear.case.checks import cross_check
 from femgear.case.fields import described
-from femgear.case.problems import added_material, combine, notices, translate
+from femgear.case.problems import added_material, checked_case, combine, notices
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.tables import embed_profiles
 from femgear.case.text import text_with_points
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
 from femgear.trains.protocol import OwnFile, Train
@@ -48,7 +48,8 @@ def read_case(path: str | os.PathLike) -> Any:
     CaseError
         Everything that is wrong with the file, at once; ``problems`` holds one `CaseError` for each.
     """
-    return parse_case(case_text.read_text(path), name=case_text.printable(os.fsdecode(path)))
+    text, name = case_text.read_text(path), case_text.printable(os.fsdecode(path))
+    return _build(case_text.parse(text, name), text, name)
 
 
 def parse_case(text: str, *, name: str = "") -> Case:
@@ -139,7 +140,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     except CaseError as error:
         error.key, error.file = ", ".join(values), case.name or None
         raise
-    said: tuple[str, ...] = ()
+    said: tuple[Finding, ...] = ()
     try:
         changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
     except CaseError as error:
@@ -246,12 +247,14 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     files = embed_profiles(data, name)
     if files:
         text = text_with_points(data, name, points="measured profiles", remedy="measure at fewer points")
-    try:
-        case = train.model.model_validate(data)
-    except ValidationError as error:
-        raise combine(translate(error, every_section()), lines, name) from None
-    if problems := cross_check(case, train.cross_check(case)):
-        raise combine(problems, lines, name)
+    case = checked_case(
+        train.model,
+        data,
+        lines,
+        name,
+        check=lambda case: cross_check(case, train.cross_check(case)),
+        keys=every_section,
+    )
     said = (*notices(data), *train.notices(data), *added_material(case))
     case.read_from(text, lines, name, notices=said, profile_files=files)
     return with_shafts(case)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from femgear.gears.phasing import MeshPhasing, standard_lag
 from femgear.system.rigid_bodies import (
+    CENTRAL,
     HelicalBody,
     HelicalSupport,
     PlanarBody,
     PlanarSet,
     inertia_of_reduced,
-    torsional_of_reduced,
 )
 from femgear.trains.helical.model import HelicalSet
 
@@ -113,6 +114,15 @@ def cases(*, convention: str = "rotation") -> dict[str, MeshPhasing]:
     }  # fmt: skip
 
 
+def torsional_set(data: PlanarSet) -> PlanarSet:
+    """The same set with all axes held: N + 3 rotations (A. Kahraman, J. Sound Vib. 173, 1994, 125-130).
+
+    The planets' axes are then fixed to the carrier, whose rotation carries their mass.
+    """
+    held = {name: replace(getattr(data, name), support=math.inf) for name in CENTRAL}
+    return replace(data, planet_bearing=math.inf, **held)
+
+
 def lin_parker_set(planets: int = 3, *, planet_bearing: float = 1e8, sun_support: float = 1e8) -> PlanarSet:
     """Example set of Lin and Parker (1999, Table 1), equally spaced.
 
@@ -127,10 +137,10 @@ def lin_parker_set(planets: int = 3, *, planet_bearing: float = 1e8, sun_support
     def body(mass, reduced, radius, **supports):
         return PlanarBody(mass, inertia_of_reduced(reduced, radius), **supports)
 
-    torsional = torsional_of_reduced(1e9, ring)
+    # k_u acts on u = r theta
     return PlanarSet(
         sun=body(0.4, 0.39, sun, support=sun_support),
-        ring=body(2.35, 3.00, ring, support=1e8, torsional_support=torsional),
+        ring=body(2.35, 3.00, ring, support=1e8, torsional_support=1e9 * ring**2),
         carrier=body(5.43, 6.29, distance, support=1e8),
         planet=body(0.66, 0.61, planet),
         sun_radius=sun,

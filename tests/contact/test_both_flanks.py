@@ -59,11 +59,11 @@ def test_teeth_stand_where_their_flanks_touch(gears, direction, angles):
     if angles is not None:
         gears = replace(gears, planet_angles=tuple(np.array(angles) * 2 * np.pi / 135))
     N = gears.n_planets
-    side = flank_side(gears, direction)
-    index = np.floor(-side.phase).astype(int)[:, None] + np.arange(-1, 3)
+    phase, _ = flank_side(gears, direction)
+    index = np.floor(-phase).astype(int)[:, None] + np.arange(-1, 3)
     teeth = side_teeth(gears, index, direction)
     tau = 0.3
-    zeta = gears.base_pitch * (direction * tau + side.phase[:, None] + index)
+    zeta = gears.base_pitch * (direction * tau + phase[:, None] + index)
     zero = orientations(gears, tau)
     for j in range(2 * N):
         kind, n = divmod(j, N)

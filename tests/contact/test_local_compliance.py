@@ -13,8 +13,7 @@ from validation.reference.hertz import (
     weber_banaschek,
 )
 
-from femgear.contact.local_compliance import depth_displacement, hertz_half_width, surface_displacement
-from femgear.errors import ContactError
+from femgear.contact.local_compliance import depth_displacement, surface_displacement
 
 E, NU = 206e9, 0.3
 MU = E / (2 * (1 + NU))
@@ -139,24 +138,3 @@ def test_no_load_no_contact():
 def test_relative_radius_of_a_hollow_surface():
     assert relative_radius(0.05, -0.075) == pytest.approx(0.15)
     assert relative_radius(0.05, np.float64(1e9)) == pytest.approx(0.05)
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: surface_displacement(0.0, 0.0, MU, NU),
-        lambda: surface_displacement(0.0, 1e-5, -MU, NU),
-        lambda: depth_displacement(0.0, 0.0, MU, NU),
-        lambda: depth_displacement(1.0, np.nan, MU, NU),
-        lambda: surface_displacement(0.0, -1e-5, MU, NU),
-        lambda: surface_displacement(0.0, 1e-5, MU, 0.5),
-        lambda: depth_displacement(0.0, 1e-4, MU, np.nan),
-        lambda: hertz_half_width(-1.0, 0.01, 1e11),
-        lambda: hertz_half_width(np.nan, 0.01, 1e11),
-        lambda: hertz_half_width(1.0, -0.01, 1e11),
-        lambda: hertz_half_width(1.0, 0.01, np.inf),
-    ],
-)
-def test_impossible_values_are_refused(call):
-    with pytest.raises(ContactError, match="E-RANGE"):
-        call()

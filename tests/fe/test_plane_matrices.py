@@ -12,7 +12,7 @@ from validation.reference.plane_elasticity import (
     to_skfem,
 )
 
-from femgear.errors import CaseError, FemgearError, GridError
+from femgear.errors import FemgearError, GridError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import Grid
 from femgear.fe.meshing import mesh_outline
@@ -114,13 +114,6 @@ def test_states_and_thicknesses_by_region():
     assert np.ones(2 * grid.n_nodes) @ M @ np.ones(2 * grid.n_nodes) == pytest.approx(
         2 * 7850 * 0.4, rel=1e-13
     )
-    for bad in ({"left": "plane stress"}, {"left": "plane stress", "no": "plane stress"}):
-        with pytest.raises(GridError) as error:
-            stiffness(grid, STEEL, state=bad)
-        assert error.value.code == "E-GRID"
-    with pytest.raises(GridError) as error:
-        stiffness(grid, STEEL, state="plain stress")
-    assert error.value.code == "E-CHOICE"
 
 
 def test_mass_gives_weight_and_moments_of_inertia():
@@ -160,10 +153,6 @@ def test_foundation_work_of_rigid_motions():
     assert turn @ K @ turn == pytest.approx(kt * radius**2 * arc, rel=1e-6)
     assert shift @ K @ shift == pytest.approx(0.5 * (kr + kt) * arc, rel=1e-6)
     assert abs(K - K.T).max() < 1e-15 * abs(K).max()
-    for bad in (-1.0, np.nan):
-        with pytest.raises(GridError) as error:
-            foundation(grid, "outer", bad, kt, thickness=thickness)
-        assert error.value.code == "E-RANGE"
 
 
 def test_foundation_pressure_is_modulus_times_displacement():
@@ -192,23 +181,6 @@ def test_skfem_grid_keeps_names_and_order(plate):
         ends = np.sort(other.p[:, other.facets[:, other.boundaries[name]]].transpose(2, 1, 0), axis=1)
         assert np.allclose(ends, np.sort(plate.points[edges[:, :2]], axis=1))
     assert np.array_equal(other.subdomains["body"], plate.regions["body"])
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        (-1.0, 0.3, 1.0),
-        (np.nan, 0.3, 1.0),
-        (1.0, 0.5, 1.0),
-        (1.0, 0.6, 1.0),
-        (1.0, -1.0, 1.0),
-        (1.0, 0.3, 0.0),
-    ],
-)
-def test_impossible_materials(values):
-    with pytest.raises(CaseError) as error:
-        Material(*values)
-    assert error.value.code == "E-RANGE"
 
 
 def test_free_and_half_held_bodies_are_refused(plate):  # bad input 59

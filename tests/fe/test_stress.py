@@ -5,7 +5,6 @@ import pytest
 from validation.mapped import mapped_grid
 from validation.reference.plane_elasticity import checked_solve, edge_load
 
-from femgear.errors import GridError
 from femgear.fe.elasticity import Material, plane_modulus, stiffness, tangential_stress
 from femgear.fe.meshing import mesh_outline
 from femgear.fe.outline import Outline
@@ -151,17 +150,3 @@ def test_consecutive_boundaries_are_one_line():
 def test_modulus_of_an_edge():
     assert plane_modulus(STEEL, "plane stress") == pytest.approx(206e9)
     assert plane_modulus(STEEL, "plane strain") == pytest.approx(206e9 / (1 - 0.3**2))
-
-
-def test_refusals():
-    grid = quarter(0.5, 1.0, 3)
-    for names, state, code in (
-        ("nothing", "plane stress", "E-GRID"),
-        (("u=1", "v=0"), "plane stress", "E-GRID"),
-        ("u=0", "membrane", "E-CHOICE"),
-    ):
-        with pytest.raises(GridError) as caught:
-            tangential_stress(grid, STEEL, names, state=state)
-        assert caught.value.code == code
-    with pytest.raises(GridError):
-        tangential_stress(quarter(0.5, 1.0, 1), STEEL, "u=0", state="plane stress")

@@ -218,10 +218,10 @@ def test_thin_tips_and_thin_rims_are_warned_about():
     thin_rim = replace(REFERENCE, ring=replace(REFERENCE.ring, rim_radius=85e-3))
     assert codes(thin_rim) == ["W-RIM"]
     (warning,) = check_set(thin_rim)
-    assert 'static.members = "fixed"' in warning.message and "stiffer as it thins" in warning.message
+    assert 'static.members = "fixed"' in warning.text and "stiffer as it thins" in warning.text
     planet_rim = replace(REFERENCE, planet=replace(REFERENCE.planet, rim_radius=26e-3))
     (warning,) = check_set(planet_rim)
-    assert "bore is held rigid" in warning.message and "stiffer as it thins" in warning.message
+    assert "bore is held rigid" in warning.text and "stiffer as it thins" in warning.text
     sun = Gear(27, 1.5e-3, ALPHA, 1.2, 25e-3, 9e-3)
     planet = replace(REFERENCE.planet, tip_diameter=62e-3)
     thin_tip = close_set(

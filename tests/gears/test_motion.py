@@ -63,26 +63,6 @@ def test_orientations_turn_as_the_speeds_say():
         assert two - one == pytest.approx((s.planet - s.carrier) * period)
 
 
-@pytest.mark.parametrize("member", ["planet", "", "Sun"])
-def test_members_that_are_none_are_refused(member):
-    for call in (
-        lambda: speeds(SET, input=member, fixed="ring", speed=1.0),
-        lambda: speeds(SET, input="sun", fixed=member, speed=1.0),
-        lambda: torques(SET, member=member, torque=1.0),
-    ):
-        with pytest.raises(GeometryError) as caught:
-            call()
-        assert caught.value.code == "E-MECHANISM"
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_numbers_that_are_not_finite_are_refused(value):
-    with pytest.raises(GeometryError):
-        speeds(SET, input="sun", fixed="ring", speed=value)
-    with pytest.raises(GeometryError):
-        torques(SET, member="sun", torque=value)
-
-
 def test_a_set_at_rest_has_mesh_frequency_zero():
     assert speeds(SET, input="sun", fixed="ring", speed=0.0).mesh_frequency == 0.0
 

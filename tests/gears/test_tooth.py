@@ -198,10 +198,3 @@ def test_a_body_too_deep_for_its_sector_is_refused():
     with pytest.raises(GeometryError) as caught:
         half_sector(Gear(400, 1.5e-3, ALPHA, 0.0, 25e-3, 5e-3, name="sun"))
     assert (caught.value.code, caught.value.key) == ("E-GRID", "sun.bore_radius")
-
-
-@pytest.mark.parametrize("sizes", [(1, 1.0), (24, 0.0), (24, math.nan)])
-def test_unusable_sizes_are_refused(sizes):
-    with pytest.raises(GeometryError) as caught:
-        half_sector(GEARS["sun"], flank_elements=sizes[0], refine=sizes[1])
-    assert caught.value.code == "E-RANGE"

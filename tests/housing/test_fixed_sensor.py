@@ -191,11 +191,3 @@ def test_unusable_data_are_refused(name, lines_of):
         lines_of(**(GOOD | change))
     assert caught.value.code == code
     assert caught.value.remedy and caught.value.limit
-
-
-def test_too_few_samples_are_refused():
-    lines = fixed_sensor_lines(**GOOD)
-    with pytest.raises(CaseError, match="432 carrier orders") as caught:
-        fixed_sensor_signal(lines, samples=864)
-    assert caught.value.code == "E-HARMONICS"
-    assert fixed_sensor_signal(lines, samples=865).displacement.shape == (865,)

@@ -55,10 +55,10 @@ def test_several_revolutions_resolve_parts_of_orders():
 def test_band_pass_and_envelope_of_two_carriers():
     modulated = (1 + 0.6 * np.cos(3 * THETA)) * np.cos(108 * THETA) + 0.7 * np.cos(216 * THETA)
     band = band_pass(order_spectrum(modulated), 54, 162)
-    heard = np.abs(analytic_signal(band, samples=2050))
-    t = 2 * np.pi * np.arange(2050) / 2050
+    heard = np.abs(analytic_signal(band))
+    t = 2 * np.pi * np.arange(heard.size) / heard.size
     assert np.allclose(heard, 1 + 0.6 * np.cos(3 * t), atol=1e-12)
-    signal = analytic_signal(band, samples=2050).real
+    signal = analytic_signal(band).real
     assert np.allclose(signal, (1 + 0.6 * np.cos(3 * t)) * np.cos(108 * t), atol=1e-12)
 
 
@@ -125,7 +125,6 @@ def test_dominant_lines_are_sorted_and_cut_at_the_floor():
     assert [(line.order, line.amplitude) for line in lines] == [(105, 3.0), (111, 2.0), (108, 1.0)]
     assert lines[1].level == pytest.approx(20 * np.log10(2 / 3))
     assert len(dominant_lines(spectrum, low=54, high=162, count=2)) == 2
-    assert len(dominant_lines(spectrum, low=54, high=162, floor=-120)) == 4
     assert dominant_lines(spectrum, low=300, high=310) == ()
 
 
@@ -163,7 +162,6 @@ def test_unusable_requests_are_refused():
         (lambda: band_pass(spectrum, 500, 600), "E-RANGE"),
         (lambda: analyse_band(spectrum, 108, 9), "E-RANGE"),
         (lambda: analyse_band(spectrum, 0, 1), "E-TEETH"),
-        (lambda: analytic_signal(spectrum, samples=800), "E-HARMONICS"),
         (lambda: dominant_lines(several, low=1, high=5), "E-SHAPE"),
         (lambda: count_lobes(np.ones((2, 9))), "E-SHAPE"),
         (lambda: count_lobes(-np.ones(9)), "E-SHAPE"),

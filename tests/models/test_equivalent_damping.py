@@ -4,18 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from published.planetary_sets import lin_parker_set
-from scipy import linalg
-
-from femgear.errors import CaseError
-from femgear.system.assembler import gear_set_system
-from femgear.system.rigid_bodies import torsional_set
-from femgear.system.transmission_errors import (
+from published.planetary_sets import lin_parker_set, torsional_set
+from published.transmission_errors import (
     equivalent_damping,
     mesh_dampers,
     planar_mesh_dampers,
     support_dampers,
 )
+from scipy import linalg
+
+from femgear.errors import CaseError
+from femgear.system.assembler import gear_set_system
 
 
 def ratios(M, C, K):

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from published.planetary_sets import TABLE_2, cases, kahraman_set
 from validation.reference.frequency_response import mesh_error_response
+from validation.reference.mode_energy import gear_set_springs, signed_phase_shares
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears.phasing import MeshPhasing, mesh_phasing, phase_factors
-from femgear.system.assembler import free_motions, gear_set_springs, gear_set_system
-from femgear.system.mode_kinds import gear_set_motions, phase_shares
+from femgear.system.assembler import free_motions, gear_set_system
+from femgear.system.mode_kinds import gear_set_motions
 from femgear.system.rigid_bodies import body_masses
 from femgear.trains.helical.model import (
     helical_modes,
@@ -82,7 +83,7 @@ def test_each_harmonic_moves_the_planets_in_its_own_phasing(letter, planets):
     found = direct(data, error, np.eye(n), hertz=np.array([400.0, 1300.0, 2500.0]))
     for h in range(4):
         motions = gear_set_motions(data, found.output[:, h].T)
-        share = phase_shares(motions, signed=True)
+        share = signed_phase_shares(motions)
         own = (-(h + 1) * sun) % planets
         others = np.delete(share, own, axis=0)
         # shares of energy: squares of the leakage

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from published.planetary_sets import lin_parker_set
+from published.planetary_sets import lin_parker_set, torsional_set
 from scipy.linalg import eig, eigh
 from uneven_set import ANGLES, UNEVEN
 from validation.planetary import nrel_set
@@ -21,14 +21,7 @@ from femgear.system.assembler import (
     mesh_directions,
     pin_directions,
 )
-from femgear.system.rigid_bodies import (
-    CENTRAL,
-    PlanarBody,
-    PlanarTorque,
-    planar_from_set,
-    torque_shares,
-    torsional_set,
-)
+from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarTorque, planar_from_set, torque_shares
 
 
 def uneven(**changes):

@@ -5,22 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
-
-from femgear.errors import CaseError
-from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.time.transient import solve_transient
-from femgear.system.assembler import gear_set_system, mesh_elements
-from femgear.system.fourier import series_spectrum
-from femgear.system.rigid_bodies import PlanarTorque
-from femgear.system.transmission_errors import (
+from published.transmission_errors import (
     Eccentricity,
     TransmissionErrors,
     carrier_pins,
     equivalent_damping,
     planar_mesh_dampers,
-    tooth_lines,
+    series_spectrum,
     with_errors,
 )
+
+from femgear.errors import CaseError
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.assembler import gear_set_system, mesh_elements
+from femgear.system.fourier import tooth_lines
+from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains.planar.model import planar_problem
 
 DATA = lin_parker_set(3)

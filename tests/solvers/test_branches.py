@@ -6,13 +6,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError
-from femgear.solvers.continuation.arclength import StepOptions
 from femgear.solvers.continuation.branches import (
     branch_maximum,
     crossing_branches,
     frequency_response_curve,
     parameter_curve,
 )
+from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.stability.parametric import stability_boundary

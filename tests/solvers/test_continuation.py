@@ -2,11 +2,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.continuation.arclength import (
-    StepOptions,
-    continue_curve,
-    switch_branch,
-)
+from femgear.solvers.continuation.arclength import continue_curve, switch_branch
+from femgear.solvers.continuation.corrector import StepOptions
 
 
 def circle(u, p):

@@ -207,6 +207,25 @@ def test_reduction_to_one_planet_equals_the_full_equations(planet_set, planet_ex
         assert response.residual.max() < 1e-11
 
 
+@pytest.mark.parametrize("reached", [True, False])
+def test_many_unknowns_by_krylov_steps_or_by_elimination_are_the_same(
+    planet_set, planet_excitation, monkeypatch, reached
+):
+    excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
+    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
+    problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
+    eliminated = []
+    elimination = spectral._eliminated
+    expected = elimination(problem)
+    monkeypatch.setattr(spectral, "_eliminated", lambda one: eliminated.append(1) or elimination(one))
+    monkeypatch.setattr(spectral, "_DENSE", 0)
+    if not reached:
+        monkeypatch.setattr(spectral, "_ROUNDING", 1e-20)
+    found = spectral.solve_direct(problem)
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+    assert len(eliminated) == (0 if reached else 30)
+
+
 def test_nearly_identical_planets_meet_the_full_equations(planet_set, planet_excitation):
     """A difference too small to break the symmetry does not keep a tight tolerance from being met."""
     system = planet_set()

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from published.transmission_errors import series_spectrum
 
 from femgear.errors import CaseError
 from femgear.system.elements import GearMeshes
-from femgear.system.fourier import FourierSeries, SummedSeries, constant, series_spectrum
+from femgear.system.fourier import FourierSeries, SummedSeries, constant
 
 ONE = FourierSeries([[1.0, 2.0 - 1j, 0.5]], (1,))
 OTHER = FourierSeries([[0.5, 3j]], (0, 1))

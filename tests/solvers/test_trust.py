@@ -1,5 +1,7 @@
 """Every periodic result carries the spectral radius of its fixed point, its tail and its verdict."""
 
+import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +30,7 @@ from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearing
 from femgear.system.fourier import (
     FourierSeries,
     StepSeries,
-    coinciding_lines,
+    coincidence_note,
     constant,
     harmonic_lines,
     harmonics_of,
@@ -240,12 +242,12 @@ def test_equal_base_frequencies_are_refused_and_coinciding_lines_named():
 
 def test_lines_coincide_to_a_billionth_of_the_highest():
     orders = side_bands(2, 4, 2)
-    assert coinciding_lines(orders, [1.0, 108.0]) is None
-    one, other = coinciding_lines(orders, [1.0, 4.0])
-    assert abs(orders[one] @ [1, 4]) == abs(orders[other] @ [1, 4])
-    assert coinciding_lines(harmonic_lines(3, 2), [1.0, 2.0 + 1e-6]) is None
-    assert coinciding_lines(harmonic_lines(3, 2), [1.0, 2.0 + 1e-12]) is not None
-    assert coinciding_lines(harmonic_lines(3), [0.0]) is None
+    assert not coincidence_note(orders, [1.0, 108.0])
+    one, other = (json.loads(line) for line in re.findall(r"\[.*?\]", coincidence_note(orders, [1.0, 4.0])))
+    assert abs(np.dot(one, [1, 4])) == abs(np.dot(other, [1, 4])) and one != other
+    assert not coincidence_note(harmonic_lines(3, 2), [1.0, 2.0 + 1e-6])
+    assert coincidence_note(harmonic_lines(3, 2), [1.0, 2.0 + 1e-12])
+    assert not coincidence_note(harmonic_lines(3), [0.0])
 
 
 def test_a_branch_passes_equal_base_frequencies_and_flags_the_point():

@@ -42,7 +42,7 @@ def validate(
     """
     import scipy.linalg  # noqa: F401  its BLAS is limited only if it is loaded before
 
-    from femgear.threads import one_blas_thread
+    from femgear.trains.protocol import one_blas_thread
     from validation.page import row_line, summary, write_page
     from validation.run import run_validation
     from validation.themes import THEMES

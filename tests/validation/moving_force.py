@@ -21,7 +21,7 @@ from femgear.gears.kinematics import speeds
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.system import HarmonicForce, MechanicalSystem, Modes, NonlinearSystem, external_force
-from femgear.threads import one_blas_thread
+from femgear.trains.protocol import one_blas_thread
 from validation.mapped import mapped_grid, ring_mapping
 from validation.planetary import reference_set
 from validation.reference.force_history import solve_force_history

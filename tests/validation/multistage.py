@@ -14,9 +14,8 @@ from published.multistage_example import (
     four_stage_train,
     published_train,
 )
-from published.planetary_sets import lin_parker_set
+from published.planetary_sets import lin_parker_set, torsional_set
 
-from femgear.system.rigid_bodies import torsional_set
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,

@@ -13,8 +13,9 @@ from functools import cache
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from femgear.solvers.continuation.arclength import StepOptions, continue_curve
+from femgear.solvers.continuation.arclength import continue_curve
 from femgear.solvers.continuation.branches import Branch, branch_maximum, frequency_response_curve
+from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from published.planetary_sets import lin_parker_set
+from published.planetary_sets import lin_parker_set, torsional_set
 from published.wind_turbine import wind_turbine_b
 
 from femgear.errors import ConvergenceError
@@ -16,8 +16,6 @@ from femgear.system.rigid_bodies import (
     PlanarSet,
     PlanarTorque,
     planar_from_set,
-    torsional_of_reduced,
-    torsional_set,
 )
 from femgear.system.system import NonlinearSystem, element_forces
 from femgear.trains.planar.model import planar_modes, planar_problem
@@ -154,9 +152,7 @@ def sharing_set(
     """The example set with ring and carrier held, or on stiff supports [N/m] (of u too)."""
     data = lin_parker_set(planets, planet_bearing=planet_bearing, sun_support=sun_support)
     held = {
-        name: replace(
-            getattr(data, name), support=others, torsional_support=torsional_of_reduced(others, radius)
-        )
+        name: replace(getattr(data, name), support=others, torsional_support=others * radius**2)
         for name, radius in (("ring", data.ring_radius), ("carrier", data.centre_distance))
     }
     return replace(data, **held)

@@ -36,7 +36,6 @@ def _lowest(grid, stiffness_matrix, mass_matrix, count, load) -> np.ndarray:
     basis = sector_basis(grid, stiffness_matrix, mass_matrix, count=count, loads=load)
     modes = cyclic_modes(
         basis,
-        count=count,
         nodal_diameters=DIAMETERS,
         loads=load,
         outputs=load,
@@ -195,7 +194,6 @@ def _sector_modes(gear, diameters, state, *, refine: float = 1.0) -> np.ndarray:
     )
     modes = cyclic_modes(
         basis,
-        count=gear.teeth,
         nodal_diameters=diameters,
         loads=load,
         outputs=load,

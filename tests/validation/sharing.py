@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.contact.assembly import rotation_approach
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, moving_members
 from femgear.gears.deviations import body_separation, no_deviations
 from femgear.gears.gear import Gear
+from femgear.gears.kinematics import rotation_approach
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from validation import independent

@@ -7,7 +7,7 @@ import numpy as np
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import Grid
 from femgear.fe.shaft import ShaftStep, shaft_flexibility, timoshenko_flexibility
-from femgear.threads import one_blas_thread
+from femgear.trains.protocol import one_blas_thread
 from validation.mapped import mapped_grid, ring_mapping
 from validation.reference.support_stiffness import (
     annulus_support_stiffness,

@@ -20,6 +20,7 @@ from femgear.solvers.continuation.corrector import (
     LostError,
     ScaledCurve,
     Segment,
+    StepOptions,
     bracketed_root,
     branch_point,
     check_step,
@@ -41,59 +42,6 @@ _CORNER, _CORNER_LARGEST = 1e-3, 0.1
 _SHARP = 0.02
 # Largest step over its option, a unit of the scaled unknowns, where they are large.
 _RELATIVE = 0.1
-# Largest options: the chord is compared with the mean of two tangents, and Newton's method must contract.
-_MOST_ANGLE, _MOST_CONTRACTION = 0.5, 0.25
-
-
-@dataclass(frozen=True)
-class StepOptions:
-    """How a curve is followed; lengths are in the scaled unknowns ``(u / scale, parameter / unit)``.
-
-    Parameters
-    ----------
-    first, smallest, largest : float
-        Step lengths; where the scaled unknowns exceed ten, the largest is that many tenths longer.
-    angle : float
-        Angle between successive tangents that is aimed at [rad], up to 0.5; twice as much is refused.
-    contraction : float
-        Ratio of the second to the first Newton step, both with the first derivative, aimed at
-        (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 5.1), up to 0.25; it sets the next
-        step.
-    tolerance : float
-        Last Newton step relative to ``1 + |z|``.
-    max_iterations : int
-        Newton iterations of one correction.
-    max_points : int
-        The curve ends, incomplete, after so many points.
-    """
-
-    first: float = 0.01
-    smallest: float = 1e-8
-    largest: float = 0.1
-    angle: float = 0.15
-    contraction: float = 0.0625
-    tolerance: float = 1e-10
-    max_iterations: int = 10
-    max_points: int = 5000
-
-    def __post_init__(self):
-        if not 0.0 < self.smallest <= self.first or not self.smallest <= self.largest < np.inf:
-            raise CaseError(
-                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-RANGE",
-                limit="0 < smallest <= first, smallest <= largest",
-            )  # fmt: skip
-        if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
-            raise CaseError(
-                "a step option is not positive", code="E-RANGE", limit="> 0; two iterations or more"
-            )
-        for name, bound in (("angle", _MOST_ANGLE), ("contraction", _MOST_CONTRACTION)):
-            value = getattr(self, name)
-            if not value <= bound:
-                raise CaseError(
-                    f"the step option {name} is {value}", code="E-RANGE", key=name, value=value,
-                    limit=f"up to {bound}: beyond, a jump to another curve may look like a step",
-                    remedy="lengthen the steps by largest instead",
-                )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -185,8 +133,21 @@ def continue_curve(
     curve = scaled_curve(
         evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, describe=describe
     )
-    first = start_point(curve, start, parameter, limits=limits, direction=direction)
-    return collect(curve, first, limits=limits, options=options)
+    if not limits[0] <= parameter <= limits[1]:
+        raise CaseError(
+            f"the start at {describe(parameter)} lies outside the range", code="E-RANGE",
+            limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
+        )  # fmt: skip
+    axis = np.zeros(len(curve.scale) + 1)
+    axis[-1] = 1.0
+    try:
+        first = correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
+    except LostError as error:
+        raise ConvergenceError(
+            f"no solution found near the start at {describe(parameter)}: {error}", code="E-START",
+            remedy="give a better start, or start away from a limit point",
+        ) from error  # fmt: skip
+    return _collect(curve, first)
 
 
 def switch_branch(
@@ -237,10 +198,7 @@ def switch_branch(
             f"no other curve found at {describe(float(known.parameter[index]))}: {error}",
             code="E-CONVERGENCE", remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
-    along, back = (
-        collect(curve, replace(point, tangent=sign * tangent), limits=limits, options=options)
-        for sign in (1.0, -1.0)
-    )
+    along, back = (_collect(curve, replace(point, tangent=sign * tangent)) for sign in (1.0, -1.0))
     return along, back
 
 
@@ -255,47 +213,31 @@ def scaled_curve(
     options: StepOptions | None = None,
     describe: Callable[[float], str] = describe_value,
 ) -> ScaledCurve:
-    """The equations with their scales, checked; arguments as for :func:`continue_curve`."""
-    options = options or StepOptions()
+    """The equations over their scales and the sizes that the rows of their derivative have at the start.
+
+    Arguments as for :func:`continue_curve`.
+    """
     low, high = _checked_limits(limits)
     unit = high - low if unit is None else unit
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
         raise CaseError("the scales of a curve must be positive", code="E-RANGE", limit="> 0")
-    curve = ScaledCurve(
-        evaluate, scale, float(unit), options.tolerance, options.max_iterations, describe=describe
-    )
-    return _with_rows(curve, curve.scaled(start, parameter))
-
-
-def start_point(curve: ScaledCurve, start, parameter: float, *, limits, direction: int = 1) -> CurvePoint:
-    """Corrected point at the parameter; the tangent goes with ``direction``."""
-    if not limits[0] <= parameter <= limits[1]:
-        raise CaseError(
-            f"the start at {curve.describe(parameter)} lies outside the range", code="E-RANGE",
-            limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
-        )  # fmt: skip
-    axis = np.zeros(len(curve.scale) + 1)
-    axis[-1] = 1.0
+    curve = ScaledCurve(evaluate, scale, float(unit), (low, high), options or StepOptions(), describe)
     try:
-        return correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
+        size = np.abs(curve.equations(curve.scaled(start, parameter))[1]).max(axis=1)
     except LostError as error:
-        raise ConvergenceError(
-            f"no solution found near the start at {curve.describe(parameter)}: {error}", code="E-START",
-            remedy="give a better start, or start away from a limit point",
-        ) from error  # fmt: skip
+        raise ConvergenceError(f"the start cannot be used: {error}", code="E-START") from error
+    # in a branch point all of one equation may vanish
+    return replace(curve, rows=np.where(size > 0.0, size, size.max() or 1.0))
 
 
-def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptions | None = None) -> Curve:
-    """The whole curve from a corrected point in the sense of its tangent.
-
-    ``first`` has orientation zero where it is a branch point.
-    """
-    points, closed, complete, message = _walk(curve, first, limits, options or StepOptions())
+def _collect(curve: ScaledCurve, first: CurvePoint) -> Curve:
+    """The whole curve from a corrected point, of orientation zero in a branch point, along its tangent."""
+    points, closed, complete, message = _walk(curve, first)
     z = np.array([p.z for p in points])
     parameter = z[:, -1] * curve.unit
     if points[-1].kind == "end":
-        parameter[-1] = min(limits, key=lambda limit: abs(limit - parameter[-1]))
+        parameter[-1] = min(curve.limits, key=lambda limit: abs(limit - parameter[-1]))
     kinds = np.array([p.kind for p in points])
     return Curve(
         points=z[:, :-1] * curve.scale,
@@ -313,21 +255,19 @@ def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptio
     )
 
 
-def _walk(
-    curve: ScaledCurve, first: CurvePoint, limits, options: StepOptions
-) -> tuple[list[CurvePoint], bool, bool, str]:
+def _walk(curve: ScaledCurve, first: CurvePoint) -> tuple[list[CurvePoint], bool, bool, str]:
     """Points, limit points and branch points among them; whether closed, whether complete, how it ended."""
-    bounds = np.asarray(limits, float) / curve.unit
-    points, point, h = [first], first, options.first
+    points, point, options = [first], first, curve.options
+    h = options.first
     while len(points) < options.max_points:
         try:
             h = max(min(h, _longest(point, options)), options.smallest)
-            segment, special, h = _step(curve, point, h, bounds, options)
+            segment, special, h = _step(curve, point, h)
         except LostError as lost:
             return points, False, False, f"lost after {_where(curve, point)}: {lost}"
         events = [*special, (segment.length, segment.last)]
         events, closed = _closing(segment, first, events, len(points))
-        for _, end in _until_end(segment, events, bounds):
+        for _, end in _until_end(segment, events):
             points.append(end)
             if end.kind == "end":
                 return points, False, True, f"end of the range at {_where(curve, end)}"
@@ -353,16 +293,6 @@ def _checked_limits(limits) -> tuple[float, float]:
     return low, high
 
 
-def _with_rows(curve: ScaledCurve, z: np.ndarray) -> ScaledCurve:
-    """The same equations over the sizes that the rows of their derivative have at z."""
-    try:
-        size = np.abs(curve.equations(z)[1]).max(axis=1)
-    except LostError as error:
-        raise ConvergenceError(f"the start cannot be used: {error}", code="E-START") from error
-    # in a branch point all of one equation may vanish
-    return replace(curve, rows=np.where(size > 0.0, size, size.max() or 1.0))
-
-
 def _longest(point: CurvePoint, options: StepOptions) -> float:
     """Largest step from a point: relative to its unknowns where they have outgrown their scale."""
     return options.largest * max(1.0, _RELATIVE * float(np.linalg.norm(point.z[:-1])))
@@ -373,20 +303,17 @@ def _where(curve: ScaledCurve, point: CurvePoint) -> str:
     return curve.describe(float(point.z[-1] * curve.unit))
 
 
-def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: StepOptions):
+def _step(curve: ScaledCurve, point: CurvePoint, h: float):
     """The next accepted point: segment, special points on it, length of the next step."""
-    reason = ""
+    reason, options = "", curve.options
     while h >= options.smallest:
         try:
-            new = _landing(curve, point, h, bounds)
+            new = _landing(curve, point, h)
             if new is None:
                 new = correct(curve, point.z + h * point.tangent, point.tangent)
             shortness = h / (_CORNER * min(options.largest, _CORNER_LARGEST))
             corner = shortness <= 1.0
-            effort = step_effort(
-                point, new, angle=options.angle, contraction=options.contraction, corner=corner,
-                sharp=shortness <= _SHARP,
-            )  # fmt: skip
+            effort = step_effort(options, point, new, corner=corner, sharp=shortness <= _SHARP)
             if not corner:
                 check_step(curve, point, new)
             segment = Segment(curve, point, new)
@@ -401,10 +328,10 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
     raise LostError(f"{reason} (step reduced to {h:.1e})")
 
 
-def _landing(curve: ScaledCurve, point: CurvePoint, h: float, bounds) -> CurvePoint | None:
+def _landing(curve: ScaledCurve, point: CurvePoint, h: float) -> CurvePoint | None:
     """Point at the end of the range where the predictor reaches it, so that nothing is evaluated beyond."""
     rate = point.tangent[-1]
-    bound = bounds[1] if rate > 0.0 else bounds[0]
+    bound = curve.bounds[1 if rate > 0.0 else 0]
     way = (bound - point.z[-1]) / rate if rate else 0.0
     if not 0.0 < way <= h:
         return None
@@ -423,9 +350,9 @@ def _at_parameter(curve: ScaledCurve, guess: np.ndarray, bound: float, along: np
     return replace(found, z=np.append(found.z[:-1], bound))
 
 
-def _until_end(segment: Segment, events, bounds):
+def _until_end(segment: Segment, events):
     """Events up to the end of the range, which replaces the first one beyond it."""
-    low = (0.0, segment.first)
+    low, bounds = (0.0, segment.first), segment.curve.bounds
     for event in events:
         value = event[1].z[-1]
         beyond = bounds[0] if value < bounds[0] else bounds[1] if value > bounds[1] else None
@@ -445,13 +372,9 @@ def _at_bound(segment: Segment, low, high, bound: float):
     if low[1].z[-1] == bound:
         # the curve starts at the bound and leaves at once
         return low[0] + np.finfo(float).tiny, replace(low[1], kind="end")
-    known = {low[0]: low[1].z[-1] - bound, high[0]: high[1].z[-1] - bound}
-
-    def gap(h: float) -> float:
-        return known[h] if h in known else segment.at(h).z[-1] - bound
-
-    h = bracketed_root(gap, low[0], high[0], xtol=1e-13 * segment.length)
-    near = segment.at(h) if h not in known else (low if h == low[0] else high)[1]
+    ends, known = dict((low, high)), {h: point.z[-1] - bound for h, point in (low, high)}
+    h = bracketed_root(lambda h: segment.at(h).z[-1] - bound, known, xtol=1e-13 * segment.length)
+    near = ends[h] if h in ends else segment.at(h)
     try:
         exact = _at_parameter(segment.curve, near.z, bound, near.tangent)
         if np.linalg.norm(exact.z - near.z) < 1e-6 * segment.length:

@@ -11,16 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.optimize import OptimizeResult, minimize_scalar
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
-from femgear.solvers.continuation.arclength import (
-    Curve,
-    StepOptions,
-    continue_curve,
-    scaled_curve,
-    switch_branch,
-)
-from femgear.solvers.continuation.corrector import Segment, correct, describe_value
+from femgear.solvers.continuation.arclength import Curve, continue_curve, scaled_curve, switch_branch
+from femgear.solvers.continuation.corrector import Segment, StepOptions, correct, describe_value
 from femgear.solvers.linear.receptance import Reduction
 from femgear.solvers.periodic.equations import HarmonicBalance, harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -33,6 +28,16 @@ from femgear.system.system import NonlinearSystem
 _DIFFERENCE = 1e-5
 # Share of the upper half of the lines that asks for more of them.
 _LONG_TAIL = 1e-2
+
+
+def _of_curve(name: str, text: str) -> property:
+    """Property of a branch that its curve has."""
+    return property(lambda branch: getattr(branch.curve, name), doc=text)
+
+
+def _of_solutions(name: str, text: str) -> property:
+    """Property of a branch that every solution has, as an array (p,)."""
+    return property(lambda branch: np.array([getattr(one, name) for one in branch.solutions]), doc=text)
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,15 @@ class Branch:
     equations: ContinuationProblem = field(repr=False)
     stability: bool = True
 
+    folds = _of_curve("folds", "Indices of the limit points.")
+    branch_points = _of_curve("branch_points", "Indices of the points where another branch crosses.")
+    closed = _of_curve("closed", "The last solution is the first one again.")
+    complete = _of_curve("complete", "The branch reached an end of the range or closed.")
+    converged = _of_solutions("converged", "(p,) bool.")
+    residual = _of_solutions("residual", "Residual of the harmonic equations over the deflection, (p,).")
+    tail = _of_solutions("tail", "Share of the amplitude in the upper half of the lines, (p,).")
+    spectral_radius = _of_solutions("spectral_radius", "Of the fixed point, (p,); nan where not asked for.")
+
     @property
     def verdicts(self) -> tuple[FloquetVerdict, ...]:
         """Verdicts of the solutions; empty when stability was not asked for."""
@@ -81,16 +95,6 @@ class Branch:
         return self.solutions[0].orders
 
     @property
-    def folds(self) -> np.ndarray:
-        """Indices of the limit points."""
-        return self.curve.folds
-
-    @property
-    def branch_points(self) -> np.ndarray:
-        """Indices of the points where another branch crosses."""
-        return self.curve.branch_points
-
-    @property
     def stable(self) -> np.ndarray:
         """(p,) bool: known to be stable; False where the verdict is open."""
         return np.array([verdict.stable is True for verdict in self.verdicts])
@@ -104,36 +108,6 @@ class Branch:
     def largest_multiplier(self) -> np.ndarray:
         """Largest modulus of the Floquet multipliers, (p,); nan where there is no verdict."""
         return np.array([abs(v.multipliers[0]) if len(v.multipliers) else np.nan for v in self.verdicts])
-
-    @property
-    def converged(self) -> np.ndarray:
-        """(p,) bool."""
-        return np.array([solution.converged for solution in self.solutions])
-
-    @property
-    def residual(self) -> np.ndarray:
-        """Largest violation of the harmonic equations relative to the largest deflection, (p,)."""
-        return np.array([solution.residual for solution in self.solutions])
-
-    @property
-    def tail(self) -> np.ndarray:
-        """Share of the amplitude in the upper half of the lines, (p,)."""
-        return np.array([solution.tail for solution in self.solutions])
-
-    @property
-    def spectral_radius(self) -> np.ndarray:
-        """Spectral radius of the fixed point, (p,); nan where it was not asked for."""
-        return np.array([solution.spectral_radius for solution in self.solutions])
-
-    @property
-    def closed(self) -> bool:
-        """The last solution is the first one again."""
-        return self.curve.closed
-
-    @property
-    def complete(self) -> bool:
-        """The branch reached an end of the range or closed."""
-        return self.curve.complete
 
     @property
     def message(self) -> str:
@@ -232,9 +206,7 @@ def frequency_response_curve(
         )  # fmt: skip
     if not 0.0 <= min(frequency) < max(frequency) < np.inf:
         raise CaseError(
-            f"a range of frequencies {tuple(frequency)}",
-            code="E-RANGE",
-            limit="two different ones, not negative",
+            f"a range of frequencies {frequency}", code="E-RANGE", limit="two different ones, not negative"
         )
     if chosen.stability and bases == 1:
         require_period(min(frequency))
@@ -264,9 +236,7 @@ def parameter_curve(
     """
     chosen, parameter = CurveOptions(**options), _ends(parameter, "parameter", "")
     if not np.all(np.isfinite(parameter)) or min(parameter) == max(parameter):
-        raise CaseError(
-            f"a range of parameters {tuple(parameter)}", code="E-RANGE", limit="two different ones"
-        )
+        raise CaseError(f"a range of parameters {parameter}", code="E-RANGE", limit="two different ones")
     if chosen.stability:
         require_period(frequency)
     balance = chosen.balance(family(parameter[0] if chosen.start_at is None else chosen.start_at))
@@ -288,6 +258,8 @@ def crossing_branches(
     branch : Branch
     index : int
         One of ``branch.branch_points``.
+    stability, tolerance, options
+        Fields of `CurveOptions`.
 
     Raises
     ------
@@ -298,13 +270,9 @@ def crossing_branches(
     """
     tolerance, equations = checked_tolerance(tolerance), branch.equations
     along, back = switch_branch(
-        equations.evaluate,
-        branch.curve,
-        index,
-        limits=equations.limits,
-        options=options,
+        equations.evaluate, branch.curve, index, limits=equations.limits, options=options,
         describe=equations.describe,
-    )
+    )  # fmt: skip
     return _branch(equations, along, stability, tolerance), _branch(equations, back, stability, tolerance)
 
 
@@ -321,8 +289,6 @@ def branch_maximum(
     tolerance : float
         Of the verdict, which the solution has where the branch has them.
     """
-    from scipy.optimize import OptimizeResult, minimize_scalar
-
     equations, known = branch.equations, branch.curve
     values = np.array([measure(lines) for lines in branch.lines])
     top = int(np.argmax(values))

@@ -16,8 +16,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy import linalg
+from scipy.optimize import root_scalar
 
-from femgear.errors import FemgearError
+from femgear.errors import CaseError, FemgearError
 
 # Residuals over the sizes of the rows, relative to 1 + |z|, that are rounding.
 _ROUNDING = 1e-13
@@ -43,7 +45,7 @@ class LostError(Exception):
     """A correction that did not succeed; the reason is its text."""
 
 
-class RoundingError(LostError):
+class _RoundingError(LostError):
     """A correction that came near a solution, but whose last steps are rounding: it is nearly singular."""
 
 
@@ -53,22 +55,79 @@ def describe_value(parameter: float) -> str:
 
 
 @dataclass(frozen=True)
+class StepOptions:
+    """How a curve is followed; lengths are in the scaled unknowns ``(u / scale, parameter / unit)``.
+
+    Parameters
+    ----------
+    first, smallest, largest : float
+        Step lengths; where the scaled unknowns exceed ten, the largest is that many tenths longer.
+    angle : float
+        Angle between successive tangents that is aimed at [rad], up to 0.5; twice as much is refused.
+    contraction : float
+        Ratio of the second to the first Newton step, both with the first derivative, aimed at
+        (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 5.1), up to 0.25; it sets the next
+        step.
+    tolerance : float
+        Last Newton step relative to ``1 + |z|``.
+    max_iterations : int
+        Newton iterations of one correction.
+    max_points : int
+        The curve ends, incomplete, after so many points.
+    """
+
+    first: float = 0.01
+    smallest: float = 1e-8
+    largest: float = 0.1
+    angle: float = 0.15
+    contraction: float = 0.0625
+    tolerance: float = 1e-10
+    max_iterations: int = 10
+    max_points: int = 5000
+
+    def __post_init__(self):
+        if not 0.0 < self.smallest <= self.first or not self.smallest <= self.largest < np.inf:
+            raise CaseError(
+                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-RANGE",
+                limit="0 < smallest <= first, smallest <= largest",
+            )  # fmt: skip
+        if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
+            raise CaseError(
+                "a step option is not positive", code="E-RANGE", limit="> 0; two iterations or more"
+            )
+        # the chord is compared with the mean of two tangents, and Newton's method must contract
+        for name, bound in (("angle", 0.5), ("contraction", 0.25)):
+            value = getattr(self, name)
+            if not value <= bound:
+                raise CaseError(
+                    f"the step option {name} is {value}", code="E-RANGE", key=name, value=value,
+                    limit=f"up to {bound}: beyond, a jump to another curve may look like a step",
+                    remedy="lengthen the steps by largest instead",
+                )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class ScaledCurve:
     """``F(u, parameter)`` in the unknowns ``z = (u / scale, parameter / unit)``.
 
     ``evaluate(u (n,), parameter)`` gives residual (n,), jacobian (n, n) and slope (n,); ``scale`` (n,) and
     ``unit`` are typical sizes of u and of a change of the parameter, ``rows`` those of the rows of the scaled
-    derivative, constant so that no singularity is divided away. Newton's method ends with a step of
-    ``tolerance``, relative to ``1 + |z|``. ``describe(parameter)`` is text for messages.
+    derivative, constant so that no singularity is divided away. ``limits`` are the ends of the range of the
+    parameter, ``options`` says how the curve is followed, ``describe(parameter)`` is text for messages.
     """
 
     evaluate: Callable
     scale: np.ndarray
     unit: float
-    tolerance: float
-    max_iterations: int
-    rows: np.ndarray | float = 1.0
+    limits: tuple[float, float]
+    options: StepOptions
     describe: Callable[[float], str] = describe_value
+    rows: np.ndarray | float = 1.0
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Ends of the range of the scaled parameter (2,)."""
+        return np.asarray(self.limits, float) / self.unit
 
     def scaled(self, u, parameter: float) -> np.ndarray:
         """``z`` (n + 1,)."""
@@ -136,13 +195,11 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     LostError
         No convergence, or a bordered matrix that is singular.
     """
-    from scipy import linalg
-
     z, lengths, contraction, factors = guess.copy(), [], 0.0, None
     residuals = []
     unit = np.zeros(len(z))
     unit[-1] = 1.0
-    for _ in range(curve.max_iterations):
+    for _ in range(curve.options.max_iterations):
         residual, derivative = curve.equations(z)
         right = np.append(residual, normal @ (z - guess))
         residuals.append(float(np.abs(residual).max() / (1.0 + np.linalg.norm(z))))
@@ -156,27 +213,25 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
         lengths.append(float(np.linalg.norm(step) / (1.0 + np.linalg.norm(z))))
         if not np.isfinite(lengths[-1]):
             raise LostError("Newton's method left the finite numbers")
-        if lengths[-1] <= curve.tolerance:
+        if lengths[-1] <= curve.options.tolerance:
             break
         if len(lengths) > 3 and lengths[-1] > 2.0 * max(lengths[-2], lengths[-3]):
             raise _failed(residuals)(f"Newton's method diverges (steps {lengths[-2]:.1e}, {lengths[-1]:.1e})")
     else:
-        count, last = curve.max_iterations, lengths[-1]
+        count, last = curve.options.max_iterations, lengths[-1]
         raise _failed(residuals)(f"no convergence in {count} iterations (last step {last:.1e})")
     tangent = linalg.lu_solve(factors, unit, check_finite=False)
     tangent /= np.linalg.norm(tangent)
     if along is not None and tangent @ along < 0.0:
         # normal . tangent is positive as solved, so only a turned tangent changes the sign of the determinant
         tangent, sign = -tangent, -sign
-    if lengths[0] <= 1e2 * curve.tolerance:
+    if lengths[0] <= 1e2 * curve.options.tolerance:
         contraction = 0.0  # rounding
     return CurvePoint(z, tangent, derivative, sign, len(lengths), float(contraction), lengths[-1])
 
 
 def factored(matrix: np.ndarray):
     """LU factors of a bordered matrix and the sign of its determinant."""
-    from scipy import linalg
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", linalg.LinAlgWarning)
         factors = linalg.lu_factor(matrix, check_finite=False)
@@ -188,15 +243,9 @@ def factored(matrix: np.ndarray):
 
 
 def step_effort(
-    point: CurvePoint,
-    new: CurvePoint,
-    *,
-    angle: float,
-    contraction: float,
-    corner: bool = False,
-    sharp: bool = False,
+    options: StepOptions, point: CurvePoint, new: CurvePoint, *, corner: bool, sharp: bool
 ) -> float:
-    """How far a step was from the ``angle`` [rad] and ``contraction`` that are aimed at: 1 on target.
+    """How far a step was from the angle and the contraction that the options aim at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
     a jump from curve to curve turns the chord but not the tangents. A step may be so short that the curve may
@@ -207,6 +256,7 @@ def step_effort(
     LostError
         The angle is twice what is aimed at, or the chord leaves the tangents.
     """
+    angle, contraction = options.angle, options.contraction
     turn = np.arccos(float(np.clip(point.tangent @ new.tangent, -1.0, 1.0)))
     if sharp and 2.0 * angle < turn <= _SHARPEST:
         _check_sides(point, new)
@@ -231,7 +281,7 @@ def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
     LostError
         The step left the curve, or passed over a piece of it.
     """
-    if np.linalg.norm(new.z - point.z) <= 1e2 * curve.tolerance * (1.0 + np.linalg.norm(new.z)):
+    if np.linalg.norm(new.z - point.z) <= 1e2 * curve.options.tolerance * (1.0 + np.linalg.norm(new.z)):
         return
     _check_return(curve, point, new)
     _check_middle(curve, point, new)
@@ -239,7 +289,7 @@ def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
 
 def _failed(residuals: list[float]) -> type[LostError]:
     """Kind of a failure: the last steps began where the equations hold to rounding, or not."""
-    return RoundingError if max(residuals[-2:]) <= _ROUNDING else LostError
+    return _RoundingError if max(residuals[-2:]) <= _ROUNDING else LostError
 
 
 def _check_sides(point: CurvePoint, new: CurvePoint) -> None:
@@ -254,15 +304,11 @@ def _check_sides(point: CurvePoint, new: CurvePoint) -> None:
 
 
 def _check_return(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
-    """Predict the old point from the new one: Newton's method must lead back to it.
-
-    Where a step jumped to a neighbouring curve, the way back misses the curve that it came from. The old
-    point is known, so one Newton step tells how the method contracts towards it.
-    """
+    """One Newton step from a prediction of the old point leads back to it, but from a neighbouring curve."""
     way = float(new.tangent @ (point.z - new.z))
     guess = new.z + way * new.tangent
     miss = np.linalg.norm(guess - point.z)
-    if miss <= 1e2 * curve.tolerance * (1.0 + np.linalg.norm(point.z)):
+    if miss <= 1e2 * curve.options.tolerance * (1.0 + np.linalg.norm(point.z)):
         return
     step, _, _ = _newton_step(curve, guess, new.tangent)
     left = np.linalg.norm(guess - step - point.z) / miss
@@ -271,11 +317,10 @@ def _check_return(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> Non
 
 
 def _check_middle(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
-    """The curve passes near the middle of the cubic between both ends, with the tangent that it has there.
+    """The curve passes near the middle of the cubic between both ends, with the tangent by Simpson's rule.
 
-    Simpson's rule gives the chord from the tangents at both ends and in the middle. A curve that makes a
-    detour between two points, such as a resonance narrower than the step, is not near; two branch points in
-    one step show by the orientation between them.
+    A detour such as a resonance narrower than the step is not near; two branch points in one step show by the
+    orientation between them.
     """
     chord = new.z - point.z
     length = float(np.linalg.norm(chord))
@@ -293,8 +338,6 @@ def _check_middle(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> Non
 
 def _newton_step(curve: ScaledCurve, z: np.ndarray, normal: np.ndarray):
     """Newton step to subtract in the plane normal to a vector, tangent over that vector, sign."""
-    from scipy import linalg
-
     residual, derivative = curve.equations(z)
     factors, sign = factored(np.vstack([derivative, normal]))
     right = np.zeros((len(z), 2))
@@ -343,9 +386,9 @@ def folds(segment: Segment) -> list[tuple[float, CurvePoint]]:
     if inner is not None:
         ends.insert(1, (inner, segment.at(inner).tangent[-1]))
     found = []
-    for (low, before), (high, after) in pairwise(ends):
-        if before * after < 0.0 and abs(before) > _START:
-            h = _root(lambda h: segment.at(h).tangent[-1], low, high, before, after)
+    for low, high in pairwise(ends):
+        if low[1] * high[1] < 0.0 and abs(low[1]) > _START:
+            h = bracketed_root(lambda h: segment.at(h).tangent[-1], dict((low, high)), xtol=1e-13 * high[0])
             found.append((h, replace(segment.at(h), kind="fold")))
     return [(h, point) for h, point in found if h > _START * segment.length]
 
@@ -401,15 +444,9 @@ def _singular_place(tau, length: float, at_low: float, at_high: float) -> float:
     Rounding grows with one over tau, so that points very near the zero cannot be corrected to tolerance.
     """
     known = {0.0: at_low, length: at_high}
-
-    def value(h: float) -> float:
-        if h not in known:
-            known[h] = tau(h)
-        return known[h]
-
     try:
-        return bracketed_root(value, 0.0, length, xtol=1e-13 * length)
-    except RoundingError:
+        return bracketed_root(tau, known, xtol=1e-13 * length)
+    except _RoundingError:
         low = max(h for h in known if known[h] * at_low > 0.0)
         high = min(h for h in known if known[h] * at_high > 0.0)
         if high < low:
@@ -430,16 +467,13 @@ def _check_smooth(segment: Segment, h: float) -> None:
 
 
 def _beside(segment: Segment, h: float, part: float):
-    """Places and points before and after the place h, as near as asked or as rounding allows.
-
-    The distance starts with a part of the segment.
-    """
+    """Places and points before and after the place h, a part of the segment away or as rounding allows."""
     while True:
         width = part * segment.length
         low, high = max(h - width, 0.0), min(h + width, segment.length)
         try:
             return low, high, segment.at(low), _turned(segment, high)
-        except RoundingError:
+        except _RoundingError:
             part *= 4.0
             if part > 1.0:
                 raise
@@ -456,18 +490,18 @@ def _on_both(segment: Segment, h: float) -> CurvePoint:
     return CurvePoint(z, tangent / np.linalg.norm(tangent), derivative, 0.0, 0, 0.0, error, "branch point")
 
 
-def _root(function, low: float, high: float, at_low: float, at_high: float) -> float:
-    if at_low == 0.0 or at_high == 0.0:
-        return low if at_low == 0.0 else high
-    known = {low: at_low, high: at_high}
-    return bracketed_root(lambda h: known.get(h) or function(h), low, high, xtol=1e-13 * high)
+def bracketed_root(function: Callable[[float], float], known: dict[float, float], *, xtol: float) -> float:
+    """Zero of a function between two places with ``known`` values of different sign, by Brent's method.
 
+    ``known`` collects all values.
+    """
 
-def bracketed_root(function: Callable[[float], float], low: float, high: float, *, xtol: float) -> float:
-    """Zero of a function between two places of different sign, by Brent's method."""
-    from scipy.optimize import root_scalar
+    def value(h: float) -> float:
+        if h not in known:
+            known[h] = function(h)
+        return known[h]
 
-    return root_scalar(function, bracket=(low, high), method="brentq", xtol=xtol, rtol=1e-14).root
+    return root_scalar(value, bracket=tuple(known), method="brentq", xtol=xtol, rtol=1e-14).root
 
 
 def crossing_tangent(curve: ScaledCurve, point: CurvePoint) -> np.ndarray:

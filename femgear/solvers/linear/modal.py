@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.system import MechanicalSystem, Modes, Response, freeze
@@ -84,11 +85,6 @@ class ComplexModes:
         return np.abs(self.eigenvalue) / (2.0 * np.pi)
 
     @property
-    def damped_frequency(self) -> np.ndarray:
-        """``Im lambda / 2 pi`` (p,) [Hz]; zero for real poles."""
-        return self.eigenvalue.imag / (2.0 * np.pi)
-
-    @property
     def damping_ratio(self) -> np.ndarray:
         """``-Re lambda / |lambda|`` (p,): negative where motions grow, +-1 for real poles, 0 if rigid."""
         return np.where(
@@ -141,7 +137,7 @@ def solve_modes(
     values, shape, rigid = _eigen(system.M, stiffness, count, max_frequency)
     if np.any(rigid):
         shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
-    springs = spring_directions(system, mesh_stiffness)
+    springs = _spring_directions(system, mesh_stiffness)
     rows = springs.T @ shape
     modal_load = shape.T @ system.load
     _check_rigid(system, shape[:, rigid])
@@ -185,7 +181,7 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
         ``L K^+ W - sum (L phi) r^T / omega^2`` [m/N per unit of L].
     """
     outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
-    springs = spring_directions(system, modes.mesh_stiffness)
+    springs = _spring_directions(system, modes.mesh_stiffness)
     static = outputs @ pseudo_solve(*rigid_basis(system, modes), springs)
     omega = 2.0 * np.pi * modes.frequency
     return static - _modal_flexibility(outputs @ modes.shape, modes.mesh_deflection, omega)
@@ -248,18 +244,18 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     1997, sections 4.4 and 4.9); the left vectors are the rows of the inverse of the right ones, so that both
     are biorthonormal within multiple poles as well.
     """
-    from scipy import linalg
-
-    square, real, rigid = _real_modes(system, mesh_stiffness)
+    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
+    try:
+        square, real = linalg.eigh(stiffness, system.M)
+    except linalg.LinAlgError as error:
+        raise mass_error() from error
+    limit = max(_RIGID, 10.0 * len(square) * np.finfo(float).eps) * np.abs(square).max()
+    rigid = np.abs(square) <= limit
     damping = real.T @ damping_matrix(system, speed) @ real
     m, elastic = int(np.count_nonzero(~rigid)), ~rigid
     order = np.concatenate([np.flatnonzero(elastic), np.flatnonzero(rigid)])
-    # speeds scaled by a mean frequency keep the state matrix balanced
     scale = np.exp(0.5 * np.mean(np.log(np.abs(square[elastic])))) if m else 1.0
-    state = np.zeros((m + len(square),) * 2)
-    state[:m, m : 2 * m] = scale * np.eye(m)
-    state[m : 2 * m, :m] = -np.diag(square[elastic]) / scale
-    state[m:, m:] = -damping[np.ix_(order, order)]
+    state = state_matrix(square[elastic], damping[np.ix_(order, order)], scale)
     pairs = linalg.eig(state)
     value, vector = np.asarray(pairs[0], np.complex128), np.asarray(pairs[1])
     inverse = _inverse(vector)
@@ -304,6 +300,26 @@ def whirl(shape, mass, planes) -> np.ndarray:
     bound = weight @ (np.abs(x) ** 2 + np.abs(y) ** 2)
     total = mass @ np.abs(shape) ** 2
     return np.where(bound > 1e-12 * total, area / np.where(bound > 0.0, bound, 1.0), 0.0)
+
+
+def state_matrix(square: np.ndarray, damping: np.ndarray, scale: float) -> np.ndarray:
+    """First-order form of modes, elastic ones first; rigid ones by their velocity, without a double zero.
+
+    Parameters
+    ----------
+    square : (m,) array
+        ``omega^2`` of the elastic modes [1/s^2].
+    damping : (m + r, m + r) array
+        Modal damping, rigid modes last [1/s].
+    scale : float
+        Speeds are over it; a mean frequency [1/s] keeps the matrix balanced.
+    """
+    m = len(square)
+    state = np.zeros((m + len(damping),) * 2)
+    state[:m, m : 2 * m] = scale * np.eye(m)
+    state[m : 2 * m, :m] = -np.diag(square) / scale
+    state[m:, m:] = -damping
+    return state
 
 
 def damping_matrix(system: MechanicalSystem, speed: float = 0.0) -> np.ndarray:
@@ -384,8 +400,8 @@ def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     return 0.5 * (system.K + system.K.T) + system.W @ carried @ system.W.T
 
 
-def spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
-    """Directions (n, n_meshes) whose products with the motions are the deflections of the mesh springs.
+def _spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+    """Directions (n, n_meshes) of which ``directions^T q`` are the deflections of the mesh springs.
 
     With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give
     ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the
@@ -405,8 +421,6 @@ def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
 
     ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
     """
-    from scipy import linalg
-
     carried = mass @ rigid
     loads = loads - carried @ (rigid.T @ loads)
     out = linalg.cho_solve(_held(mass, stiffness, rigid), loads)
@@ -429,8 +443,6 @@ def _spring_share(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
 
 def _eigen(mass, stiffness, count, max_frequency):
     """Eigenvalues and mass-normalised shapes that are asked for, and which of them are rigid."""
-    from scipy import linalg
-
     if count is not None and max_frequency is not None:
         raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
     n = len(mass)
@@ -481,8 +493,6 @@ def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
 
 def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
     """Rigid modes cleaned of elastic parts, mass-orthonormal: twice ``x - (K + a M x x^T M)^-1 K x``."""
-    from scipy import linalg
-
     for _ in range(2):
         shape = shape - linalg.cho_solve(_held(mass, stiffness, shape), stiffness @ shape)
         lower = np.linalg.cholesky(shape.T @ mass @ shape)
@@ -492,8 +502,6 @@ def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
 
 def _held(mass, stiffness, rigid):
     """Cholesky factor of ``K + a M R R^T M``: the elastic part as it is, rigid motions held by a spring a."""
-    from scipy import linalg
-
     carried = mass @ rigid
     # as soft as the softest coordinate: a stiff spring would drown soft couplings in its rounding
     own = np.diag(stiffness) / np.diag(mass)
@@ -526,11 +534,8 @@ def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
 
 
 def _allowed(columns: np.ndarray, rigid: np.ndarray) -> np.ndarray:
-    """Products (n_columns, n_rigid) of columns and rigid modes that count as zero.
-
-    A share of the absolute terms; where the mode does not move the column these terms are rounding
-    themselves, so that entries of the mode below the rounding of its largest one count as zero.
-    """
+    """Products (n_columns, n_rigid) of columns and rigid modes that count as zero."""
+    # where a mode does not move a column, its terms there are rounding of its largest entry
     terms = _RIGID_TOLERANCE * np.abs(columns).T @ np.abs(rigid)
     largest = np.abs(columns).max(axis=0, initial=0.0)[:, None] * np.abs(rigid).max(axis=0, initial=0.0)
     return np.maximum(terms, _RIGID_ROUNDING * largest)
@@ -569,19 +574,6 @@ def _damping_ratios(system: MechanicalSystem, shape, omega, damping_ratio) -> np
             value=ratio.tolist(), limit=">= 0",
         )  # fmt: skip
     return np.where(omega > 0.0, ratio, 0.0)
-
-
-def _real_modes(system: MechanicalSystem, mesh_stiffness):
-    """``omega^2`` of any sign, mass-normalised shapes and which of them are rigid."""
-    from scipy import linalg
-
-    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
-    try:
-        square, shape = linalg.eigh(stiffness, system.M)
-    except linalg.LinAlgError as error:
-        raise mass_error() from error
-    limit = max(_RIGID, 10.0 * len(square) * np.finfo(float).eps) * np.abs(square).max()
-    return square, shape, np.abs(square) <= limit
 
 
 def _inverse(vector: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ from femgear.solvers.linear.modal import (
     residual_output,
     rigid_basis,
     solve_modes,
+    state_matrix,
     total_stiffness,
 )
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
@@ -296,8 +297,13 @@ def _modes_with_loads(problem, reference, count, max_frequency) -> tuple[Mechani
     try:
         modes = solve_modes(bare, reference, damping_ratio=0.0, count=count, max_frequency=max_frequency)
     except ConvergenceError as error:
-        _tell_of_the_speed(problem, error)
-        raise
+        if error.code != "E-STIFFNESS" or problem.system.gyroscopic is None:
+            raise
+        raise ConvergenceError(
+            error.message + ", in a system that turns", code=error.code,
+            remedy="where K holds centripetal terms (-speed^2) the speed is above a critical one: lower the "
+            "speed or leave those terms out; else check the signs of supports, couplings and mesh directions",
+        ) from error  # fmt: skip
     loads = [bare.load]
     for force in problem.forces:
         loads += [force.force.real, force.force.imag]
@@ -307,17 +313,6 @@ def _modes_with_loads(problem, reference, count, max_frequency) -> tuple[Mechani
     rows[: len(reference) + 1, modes.frequency == 0.0] = 0.0
     stiffness = np.concatenate([reference, np.zeros(len(loads))])
     return system, replace(modes, mesh_stiffness=stiffness, mesh_deflection=rows)
-
-
-def _tell_of_the_speed(problem: NonlinearSystem, error: ConvergenceError) -> None:
-    """Raise a negative stiffness again with a remedy for systems that turn: K may hold centripetal terms."""
-    if error.code != "E-STIFFNESS" or problem.system.gyroscopic is None:
-        return
-    raise ConvergenceError(
-        error.message + ", in a system that turns", code=error.code,
-        remedy="where K holds centripetal terms (-speed^2) the speed is above a critical one: lower the "
-        "speed or leave those terms out; else check the signs of supports, couplings and mesh directions",
-    ) from error  # fmt: skip
 
 
 def respond(reduction: Reduction, outputs, omega, inputs) -> np.ndarray:
@@ -355,19 +350,12 @@ def _pairs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _complex_modes(modal, modes: Modes, common) -> Reduction:
-    """Poles and residues of the state ``(eta, eta', v)``: elastic modes and velocities of rigid ones.
-
-    Rigid motions enter by their velocity alone, so that free rotation makes no double pole at zero.
-    """
+    """Poles and residues of the state ``(eta, eta', v)``: elastic modes and velocities of rigid ones."""
     natural = 2.0 * np.pi * modes.frequency
     elastic, rigid = np.flatnonzero(natural > 0.0), np.flatnonzero(natural == 0.0)
     m, order = len(elastic), np.concatenate([elastic, rigid])
-    state = np.zeros((2 * m + len(rigid),) * 2)
-    # speeds scaled by a mean frequency keep the state matrix balanced
     scale = np.exp(np.mean(np.log(natural[elastic])))
-    state[:m, m : 2 * m] = scale * np.eye(m)
-    state[m : 2 * m, :m] = -np.diag(natural[elastic] ** 2) / scale
-    state[m:, m:] = -modal[np.ix_(order, order)]
+    state = state_matrix(natural[elastic] ** 2, modal[np.ix_(order, order)], scale)
     rows = modes.mesh_deflection
     drive = np.zeros((len(state), len(rows)))
     drive[m:] = rows[:, order].T / scale
@@ -437,12 +425,8 @@ def _checked(frequency, inputs, outputs, n: int):
             f"inputs of shape {inputs.shape} and outputs of shape {outputs.shape}", code="E-SHAPE",
             limit=f"({n}, inputs) and (outputs, {n})",
         )  # fmt: skip
-    if (
-        frequency.ndim != 1
-        or not len(frequency)
-        or not np.all(np.isfinite(frequency))
-        or np.any(frequency < 0.0)
-    ):
+    finite = np.all(np.isfinite(frequency)) and np.all(frequency >= 0.0)
+    if frequency.ndim != 1 or not len(frequency) or not finite:
         raise CaseError(
             f"frequencies of shape {frequency.shape} must be finite and not negative", code="E-RANGE",
             key="frequency", limit="a list of one or more numbers >= 0 Hz",
@@ -465,9 +449,7 @@ def _superposed(gain: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.nda
     return (gain @ pairs.reshape(len(right), -1)).reshape(len(gain), len(left), right.shape[1])
 
 
-def _resonance(
-    where: str, remedy: str = "give the motion some damping or move the frequency"
-) -> ConvergenceError:
+def _resonance(where: str, remedy="give the motion some damping or move the frequency") -> ConvergenceError:
     return ConvergenceError(
         f"undamped resonance {where}: infinite response", code="E-RESONANCE", remedy=remedy
     )

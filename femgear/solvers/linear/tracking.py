@@ -12,6 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.linalg import polar
+from scipy.optimize import linear_sum_assignment
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import ComplexModes, complex_modes, whirl
@@ -159,11 +162,9 @@ def track_modes(
         Fewer modes at a value than are followed (E-MODES).
     """
     values = np.asarray(values, float)
-    if (
-        values.ndim != 1
-        or len(values) < 2
-        or not (np.all(np.diff(values) > 0) or np.all(np.diff(values) < 0))
-    ):
+    steps = np.diff(np.ravel(values))
+    monotonic = np.all(steps > 0) or np.all(steps < 0)
+    if values.ndim != 1 or len(values) < 2 or not monotonic:
         raise CaseError("parameter values must ascend or descend", code="E-RANGE", limit="two or more")
     root = np.linalg.cholesky(np.asarray(mass, float)).T
     first = _solved(family, float(values[0]), root)
@@ -280,8 +281,6 @@ def _solved(family, value: float, root: np.ndarray) -> _Point:
 
 def _assigned(old: _Point, new: _Point) -> tuple[_Point, np.ndarray]:
     """The new modes in the order of the old branches, and their agreement (m,)."""
-    from scipy.optimize import linear_sum_assignment
-
     m, value = len(old.eigenvalue), new.eigenvalue
     if len(value) < m:
         raise ConvergenceError(
@@ -321,8 +320,6 @@ def _groups(eigenvalue: np.ndarray) -> list[np.ndarray]:
 
 def _matched(old: np.ndarray, new: np.ndarray, eigenvalue: np.ndarray) -> np.ndarray:
     """New vectors with the phase of the old ones; vectors of a multiple eigenvalue turned onto them."""
-    from scipy.linalg import polar
-
     new = new.astype(complex)
     for group in _groups(eigenvalue):
         basis = np.linalg.qr(new[:, group])[0]
@@ -360,8 +357,6 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _critical(tracked: TrackedModes, orders) -> tuple[CriticalSpeed, ...]:
-    from scipy.interpolate import PchipInterpolator
-
     rising = np.argsort(tracked.value)
     speed, angular = tracked.value[rising], tracked.eigenvalue.imag[rising]
     found = []

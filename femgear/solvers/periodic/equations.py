@@ -13,7 +13,7 @@ with reference springs, whose eigenvalues are small or few.
 A periodic motion needs a mean acceleration of zero, so on motions that supports leave free the mean forces of
 the elements balance the constant load (Krack and Gross, section 2.3: line zero of the harmonic equations). A
 one-sided contact pushes only; where the load asks it to pull, with nothing else to hold it, its mean
-deflection grows without end, and so does everything that is measured by it (`uncarried_note`).
+deflection grows without end, and so does everything that is measured by it (`_uncarried_note`).
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg, optimize
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, gmres
 
 from femgear.errors import CaseError, ConvergenceError, checked_count
 from femgear.solvers.linear.receptance import Reduction, reduce_problem, source_columns
@@ -195,13 +197,12 @@ class HarmonicBalance:
         if radius:
             what_happened["spectral_radius"] = self.spectral_radius(y, frequency, forces)
         told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
-        note = uncarried_note(
+        if note := _uncarried_note(
             self,
             lines,
             lambda: self.residual(lines, forces, self.receptance(frequency)[0]),
             told["converged"],
-        )
-        if note:
+        ):
             # the whole mean load is out of balance, whatever its ratio to a deflection that runs away
             told |= {"converged": False, "message": f"Not converged: {note}."}
             told["residual"] = max(told["residual"], 1.0)
@@ -304,14 +305,14 @@ def reduced(problem: NonlinearSystem) -> Reduction:
         if error.code != "E-RIGID-MODE" or total[column] > _NO_STIFFNESS * total.max():
             raise
         raise ConvergenceError(
-            f"{element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
+            f"{_element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
             "that strains it", code="E-RIGID-MODE", limit="a stiffness at rest, or a reference in its place",
             remedy="where it stiffens with the deflection pass reduction=reduce_problem(problem, "
             "reference=stiffness of every column at the expected amplitude [N/m]); else give it a stiffness",
         ) from error  # fmt: skip
 
 
-def element_name(problem: NonlinearSystem, column: int) -> str:
+def _element_name(problem: NonlinearSystem, column: int) -> str:
     """Kind and number of the first element on a column: "bearing 1"."""
     kinds = {"GearMeshes": "mesh", "RadialBearings": "bearing", "PolynomialSprings": "spring"}
     count: dict[str, int] = {}
@@ -349,8 +350,6 @@ class LineTangent:
 
     def solve(self, error) -> np.ndarray | None:
         """``dR/dX^-1 error`` to three digits; None where GMRES does not get there."""
-        from scipy.sparse.linalg import gmres
-
         operator = _operator(len(error), lambda y: y + self.fixed_point(y))
         step, state = gmres(operator, error, rtol=_ACCURACY, restart=_PRODUCTS, maxiter=1)
         return None if state else step
@@ -371,8 +370,6 @@ def krylov_radius(tangent: LineTangent) -> float | None:
     Hundreds of lines far from any resonance have eigenvalues of nearly the same modulus: more digits would
     take ten times as many products.
     """
-    from scipy.sparse.linalg import ArpackError, eigs
-
     size = tangent.balance.size
     operator = _operator(size, tangent.fixed_point)
     # a fixed start: the same value every time
@@ -388,8 +385,6 @@ def krylov_radius(tangent: LineTangent) -> float | None:
 
 
 def _operator(size: int, product: Callable[[np.ndarray], np.ndarray]):
-    from scipy.sparse.linalg import LinearOperator
-
     return LinearOperator((size, size), matvec=product, dtype=float)  # type: ignore[call-arg]
 
 
@@ -407,15 +402,12 @@ def far(balance: HarmonicBalance) -> float:
     return max(_FAR * balance.scale, _LENGTHS * balance.longest)
 
 
-def uncarried_note(balance: HarmonicBalance, lines, residual, converged: bool) -> str:
-    """Which column's mean load nothing carries; empty where there is no such column.
-
-    ``residual()`` gives the violation (n_columns, L) of the harmonic equations at the lines [m]. Converged
-    lines are doubted only where their mean is far away and out of balance.
-    """
+def _uncarried_note(balance: HarmonicBalance, lines, residual, converged: bool) -> str:
+    """Which column's mean load nothing carries, or ""; ``residual()`` (n_columns, L) [m] is at the lines."""
     mean = np.abs(lines[:, 0])
     finite = bool(np.all(np.isfinite(lines)))
     away = not finite or mean.max() > max(far(balance), 10.0 * np.abs(lines[:, 1:]).max(initial=0.0))
+    # converged lines are doubted only where their mean is far away and out of balance
     if converged and not away:
         return ""
     # first by the forces alone: so far away the residual is the rounding of two large numbers
@@ -436,7 +428,7 @@ def uncarried_note(balance: HarmonicBalance, lines, residual, converged: bool) -
 
 
 def _named(balance: HarmonicBalance, column: int) -> str:
-    name = element_name(balance.problem, column)
+    name = _element_name(balance.problem, column)
     return f" ({name})" if not name.startswith("column") else ""
 
 
@@ -446,8 +438,6 @@ def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] |
     None where some forces within the reach of all elements balance the load on the free motions: a linear
     programme that minimises what is left over. Of several columns the least forces are the wanted ones.
     """
-    from scipy import optimize
-
     strain, load = _free_balance(balance)
     columns = np.flatnonzero(np.abs(strain).max(axis=0, initial=0.0) > _UNSTRAINED)
     if not len(columns) or not np.any(load):
@@ -466,14 +456,9 @@ def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] |
 
 
 def _free_balance(balance: HarmonicBalance) -> tuple[np.ndarray, np.ndarray]:
-    """Strain (r, n_columns) of the columns by motions that only elements hold, and the load (r,) on them.
-
-    Rows have unit size; none for systems so large that the motions are not looked for.
-    """
-    from scipy import linalg
-
+    """Strain (r, n_columns) by motions that only elements hold, of unit size, and the load (r,) on them."""
     system, reference = balance.problem.system, balance.reduction.reference
-    if len(system.M) > _MOST_DOFS:
+    if len(system.M) > _MOST_DOFS:  # these motions are not looked for
         return np.zeros((0, len(reference))), np.zeros(0)
     square, shape = linalg.eigh(0.5 * (system.K + system.K.T), system.M)
     whole = np.diag(system.K) + np.einsum("ij,j,ij->i", system.W, reference, system.W)

@@ -1,7 +1,7 @@
 """Harmonic balance of systems with gear meshes, bearings and other springs between motions.
 
 The harmonic equations are solved by Newton's method (`newton`), where it fails after an embedding that leads
-to a start (`embed`). `periodic_response` checks the period first and has the verdict at hand.
+to a start. `periodic_response` checks the period first and has the verdict at hand.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def solve_harmonic_balance(
     start : PeriodicSolution or (n_columns, L) complex array, optional
         Where to start. Which of several solutions is found depends on it. When not given, the response with
         reference springs; where Newton's method fails from there, that response is followed while the
-        springs turn into the elements, see `embed`, and the message says so.
+        springs turn into the elements, and the message says so.
     tolerance : float
         Largest residual relative to the largest deflection.
     max_iterations : int
@@ -87,7 +87,7 @@ def solve_harmonic_balance(
     max_iterations = checked_count(max_iterations, "max_iterations", code="E-RANGE")
     found = newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
     if start is None and not found.converged:
-        found = embed(balance, frequency, found, tolerance, max_iterations)
+        found = _embed(balance, frequency, found, tolerance, max_iterations)
     if note := coincidence_note(balance.orders, frequency):
         found = replace(found, message=found.message + note)
     if stability if radius is None else radius:
@@ -279,24 +279,13 @@ def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterati
     )  # fmt: skip
 
 
-def embed(
+def _embed(
     balance: HarmonicBalance, frequency, failed: PeriodicSolution, tolerance: float, max_iterations: int
 ) -> PeriodicSolution:
-    """Solution found by turning the reference springs gradually into the elements.
-
-    ``X + t T (F - reference X) = T_load S`` is followed from t = 0, where it is linear, to t = 1 along its
-    arc, through limit points if there are any (Allgower and Georg, Introduction to Numerical Continuation
-    Methods, 2003, chapters 2 and 6); Newton's method finishes at t = 1.
-
-    Parameters
-    ----------
-    failed : PeriodicSolution
-        The attempt without embedding; returned, with a longer message, where the arc does not get there.
-    """
-    receptance = balance.receptance(frequency)[0]
-    curve = _Embedding(balance, receptance)
-    y, steps, count = curve.follow()
-    work = failed.factorisations + count
+    """Solution found by Newton's method from the end of an `_Embedding`; ``failed`` where it has no end."""
+    curve = _Embedding(balance, balance.receptance(frequency)[0])
+    y, steps = curve.follow()
+    work = failed.factorisations + curve.factorisations
     if y is None:
         note = f" The embedding of the reference springs was lost after {steps} steps."
         return replace(failed, factorisations=work, message=failed.message + note)
@@ -317,7 +306,12 @@ def with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSo
 
 
 class _Embedding:
-    """The arc of solutions over t, in unknowns scaled by the linear solution."""
+    """The arc of ``X + t T (F - reference X) = T_load S`` from t = 0, where it is linear, to t = 1.
+
+    Reference springs turn gradually into the elements, through limit points if there are any (Allgower and
+    Georg, Introduction to Numerical Continuation Methods, 2003, chapters 2 and 6). Unknowns are scaled by the
+    linear solution.
+    """
 
     def __init__(self, balance: HarmonicBalance, receptance):
         self.balance, self.receptance = balance, receptance
@@ -327,25 +321,24 @@ class _Embedding:
         self.scale = max(np.linalg.norm(self.linear), balance.scale)
         self.factorisations = 0
 
-    def follow(self) -> tuple[np.ndarray | None, int, int]:
-        """Unknowns near t = 1, or none; steps; factorisations."""
+    def follow(self) -> tuple[np.ndarray | None, int]:
+        """Unknowns near t = 1, or none, and the number of steps."""
         point = np.append(self.linear / self.scale, 0.0)
-        tangent, length = np.append(np.zeros(len(self.linear)), 1.0), _FIRST
-        tangent = self._tangent(point, tangent)
+        length, tangent = _FIRST, self._tangent(point, np.append(np.zeros(len(self.linear)), 1.0))
         for number in range(_STEPS):
             new, rounds = self._correct(point + length * tangent, tangent)
             if new is None:
                 length *= 0.5
                 if length < _LEAST:
-                    return None, number, self.factorisations
+                    return None, number
                 continue
             if new[-1] >= 1.0:
                 share = (1.0 - point[-1]) / (new[-1] - point[-1])
                 end = point + share * (new - point)
-                return self.scale * end[:-1], number + 1, self.factorisations
+                return self.scale * end[:-1], number + 1
             point, tangent = new, self._tangent(new, tangent)
             length = min(_LONGEST, 1.5 * length) if rounds <= 3 else length
-        return None, _STEPS, self.factorisations
+        return None, _STEPS
 
     def _system(self, point):
         """Residual and its derivative (n_y, n_y + 1) by the scaled unknowns and t."""
@@ -436,14 +429,10 @@ def _start(balance: HarmonicBalance, frequency, start) -> np.ndarray:
         return balance.linear_start(frequency)
     shape = (len(balance.reduction.reference), len(balance.orders))
     if isinstance(start, PeriodicSolution):
-        lines = np.zeros(shape, complex)
-        known = {tuple(order): number for number, order in enumerate(start.orders.tolist())}
-        for number, order in enumerate(balance.orders.tolist()):
-            mirror = tuple(-o for o in order)
-            if tuple(order) in known:
-                lines[:, number] = start.deflection[:, known[tuple(order)]]
-            elif mirror in known:
-                lines[:, number] = start.deflection[:, known[mirror]].conj()
+        known = {tuple(-order): line.conj() for order, line in zip(start.orders, start.deflection.T)}
+        known |= {tuple(order): line for order, line in zip(start.orders, start.deflection.T)}
+        nothing = np.zeros(len(start.deflection), complex)
+        lines = np.stack([known.get(tuple(order), nothing) for order in balance.orders], axis=1)
     else:
         lines = checked_numbers(start, "start", code="E-START", unit="m", kind=complex)
     if lines.shape != shape or not np.all(np.isfinite(lines)):

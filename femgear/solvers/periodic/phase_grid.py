@@ -6,12 +6,13 @@ phases (Kim and Choi, J. Vib. Acoust. 119 (1997) 107).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 
 import numpy as np
+from scipy.fft import irfftn, next_fast_len, rfftn
 
 from femgear.errors import CaseError
-from femgear.system.elements import Element, GearMeshes, PolynomialSprings
+from femgear.system.elements import Element, GearMeshes, PolynomialSprings, coefficients_of
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import NonlinearSystem
 
@@ -20,7 +21,7 @@ _CONTACT_SAMPLES = ((128, 2048), (8, 64))
 
 
 @dataclass(frozen=True)
-class GridSeries:
+class _GridSeries:
     """Coefficients on a fixed grid of phases: ``values`` (N, n), their ``mean`` (n,) and their orders."""
 
     values: np.ndarray
@@ -66,8 +67,6 @@ class PhaseGrid:
 
     def values(self, lines: np.ndarray) -> np.ndarray:
         """Signals (N, n) of one-sided lines (n, L)."""
-        from scipy.fft import irfftn
-
         shape = (*self.samples[:-1], self.samples[-1] // 2 + 1)
         spectrum = np.zeros((len(lines), int(np.prod(shape))), complex)
         place, mirrored = self.lines
@@ -81,8 +80,6 @@ class PhaseGrid:
 
     def transform(self, signals: np.ndarray) -> np.ndarray:
         """Two-sided coefficients (n, M) of signals (N, n), the last base half."""
-        from scipy.fft import rfftn
-
         grid = np.ascontiguousarray(signals.T).reshape(-1, *self.samples)
         axes = tuple(range(1, grid.ndim))
         return np.asarray(rfftn(grid, axes=axes)).reshape(len(grid), -1) / len(self.theta)
@@ -141,8 +138,6 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
     coefficient jumps, the error falls with the square of the spacing (with the spacing for a jump): 128 H and
     at least 2048 samples for one base, 8 H and at least 64 along each of several.
     """
-    from scipy.fft import next_fast_len
-
     top = np.abs(orders).max(axis=0)
     counts = np.ones(orders.shape[1], int)
     for element in problem.elements:
@@ -161,18 +156,11 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
 
 def on_grid(element: Element, theta: np.ndarray) -> Element:
     """The element with its periodic coefficients evaluated once at the phases ``theta`` (N, n_bases)."""
-    if not is_dataclass(element):
-        return element
-    series = {
-        item.name: getattr(element, item.name)
-        for item in fields(element)
-        if hasattr(getattr(element, item.name), "at") and hasattr(getattr(element, item.name), "orders")
-    }
     fixed = {
-        name: GridSeries(np.ascontiguousarray(value.at(theta)), value.mean, value.orders)
-        for name, value in series.items()
+        name: _GridSeries(np.ascontiguousarray(value.at(theta)), value.mean, value.orders)
+        for name, value in coefficients_of(element).items()
     }
-    return replace(element, **fixed) if fixed else element
+    return replace(element, **fixed) if fixed and is_dataclass(element) else element
 
 
 def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:
@@ -240,10 +228,7 @@ def _degree(element: Element) -> int | None:
 def _series_content(element: Element, bases: int) -> np.ndarray | None:
     """Highest order along every base in the element's coefficients; none where one of them jumps."""
     top = np.zeros(bases, int)
-    values = [getattr(element, item.name) for item in fields(element)] if is_dataclass(element) else []
-    for series in values:
-        if not (hasattr(series, "at") and hasattr(series, "orders")):
-            continue
+    for series in coefficients_of(element).values():
         if not isinstance(series, FourierSeries):
             return None
         orders = np.abs(np.array((*series.orders, *[0] * bases))[:bases])

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from femgear.errors import CaseError, FemgearError, checked_count, checked_tolerance
 from femgear.solvers.periodic.equations import harmonic_balance
@@ -113,13 +114,10 @@ class ShootingOptions:
     radius: bool = True
 
     def __post_init__(self):
+        for name in ("tolerance", "integration"):
+            object.__setattr__(self, name, checked_tolerance(getattr(self, name), name))
         most = checked_count(self.max_iterations, "max_iterations", code="E-RANGE")
-        for name, value in (
-            ("tolerance", checked_tolerance(self.tolerance)),
-            ("integration", checked_tolerance(self.integration, "integration")),
-            ("max_iterations", most),
-        ):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "max_iterations", most)
         if self.harmonics < 1 or self.samples < 4 * self.harmonics:
             raise CaseError(
                 f"{self.harmonics} harmonics, {self.samples} samples", code="E-RANGE",
@@ -198,43 +196,34 @@ def solve_shooting(
     return _judged(moving, found, chosen)
 
 
-def verdict_of_monodromy(
-    problem: NonlinearSystem, monodromy: np.ndarray, period: float, *, error: float, trivial: int = 0
+def _verdict(
+    problem: NonlinearSystem, found: ShootingSolution, *, error: float, trivial: int
 ) -> FloquetVerdict:
-    """Verdict of a monodromy matrix (2n, 2n) in (q, v / rate), of relative error ``error``, over a period
-    [s].
+    """Verdict of the monodromy matrix, of relative error ``error``, without ``trivial`` multipliers one.
 
     Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
     rounding splits; they are left out (as `floquet.floquet_verdicts` does). Of those that damping feels the
-    position has the multiplier one and is left out, the velocity counts. ``trivial`` multipliers one of a
-    free vibration, its phase and its amplitude, are left out too.
+    position has the multiplier one and is left out, the velocity counts.
     """
-    matrix, positions = _without_free_motions(problem, monodromy)
-    values = np.linalg.eigvals(matrix)
-    found = verdict_of(
-        values, period, "shooting", error, np.inf, positions=trivial + positions, velocities=positions
-    )
-    if trivial:
-        note = f", without {trivial} of phase{' and amplitude' if trivial > 1 else ''} that are one"
-        found = replace(found, message=found.message + note)
-    return found
+    matrix, positions = _without_free_motions(problem, found.monodromy)
+    return verdict_of(
+        np.linalg.eigvals(matrix), found.period, "shooting", error, np.inf, positions=trivial + positions,
+        velocities=positions,
+    )  # fmt: skip
 
 
-def radius_of_lines(problem: NonlinearSystem, turns, omega: float, lines: np.ndarray) -> tuple[float, str]:
-    """Spectral radius of the fixed point at the lines (n_columns, L) [m] of a periodic motion of ``omega``
-    [rad/s].
-
-    The base frequencies are ``turns`` (n_bases,) times that of the motion. Nan and the reason without a
-    radius.
+def _radius(problem: NonlinearSystem, turns, omega: float, lines: np.ndarray) -> tuple[float, str]:
+    """Spectral radius of the fixed point at lines (n_columns, L) [m] of a motion of ``omega`` [rad/s]; nan
+    and the reason where there is none. Base frequencies are ``turns`` (n_bases,) times that of the motion.
     """
     try:
-        balance = harmonic_balance(on_one_base(problem, turns), orders=np.arange(lines.shape[1])[:, None])
+        balance = harmonic_balance(_on_one_base(problem, turns), orders=np.arange(lines.shape[1])[:, None])
         return balance.spectral_radius(balance.unknowns(lines), [omega]), ""
     except FemgearError as error:
         return np.nan, f"; no spectral radius of a fixed point: {error.message}"
 
 
-def on_one_base(problem: NonlinearSystem, turns) -> NonlinearSystem:
+def _on_one_base(problem: NonlinearSystem, turns) -> NonlinearSystem:
     """The problem over one base frequency of which the given ones are the multiples ``turns`` (n_bases,)."""
     turns = tuple(int(turn) for turn in turns)
     if turns == (1,):
@@ -272,8 +261,6 @@ def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> tu
 
     With it the number of free motions left in it, whose velocities damping feels.
     """
-    from scipy import linalg
-
     system, n = problem.system, len(problem.system.M)
     root = np.linalg.cholesky(system.M)
 
@@ -407,16 +394,14 @@ def _result(
 def _judged(
     moving: Flow, found: ShootingSolution, chosen: ShootingOptions, *, trivial: int = 0
 ) -> ShootingSolution:
-    """The motion with its verdict and the spectral radius of the fixed point at its lines."""
+    """The motion with its verdict, without ``trivial`` multipliers, and the radius at its lines."""
     solution, problem = found.solution, moving.problem
     told: dict[str, Any] = {"verdict": open_verdict("not covered: the solution did not converge")}
     if solution.converged:
-        told["verdict"] = verdict_of_monodromy(
-            problem, found.monodromy, found.period, error=chosen.integration, trivial=trivial
-        )
+        told["verdict"] = _verdict(problem, found, error=chosen.integration, trivial=trivial)
     if chosen.radius:
         omega = float(solution.frequency[0])
         turns = np.rint(moving.frequency / omega).astype(int)
-        value, note = radius_of_lines(problem, turns, omega, solution.deflection)
+        value, note = _radius(problem, turns, omega, solution.deflection)
         told |= {"spectral_radius": value, "message": solution.message + note}
     return replace(found, solution=replace(solution, **told))

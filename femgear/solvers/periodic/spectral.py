@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import linalg as sparse_linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.fourier import multiply, pad, product_matrix, sample
@@ -23,6 +24,9 @@ _TAIL_ENERGY = 1e-3
 _STILL = 1e-12
 # Speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 40
+# Unknowns of one speed above which Krylov steps replace elimination, and the residual that they must reach.
+_DENSE = 1500
+_ROUNDING = 1e-13
 
 
 def solve_spectral(
@@ -152,7 +156,7 @@ def compliance(modes: Modes, omega: np.ndarray) -> np.ndarray:
     return np.where(elastic, 1.0 / (safe * w * w), 0.0)
 
 
-def modal_receptance(modes: Modes, modal: np.ndarray) -> np.ndarray:
+def _modal_receptance(modes: Modes, modal: np.ndarray) -> np.ndarray:
     """``T = sum r r^T H_k + residual`` (n, n, ...) from the modal receptances (..., n_modes) [m/N]."""
     rows = modes.mesh_deflection
     n, lower = len(rows), np.tril_indices(len(rows))
@@ -173,14 +177,14 @@ def transfer(receptances: np.ndarray, force: np.ndarray) -> np.ndarray:
     return out
 
 
-def apply(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
+def _apply(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
     """``T G E`` of (n, n_speeds, H + 1) harmonics."""
     return transfer(problem.receptance, multiply(problem.product, deflection))
 
 
-def harmonic_residual(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
+def _harmonic_residual(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
     """Size of ``E + T G E - S`` relative to that of E, per speed."""
-    error = deflection + apply(problem, deflection) - problem.source
+    error = deflection + _apply(problem, deflection) - problem.source
     return norm(error) / np.maximum(norm(deflection), np.finfo(float).tiny)
 
 
@@ -203,13 +207,40 @@ def matrices(problem: HarmonicProblem) -> np.ndarray:
 
 
 def solve_direct(problem: HarmonicProblem) -> np.ndarray:
-    """``E`` (n, n_speeds, H + 1) by Gaussian elimination of ``(I + T G) E = S`` at every speed.
+    """Solve ``(I + T G) E = S`` for the harmonics (n, n_speeds, H + 1) of the mesh deflections [m].
+
+    By Gaussian elimination; many unknowns by GMRES (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7,
+    1986, pp. 856-869) without ever forming the matrix, and by elimination where that does not reach rounding.
 
     Raises
     ------
     ConvergenceError
         When the equations are singular: an undamped parametric resonance.
     """
+    n, speeds, size = problem.source.shape
+    if 2 * n * size <= _DENSE:
+        return _eliminated(problem)
+    return np.concatenate([_krylov(problem.take(np.array([i]))) for i in range(speeds)], axis=1)
+
+
+def _krylov(problem: HarmonicProblem) -> np.ndarray:
+    """Harmonics (n, 1, H + 1) [m] of one speed by GMRES, or by elimination."""
+    n, _, size = problem.source.shape
+
+    def image(row: np.ndarray) -> np.ndarray:
+        return (
+            row + _rows(_apply(problem, np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)))[0]
+        )
+
+    right = _rows(problem.source)[0]
+    operator = sparse_linalg.LinearOperator((len(right), len(right)), matvec=image, dtype=float)  # type: ignore[call-arg]
+    row, _ = sparse_linalg.gmres(operator, right, rtol=0.1 * _ROUNDING, atol=0.0, restart=200, maxiter=4)
+    found = np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)
+    return found if _harmonic_residual(problem, found)[0] <= _ROUNDING else _eliminated(problem)
+
+
+def _eliminated(problem: HarmonicProblem) -> np.ndarray:
+    """Harmonics (n, n_speeds, H + 1) [m] by Gaussian elimination; refuses singular equations."""
     n, speeds, size = problem.source.shape
     operator = matrices(problem)
     diagonal = np.arange(operator.shape[-1])
@@ -257,7 +288,7 @@ def reduce_twins(problem: HarmonicProblem, twins: Twins) -> HarmonicProblem | No
     return HarmonicProblem(reduced, problem.product[twins.leaders], problem.source[twins.leaders])
 
 
-def expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
+def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
     """Harmonics of all meshes from those of the group leaders."""
     return deflection[twins.group] * twins.shift[:, None, :]
 
@@ -280,7 +311,7 @@ def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np
     basis[:, 0] = _rows(start / norm(start)[None, :, None])
     for k in range(steps):
         vector = basis[:, k].reshape(speeds, n, 2 * size).transpose(1, 0, 2)
-        image = _rows(apply(problem, np.ascontiguousarray(vector).view(complex)))[..., None]
+        image = _rows(_apply(problem, np.ascontiguousarray(vector).view(complex)))[..., None]
         known = basis[:, : k + 1]
         for _ in range(2):
             share = np.matmul(known, image)
@@ -381,7 +412,7 @@ def _solve_batch(modes, data: _Data, fundamental, options, top: int) -> tuple[np
     method, tolerance, max_iterations = options
     lines = np.arange(data.forcing.shape[-1])
     modal = compliance(modes, 2.0 * np.pi * fundamental[:, None] * lines)
-    receptance = modal_receptance(modes, modal)
+    receptance = _modal_receptance(modes, modal)
     forcing = np.repeat(data.forcing[:, None, :], len(fundamental), axis=1)
     source = -transfer(receptance, forcing)
     source[..., 0] += modes.load_deflection[:, None]
@@ -390,13 +421,13 @@ def _solve_batch(modes, data: _Data, fundamental, options, top: int) -> tuple[np
     reduced = reduce_twins(problem, data.twins) if len(data.twins.leaders) < len(source) else None
     deflection, iterations, direct = _solve(reduced or problem, radius, method, tolerance, max_iterations)
     if reduced is not None:
-        deflection = expand_twins(deflection, data.twins)
-    residual = harmonic_residual(problem, deflection)
+        deflection = _expand_twins(deflection, data.twins)
+    residual = _harmonic_residual(problem, deflection)
     # the full equations decide: planets equal to 1e-9 only, or a last iteration that grew again
     rough = np.flatnonzero(~(residual <= tolerance))
     if len(rough) and method != "fixed point":
         deflection[:, rough], direct[rough] = solve_direct(problem.take(rough)), True
-        residual[rough] = harmonic_residual(problem.take(rough), deflection[:, rough])
+        residual[rough] = _harmonic_residual(problem.take(rough), deflection[:, rough])
     total = forcing + multiply(data.product, deflection)
     force = total + modes.mesh_stiffness[:, None, None] * deflection
     work = -np.tensordot(modes.mesh_deflection, total, axes=(0, 0))
@@ -437,7 +468,7 @@ def _fixed_point(problem: HarmonicProblem, tolerance: float, max_iterations: int
     active = np.arange(value.shape[1])
     for _ in range(max_iterations):
         old = value[:, active]
-        new = problem.source[:, active] - apply(problem.take(active), old)
+        new = problem.source[:, active] - _apply(problem.take(active), old)
         size = np.maximum(norm(new), np.finfo(float).tiny)
         change[active] = norm(new - old) / size
         value[:, active] = new

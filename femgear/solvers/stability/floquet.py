@@ -14,6 +14,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import linalg
+from scipy.linalg import expm
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.periodic.solution import (
@@ -61,8 +63,6 @@ def monodromy(matrices, durations) -> np.ndarray:
     (..., n, n) array
         ``expm(A_last dt_last) ... expm(A_0 dt_0)``; its eigenvalues are the Floquet multipliers.
     """
-    from scipy.linalg import expm
-
     matrices, durations = np.asarray(matrices, dtype=float), np.asarray(durations, dtype=float)
     if matrices.ndim < 3 or durations.shape != matrices.shape[:-2] or np.any(durations <= 0.0):
         raise CaseError("every matrix needs one positive duration", code="E-SHAPE", key="durations")
@@ -156,6 +156,13 @@ class Frame:
         both = np.concatenate([np.ones(n), np.full(n, self.fastest or 1.0)])
         return monodromy(self.state_matrices(self.kappa(tangents)) * both / both[:, None], durations)
 
+    def verdict(
+        self, multipliers, period: float, method: str, error: float, tolerance: float
+    ) -> FloquetVerdict:
+        """`verdict_of` with what it has to know of free motions."""
+        free = {"positions": self.positions, "velocities": self.positions, "drift": self.drift}
+        return verdict_of(multipliers, period, method, error, tolerance, **free)
+
 
 def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
     """Modes of a problem about its reference stiffness, at most so many, lowest first.
@@ -164,8 +171,6 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
     positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static
     flexibility.
     """
-    from scipy import linalg
-
     system, reference = problem.system, np.maximum(problem.reference, 0.0)
     stiffness = system.K + (system.W * reference) @ system.W.T
     count = min(int(modes), len(stiffness))
@@ -251,8 +256,6 @@ def passage(
 
 def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
     """``W^T K^+ W`` without the part of the modes kept; rigid motions that no column feels are held."""
-    from scipy import linalg
-
     system = problem.system
     carried = system.M @ rigid
     weight = np.trace(stiffness) / np.trace(system.M)
@@ -278,11 +281,7 @@ def _extrapolated(table, found):
 
 
 def _steps(breaks: list[np.ndarray], base: int, level: int) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and durations (p, s) of steps, in parts of the period, that end at the breaks.
-
-    Every piece between breaks has its share of ``base`` steps, each halved ``level`` times; rows that have
-    fewer are filled up with steps of no duration.
-    """
+    """Starts and durations (p, s), over the period, of ``base 2^level`` steps or more that end at breaks."""
     rows = []
     for inner in breaks:
         ends = np.concatenate([[0.0], inner, [1.0]])
@@ -292,6 +291,7 @@ def _steps(breaks: list[np.ndarray], base: int, level: int) -> tuple[np.ndarray,
         number = np.concatenate([np.arange(m) for m in each])
         rows.append((np.repeat(ends[:-1], each) + duration * number, duration))
     longest = max(len(duration) for _, duration in rows)
+    # rows that have fewer are filled up with steps of no duration
     out = np.zeros((2, len(rows), longest))
     out[0] = 1.0
     for i, (start, duration) in enumerate(rows):
@@ -350,8 +350,6 @@ def _modal_drift(frame: Frame, scale, durations):
 
 def _coupled_drift(frame: Frame, scale, durations):
     """As :func:`_modal_drift` for damping and gyroscopic terms that couple the modes."""
-    from scipy.linalg import expm
-
     both = np.concatenate([np.ones_like(scale), scale])
     matrix = frame.state_matrices(np.zeros((len(frame.rows),) * 2)) * both / both[:, None]
     values, where = np.unique(durations, return_inverse=True)
@@ -467,14 +465,13 @@ def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution])
     return tangents
 
 
-def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
-    """Floquet exponents (2 n,) [1/s] by Hill's method.
+def _hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
+    """Floquet exponents (2 n,) [1/s] from the stiffness changes kappa (samples, n_c, n_c) [N/m].
 
     ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
     block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
     those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
-    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each. ``kappa``
-    (samples, n_c, n_c) is the change of stiffness from the reference over one period [N/m].
+    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
     """
     n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
     lines = np.fft.fft(kappa, axis=0) / len(kappa)
@@ -534,9 +531,7 @@ def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[Fl
         )  # fmt: skip
         values = np.linalg.eigvals(matrix)
         for i, multipliers, error in zip(rest, values, errors):
-            out[i] = verdict_of(
-                multipliers, float(period[i]), "splitting", float(error), tolerance, **_free(frame)
-            )
+            out[i] = frame.verdict(multipliers, float(period[i]), "splitting", float(error), tolerance)
     return [out[i] for i in range(len(solutions))]
 
 
@@ -565,7 +560,7 @@ def _constant_pieces(tangents, state: int, inner: np.ndarray) -> np.ndarray | No
 def _exact_verdict(frame: Frame, period: float, inner, pieces) -> FloquetVerdict:
     durations = np.diff(np.concatenate([[0.0], inner, [1.0]])) * period
     multipliers = np.linalg.eigvals(frame.exact_monodromy(pieces, durations))
-    return verdict_of(multipliers, period, "exact exponentials", 0.0, np.inf, **_free(frame))
+    return frame.verdict(multipliers, period, "exact exponentials", 0.0, np.inf)
 
 
 def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int | None) -> FloquetVerdict:
@@ -576,14 +571,9 @@ def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int |
     samples = max(512, 16 * count)
     fraction = np.arange(samples)[None] / samples
     kappa = frame.kappa(tangents_of(problem, [solution])(fraction, np.array([0]))[0])
-    exponents = hill_exponents(frame, kappa, omega, harmonics=count)
+    exponents = _hill_exponents(frame, kappa, omega, harmonics=count)
     period = 2.0 * np.pi / omega
-    return verdict_of(np.exp(exponents * period), period, "Hill", np.nan, np.inf, **_free(frame))
-
-
-def _free(frame: Frame) -> dict:
-    """What the verdict has to know of free motions."""
-    return {"positions": frame.positions, "velocities": frame.positions, "drift": frame.drift}
+    return frame.verdict(np.exp(exponents * period), period, "Hill", np.nan, np.inf)
 
 
 def _one_copy_each(values: np.ndarray, omega: float, count: int) -> np.ndarray:

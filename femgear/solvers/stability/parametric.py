@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import root_scalar
+from scipy.sparse.csgraph import connected_components
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.periodic.solution import CIRCLE, loss_of
@@ -263,8 +265,6 @@ def stability_boundary(
     CaseError
         Not exactly one of frequency and depth, or no change between the two ends.
     """
-    from scipy.optimize import root_scalar
-
     if (frequency is None) == (depth is None):
         raise CaseError("hold the frequency or the depth", code="E-RANGE", limit="exactly one of the two")
     tolerance = checked_tolerance(tolerance)
@@ -383,8 +383,6 @@ def _kicks(stiffness: np.ndarray, flexibility: np.ndarray, steps: int) -> np.nda
 
 def _coupled(rows: np.ndarray, kicks: np.ndarray) -> list[np.ndarray]:
     """Groups of modes that the kicks couple, from the rows (n_meshes, m) divided by the frequencies."""
-    from scipy.sparse.csgraph import connected_components
-
     if not rows.shape[1]:
         return []
     strength = np.abs(rows.T @ kicks @ rows).max(axis=0)

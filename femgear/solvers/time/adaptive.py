@@ -15,10 +15,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass, replace
 
 import numpy as np
+from scipy import integrate, linalg
+from scipy.optimize import root_scalar
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error
-from femgear.system.elements import Element, GearMeshes, PiecewiseSprings, RadialBearings
+from femgear.system.elements import (
+    Element,
+    GearMeshes,
+    PiecewiseSprings,
+    RadialBearings,
+    coefficients_of,
+)
 from femgear.system.fourier import FourierSeries, StepSeries, constant, phase_of
 from femgear.system.system import NonlinearSystem
 
@@ -126,8 +134,6 @@ class Flow:
 
 def flow(problem: NonlinearSystem, frequency, *, variational=False) -> Flow:
     """First-order form of a problem; M is factorised once."""
-    from scipy import linalg
-
     system, n = problem.system, len(problem.system.M)
     frequency = np.atleast_1d(np.asarray(frequency, float))
     loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
@@ -179,7 +185,7 @@ def trajectory(
         atol.reshape(2 * motion.size, -1)[:, 1:] = tolerance
     small = _TOGETHER * max(abs(begin), abs(end), 1.0 / motion.rate)
     while t < end:
-        stop = min(next_break(steps, t), end)
+        stop = min(_next_break(steps, t), end)
         stop = end if end - stop <= small else stop
         if stop - t <= small:
             t = stop
@@ -229,16 +235,15 @@ def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.
     n = len(problem.system.M)
     if start is None:
         return np.zeros(n), np.zeros(n)
-    found = "no pair of lists of numbers"
     try:
         q, v = (np.array(part, float) for part in start)
     except (TypeError, ValueError):
-        pass
+        found = "no pair of lists of numbers"
     else:
-        if q.shape == v.shape == (n,) and np.all(np.isfinite([q, v])):
+        finite = np.all(np.isfinite(q)) and np.all(np.isfinite(v))
+        if q.shape == v.shape == (n,) and finite:
             return q, v
-        found = f"shapes {q.shape} and {v.shape}"
-        found += ", not all finite" if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))) else ""
+        found = f"shapes {q.shape} and {v.shape}" + ("" if finite else ", not all finite")
     raise CaseError(
         f"a start of {found} for {n} degrees of freedom", code="E-START", key="start",
         limit=f"finite displacements [m] and velocities [m/s], each of shape ({n},)",
@@ -300,8 +305,6 @@ def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, toler
 
 
 def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
-    from scipy import integrate
-
     if method not in METHODS or (motion.variational and method != "DOP853"):
         raise CaseError(f"no integrator {method}", code="E-CHOICE", limit=", ".join(METHODS))
     options = {"rtol": max(tolerance, 3e-14), "atol": atol}
@@ -314,8 +317,6 @@ def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
 
 def _first_change(motion: Flow, law: Contacts, dense, t0, t1, small):
     """Instant of the first contact change in a step and the switches that change, or the end and None."""
-    from scipy.optimize import root_scalar
-
     times = np.linspace(t0, t1, _SAMPLES + 1)
     gaps = _gaps(motion, law, dense, times)
     wrong = gaps[1:] < 0.0
@@ -343,7 +344,7 @@ def _gaps(motion: Flow, law: Contacts, dense, times):
 
 
 @dataclass(frozen=True)
-class SharpMeshes:
+class _SharpMeshes:
     """Separating gear meshes without smoothing; ``k``, deflection and force come from one series, (3, g)."""
 
     columns: np.ndarray
@@ -376,22 +377,22 @@ class SharpMeshes:
         return (line * drive + behind * back)[:, None], (k * (drive + back))[:, None, None]
 
 
-Piece = Element | GearMeshes | SharpMeshes
+Piece = Element | GearMeshes | _SharpMeshes
 
 
 def _sharp(element: Element) -> Piece:
-    """Gear meshes as `SharpMeshes` where those say the same, else the element itself."""
+    """Gear meshes as `_SharpMeshes` where those say the same, else the element itself."""
     if type(element) is not GearMeshes or not element.separates or element.smoothing:
         return element
     has_back = np.isfinite(element.backlash)
     backlash = np.where(has_back, element.backlash, 0.0)
-    return SharpMeshes(element.columns, _coefficients(element), backlash, has_back)
+    return _SharpMeshes(element.columns, _coefficients(element), backlash, has_back)
 
 
 def switches(element: Piece, x, theta) -> np.ndarray:
     """Arguments (..., m) of the positive parts of an element at deflections x (..., g, d); none if smooth."""
     x = np.asarray(x, float)
-    if isinstance(element, SharpMeshes):
+    if isinstance(element, _SharpMeshes):
         return element.switches(x, theta)
     if isinstance(element, PiecewiseSprings) and not element.smoothing:
         return (x - element.breaks).reshape(*x.shape[:-2], -1)
@@ -410,7 +411,7 @@ def frozen(element: Piece, x, theta, closed) -> tuple[np.ndarray, np.ndarray]:
     """Forces (g, d) and tangents (g, d, d) of an element whose switches are closed as given, one instant."""
     if not len(closed):
         return element.evaluate(x, theta)
-    if isinstance(element, SharpMeshes):
+    if isinstance(element, _SharpMeshes):
         return element.frozen(x, theta, closed)
     groups = len(element.columns)
     closed = closed.reshape(groups, -1)
@@ -487,7 +488,7 @@ def stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float
     """Breaks (fractions) and repetition rate [1/s] of every step series of the elements."""
     found = []
     for element in problem.elements:
-        for series in vars(element).values():
+        for series in coefficients_of(element).values():
             if isinstance(series, StepSeries) and len(series.breaks) > 1:
                 rate = float(phase_of(frequency, series.orders)) / (2.0 * np.pi)
                 if rate < 0.0:
@@ -497,7 +498,7 @@ def stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float
     return found
 
 
-def next_break(steps, time: float) -> float:
+def _next_break(steps, time: float) -> float:
     """First instant after ``time`` at which a step series changes; infinite when none does."""
     best = np.inf
     for breaks, rate in steps:
@@ -514,7 +515,7 @@ def held(problem: NonlinearSystem, theta) -> NonlinearSystem:
     for element in problem.elements:
         changed = {
             name: constant(series.at(theta))
-            for name, series in vars(element).items()
+            for name, series in coefficients_of(element).items()
             if isinstance(series, StepSeries)
         }
         elements.append(replace(element, **changed) if changed and is_dataclass(element) else element)

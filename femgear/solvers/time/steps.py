@@ -25,12 +25,13 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import get_lapack_funcs
+from scipy import linalg
+from scipy.linalg import expm, get_lapack_funcs
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error, output_load, residual_output, solve_modes
 from femgear.system.fourier import phase_of
-from femgear.system.system import Law, MechanicalSystem, Modes, NonlinearSystem, external_force, tabulated_law
+from femgear.system.system import Law, NonlinearSystem, external_force, tabulated_law
 
 # Numbers held in the states of one block of steps.
 _BLOCK_NUMBERS = 2_000_000
@@ -116,28 +117,42 @@ def stability_limit(rule: StepRule) -> float:
     return np.sqrt(short) / short / (2.0 * np.pi)
 
 
-@dataclass(frozen=True)
 class RuleScheme:
-    """A step rule on all degrees of freedom; the state is (q, v, a), (3, n). See `Scheme`."""
+    """A step rule on all degrees of freedom; the state is (q, v, a), (3, n). See `Scheme`.
 
-    rule: StepRule
-    step: float
-    predictor: np.ndarray
-    weights: np.ndarray
-    balance: np.ndarray
-    carried: np.ndarray
-    drawn: np.ndarray
-    flexibility: np.ndarray
-    forces: np.ndarray
-    problem: NonlinearSystem
-    stiffness: np.ndarray
-    rows: np.ndarray
-    factorisations: int = 2
+    ``(1 - mass) M + (1 - force) (gamma h C + beta h^2 (K + W c W^T))``, with c the reference stiffnesses, is
+    factorised once; a singular one is refused (E-MASS).
+    """
+
+    factorisations = 2
+
+    def __init__(self, problem: NonlinearSystem, rule: StepRule, step: float):
+        system, part = problem.system, 1.0 - rule.force
+        stiffness, damping = problem.stiffness, problem.damping
+        matrix = (1.0 - rule.mass) * system.M + part * step * (
+            rule.gamma * damping + rule.beta * step * stiffness
+        )
+        factor = linalg.lu_factor(matrix, check_finite=True)
+        pivots = np.abs(np.diag(factor[0]))
+        if not np.all(np.isfinite(pivots)) or pivots.min() <= 1e-14 * pivots.max():
+            raise ConvergenceError(
+                "the matrix of the time step is singular", code="E-MASS",
+                remedy="give every degree of freedom some mass or condense it",
+            )  # fmt: skip
+        blocks = [stiffness, damping, system.M] if rule.mass else [stiffness, damping]
+        loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
+        self.problem, self.rule, self.step, self.stiffness = problem, rule, step, stiffness
+        self.rows = np.ascontiguousarray(system.W.T)
+        self.predictor = rule.predictor(step)[: 3 + len(blocks)]
+        self.weights = np.array([rule.beta * step * step, rule.gamma * step, 1.0])[:, None]
+        self.balance = linalg.lu_solve(factor, np.hstack(blocks))
+        self.carried = linalg.lu_solve(factor, system.W)
+        self.drawn = (part * self.weights[:, None] * self.carried).reshape(-1, self.carried.shape[1])
+        self.flexibility = part * rule.beta * step * step * (system.W.T @ self.carried)
+        self.forces = linalg.lu_solve(factor, loads.T).T
 
     def start(self, q, v, theta, law):
         """State with the acceleration that the equation of motion asks for, and the column forces."""
-        from scipy import linalg
-
         system = self.problem.system
         g, _ = law(0, self.rows @ q)
         force = (
@@ -155,7 +170,6 @@ class RuleScheme:
         return np.real(mixed.T @ self.forces)
 
     def free(self, state, g, load):
-        """(q, v, a) at the end of the step without the column forces there."""
         both = self.predictor @ state
         acceleration = load - self.balance @ both[3:].ravel()
         if self.rule.force:
@@ -163,19 +177,15 @@ class RuleScheme:
         return both[:3] + self.weights * acceleration
 
     def deflection(self, state, load):
-        """Columns (n_c,)."""
         return self.rows @ state[0]
 
     def finish(self, state, g):
-        """(q, v, a) at the end of the step."""
         return state - (self.drawn @ g).reshape(state.shape)
 
     def columns(self, states, g, theta):
-        """(..., n_c)."""
         return states[..., 0, :] @ self.rows.T
 
     def motion(self, states, g, theta):
-        """Displacements, velocities and accelerations (n, dofs)."""
         return states[:, 0], states[:, 1], states[:, 2]
 
     def local_error(self, states, g):
@@ -193,63 +203,47 @@ class RuleScheme:
         return np.sqrt(np.abs(np.einsum("ti,ij,tj->t", error, self.problem.system.M, error, optimize=True)))
 
 
-def rule_scheme(problem: NonlinearSystem, rule: StepRule, step: float) -> RuleScheme:
-    """Factorise the matrix of a step rule once.
-
-    ``(1 - mass) M + (1 - force) (gamma h C + beta h^2 (K + W c W^T))`` with c the reference stiffnesses.
-
-    Raises
-    ------
-    ConvergenceError
-        The matrix is singular.
-    """
-    from scipy import linalg
-
-    system, part = problem.system, 1.0 - rule.force
-    stiffness, damping = problem.stiffness, problem.damping
-    matrix = (1.0 - rule.mass) * system.M + part * step * (
-        rule.gamma * damping + rule.beta * step * stiffness
-    )
-    factor = linalg.lu_factor(matrix, check_finite=True)
-    pivots = np.abs(np.diag(factor[0]))
-    if not np.all(np.isfinite(pivots)) or pivots.min() <= 1e-14 * pivots.max():
-        raise ConvergenceError(
-            "the matrix of the time step is singular", code="E-MASS",
-            remedy="give every degree of freedom some mass or condense it",
-        )  # fmt: skip
-    blocks = [stiffness, damping, system.M] if rule.mass else [stiffness, damping]
-    predictor = rule.predictor(step)[: 3 + len(blocks)]
-    weights = np.array([rule.beta * step * step, rule.gamma * step, 1.0])[:, None]
-    carried = linalg.lu_solve(factor, system.W)
-    loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
-    forces = linalg.lu_solve(factor, loads.T).T
-    return RuleScheme(
-        rule, step, predictor, weights, linalg.lu_solve(factor, np.hstack(blocks)), carried,
-        (part * weights[:, None] * carried).reshape(-1, carried.shape[1]),
-        part * rule.beta * step * step * (system.W.T @ carried), forces, problem, stiffness,
-        np.ascontiguousarray(system.W.T),
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
 class ModalScheme:
-    """Exact modal steps; the state is (y, v) of the modes, (2, m). See `Scheme`."""
+    """Exact steps of modes with the reference stiffnesses of the columns; the state is (y, v), (2, m).
 
-    step: float
-    modes: Modes
-    transition: np.ndarray
-    first: np.ndarray
-    last: np.ndarray
-    pushed: np.ndarray
-    drawn: np.ndarray
-    flexibility: np.ndarray
-    rows: np.ndarray
-    loads: np.ndarray
-    static: np.ndarray
-    static_columns: np.ndarray
-    residual: np.ndarray
-    problem: NonlinearSystem
-    factorisations: int = 1
+    See `Scheme`. Damping that couples the modes, gyroscopic terms and negative reference stiffnesses are
+    refused, see `solve_modes`.
+    """
+
+    factorisations = 1
+
+    def __init__(self, problem: NonlinearSystem, step: float, *, count: int | None = None):
+        system = problem.system
+        if system.gyroscopic is not None and problem.speed and np.any(system.gyroscopic):
+            raise CaseError(
+                "modal steps cannot carry gyroscopic terms", code="E-CHOICE", key="method",
+                remedy='take method "average acceleration" or "generalised alpha"',
+            )  # fmt: skip
+        system = replace(system, gyroscopic=None)
+        modes = solve_modes(system, problem.reference, count=count)
+        natural, every = 2.0 * np.pi * modes.frequency, np.eye(len(system.M))
+        transition, first, last = step_matrices(natural, modes.damping_ratio, step)
+        self.problem, self.step, self.modes, self.rows = problem, step, modes, modes.mesh_deflection
+        self.transition, self.first, self.last = (
+            np.ascontiguousarray(transition.transpose(1, 2, 0)), first.T, last.T,
+        )  # fmt: skip
+        self.pushed, self.drawn = (
+            (part[:, :, None] * self.rows.T).reshape(-1, len(self.rows)) for part in (first.T, last.T)
+        )
+        self.residual = residual_output(system, modes, every)
+        self.flexibility = self.rows @ self.drawn[: len(natural)] + system.W.T @ self.residual
+        loads, static = [modes.modal_load], [output_load(system, modes, every)]
+        for force in problem.forces:
+            loads.append(modes.shape.T @ force.force)
+            real, imaginary = (
+                output_load(replace(system, load=part), modes, every)
+                for part in (np.real(force.force), np.imag(force.force))
+            )
+            static.append(real + 1j * imaginary)
+        elastic = np.where(natural > 0.0, natural, np.inf)
+        self.loads = np.array(loads, complex)
+        self.static = np.array(static) - (self.loads / elastic**2) @ modes.shape.T
+        self.static_columns = self.static @ system.W
 
     def start(self, q, v, theta, law):
         """Modal state of the motion; the part of modes that are left out is dropped."""
@@ -271,7 +265,6 @@ class ModalScheme:
         return np.hstack([push.reshape(len(push), -1), static])
 
     def free(self, state, g, load):
-        """(y, v) at the end of the step without the column forces there."""
         out = (self.transition * state).sum(axis=1)
         out -= (self.pushed @ g).reshape(out.shape)
         out += load[: out.size].reshape(out.shape)
@@ -282,11 +275,9 @@ class ModalScheme:
         return self.rows @ state[0] + load[state.size :]
 
     def finish(self, state, g):
-        """(y, v) at the end of the step."""
         return state - (self.drawn @ g).reshape(state.shape)
 
     def columns(self, states, g, theta):
-        """(..., n_c)."""
         own = self.problem.system.W.T @ self.residual
         return states[..., 0, :] @ self.rows.T - g @ own + np.real(self._waves(theta) @ self.static_columns)
 
@@ -307,50 +298,6 @@ class ModalScheme:
         return np.linalg.norm(bend @ (self.drawn + self.pushed)[: len(self.rows.T)].T, axis=1) / 12.0
 
 
-def modal_scheme(problem: NonlinearSystem, step: float, *, count: int | None = None) -> ModalScheme:
-    """Modes with the reference stiffnesses of the columns and their exact steps.
-
-    Raises
-    ------
-    CaseError
-        Damping that couples the modes, gyroscopic terms, negative reference stiffnesses (see
-        `solve_modes`).
-    """
-    system = problem.system
-    if system.gyroscopic is not None and problem.speed and np.any(system.gyroscopic):
-        raise CaseError(
-            "modal steps cannot carry gyroscopic terms", code="E-CHOICE", key="method",
-            remedy='take method "average acceleration" or "generalised alpha"',
-        )  # fmt: skip
-    system = replace(system, gyroscopic=None)
-    modes = solve_modes(system, problem.reference, count=count)
-    natural, every = 2.0 * np.pi * modes.frequency, np.eye(len(system.M))
-    transition, first, last = step_matrices(natural, modes.damping_ratio, step)
-    rows = modes.mesh_deflection
-    pushed, drawn = ((part[:, :, None] * rows.T).reshape(-1, len(rows)) for part in (first.T, last.T))
-    residual = residual_output(system, modes, every)
-    loads, static = [modes.modal_load], [output_load(system, modes, every)]
-    for force in problem.forces:
-        loads.append(modes.shape.T @ force.force)
-        real, imaginary = (
-            _static_displacement(system, modes, part) for part in (np.real(force.force), np.imag(force.force))
-        )
-        static.append(real + 1j * imaginary)
-    elastic = np.where(natural > 0.0, natural, np.inf)
-    loads = np.array(loads, complex)
-    static = np.array(static) - (loads / elastic**2) @ modes.shape.T
-    return ModalScheme(
-        step, modes, np.ascontiguousarray(transition.transpose(1, 2, 0)), first.T, last.T, pushed, drawn,
-        rows @ drawn[: len(natural)] + system.W.T @ residual, rows, loads, static, static @ system.W,
-        residual, problem,
-    )  # fmt: skip
-
-
-def _static_displacement(system: MechanicalSystem, modes: Modes, force) -> np.ndarray:
-    """Elastic displacement (n,) under a force (n,), all modes."""
-    return output_load(replace(system, load=force), modes, np.eye(len(force)))
-
-
 def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Exact step of ``y'' + 2 zeta w y' + w^2 y = p`` with p linear in the step, state ``(y, v)``.
 
@@ -366,8 +313,6 @@ def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.n
     transition (m, 2, 2), first (m, 2), last (m, 2) arrays
         ``state_1 = transition state_0 + first p_0 + last p_1``.
     """
-    from scipy.linalg import expm
-
     natural = np.asarray(natural, float)
     turn, scale = natural * step, np.array([1.0, 1.0 / step])
     matrix = np.zeros((len(natural), 4, 4))
@@ -382,8 +327,6 @@ def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.n
 
 def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
     """Largest undamped natural frequency [rad/s] with the given stiffnesses of the columns."""
-    from scipy import linalg
-
     system, n = problem.system, len(problem.system.M)
     total = system.K + (system.W * mesh_stiffness) @ system.W.T
     try:
@@ -404,14 +347,9 @@ class Scheme(Protocol):
     the displacements in the steps, in the norm of the mass matrix.
     """
 
-    @property
-    def step(self) -> float: ...
-
-    @property
-    def factorisations(self) -> int: ...
-
-    @property
-    def flexibility(self) -> np.ndarray: ...
+    step: float
+    factorisations: int
+    flexibility: np.ndarray
 
     def start(self, q, v, theta, law: Law) -> tuple[np.ndarray, np.ndarray]: ...
 

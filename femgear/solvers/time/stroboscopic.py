@@ -98,8 +98,9 @@ def stroboscopic_map(
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     period = common_period(frequency, periods)
     if not 4 <= steps <= _MOST_STEPS:
-        limit = f"4 to {_MOST_STEPS}"
-        raise CaseError(f"{steps} steps in a period", code="E-RANGE", key="steps", limit=limit)
+        raise CaseError(
+            f"{steps} steps in a period", code="E-RANGE", key="steps", limit=f"4 to {_MOST_STEPS}"
+        )
     scheme, _ = step_scheme(problem, frequency, method, period / steps, period / steps)
     theta = (period * np.arange(steps + 1) / steps)[:, None] * frequency
     # the last instant is the first of the next period

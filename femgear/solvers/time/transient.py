@@ -11,13 +11,13 @@ from femgear.solvers.time import adaptive
 from femgear.solvers.time.adaptive import checked_start, motion_scale
 from femgear.solvers.time.steps import (
     RULES,
+    ModalScheme,
+    RuleScheme,
     Scheme,
     StepRule,
     generalised_alpha,
     highest_frequency,
     march_times,
-    modal_scheme,
-    rule_scheme,
     stability_limit,
 )
 from femgear.system.elements import GearMeshes, PiecewiseSprings
@@ -186,11 +186,11 @@ def step_scheme(
     made = {"newmark": lambda: StepRule(gamma, beta), "generalised alpha": lambda: generalised_alpha(radius)}
     if method not in RULES and method not in made and method != "modal":
         raise CaseError(f"no method {method}", code="E-CHOICE", key="method", limit=", ".join(METHODS))
-    rule = RULES.get(method) or (made[method]() if method in made else None)
+    rule = made[method]() if method in made else RULES.get(method)
     number, step = _steps(problem, np.atleast_1d(frequency), rule, span, step)
     if rule is None:
-        return modal_scheme(problem, step, count=count), number
-    return rule_scheme(problem, rule, step), number
+        return ModalScheme(problem, step, count=count), number
+    return RuleScheme(problem, rule, step), number
 
 
 def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
@@ -317,21 +317,19 @@ def _amplitude(problem, q) -> float:
 
 
 def _verdict(steps, number, time, error, step) -> tuple[bool, str]:
+    """Whether a motion counts as converged, and what happened."""
+    message = "every step converged"
+    errs = f"a step errs by {error:.2g} of the motion"
     if steps < number:
-        return False, (
+        message = (
             f"the column equations did not converge in the step after {time:.6g} s: shorten the step of "
             f"{step:.3g} s or smooth the contact"
         )
-    if not error <= _WRONG:
-        return False, (
-            f"too coarse: a step errs by {error:.2g} of the motion; shorten the step of {step:.3g} s"
-        )
-    if error > _COARSE:
-        return (
-            True,
-            f"coarse: a step errs by {error:.2g} of the motion; a shorter step than {step:.3g} s is better",
-        )
-    return True, "every step converged"
+    elif not error <= _WRONG:
+        message = f"too coarse: {errs}; shorten the step of {step:.3g} s"
+    elif error > _COARSE:
+        message = f"coarse: {errs}; a shorter step than {step:.3g} s is better"
+    return steps == number and error <= _WRONG, message
 
 
 def _adaptive(problem, frequency, times, start, method, tolerance, events) -> TransientResponse:

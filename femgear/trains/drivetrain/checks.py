@@ -18,7 +18,7 @@ import numpy as np
 from scipy import linalg
 
 from femgear.case.units import FREQUENCY, SPEED, TIME
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.solvers.linear.modal import solve_modes
 from femgear.storage.dataset import RPM
 from femgear.system.fourier import FourierSeries
@@ -410,8 +410,8 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
     )  # fmt: skip
 
 
-def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[str, ...]:
-    """What is allowed but deserves a look, in sentences; the model is made where it is not given.
+def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[Finding, ...]:
+    """What is allowed but deserves a look; the model is made where it is not given.
 
     Raises
     ------
@@ -429,17 +429,19 @@ def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = No
     )
 
 
-def _undamped(case: DrivetrainCase) -> Iterator[str]:
+def _undamped(case: DrivetrainCase) -> Iterator[Finding]:
     """Runs in which nothing takes energy out of vibration."""
     if case.simulation.damping_ratio == 0.0:
-        yield (
-            "[W-DAMPING] simulation.damping_ratio: 0, no damping at all: vibration of the start never dies "
-            "away, resonances grow until something else stops them, and teeth seem to part that would not; "
-            "gear trains are commonly computed with 0.02 to 0.05"
+        yield Finding(
+            "W-DAMPING",
+            "simulation.damping_ratio",
+            "0, no damping at all: vibration of the start never dies "
+            "away, resonances grow until something else stops them, and teeth seem to part that would not",
+            remedy="gear trains are commonly computed with 0.02 to 0.05",
         )
 
 
-def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
+def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[Finding]:
     """Torques that change the speed more than a run is meant for."""
     first = speeds.first
     if speeds.highest <= _CHANGE * first and speeds.lowest >= first / _CHANGE:
@@ -449,13 +451,16 @@ def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
         "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
     )
     turns = " and turn it back" if speeds.lowest < 0.0 else ""
-    yield (
-        f"[W-SPEED] operation.torque: the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
-        f"{case.simulation.duration:g} s{between}{turns}; share = 1.0 on another body balances them"
+    yield Finding(
+        "W-SPEED",
+        "operation.torque",
+        f"the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
+        f"{case.simulation.duration:g} s{between}{turns}",
+        remedy="share = 1.0 on another body balances them",
     )
 
 
-def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[str]:
+def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[Finding]:
     """Steps and records that are too slow for the highest mesh frequency, at the fastest speed."""
     name, top = highest_mesh(model, speeds.fastest)
     rate, record = case.simulation.rate, record_rate(case, model)
@@ -463,22 +468,27 @@ def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> 
     if speeds.fastest > 1.01 * speeds.first:
         where += f" at {speeds.fastest / RPM:.6g} rpm, the fastest"
     if rate < GOOD_STEPS * top:
-        yield (
-            f"[W-RATE] simulation.rate: {rate / top:.3g} steps a period of the {name} ({where}) shift and "
-            f"damp it; take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz"
+        yield Finding(
+            "W-RATE",
+            "simulation.rate",
+            f"{rate / top:.3g} steps a period of the {name} ({where}) shift and damp it",
+            remedy=f"take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz",
         )
     # modes above the last line of the mesh stiffness answer as springs
     mode = mesh_mode(model, top * case.simulation.harmonics)
     if (shift := frequency_shift(mode, rate)) > _SHIFT:
-        yield (
-            f"[W-RATE] simulation.rate: steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the "
-            f"meshes drive, by {shift:.2%}; {_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
-            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}"
+        yield Finding(
+            "W-RATE",
+            "simulation.rate",
+            f"steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the meshes drive, by {shift:.2%}",
+            remedy=f"{_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
+            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}",
         )
     if 0.5 * PASS_BAND * record < top:
-        yield (
-            f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
-            f"below the {name} ({where})"
+        yield Finding(
+            "W-RECORD",
+            "simulation.record",
+            f"records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, below the {name} ({where})",
         )
 
 
@@ -488,14 +498,15 @@ def _up(value: float) -> str:
     return f"{math.ceil(value / unit) * unit:.12g}"
 
 
-def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
+def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[Finding]:
     """Runs that stop before the spectra, which would be refused."""
     if not len(model.meshes):
         return
     try:
         check_spectrum(case, model)
     except CaseError as error:
-        yield f"[W-SPECTRUM] {error.key}: {error.message}: the stage spectrum refuses this ({error.code})"
+        text = f"{error.message}: the stage spectrum refuses this ({error.code})"
+        yield Finding("W-SPECTRUM", f"{error.key}", text)
 
 
 def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tuple[str, ...]]:

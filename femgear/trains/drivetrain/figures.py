@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from femgear.report.frequency import campbell
+from femgear.report.response import campbell
 from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure
 from femgear.storage.dataset import RPM
 from femgear.system.fourier import FourierSeries

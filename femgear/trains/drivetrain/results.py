@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.errors import Finding
 from femgear.report.tables import Block
 from femgear.storage.dataset import RPM, dataset
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
@@ -305,41 +306,42 @@ def _kinds(frequency, rotation) -> list[str]:
     return [str(word) for word in np.where(rigid, "rigid", words)]
 
 
-def transient_warnings(data: xr.Dataset) -> Iterator[str]:
+def transient_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """What transient.nc says against itself."""
     pulling, least = data["pulling"].values, data["least_force"].values
     for v, variant in enumerate(data["variant"].values):
         if pulling[v].any() and least[v].min() < -_NOTHING and not separating(data):
             worst, lowest = int(np.argmax(pulling[v])), int(np.argmin(least[v]))
             beside = "" if lowest == worst else f" {data['mesh'].values[lowest]}"
-            yield (
-                f"[W-PULL] {variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the "
+            text = (
+                f"{variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the "
                 f"time,{beside} with up to "
                 f"{-1e-3 * least[v, lowest]:.4g} kN: real teeth would part (simulation.contact_loss)"
             )
+            yield Finding("W-PULL", "", text)
     for variant, lost in zip(data["variant"].values, data["lost"].values):
         if names := [str(mesh) for mesh, share in zip(data["mesh"].values, lost) if share >= 1.0]:
-            yield (
-                f"[W-PARTED] {variant}: the teeth of {', '.join(names)} never touch and transmit nothing; "
-                "give torques or a start that close the flanks"
-            )
+            text = f"{variant}: the teeth of {', '.join(names)} never touch and transmit nothing"
+            yield Finding("W-PARTED", "", text, remedy="give torques or a start that close the flanks")
     yield from _growth_warnings(data)
     for name, words in (("energy_error", "energy"), ("momentum_error", "angular momentum")):
         if not (error := float(data[name].max())) <= BALANCE:
-            yield f"[W-BALANCE] the balance of {words} misses {error:.1e} of its largest term"
+            text = f"the balance of {words} misses {error:.1e} of its largest term"
+            yield Finding("W-BALANCE", "", text)
 
 
-def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
+def _growth_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """Parametric resonances; with contact loss motions that depend on every detail, steps included."""
     duration, parts = float(data.attrs["steps"]) * float(data.attrs["step"]), separating(data)
     pulls = data["least_force"].values.min(axis=1, initial=0.0) < -_NOTHING
     for (variant, rate, gain), pulled in zip(_growth(data), pulls):
         grows = rate * duration > math.log(GROWN)
         if grows and parts:
-            yield (
-                f"[W-CHAOS] {variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
-                "and peaks depend on every detail, the steps included; compare two values of simulation.rate"
+            text = (
+                f"{variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
+                "and peaks depend on every detail, the steps included"
             )
+            yield Finding("W-CHAOS", "", text, remedy="compare two values of simulation.rate")
         if parts or not (grows or gain > _GAINED):
             continue
         if grows:
@@ -349,11 +351,12 @@ def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
             way = "grows slowly" if rate > 0.0 else "decays"
             found = f"{way} in the mean, but grows {_shown_factor(math.log10(gain))} times on the way"
         senseless = gain > _GAINED and pulled
-        yield (
-            f"[W-GROWTH] {variant}: the free motion {found}: a parametric resonance"
-            f"{'; these forces mean nothing: real teeth part long before' if senseless else ''}; give more "
-            "damping or another speed, or contact_loss = true"
+        text = (
+            f"{variant}: the free motion {found}: a parametric resonance"
+            f"{'; these forces mean nothing: real teeth part long before' if senseless else ''}"
         )
+        remedy = "give more damping or another speed, or contact_loss = true"
+        yield Finding("W-GROWTH", "", text, remedy=remedy)
 
 
 def separating(data: xr.Dataset) -> bool:
@@ -387,7 +390,7 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
         _shafts(model),
         _stages(case, model),
         _operation(case, model),
-        Block("Warnings", notes=drivetrain_warnings(case, model) or ("none",)),
+        Block("Warnings", notes=tuple(map(str, drivetrain_warnings(case, model))) or ("none",)),
     )
 
 

@@ -23,7 +23,7 @@ from femgear.case.problems import checked_case, combine
 from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase, text_with_points
 from femgear.case.units import ACCELERATION, FREQUENCY, LENGTH, SPEED, TIME, TORQUE
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.trains.drivetrain.data import (
     BearingSection,
     BodySection,
@@ -578,62 +578,43 @@ def _given(section, names) -> list[str]:
     return [name for name in names if getattr(section, name) is not None]
 
 
-def _notices(case: DrivetrainCase) -> Iterator[str]:
+def _notices(case: DrivetrainCase) -> Iterator[Finding]:
     """Remarks on a case that was checked."""
     stages = [(f"parallel[{i}]", stage) for i, stage in enumerate(case.parallel)]
     stages += [(f"planetary[{i}]", stage) for i, stage in enumerate(case.planetary)]
     for key, stage in stages:
         for _, radii, teeth in _ratios(stage)[:1]:
             if abs(teeth / radii - 1.0) > _REMARK:
-                yield (
-                    f"[W-TEETH] {key}.teeth: the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; "
-                    "speeds follow the radii, mesh frequencies the teeth of the first gear or of the ring"
+                yield Finding(
+                    "W-TEETH",
+                    f"{key}.teeth",
+                    f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
+                    "the radii, mesh frequencies the teeth of the first gear or of the ring",
                 )
     if not case.bearing:
-        yield "[W-BEARING] there is no [[bearing]]"
+        yield Finding("W-BEARING", "", "there is no [[bearing]]")
     if not case.simulation.contact_loss:
         return
     if not stages:
-        yield "[W-BACKLASH] simulation.contact_loss: there are no meshes that could part"
+        yield Finding("W-BACKLASH", "simulation.contact_loss", "there are no meshes that could part")
     meshes = [(f"{key}.{name}", getattr(stage, name, None)) for key, stage in stages for name in _MESHES]
     if bare := [key for key, mesh in meshes if mesh is not None and mesh.backlash is None]:
-        yield (
-            f"[W-BACKLASH] {', '.join(bare)}: without backlash given there is no back side: with "
-            "simulation.contact_loss these teeth part and meet no back flank"
+        yield Finding(
+            "W-BACKLASH",
+            ", ".join(bare),
+            "without backlash given there is no back side: with "
+            "simulation.contact_loss these teeth part and meet no back flank",
         )
 
 
 def embed_torques(data: dict, name: str) -> dict[str, str]:
-    """Put the points of every ``file`` of a torque in its place.
+    """Put the points of every ``file`` of a torque in its place; see `femgear.case.tables.embed_points`."""
 
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file; modified.
-    name : str
-        Name of the case file: files are looked for in its folder and below.
+    def plain(table: dict) -> bool:
+        return not table.keys() & {"torque", "times", "torques", "share"}
 
-    Returns
-    -------
-    dict of str to str
-        The files by the key of their entry, such as ``"operation.torque[0]"``.
-
-    Raises
-    ------
-    CaseError
-        As `read_torques`, or a path that leads out of the folder (E-FILE).
-    """
-    operation, found = data.get("operation"), {}
-    tables = operation.get("torque") if isinstance(operation, dict) else None
-    for i, table in enumerate(tables if isinstance(tables, list) else ()):
-        # contradicting entries stay as they are, and are refused with the others
-        if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
-            continue
-        if table.keys() & {"torque", "times", "torques", "share"}:
-            continue
-        key = f"operation.torque[{i}]"
-        found[key] = embed_points(table, name, key, read_torques, {"times": "s", "torques": "N m"})
-    return found
+    units = {"times": "s", "torques": "N m"}
+    return embed_points(data, "operation.torque", name, read=read_torques, units=units, plain=plain)
 
 
 def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:

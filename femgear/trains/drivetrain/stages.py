@@ -22,7 +22,6 @@ from scipy.signal import welch, windows
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import campbell_data
-from femgear.threads import one_blas_thread
 from femgear.trains.drivetrain.checks import (
     BENDING,
     TORSIONAL,
@@ -55,7 +54,7 @@ from femgear.trains.drivetrain.section import (
     torque_histories,
 )
 from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
-from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
+from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results

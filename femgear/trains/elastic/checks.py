@@ -22,12 +22,15 @@ import numpy as np
 from femgear.case.case import planetary_set, set_deviations
 from femgear.case.checks import check_floating
 from femgear.case.sections import Case
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.gears.kinematics import MEMBERS, torques
+from femgear.report.tables import response_warnings
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.static.description import set_warnings
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from femgear.fe.reduction import CyclicModes
     from femgear.gears.planetary import PlanetarySet
 
@@ -156,29 +159,41 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
         )
 
 
-def case_warnings(case: Case) -> tuple[str, ...]:
-    """What is allowed in a set with an elastic ring but deserves a look, in sentences."""
+def case_warnings(case: Case) -> tuple[Finding, ...]:
+    """What is allowed in a set with an elastic ring but deserves a look."""
     found = list(set_warnings(case))
     if case.dynamics.damping_ratio == 0.0 and case.operation.fixed == "ring":
         found.append(
-            "[W-DAMPING] dynamics.damping_ratio: without damping resonances have no limit, and levels depend "
-            "on how near a line lies to one; 0.02 to 0.05 is usual"
+            Finding(
+                "W-DAMPING",
+                "dynamics.damping_ratio",
+                "without damping resonances have no limit, and levels depend on how near a line lies to one",
+                remedy="0.02 to 0.05 is usual",
+            )
         )
     found += _wound_up(case)
     if case.planet.bearing_clearance and case.operation.fixed == "ring":
         found.append(
-            "[W-BEARING] planet.bearing_clearance: the dynamics have linear planet bearings; the clearance "
-            'acts in the static results alone, with static.members = "elastic"'
+            Finding(
+                "W-BEARING",
+                "planet.bearing_clearance",
+                "the dynamics have linear planet bearings; the clearance "
+                'acts in the static results alone, with static.members = "elastic"',
+            )
         )
     if case.housing.form == "linear" and case.housing.points <= 2 * MAX_DIAMETER:
         found.append(
-            f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
-            f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"
+            Finding(
+                "W-POINTS",
+                "housing.points",
+                f"{case.housing.points} points do not resolve the ring's {MAX_DIAMETER} nodal diameters",
+                remedy=f"use more than {2 * MAX_DIAMETER}",
+            )
         )
     return tuple(found)
 
 
-def _wound_up(case: Case) -> Iterator[str]:
+def _wound_up(case: Case) -> Iterator[Finding]:
     """Couplings that the torque turns further than any stands: a slip of units, as a rule."""
     acting = torques(planetary_set(case), member=case.operation.input, torque=case.operation.torque)
     output = next(name for name in MEMBERS if name not in (case.operation.input, case.operation.fixed))
@@ -188,10 +203,12 @@ def _wound_up(case: Case) -> Iterator[str]:
             continue
         angle = abs(getattr(acting, member)) / section.coupling_stiffness
         if angle > MOST_WINDING:
-            yield (
-                f"[W-COUPLING] {name}.coupling_stiffness: {section.coupling_stiffness:.4g} N m/rad lets the "
+            yield Finding(
+                "W-COUPLING",
+                f"{name}.coupling_stiffness",
+                f"{section.coupling_stiffness:.4g} N m/rad lets the "
                 f"torque turn the coupling by {math.degrees(angle):.4g} deg; couplings stand a few degrees, "
-                "elastic ones twenty"
+                "elastic ones twenty",
             )
 
 
@@ -324,7 +341,15 @@ def levels_below(lines, frequency) -> np.ndarray:
     return np.sqrt(power[place] / power[-1])
 
 
-def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[str, ...]:
+def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """What the solver says against dynamics.nc: excitation that ends too early, speeds without a solution."""
+    if "level_change" in data:
+        change, limit = data["level_change"].values, data["excitation_limit"].values
+        yield from missing_level(data["speed"].values, change, limit, float(data.attrs["compared_to"]))
+    yield from response_warnings(data)
+
+
+def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[Finding, ...]:
     """Warning where the level of the housing would change by `NOTICEABLE` or more.
 
     Parameters
@@ -339,10 +364,11 @@ def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[str, ..
     if known.max(initial=0.0) < NOTICEABLE:
         return ()
     worst = int(known.argmax())
-    return (
-        f"[W-EXCITATION] at {rpm[worst]:.6g} rpm the excitation ends at {limit[worst]:.4g} Hz; up to "
+    text = (
+        f"at {rpm[worst]:.6g} rpm the excitation ends at {limit[worst]:.4g} Hz; up to "
         f"{compared_to:.4g} Hz the level of the housing changes by {level_change[worst]:+.1f} dB. It does by "
         f"{NOTICEABLE:g} dB or more at {int((known >= NOTICEABLE).sum())} of the "
         f"{int(np.isfinite(level_change).sum())} speeds looked at: raise dynamics.up_to or "
-        "dynamics.mesh_harmonics, or leave the slowest speeds out, before levels are compared",
+        "dynamics.mesh_harmonics, or leave the slowest speeds out, before levels are compared"
     )
+    return (Finding("W-EXCITATION", "", text),)

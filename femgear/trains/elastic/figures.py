@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.case import material_of, planetary_set
 from femgear.housing.orders import BandAnalysis, analyse_band
 from femgear.housing.orders import order_spectrum as _spectrum
 from femgear.report.response import (
@@ -55,7 +55,7 @@ from femgear.report.style import (
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import PICTURE_FLANK_ELEMENTS, PICTURE_REFINE
-from femgear.trains.static.stages import material_of, ring_foundation
+from femgear.trains.static.stages import ring_foundation
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -491,7 +491,6 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     )
     modes = cyclic_modes(
         basis,
-        count=gears.ring.teeth,
         nodal_diameters=range(7),
         loads=load,
         outputs=load,
@@ -536,7 +535,7 @@ def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Data
 
 def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
     """The ring's operating deflection while the carrier turns, at the last speed."""
-    from femgear.report.scene import animate_operating_deflection
+    from femgear.report.animation import animate_operating_deflection
 
     case, dynamics = drawn.case, drawn.results.get("dynamics")
     if dynamics is None:

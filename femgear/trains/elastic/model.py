@@ -549,7 +549,6 @@ def ring_model(
     basis = sector_basis(grid, stiffness + foundation, mass, count=ring.teeth, loads=load)
     modes = cyclic_modes(
         basis,
-        count=ring.teeth,
         nodal_diameters=diameters,
         loads=load,
         outputs=outer_surface_outputs(grid),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.dependencies import Entries
+from femgear.errors import Finding
 from femgear.report.tables import Block, chosen
 from femgear.storage.dataset import FOURIER, RPM, _mesh_names, complex_entries, dataset, response_entries
 
@@ -131,7 +132,7 @@ class DynamicsResult:
     entries: Entries
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Finding, ...]:
         """What an engineer should not overlook in this result."""
         from femgear.trains.elastic.checks import missing_level
 
@@ -173,7 +174,7 @@ class DynamicsResult:
                 "title": "periodic response by the spectral method",
                 "message": response.message,
                 "compared_to": self.compared_to,
-                "warnings": " ".join(self.warnings),
+                "warnings": " ".join(map(str, self.warnings)),
                 "ring_teeth": self.ring_teeth,
                 "fourier_convention": FOURIER,
             },

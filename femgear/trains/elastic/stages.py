@@ -24,13 +24,14 @@ from femgear.case.dependencies import (
     static_entries,
 )
 from femgear.case.sections import CarrierSection, Case, MachineSection, SunSection
-from femgear.report.tables import describe_modes, describe_response, response_warnings
-from femgear.threads import one_blas_thread
+from femgear.errors import Finding, remark
+from femgear.report.tables import describe_modes, describe_response
 from femgear.trains.elastic.checks import (
     case_warnings,
     check_dynamic_case,
     check_reach,
     check_rim_speed,
+    dynamics_warnings,
     fastest_mesh_frequency,
     max_nodal_diameter,
 )
@@ -41,7 +42,7 @@ from femgear.trains.elastic.results import (
     describe_housing,
     mesh_bands,
 )
-from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
 from femgear.trains.static.description import describe_case
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import (
@@ -497,9 +498,9 @@ def _figures() -> Mapping[str, Figures]:
     return FIGURES
 
 
-def _notices(data: dict) -> Iterator[str]:
+def _notices(data: dict) -> Iterator[Finding]:
     if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
-        yield (
+        yield remark(
             'planet.bearing_clearance has no effect while static.members is "fixed": write '
             'static.members = "elastic"'
         )
@@ -548,7 +549,7 @@ ELASTIC = Train(
     describe=lambda case: describe_case(case, warnings=case_warnings(case)),
     warnings=case_warnings,
     result_warnings=lambda results: (
-        response_warnings(results.dynamics) if "dynamics" in results.stages else ()
+        dynamics_warnings(results.dynamics) if "dynamics" in results.stages else ()
     ),
     figures=_figures,
     notices=_notices,

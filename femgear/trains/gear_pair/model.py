@@ -52,7 +52,7 @@ class PairBearings:
     stiffness : (float, float)
         Of their bearings over the mean mesh stiffness.
     damping_ratio : float
-        ``c_i = 2 xi sqrt(k_i m_i)``, see `femgear.system.transmission_errors`.
+        ``c_i = 2 xi sqrt(k_i m_i)``.
     """
 
     mass: tuple[float, ...]

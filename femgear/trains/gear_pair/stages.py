@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.errors import Finding
 from femgear.report.tables import Block
 from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
 from femgear.system.contact_states import (
@@ -20,10 +21,9 @@ from femgear.system.contact_states import (
     solution_states,
     state_regions,
 )
-from femgear.threads import one_blas_thread
 from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
 from femgear.trains.gear_pair.section import GearPairCase, build_gear_pair, pair_of, scales_of
-from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
+from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -197,8 +197,8 @@ def _units(case: GearPairCase, title: str) -> dict[str, Any]:
 @one_blas_thread()
 def solve_response(case: GearPairCase) -> ResponseResult:
     """Periodic motions over the frequency ratio past limit points, with stability and contact."""
-    from femgear.solvers.continuation.arclength import StepOptions
     from femgear.solvers.continuation.branches import parameter_curve
+    from femgear.solvers.continuation.corrector import StepOptions
 
     pair, given = pair_of(case), case.response
     branch = parameter_curve(
@@ -281,24 +281,25 @@ def describe_gear_pair(case: GearPairCase) -> tuple[Block, ...]:
         )
         ends = " and ".join(f"{ratio:.4f}" for ratio in parting) or "no ratio"
         notes = (f"with constant stiffness drive flanks begin to part at {ends} of the natural frequency",)
-    warnings = tuple(gear_pair_warnings(case)) or ("none",)
+    warnings = tuple(map(str, gear_pair_warnings(case))) or ("none",)
     return Block(case.title), Block("Gear pair", (), tuple(rows), notes), Block("Warnings", notes=warnings)
 
 
-def gear_pair_warnings(case: GearPairCase) -> Iterator[str]:
+def gear_pair_warnings(case: GearPairCase) -> Iterator[Finding]:
     """What is allowed but deserves a look."""
     if case.operation.torque == 0.0:
-        yield "[W-LOAD] operation.torque: without load nothing keeps the flanks on one side"
+        yield Finding("W-LOAD", "operation.torque", "without load nothing keeps the flanks on one side")
     if not (case.mesh.error or case.mesh.stiffness_waves or any(case.gears.eccentricity)):
-        yield "[W-EXCITATION] mesh: neither error nor stiffness waves nor eccentricity excite the pair"
+        text = "neither error nor stiffness waves nor eccentricity excite the pair"
+        yield Finding("W-EXCITATION", "mesh", text)
 
 
-def result_warnings(results) -> Iterator[str]:
+def result_warnings(results) -> Iterator[Finding]:
     """What the solvers say against their own results."""
     if "response" in results.stages and not results.response.attrs["complete"]:
-        yield f"[W-BRANCH] response: {results.response.attrs['message']}"
+        yield Finding("W-BRANCH", "response", str(results.response.attrs["message"]))
     if "sweep" in results.stages and (lost := int((~results.sweep["settled"].values.astype(bool)).sum())):
-        yield f"[W-SETTLED] sweep: {lost} motions do not repeat within sweep.most_periods"
+        yield Finding("W-SETTLED", "sweep", f"{lost} motions do not repeat within sweep.most_periods")
 
 
 def _describe_response(data: xr.Dataset) -> Block:

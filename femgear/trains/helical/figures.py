@@ -161,7 +161,7 @@ def helical_modes_figures(
         Contents of static.nc, the spur gears of that section.
     """
     from femgear.gears.phasing import phasing_of_set
-    from femgear.trains.static.figures import phase_diagram
+    from femgear.trains.static.charts import phase_diagram
 
     figures = {
         "spatial_mode_shapes": spatial_mode_shapes(modes, gears),

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from femgear.system.rigid_bodies import (
     RigidSet,
     check_support,
     gear_geometry,
+    refuse,
 )
 from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem
 
@@ -88,13 +89,6 @@ class HelicalSet(RigidSet):
         `closure` tells by how much they do.
     """
 
-    directions: ClassVar[dict[str, tuple[int, ...]]] = {
-        "{}, radial": (0, 1),
-        "{}, axial": (2,),
-        "{}, tilt": (3, 4),
-        "{}, torsional": (5,),
-    }
-
     base_helix_angle: float
     planet_bearing: HelicalSupport
     contact_points: str = "pitch_point"
@@ -105,10 +99,10 @@ class HelicalSet(RigidSet):
         super().__post_init__()
         if self.ring_radius <= self.planet_radius:
             allowed = f"above the {self.planet_radius} m of the planets"
-            self.refuse("ring_radius", self.ring_radius, "m", allowed)
+            refuse("ring_radius", self.ring_radius, "m", allowed)
         if not abs(self._numbers("base_helix_angle", 0)) < 0.5 * math.pi:
             allowed = "between -pi/2 and pi/2"
-            self.refuse("base_helix_angle", self.base_helix_angle, "rad", allowed, remedy="give radians")
+            refuse("base_helix_angle", self.base_helix_angle, "rad", allowed, remedy="give radians")
         check_support("planet_bearing", self.planet_bearing, count=self.n_planets)
         _check_contact(self)
         _check_closure(self)
@@ -179,19 +173,19 @@ def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_widt
 
 def _check_contact(data: HelicalSet) -> None:
     if data.contact_points not in CONTACT_POINTS:
-        data.refuse("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
+        refuse("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
     if isinstance(data.slices, bool) or int(data.slices) != data.slices or data.slices < 1:
-        data.refuse("slices", data.slices, "", "a whole number of 1 or more")
+        refuse("slices", data.slices, "", "a whole number of 1 or more")
     if not (math.isfinite(data.face_width) and data.face_width >= 0.0):
-        data.refuse("face_width", data.face_width, "m", "finite, 0 or more")
+        refuse("face_width", data.face_width, "m", "finite, 0 or more")
     if data.slices > 1 and not data.face_width:
-        data.refuse("face_width", data.face_width, "m", "above 0 for several slices")
+        refuse("face_width", data.face_width, "m", "above 0 for several slices")
 
 
 def _check_closure(data: HelicalSet) -> None:
     worst = max(data.closure, key=abs)
     if abs(worst) > LARGEST_CLOSURE:
-        data.refuse(
+        refuse(
             "centre_distance", data.centre_distance, "m",
             f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
             remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
@@ -462,8 +456,8 @@ def spring_loads(springs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[
     Parameters
     ----------
     springs : mapping of str to (columns (n, g), stiffness (g,))
-        From `femgear.system.assembler.gear_set_springs`; those of meshes give ``k W^T q``
-        without the transmission error, whose force is in `MeshErrorResponse.force`.
+        Columns and stiffnesses by name; those of meshes give ``k W^T q`` without the
+        transmission error, whose force is in `MeshErrorResponse.force`.
 
     Returns
     -------

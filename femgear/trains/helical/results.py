@@ -28,6 +28,7 @@ from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import contact_ratios
 from femgear.trains.helical.setup import SectionStiffness
 from femgear.trains.rigid import modes_entries, stiffness_text, torsion_text
+from femgear.trains.static.description import static_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -267,7 +268,7 @@ def _model(case: HelicalCase, s: PlanetarySet) -> tuple[str, ...]:
     return text, f"{slices} over the face width; forces act at the {points}"
 
 
-def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None) -> Block:
+def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None, *, module: float) -> Block:
     """Numbers of static.nc, which holds spur gears, and beside them those of the helical meshes.
 
     Parameters
@@ -276,6 +277,8 @@ def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None)
         Contents of static.nc of a helical case.
     modes : xarray.Dataset, optional
         Contents of modes.nc, which has stiffness and transmission error of the helical meshes.
+    module : float
+        In the transverse section [m].
     """
     sources = [("spur", static["ste"], static["mesh_stiffness"])]
     if modes is not None and "helical_ste" in modes:
@@ -299,5 +302,5 @@ def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None)
     ]
     if static.attrs.get("mesh_periods", 1) > 1:
         notes.append(str(static.attrs["period"]))
-    notes += [f"[{text.strip()}" for text in str(static.attrs.get("warnings", "")).split("[") if text]
+    notes += map(str, static_warnings(static, module))
     return Block("Static", tuple(header), tuple(zip(*columns)), tuple(notes))

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from femgear.case.fields import Count, Quantity, Section
 from femgear.case.sections import MeshStiffnessSection, RigidCase
 from femgear.case.units import ANGLE, INERTIA, MASS, STIFFNESS, TORSION
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     entries_without_effect,
     flank_entries,
@@ -84,7 +84,7 @@ class HelicalSection(Section):
         return self.helix_angle if self.hand == "right" else -self.helix_angle
 
 
-def helical_notices(data: dict) -> Iterator[str]:
+def helical_notices(data: dict) -> Iterator[Finding]:
     """What a helical case gives without effect.
 
     Parameters
@@ -97,12 +97,14 @@ def helical_notices(data: dict) -> Iterator[str]:
     if data["planet"].get("bearing_clearance"):
         unused.append("planet.bearing_clearance")
     if unused:
-        yield f"{listed(unused)} no effect in this helical case"
+        yield remark(f"{listed(unused)} no effect in this helical case")
     if data["helical"].get("contact_points") == "base_circles":
-        yield (
-            '[W-CONTACT-POINTS] helical.contact_points: with "base_circles" the mesh forces on both gears do '
-            "not act on one line, so that the set is not in equilibrium: pin and support moments are wrong, "
-            'for 30/20/70 teeth those of the pins by 13 % (usual: "pitch_point"; frequencies differ by 0.1 %)'
+        yield Finding(
+            "W-CONTACT-POINTS",
+            "helical.contact_points",
+            'with "base_circles" the mesh forces on both gears do not act on one line, so '
+            "that the set is not in equilibrium: pin and support moments are wrong, for 30/20/70 teeth "
+            'those of the pins by 13 % (usual: "pitch_point"; frequencies differ by 0.1 %)',
         )
     if "mesh_stiffness" in data["helical"]:
         given = [name for name in ("static", "dynamics") if name in data]
@@ -110,7 +112,7 @@ def helical_notices(data: dict) -> Iterator[str]:
             given.append("helical.section")
         given += flank_entries(data)
         if given:
-            yield (
+            yield remark(
                 f"{listed(given)} no effect while helical.mesh_stiffness is given: it leaves nothing that "
                 "excites, and modes are all that is computed"
             )
@@ -118,7 +120,7 @@ def helical_notices(data: dict) -> Iterator[str]:
         yield from _slow_notice(data)
 
 
-def _slow_notice(data: dict) -> Iterator[str]:
+def _slow_notice(data: dict) -> Iterator[Finding]:
     """What many slices cost."""
     slices, angles = data["helical"].get("slices", 1), data["set"].get("planet_angles")
     planets = data["set"]["planets"] if angles is None else len(angles)
@@ -126,9 +128,11 @@ def _slow_notice(data: dict) -> Iterator[str]:
     speeds = given["count"] if isinstance(given, dict) else len(given)
     seconds = _SECONDS * speeds * (2 * planets * slices) ** 3
     if slices > 1 and seconds > _LONG:
-        yield (
-            f"[W-SLICES] helical.slices: {slices} slices of {2 * planets} meshes at {speeds} speeds take "
-            f"dynamics about {_duration(seconds)} (usual: 8 slices or fewer)"
+        yield Finding(
+            "W-SLICES",
+            "helical.slices",
+            f"{slices} slices of {2 * planets} meshes at {speeds} speeds take "
+            f"dynamics about {_duration(seconds)} (usual: 8 slices or fewer)",
         )
 
 

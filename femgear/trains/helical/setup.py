@@ -16,8 +16,8 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError, GeometryError
 from femgear.system.system import MeshExcitation
-from femgear.threads import one_blas_thread
 from femgear.trains.helical.section import HelicalCase
+from femgear.trains.protocol import one_blas_thread
 from femgear.trains.rigid import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ from femgear.case.dependencies import check_entries, static_entries
 from femgear.errors import CaseError
 from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.system.system import MeshExcitation
-from femgear.threads import one_blas_thread
 from femgear.trains.helical.results import (
     HelicalDynamicsResult,
     HelicalModesResult,
@@ -34,7 +33,7 @@ from femgear.trains.helical.setup import (
     section_stiffness,
     shared_load,
 )
-from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     driving_torque,
     member_speeds,
@@ -234,7 +233,9 @@ HELICAL = Train(
             ),
             verdict=static_stages.static_verdict,
             describe=lambda results: describe_helical_static(
-                results.static, results.modes if "modes" in results.stages else None
+                results.static,
+                results.modes if "modes" in results.stages else None,
+                module=planetary_set(results.case).sun.module,
             ),
             unavailable=lambda case: (
                 "a given helical.mesh_stiffness takes the place of the static solution"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.errors import Finding
 from femgear.report.tables import Block
 from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
 from femgear.trains.multistage.model import (
@@ -218,15 +219,16 @@ def describe_multistage(case: MultistageCase, train: MultistageSet) -> tuple[Blo
         Block(case.title),
         Block("Stages", tuple(header), tuple(map(tuple, rows)), notes),
         Block("Couplings", ("from", "to", "torsional [N m/rad]", "lateral [N/m]"), tuple(couplings)),
-        Block("Warnings", notes=tuple(multistage_warnings(case)) or ("none",)),
+        Block("Warnings", notes=tuple(map(str, multistage_warnings(case))) or ("none",)),
     )
 
 
-def multistage_warnings(case: MultistageCase) -> Iterator[str]:
+def multistage_warnings(case: MultistageCase) -> Iterator[Finding]:
     """What is allowed but deserves a look."""
     response = case.response
     if response is not None and (case.operation is None or not case.geared):
-        yield "[W-RESPONSE] response: without operation, or gears of every stage, there are modes alone"
+        text = "without operation, or gears of every stage, there are modes alone"
+        yield Finding("W-RESPONSE", "response", text)
 
 
 def describe_modes(data: xr.Dataset) -> Block:
@@ -260,9 +262,10 @@ def describe_forces(data: xr.Dataset, title: str) -> Block:
     return Block(title, header, tuple(rows), (count,))
 
 
-def balance_warnings(data: xr.Dataset) -> Iterator[str]:
+def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """What harmonic balance says against balance.nc."""
     lost = data["speed"].values[~data["converged"].values.astype(bool)]
     if len(lost):
         shown = ", ".join(f"{value:.6g}" for value in lost[:8])
-        yield f"[W-BALANCE] harmonic balance did not converge at {len(lost)} speeds: {shown} rpm"
+        text = f"harmonic balance did not converge at {len(lost)} speeds: {shown} rpm"
+        yield Finding("W-BALANCE", "", text)

@@ -21,7 +21,6 @@ from femgear.system.elements import GearMeshes, TurningSprings, turning_wave
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample
 from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
-from femgear.threads import one_blas_thread
 from femgear.trains.multistage.model import (
     MultistageSet,
     Stage,
@@ -52,7 +51,7 @@ from femgear.trains.multistage.section import (
     multistage_of,
     stage_gears,
 )
-from femgear.trains.protocol import Figures, OwnFile, Progress, Train
+from femgear.trains.protocol import Figures, OwnFile, Progress, Train, one_blas_thread
 from femgear.trains.protocol import Stage as RunStage
 
 # relative distance of frequencies that count as one

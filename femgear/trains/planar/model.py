@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.continuation.arclength import StepOptions
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
+from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.harmonic_balance import displacements
@@ -33,11 +33,18 @@ from femgear.system.assembler import (
     pin_directions,
 )
 from femgear.system.elements import GearMeshes, RadialBearings
-from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, line_tail, series_of
+from femgear.system.fourier import (
+    FourierSeries,
+    Series,
+    StepSeries,
+    SummedSeries,
+    line_tail,
+    series_of,
+    tooth_lines,
+)
 from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.rigid_bodies import CENTRAL, PlanarSet, PlanarTorque, flank_sign
 from femgear.system.system import HarmonicForce, Modes, NonlinearSystem, element_forces
-from femgear.system.transmission_errors import tooth_lines
 
 # natural frequencies closer than this, relative to the frequency, count as one
 _SAME = 1e-3

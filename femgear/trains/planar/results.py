@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.sections import output_member
+from femgear.errors import Finding, remark
 from femgear.report.tables import Block
 from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset
 from femgear.trains.rigid import modes_entries, stiffness_text, torsion_text
@@ -354,7 +355,7 @@ def _smoothing(case: PlanarCase, planetary: PlanetarySet) -> str:
     text += f", {smoothing / compression:.2g} of the mean compression {compression * 1e6:.4g} um"
     if smoothing <= _SMOOTH * compression:
         return text
-    return f"[W-SMOOTHING] {text}: lower planar.smoothing where teeth part or wedge"
+    return str(Finding("W-SMOOTHING", "", f"{text}: lower planar.smoothing where teeth part or wedge"))
 
 
 def _sense(case: PlanarCase) -> str:
@@ -400,7 +401,7 @@ def describe_branch(data: xr.Dataset) -> Block:
     ]
     notes += _verdicts(data) if known else ["stability was not computed"]
     notes += _truncation(data) if known else []
-    notes += [_tails(data), *tail_warnings(data, "planar.branch.harmonics")]
+    notes += [_tails(data), *map(str, tail_warnings(data, "planar.branch.harmonics"))]
     return Block("Response to the weight", header, tuple(rows), tuple(notes))
 
 
@@ -412,8 +413,8 @@ def _tails(data: xr.Dataset) -> str:
     )
 
 
-def tail_warnings(data: xr.Dataset, key: str) -> tuple[str, ...]:
-    """What truncation of the lines does to branch.nc or response.nc, in sentences.
+def tail_warnings(data: xr.Dataset, key: str) -> tuple[Finding, ...]:
+    """What truncation of the lines does to branch.nc or response.nc.
 
     Parameters
     ----------
@@ -426,16 +427,18 @@ def tail_warnings(data: xr.Dataset, key: str) -> tuple[str, ...]:
     tail, force = data["tail"].values, data["force_tail"].values
     worst = np.maximum(tail, force)
     if (wrong := worst > TAIL_LIMIT).any():
-        return (
-            f"[W-TAIL] {_where(data, wrong)}: {worst.max():.2g} of the amplitude lies in the upper half of "
+        text = (
+            f"{_where(data, wrong)}: {worst.max():.2g} of the amplitude lies in the upper half of "
             f"the lines ({tail.max():.2g} of the deflections, {force.max():.2g} of the mesh forces): forces "
-            f"and contact shares of this response are not to be trusted, raise {key}",
+            f"and contact shares of this response are not to be trusted, raise {key}"
         )
+        return (Finding("W-TAIL", "", text),)
     if (cut := worst**2 > _ENERGY).any():
-        return (
+        text = (
             f"{_where(data, cut)}: {worst.max() ** 2:.2g} of the energy of deflections or mesh forces lies "
-            f"in the upper half of the lines; {key} says how many there are",
+            f"in the upper half of the lines; {key} says how many there are"
         )
+        return (remark(text),)
     return ()
 
 
@@ -448,11 +451,11 @@ def _where(data: xr.Dataset, bad: np.ndarray) -> str:
     return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {listed} rpm"
 
 
-def planar_verdicts(branch: xr.Dataset | None, response: xr.Dataset | None) -> Iterator[str]:
+def planar_verdicts(branch: xr.Dataset | None, response: xr.Dataset | None) -> Iterator[Finding]:
     """What speaks against results of a planar case, for the head of the report."""
     if branch is not None:
         if not bool(branch.attrs["complete"]):
-            yield f"the branch of the response to the weight: {branch.attrs['message']!s}"
+            yield remark(f"the branch of the response to the weight: {branch.attrs['message']!s}")
         yield from tail_warnings(branch, "planar.branch.harmonics")
     if response is not None:
         yield from tail_warnings(response, response_key(response))
@@ -527,7 +530,7 @@ def describe_response(data: xr.Dataset) -> Block:
             "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
             "weight to the mesh frequency; r.m.s. values count such lines apart"
         )
-    notes += tail_warnings(data, response_key(data))
+    notes += map(str, tail_warnings(data, response_key(data)))
     return Block("Weight and mesh frequency", header, tuple(rows), tuple(notes))
 
 

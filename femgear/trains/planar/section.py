@@ -17,7 +17,7 @@ from pydantic import (
 from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
 from femgear.case.units import ACCELERATION, ANGLE, FREQUENCY, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     entries_without_effect,
     flank_entries,
@@ -161,7 +161,7 @@ class PlanarSection(Section):
     published: Annotated[tuple[PlanarPublished, ...], Field(max_length=100)] = ()
 
 
-def planar_notices(data: dict) -> Iterator[str]:
+def planar_notices(data: dict) -> Iterator[Finding]:
     """What a planar case gives without effect.
 
     Parameters
@@ -175,20 +175,22 @@ def planar_notices(data: dict) -> Iterator[str]:
         keys += ["mesh_harmonics", "response_harmonics"]
     dynamics = [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
     if unused := entries_without_effect(data, dynamics):
-        yield f"{listed(unused)} no effect in this planar case"
+        yield remark(f"{listed(unused)} no effect in this planar case")
     if "mesh_stiffness" in planar and (unused := _without_static(data)):
-        yield f"{listed(unused)} no effect while planar.mesh_stiffness is given"
+        yield remark(f"{listed(unused)} no effect while planar.mesh_stiffness is given")
     if "response" in planar and "mesh_stiffness" in planar:
         still = "no weight acts" if "gravity" not in planar else ""
         if data["operation"].get("fixed", "ring") == "carrier":
             still = "the weight does not turn against a carrier that stands"
         if still:
-            yield (
-                "planar.response: nothing varies in time, every response is static: planar.mesh_stiffness is "
-                f"constant and {still}"
+            yield Finding(
+                "",
+                "planar.response",
+                "nothing varies in time, every response is static: planar.mesh_stiffness is "
+                f"constant and {still}",
             )
     if data["planet"].get("bearing_clearance") and not {"branch", "response"} & planar.keys():
-        yield "planet.bearing_clearance has no effect without planar.branch or planar.response"
+        yield remark("planet.bearing_clearance has no effect without planar.branch or planar.response")
 
 
 def _without_static(data: dict) -> list[str]:

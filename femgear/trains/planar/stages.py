@@ -13,8 +13,8 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
+from femgear.errors import Finding
 from femgear.report.tables import describe_modes
-from femgear.threads import one_blas_thread
 from femgear.trains.planar.checks import (
     bounded_branch,
     check_branch_damping,
@@ -36,7 +36,7 @@ from femgear.trains.planar.results import (
     remarks,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     driving_torque,
     member_speeds,
@@ -374,7 +374,7 @@ def _figures() -> Mapping[str, Figures]:
     return FIGURES
 
 
-def _result_warnings(results: Results) -> Iterator[str]:
+def _result_warnings(results: Results) -> Iterator[Finding]:
     branch, response = (
         results.stage(name) if name in results.stages else None for name in ("branch", "response")
     )

@@ -1,7 +1,7 @@
 """A planetary set in tables, and what deserves a look: gears, meshes, phasing, operation, static solution.
 
 The phases of the meshes decide which of their harmonics sun and ring hear, and which kinds of modes these
-excite; neighbouring tooth numbers are listed with what they would change in that. The sentences of
+excite; neighbouring tooth numbers are listed with what they would change in that. The findings of
 `set_warnings` hold for any planetary set, those of `static_warnings` for any static solution; `check_motions`
 refuses one whose displacements are not small.
 """
@@ -9,44 +9,48 @@ refuses one whose displacements are not small.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations, shaft_lines
-from femgear.errors import ContactError
+from femgear.errors import ContactError, Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import tooth_thickness
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, phasing_of_set, phasing_table
-from femgear.gears.teeth_numbers import ToothChoices, neighbouring_teeth
-from femgear.report.tables import MANY, Block
+from femgear.gears.teeth_numbers import neighbouring_teeth
+from femgear.report.tables import Block, chosen, tabulate
 from femgear.storage.dataset import RPM
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from femgear.case.sections import Case
     from femgear.contact.cycle import MeshCycle
     from femgear.gears.planetary import PlanetarySet
 
 # harmonics whose phasing is listed
-HARMONICS = 6
+_HARMONICS = 6
 # neighbouring sets: how far their teeth and ratio may lie away, and how many are listed
-DISTANCE, TOLERANCE = 3, 0.02
-ROWS = 8
+_DISTANCE, _TOLERANCE = 3, 0.02
+_ROWS = 8
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
 
 
-def describe_case(case: Case, *, model: tuple[Block, ...] = (), warnings: Sequence[str]) -> tuple[Block, ...]:
-    """Geometry, operation and warnings of a planetary set.
+def describe_case(
+    case: Case, *, model: tuple[Block, ...] = (), warnings: Sequence[Finding]
+) -> tuple[Block, ...]:
+    """Describe a planetary set in tables: geometry, operation and warnings.
 
     Parameters
     ----------
     case : Case
     model : tuple of Block
         What a train adds about its model.
-    warnings : sequence of str
+    warnings : sequence of Finding
 
     Returns
     -------
@@ -60,21 +64,20 @@ def describe_case(case: Case, *, model: tuple[Block, ...] = (), warnings: Sequen
         *describe_phasing(planetary),
         _operation(case, planetary),
         *model,
-        Block("Warnings", notes=tuple(warnings) or ("none",)),
+        Block("Warnings", notes=tuple(map(str, warnings)) or ("none",)),
     )
 
 
-def set_warnings(case: Case) -> tuple[str, ...]:
-    """What is allowed in any planetary set but deserves a look, in sentences."""
+def set_warnings(case: Case) -> tuple[Finding, ...]:
+    """What is allowed in any planetary set but deserves a look."""
     planetary = planetary_set(case)
-    found = [str(warning) for warning in check_set(planetary)] + list(case.notices)
-    found += [str(warning) for warning in check_deviations(set_deviations(case), planetary)]
+    found = [*check_set(planetary), *case.notices, *check_deviations(set_deviations(case), planetary)]
     if case.operation.torque == 0:
-        found.append(
-            "[W-TORQUE] operation.torque: without torque no tooth touches; only static results exist"
-        )
+        text = "without torque no tooth touches; only static results exist"
+        found.append(Finding("W-TORQUE", "operation.torque", text))
     if case.operation.torque < 0:
-        found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
+        text = "a negative torque loads the other flanks"
+        found.append(Finding("W-TORQUE", "operation.torque", text))
     return tuple(found)
 
 
@@ -106,50 +109,59 @@ def check_motions(cycle: MeshCycle, module: float) -> None:
             )
 
 
-def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
-    """What is wrong with a static result in an engineer's eyes, in sentences."""
-    found = []
-    if cycle.max_pressure.max(initial=0.0) > 4e9:
-        found.append(
-            f"[W-PRESSURE] the contact pressure reaches {cycle.max_pressure.max() * 1e-6:.0f} MPa: no steel "
-            "carries that, and the model stays elastic"
+def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
+    """What is wrong with the contents of static.nc in an engineer's eyes.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    module : float
+        Of the gears, of helical ones in their transverse section [m].
+    """
+    names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
+    force, back, pressure, motion, approach = (data[name].values for name in names)
+    if pressure.max(initial=0.0) > 4e9:
+        text = (
+            f"the contact pressure reaches {pressure.max() * 1e-6:.0f} MPa: no steel carries that, and the "
+            "model stays elastic"
         )
-    moved = np.abs(cycle.member_motion).max(initial=0.0)
-    if np.abs(cycle.deflection).max(initial=0.0) > 0.05 * module:
-        found.append(_deflection_warning(cycle, moved))
+        yield Finding("W-PRESSURE", "", text)
+    moved = np.abs(motion).max(initial=0.0)
+    if np.abs(approach).max(initial=0.0) > 0.05 * module:
+        yield Finding("W-DEFLECTION", "", _deflection(approach, moved, members=len(motion)))
     if moved > 0.05 * module:
-        found.append(
-            f"[W-MOTION] a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points "
-            "and arms are those of the unmoved set"
+        text = (
+            f"a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points and arms "
+            "are those of the unmoved set"
         )
-    edges = (cycle.force > 0) & (cycle.max_pressure <= 0)
-    if edges.any():
-        found.append(
-            "[W-EDGE] at some positions every contact of a mesh lies at the end of a flank: its pressure has "
-            "no limit and is not given"
+        yield Finding("W-MOTION", "", text)
+    if ((force > 0) & (pressure <= 0)).any():
+        text = (
+            "at some positions every contact of a mesh lies at the end of a flank: its pressure has no limit "
+            "and is not given"
         )
-    if cycle.open_planets.any() and cycle.force.any():
-        planets = ", ".join(str(n + 1) for n in np.flatnonzero(cycle.open_planets.any(axis=1)))
-        found.append(f"[W-OPEN] planet {planets} carries nothing at some positions")
-    if cycle.wedged.any():
-        found.append("[W-WEDGED] some meshes are loaded on both flanks at once")
-    if ((cycle.back_force > 0) & ~cycle.wedged).any():
-        found.append(
-            "[W-BACK] some meshes carry on their back flanks alone: planets work against one another"
-        )
-    return tuple(found)
+        yield Finding("W-EDGE", "", text)
+    unloaded = (force + back)[: len(force) // 2] <= 0.0
+    if unloaded.any() and force.any():
+        planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
+        yield Finding("W-OPEN", "", f"planet {planets} carries nothing at some positions")
+    if ((force > 0) & (back > 0)).any():
+        yield Finding("W-WEDGED", "", "some meshes are loaded on both flanks at once")
+    if ((back > 0) & ~(force > 0)).any():
+        text = "some meshes carry on their back flanks alone: planets work against one another"
+        yield Finding("W-BACK", "", text)
 
 
-def _deflection_warning(cycle: MeshCycle, moved: float) -> str:
+def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
     """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
-    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(cycle.deflection, 2))
-    if not cycle.member_names:
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(approach, 2))
+    if not members:
         return (
-            f"[W-DEFLECTION] the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: "
-            "small displacements no longer hold"
+            f"the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: small displacements "
+            "no longer hold"
         )
     return (
-        f"[W-DEFLECTION] the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
+        f"the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
         "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
         "not the deflection of the teeth alone: it contains the motion of the members, up to "
         f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "
@@ -157,40 +169,35 @@ def _deflection_warning(cycle: MeshCycle, moved: float) -> str:
     )
 
 
-def describe_phasing(planetary_set: PlanetarySet) -> tuple[Block, ...]:
-    """Phasing of the first harmonics of the mesh frequency, and of neighbouring tooth numbers.
+def describe_phasing(planetary_set: PlanetarySet) -> tuple[Block, Block]:
+    """Tabulate the phasing of the first harmonics of the mesh frequency, and neighbouring tooth numbers.
 
     Parameters
     ----------
     planetary_set : PlanetarySet
         Of a case that `femgear.gears.checks.check_set` accepts.
-
-    Returns
-    -------
-    tuple of Block
     """
     return _harmonics(planetary_set), _neighbours(planetary_set)
 
 
 def _gears(s: PlanetarySet) -> Block:
-    gears = (s.sun, s.planet, s.ring)
-
-    def row(name, value):
-        return (name, *(value(gear) for gear in gears))
-
-    rows = (
-        row("teeth", lambda g: str(g.teeth)),
-        row("profile shift", lambda g: f"{g.profile_shift:.5f}"),
-        row("reference diameter [mm]", lambda g: f"{2e3 * g.reference_radius:.4f}"),
-        row("tip diameter [mm]", lambda g: f"{2e3 * g.tip_radius:.4f}"),
-        row("root diameter [mm]", lambda g: f"{2e3 * g.root_radius:.4f}"),
-        row("start of involute, diameter [mm]", lambda g: f"{2e3 * g.form_radius:.4f}"),
-        row(
-            "tooth thickness at the tip [mm]",
-            lambda g: f"{1e3 * float(tooth_thickness(g, g.tip_radius)):.4f}",
-        ),
-        row("bore or outer diameter [mm]", lambda g: f"{2e3 * g.rim_radius:.4f}"),
-    )
+    """Tabulate diameters and teeth of the three gears."""
+    rows = {
+        "teeth": lambda g: str(g.teeth),
+        "profile shift": lambda g: f"{g.profile_shift:.5f}",
+        "reference diameter [mm]": lambda g: f"{2e3 * g.reference_radius:.4f}",
+        "tip diameter [mm]": lambda g: f"{2e3 * g.tip_radius:.4f}",
+        "root diameter [mm]": lambda g: f"{2e3 * g.root_radius:.4f}",
+        "start of involute, diameter [mm]": lambda g: f"{2e3 * g.form_radius:.4f}",
+        "tooth thickness at the tip [mm]": lambda g: f"{1e3 * float(tooth_thickness(g, g.tip_radius)):.4f}",
+        "bore or outer diameter [mm]": lambda g: f"{2e3 * g.rim_radius:.4f}",
+    }
+    columns = {
+        "": lambda name: name,
+        "sun": lambda name: rows[name](s.sun),
+        "planet": lambda name: rows[name](s.planet),
+        "ring": lambda name: rows[name](s.ring),
+    }
     angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in s.planet_angles[:12])
     notes = (
         f"module {s.sun.module * 1e3:.6g} mm, pressure angle {math.degrees(s.sun.pressure_angle):.6g} deg, "
@@ -198,118 +205,109 @@ def _gears(s: PlanetarySet) -> Block:
         f"{s.n_planets} planets at {angles} deg",
         "profile shift of the ring: positive moves the flank outwards (the opposite of ISO 21771)",
     )
-    return Block("Gears", ("", "sun", "planet", "ring"), rows, notes)
+    return tabulate("Gears", rows, columns, notes)
 
 
 def _meshes(s: PlanetarySet) -> Block:
-    n = s.n_planets
-    phases = s.mesh_phases
-
-    def listing(values):
-        text = ", ".join(f"{value:.4f}" for value in values[:6])
-        return text + (", ..." if len(values) > 6 else "")
-
+    """Tabulate what the geometry says of both kinds of mesh."""
+    n, phases = s.n_planets, [f"{phase:.4f}" for phase in s.mesh_phases]
+    more = ", ..." if n > 6 else ""
     clearance = {name: f"{1e3 * value:.3f}" for name, value in tip_clearances(s).items()}
+    angles = s.working_pressure_angle_sun_planet, s.working_pressure_angle_planet_ring
+    backlashes = s.backlash_sun_planet, s.backlash_planet_ring
     rows = (
-        (
-            "working pressure angle [deg]",
-            f"{math.degrees(s.working_pressure_angle_sun_planet):.4f}",
-            f"{math.degrees(s.working_pressure_angle_planet_ring):.4f}",
-        ),
+        ("working pressure angle [deg]", *(f"{math.degrees(angle):.4f}" for angle in angles)),
         ("contact ratio", f"{s.contact_ratio_sun_planet:.4f}", f"{s.contact_ratio_planet_ring:.4f}"),
-        (
-            "normal backlash [um]",
-            f"{round(s.backlash_sun_planet * 1e6, 2) + 0.0:.2f}",
-            f"{round(s.backlash_planet_ring * 1e6, 2) + 0.0:.2f}",
-        ),
+        ("normal backlash [um]", *(f"{round(play * 1e6, 2) + 0.0:.2f}" for play in backlashes)),
         (
             "tip clearances [mm]",
             f"{clearance['sun tip to planet root']}, {clearance['planet tip to sun root']}",
             f"{clearance['planet tip to ring root']}, {clearance['ring tip to planet root']}",
         ),
-        ("mesh phases [periods]", listing(phases[:n]), listing(phases[n:])),
+        ("mesh phases [periods]", ", ".join(phases[:n][:6]) + more, ", ".join(phases[n:][:6]) + more),
     )
     return Block("Meshes", ("", "sun-planet", "planet-ring"), rows)
 
 
 def _operation(case: Case, s: PlanetarySet) -> Block:
+    """Tabulate the speeds of all members."""
     operation = case.operation
-    chosen = operation.speeds
-    if len(chosen) > MANY:
-        chosen = (*chosen[: MANY // 2], *chosen[-MANY // 2 :])
-    rows = []
-    for speed in chosen:
-        v = speeds(s, input=operation.input, fixed=operation.fixed, speed=speed)
-        turns = (f"{value / RPM:.4f}" for value in (v.sun, v.carrier, v.ring, v.planet))
-        rows.append((*turns, f"{v.mesh_frequency:.4f}"))
+    found = [
+        speeds(s, input=operation.input, fixed=operation.fixed, speed=operation.speeds[i])
+        for i in chosen(len(operation.speeds))
+    ]
+    columns = {
+        "sun [rpm]": lambda v: f"{v.sun / RPM:.4f}",
+        "carrier [rpm]": lambda v: f"{v.carrier / RPM:.4f}",
+        "ring [rpm]": lambda v: f"{v.ring / RPM:.4f}",
+        "planet [rpm]": lambda v: f"{v.planet / RPM:.4f}",
+        "mesh frequency [Hz]": lambda v: f"{v.mesh_frequency:.4f}",
+    }
     load = torques(s, member=operation.input, torque=operation.torque)
     notes = [
         f"input {operation.input}, fixed {operation.fixed}; torque on sun {load.sun:.6g} N m, "
         f"carrier {load.carrier:.6g} N m, ring {load.ring:.6g} N m"
     ]
-    if len(operation.speeds) > MANY:
+    if len(operation.speeds) > len(found):
         notes.append(f"{len(operation.speeds)} speeds, of which the first and the last are shown")
-    notes += shaft_lines(case)
-    header = ("sun [rpm]", "carrier [rpm]", "ring [rpm]", "planet [rpm]", "mesh frequency [Hz]")
-    return Block("Operation", header, tuple(rows), tuple(notes))
+    return tabulate("Operation", found, columns, (*notes, *shaft_lines(case)))
 
 
 def _harmonics(s: PlanetarySet) -> Block:
+    """Tabulate how the phases of the meshes add up at the first harmonics."""
     phasing = phasing_of_set(s)
-    table = phasing_table(phasing, range(1, HARMONICS + 1))
-    rows = [
-        (
-            str(h),
-            kind,
-            "-" if k < 0 else str(k),
-            _share(size[:, 0].max()),
-            _share(size[:, 1].max()),
-            ", ".join(modes),
-        )
-        for h, kind, k, size, modes in zip(
-            table.harmonics, table.kind, table.cyclic, table.members, table.excited
-        )
-    ]
-    header = ("harmonic", "planets are", "k", "torque", "lateral force", "can excite modes")
+    table = phasing_table(phasing, range(1, _HARMONICS + 1))
+    columns = {
+        "harmonic": lambda i: str(table.harmonics[i]),
+        "planets are": lambda i: table.kind[i],
+        "k": lambda i: "-" if table.cyclic[i] < 0 else str(table.cyclic[i]),
+        "torque": lambda i: _share(table.members[i][:, 0].max()),
+        "lateral force": lambda i: _share(table.members[i][:, 1].max()),
+        "can excite modes": lambda i: ", ".join(table.excited[i]),
+    }
     common = math.gcd(s.sun.teeth, s.planet.teeth), math.gcd(s.planet.teeth, s.ring.teeth)
     notes = (
         "k = mod(h z_sun, N); torque, lateral force: what is left of equal mesh forces on sun, ring, carrier",
         f"a planet's ring mesh follows its sun mesh by {phasing.lag:.4f} periods",
         f"common divisors of the teeth: sun and planet {common[0]}, planet and ring {common[1]}",
     )
-    return Block("Mesh phasing", header, tuple(rows), notes)
+    return tabulate("Mesh phasing", range(_HARMONICS), columns, notes)
 
 
 def _share(value: float) -> str:
+    """Write what is left of a force."""
     return "cancelled" if value < ZERO else f"{100.0 * value:.1f} %"
 
 
 def _neighbours(s: PlanetarySet) -> Block:
+    """Tabulate tooth numbers near those of the set, and what they would change."""
     wanted = (s.sun.teeth, s.planet.teeth, s.ring.teeth)
     closure = max(1, abs(wanted[2] - wanted[0] - 2 * wanted[1]))
     found = neighbouring_teeth(
-        *wanted, s.n_planets, distance=DISTANCE, ratio_tolerance=TOLERANCE, closure=min(closure, 10)
+        *wanted, s.n_planets, distance=_DISTANCE, ratio_tolerance=_TOLERANCE, closure=min(closure, 10)
     )
     found = found.only(np.any(found.teeth != np.array(wanted), axis=1))
     # sets with equal spacing first, each group by its ratio
     found = found.only(np.argsort(~found.equally_spaced, kind="stable"))
-    rows = tuple(_row(found, i) for i in range(min(len(found), ROWS)))
-    header = ("teeth", "ratio", "change", "spacing", "harmonics 1 to 4", "hunting", "room [modules]")
-    notes = (
-        f"{len(found)} within {DISTANCE} teeth and {100 * TOLERANCE:g} % of the ratio; room: unshifted tips",
-    )
-    return Block("Neighbouring tooth numbers", header, rows, notes)
+
+    def spacing(i: int) -> str:
+        off = math.degrees(found.spacing_error[i])
+        return "equal" if found.equally_spaced[i] else f"off by {off:.2f} deg"
+
+    columns = {
+        "teeth": lambda i: "/".join(str(z) for z in found.teeth[i]),
+        "ratio": lambda i: f"{found.ratio[i]:.4f}",
+        "change": lambda i: f"{100.0 * found.ratio_change[i]:+.2f} %",
+        "spacing": spacing,
+        "harmonics 1 to 4": lambda i: _kinds([_SHORT[name] for name in found.kind_names[i]]),
+        "hunting": lambda i: "yes" if found.hunting[i] else "no",
+        "room [modules]": lambda i: f"{found.room[i]:.2f}",
+    }
+    near = f"{len(found)} within {_DISTANCE} teeth and {100 * _TOLERANCE:g} % of the ratio"
+    notes = (f"{near}; room: unshifted tips",)
+    return tabulate("Neighbouring tooth numbers", range(min(len(found), _ROWS)), columns, notes)
 
 
-def _row(found: ToothChoices, i: int) -> tuple[str, ...]:
-    kinds = [_SHORT[name] for name in found.kind_names[i]]
-    off = f"off by {math.degrees(found.spacing_error[i]):.2f} deg"
-    return (
-        "/".join(str(z) for z in found.teeth[i]),
-        f"{found.ratio[i]:.4f}",
-        f"{100.0 * found.ratio_change[i]:+.2f} %",
-        "equal" if found.equally_spaced[i] else off,
-        kinds[0] if len(set(kinds)) == 1 else ", ".join(kinds),
-        "yes" if found.hunting[i] else "no",
-        f"{found.room[i]:.2f}",
-    )
+def _kinds(kinds: list[str]) -> str:
+    """Write the phasing of some harmonics, once where they agree."""
+    return kinds[0] if len(set(kinds)) == 1 else ", ".join(kinds)

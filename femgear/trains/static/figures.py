@@ -1,35 +1,30 @@
-"""Figures of gears, their phasing and their static results: deviations, transmission errors, tooth stresses.
+"""Figures of static.nc and stress.nc: errors, stiffnesses, loads, the deformed set, stresses of one tooth.
 
-By what they show:
-
-- static.nc: what the gears themselves do over one mesh period, errors, stiffnesses, loads, and the deformed
-  set;
-- stress.nc: one tooth on its way through the mesh, along its roots, with pressures and load spectra;
-- deviations as measuring machines draw them: profiles over the roll angle, pitches over the teeth;
-- mesh phasing: phases round the carrier, what they cancel and excite, spectra of the mesh forces.
-
-`FIGURES` at the end ties the pictures of the report to their captions.
+What the gears do over one mesh period, and one tooth on its way through the mesh, with the stresses along its
+roots, contact pressures and load spectra. `FIGURES` at the end ties the pictures of the report, charts of
+deviations among them, to their captions.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations
-from femgear.gears.modifications import form_deviation
-from femgear.gears.phasing import MeshPhasing, PhasingTable, phase_factors, phasing_table
+from femgear.case.case import material_of, planetary_set, set_deviations
+from femgear.contact.bodies import make_sectors
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.flank_pairs import mirrored_set
+from femgear.contact.tooth_loads import deformed_set
+from femgear.fe.grid import copy_nodes, rotated_copies
+from femgear.report.scene import Body, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.style import (
     BLACK,
     BLUE,
     COLOURS,
     GREY,
-    ORANGE,
     SIZE,
     VERMILION,
     distinct_lines,
@@ -41,24 +36,18 @@ from femgear.report.style import (
     periodic,
 )
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.stages import material_of
+from femgear.trains.static.charts import four_panels, has_pitches, has_profiles, pitch_chart, profile_chart
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+_POSITION = "position in the mesh period [1]"
 
-POSITION = "position in the mesh period [1]"
-
-TENSION, COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
+_TENSION, _COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
 # tangent of the critical section after ISO 6336-3, external and internal gears
-CRITICAL_SLOPE = {False: 30.0, True: 60.0}
-KINDS = ("sun-planet", "planet-ring")
-
-_CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
+_CRITICAL_SLOPE = {False: 30.0, True: 60.0}
+_KINDS = ("sun-planet", "planet-ring")
 
 # pictures need no converged stresses: a sector of some thousand nodes keeps the files small
 PICTURE_FLANK_ELEMENTS = 6
@@ -66,39 +55,35 @@ PICTURE_REFINE = 0.35
 
 
 def static_transmission_error(static: xr.Dataset) -> Figure:
-    """Static transmission error of every mesh, and of sun to ring over every planet.
+    """Draw the static transmission error of every mesh, and of sun to ring over every planet.
 
     Parameters
     ----------
     static : xarray.Dataset
-        With ``ste`` (mesh, position) and ``ste_overall`` (planet, position) [m].
+        Contents of static.nc, as `femgear.trains.static.results.STATIC_VARIABLES` declares them.
     """
     figure, (left, right) = new_figure(columns=2, width=9.5, sharex=True)
     names = static["mesh"].values
     drawn = distinct_lines(names, static["ste"])
     for i, (text, row) in enumerate(drawn):
         left.plot(*periodic(static["position"], static["ste"][row] * 1e6), label=text, **line_style(i))
-    label(left, POSITION, "transmission error [µm]", "each mesh, along its line of action")
-    planets = [f"sun to ring over planet {p}" for p in static["planet"].values]
+    label(left, _POSITION, "transmission error [µm]", "each mesh, along its line of action")
     position, overall = periodic(static["position"], static["ste_overall"] * 1e6)
-    rows = list(zip(planets, range(len(planets))))
-    if _equal(overall):
-        rows = [("sun to ring over every planet (identical)", 0)]
-    for i, (text, row) in enumerate(rows):
-        right.plot(position, overall[row], label=text, **line_style(i + len(drawn)))
-    label(right, POSITION, "sum of both meshes [µm]", "sun to ring")
+    for row, text in enumerate(_of_planets(static, overall)):
+        right.plot(position, overall[row], label=f"sun to ring over {text}", **line_style(row + len(drawn)))
+    label(right, _POSITION, "sum of both meshes [µm]", "sun to ring")
     right.set_xlim(0, position[-1])
     legend_below(figure, columns=2)
     return figure
 
 
 def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Figure:
-    """Tangent and secant stiffness of every mesh.
+    """Draw the tangent and secant stiffness of every mesh.
 
     Parameters
     ----------
     static : xarray.Dataset
-        With ``mesh_stiffness`` and ``mesh_stiffness_secant`` (mesh, position) [N/m].
+        Contents of static.nc.
     face_width : float, optional
         [m]; adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
     """
@@ -115,7 +100,7 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
     for kind, width in (("tangent (thick)", 2.2), ("secant (thin)", 0.9)):
         axes[-1].plot([], [], color=BLACK, linewidth=width, label=kind)
     axes[-1].set_xlim(0, position[-1])
-    label(axes[-1], POSITION)
+    label(axes[-1], _POSITION)
     # N/m over m of width is 1e-9 N/(mm µm)
     factor = 1e-3 / face_width if face_width else 0.0
     for ax, kind in zip(axes, kinds):
@@ -129,18 +114,16 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
 
 
 def load_sharing(static: xr.Dataset) -> Figure:
-    """Share of every planet in the sun's torque over the mesh period.
+    """Draw the share of every planet in the sun's torque over the mesh period.
 
     Parameters
     ----------
     static : xarray.Dataset
-        With ``load_share`` (planet, position) [1].
+        Contents of static.nc.
     """
     figure, (ax,) = new_figure(height=3.8)
     position, share = periodic(static["position"], static["load_share"] * 100)
-    identical = _equal(share)
-    for i, planet in enumerate(static["planet"].values[:1] if identical else static["planet"].values):
-        text = "every planet (identical)" if identical else f"planet {planet}"
+    for i, text in enumerate(_of_planets(static, share)):
         ax.plot(position, share[i], label=text, linewidth=2.0, **line_style(i))
     equal = 100.0 / len(share)
     ax.axhline(equal, color="0.4", linewidth=0.8, linestyle=(0, (1, 3)), label=f"equal share {equal:.4g} %")
@@ -149,13 +132,13 @@ def load_sharing(static: xr.Dataset) -> Figure:
         ax.set_ylim(0.94 * equal, 1.06 * equal)
     ax.set_xlim(0, position[-1])
     title = f"largest departure from equal shares: {spread:.3g} %" if spread > 1e-6 else "equal shares"
-    label(ax, POSITION, "share of the torque [%]", title)
+    label(ax, _POSITION, "share of the torque [%]", title)
     legend_below(figure, columns=4)
     return figure
 
 
 def tooth_loads(static: xr.Dataset) -> Figure:
-    """Load of one tooth pair from its first to its last contact, in a sun-planet and a planet-ring mesh.
+    """Draw the load of a tooth pair from first to last contact, in a sun-planet and a planet-ring mesh.
 
     The simultaneous pairs of the dataset are one base pitch apart on the path of contact, and a pair goes on
     to the next place with every mesh period: from period to period and place to place the loads are the
@@ -164,7 +147,7 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     Parameters
     ----------
     static : xarray.Dataset
-        With ``tooth_load`` (mesh, tooth, position) and ``mesh_force`` (mesh, position) [N].
+        Contents of static.nc.
     """
     figure, axes = new_figure(columns=2, width=9.5, sharey=True)
     names = [str(name) for name in static["mesh"].values]
@@ -176,10 +159,9 @@ def tooth_loads(static: xr.Dataset) -> Figure:
         place = np.arange(len(load))[:, None]
         each = np.arange(len(position)).reshape(periods, -1)[place.ravel() % periods]
         path, load = (place + position[each] % 1.0).ravel(), load[place, each].ravel()
-        carried = np.flatnonzero(load > 1e-9 * force.max(initial=0.0))
-        first, last = (carried[0], carried[-1]) if len(carried) else (0, load.size - 1)
-        shown = slice(max(first - 1, 0), last + 2)
-        ax.plot(path[shown] - path[first], load[shown], label="one tooth pair", color=COLOURS[0])
+        carried = load > 1e-9 * force.max(initial=0.0)
+        shown = _while_loaded(carried)
+        ax.plot(path[shown] - path[carried.argmax()], load[shown], label="one tooth pair", color=COLOURS[0])
         largest = max(largest, load.max(initial=0.0), force.mean())
         ax.axhline(force.mean(), color="0.45", linewidth=1.0, linestyle=(0, (1, 2)), label="whole mesh, mean")
         label(ax, "path since the first contact [base pitches]", title=names[row])
@@ -190,84 +172,89 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     return figure
 
 
-def _equal(rows) -> bool:
-    return bool(np.abs(rows - rows[0]).max() <= 1e-6 * np.abs(rows).max(initial=0.0))
+def _of_planets(static: xr.Dataset, rows) -> list[str]:
+    """Label the lines to draw of the rows of all planets: the first alone where they agree."""
+    if np.abs(rows - rows[0]).max() <= 1e-6 * np.abs(rows).max(initial=0.0):
+        return ["every planet (identical)"]
+    return [f"planet {planet}" for planet in static["planet"].values]
+
+
+def _while_loaded(loaded: np.ndarray) -> slice:
+    """Range of samples (n,) from one before the first loaded one to one behind the last."""
+    found = np.flatnonzero(loaded)
+    first, last = (found[0], found[-1]) if len(found) else (0, len(loaded) - 1)
+    return slice(max(first - 1, 0), last + 2)
 
 
 def root_stress_history(stress: xr.Dataset) -> Figure:
-    """Root stresses of one tooth of every gear from mesh to mesh, on the planet with the largest tension.
+    """Draw the root stresses of one tooth of every gear from mesh to mesh, on the planet with the largest.
 
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``root_tension`` and ``root_compression`` [Pa] and ``root_path`` [1] (mesh, gear, step); where
-        it has ``iso_root_stress`` [Pa] (mesh, gear), the nominal stress is drawn too.
+        Contents of stress.nc, as `femgear.trains.static.results.STRESS_VARIABLES` declares them; where it
+        has ``iso_root_stress``, the nominal stress is drawn too.
     """
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharex=True, sharey=True)
-    for ax, (title, row, _) in zip(axes, _four_gears(stress)):
-        path = row["root_path"].values
-        ax.plot(path, row["root_tension"].values * 1e-6, color=VERMILION, label=TENSION)
-        ax.plot(path, row["root_compression"].values * 1e-6, color=BLUE, linestyle="--", label=COMPRESSION)
+    gears = _four_gears(stress)
+
+    def draw(number: int, ax) -> str:
+        title, row = gears[number]
+        path, tension, compression = (
+            row[f"root_{name}"].values for name in ("path", "tension", "compression")
+        )
+        ax.plot(path, tension * 1e-6, color=VERMILION, label=_TENSION)
+        ax.plot(path, compression * 1e-6, color=BLUE, linestyle="--", label=_COMPRESSION)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
         _nominal(ax, row, "iso_root_stress", "σ_F0 of ISO 6336-3")
-        largest = float(row["root_tension"].max()) * 1e-6
-        lowest = float(row["root_compression"].min()) * 1e-6
-        label(ax, title=f"{title}: {largest:.3g} and {lowest:.3g} MPa")
-    for ax in axes[2:]:
-        label(ax, "path from the pitch point [base pitches]")
-    for ax in axes[::2]:
-        label(ax, y="stress [MPa]")
-    legend_below(figure, columns=2)
-    return figure
+        if number > 1:
+            label(ax, "path from the pitch point [base pitches]")
+        return f"{title}: {tension.max() * 1e-6:.3g} and {compression.min() * 1e-6:.3g} MPa"
+
+    return four_panels(draw, "stress [MPa]", columns=2, sharex=True)
 
 
 def root_stress_profile(stress: xr.Dataset) -> Figure:
-    """Stress along both roots of a tooth when its tension is largest, on the planet where that is largest.
+    """Draw the stress along both roots of a tooth when its tension is largest, on the planet where that is.
 
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``root_profile`` (mesh, gear, root, point) [Pa], ``root_arc`` [m] and ``root_slope`` [rad]
-        (mesh, gear, point).
+        Contents of stress.nc.
     """
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
-    for ax, (title, row, internal) in zip(axes, _four_gears(stress)):
+    gears = _four_gears(stress)
+
+    def draw(number: int, ax) -> str:
+        title, row = gears[number]
         arc, slope = row["root_arc"].values * 1e3, np.degrees(row["root_slope"].values)
         for side, colour, dash in (("loaded", VERMILION, "-"), ("back", BLUE, "--")):
-            values = row["root_profile"].sel(root=side).values * 1e-6
-            ax.plot(
-                arc, values, dash, color=colour, marker="o", markersize=3, label=f"root of the {side} flank"
-            )
+            values, text = row["root_profile"].sel(root=side).values * 1e-6, f"root of the {side} flank"
+            ax.plot(arc, values, dash, color=colour, marker="o", markersize=3, label=text)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
-        angle = CRITICAL_SLOPE[internal]
         known = np.isfinite(arc)
-        place = _crossing(slope[known], arc[known], angle)
+        place = _crossing(slope[known], arc[known], _CRITICAL_SLOPE[title == "ring"])
         if place is not None:
             text = "critical section of ISO 6336-3 (tangent 30°, internal gears 60°)"
             ax.axvline(place, color=GREY, linewidth=1.2, linestyle=":", label=text)
-        label(ax, "arc from the end of the flank [mm]", title=title)
-    for ax in axes[::2]:
-        label(ax, y="stress [MPa]")
-    legend_below(figure, columns=3)
-    return figure
+        label(ax, "arc from the end of the flank [mm]")
+        return title
+
+    return four_panels(draw, "stress [MPa]", columns=3)
 
 
 def contact_pressure(stress: xr.Dataset) -> Figure:
-    """Contact pressure of one tooth pair over its path, for both meshes of the planet with the largest.
+    """Draw the contact pressure of a tooth pair over its path, in both meshes of the planet with the largest.
 
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``pressure_distribution`` [Pa] (mesh, pair, cell, position), ``pressure_offset`` (mesh, cell),
-        ``pressure_centre`` and ``pressure_path`` (mesh, pair, position) [m], ``contact_pressure`` [Pa] (mesh,
-        position) and ``iso_contact_stress`` [Pa] (mesh).
+        Contents of stress.nc.
     """
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6)
     top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
     # at the end of a flank the pressure grows as cells shrink: it only decides where there is no other
     edge = stress["pressure_distribution"].max(("pair", "cell", "position")).values
     planet = _worst_planet(stress, stress["contact_pressure"].max("position").values, edge)
-    for upper, lower, kind in zip(axes[:2], axes[2:], KINDS):
+    for upper, lower, kind in zip(axes[:2], axes[2:], _KINDS):
         row = _mesh_of(stress, kind, planet)
         path, place, pressure = _along_path(row)
         upper.plot(path, pressure.max(axis=0), color=VERMILION, label="largest pressure")
@@ -302,31 +289,28 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
 
 
 def _along_path(row):
-    """Path (k,) [mm], place (C, k) [um] and pressure (C, k) [MPa] of a tooth pair from entry to exit."""
+    """Find path (k,) [mm], place (C, k) [um] and pressure (C, k) [MPa] of a tooth pair from entry to exit."""
     path = row["pressure_path"].values.ravel()
     pressure = row["pressure_distribution"].values.swapaxes(0, 1).reshape(-1, len(path))
     place = row["pressure_offset"].values[:, None] + row["pressure_centre"].values.ravel()
     order = np.argsort(path, kind="stable")
-    loaded = np.flatnonzero(pressure[:, order].any(axis=0))
-    first, last = (loaded[0], loaded[-1]) if len(loaded) else (0, len(order) - 1)
-    order = order[max(first - 1, 0) : last + 2]
+    order = order[_while_loaded(pressure[:, order].any(axis=0))]
     return path[order] * 1e3, place[:, order] * 1e6, pressure[:, order] * 1e-6
 
 
 def load_spectrum(stress: xr.Dataset) -> Figure:
-    """Load spectrum of the teeth in both meshes of the planet with the largest load.
+    """Draw the load spectrum of the teeth in both meshes of the planet with the largest load.
 
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``load_time_share`` and ``load_cycle_share`` (mesh, load_bin) [1], ``load_bin_low`` and
-        ``load_bin_high`` (load_bin) [N], ``load_cycles`` (mesh, gear) [1].
+        Contents of stress.nc.
     """
     figure, axes = new_figure(columns=2, width=9.5, sharex=True, sharey=True)
     edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
     time = stress["load_time_share"].values
     planet = _worst_planet(stress, (edges[1:] * (time > 0.0)).max(axis=1), time @ edges[1:])
-    for ax, kind in zip(axes, KINDS):
+    for ax, kind in zip(axes, _KINDS):
         row = _mesh_of(stress, kind, planet)
         time, cycles = (100 * row[f"load_{name}_share"].values for name in ("time", "cycle"))
         ax.stairs(time, edges, fill=True, color=BLUE, alpha=0.75, label="share of the time under load")
@@ -343,12 +327,12 @@ def load_spectrum(stress: xr.Dataset) -> Figure:
 
 
 def planet_bending(stress: xr.Dataset) -> Figure:
-    """Stress in both roots of a tooth of the worst planet while it turns once against the carrier.
+    """Draw the stress in both roots of a tooth of the worst planet while it turns once against the carrier.
 
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``planet_root_stress`` [Pa] (mesh, turn).
+        Contents of stress.nc.
     """
     figure, (ax,) = new_figure()
     values = stress["planet_root_stress"].values * 1e-6
@@ -365,16 +349,16 @@ def planet_bending(stress: xr.Dataset) -> Figure:
 
 
 def _mesh_of(stress: xr.Dataset, kind: str, planet: int) -> xr.Dataset:
-    """The mesh of a kind on a planet (from 0)."""
+    """Pick the mesh of a kind on a planet (from 0)."""
     names = [str(name) for name in stress["mesh"].values]
     return stress.isel(mesh=[i for i, name in enumerate(names) if family(name) == kind][planet])
 
 
 def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
-    """Planet (from 0) whose meshes have the largest of a measure (mesh,); the next measure decides ties."""
+    """Find the planet (from 0) with the largest of a measure (mesh,); the next measure decides ties."""
     kinds = [family(str(name)) for name in stress["mesh"].values]
     of_planets = [
-        np.max([measure[[kind == wanted for kind in kinds]] for wanted in KINDS], axis=0)
+        np.max([measure[[kind == wanted for kind in kinds]] for wanted in _KINDS], axis=0)
         for measure in measures
     ]
     left = np.arange(len(of_planets[0]))
@@ -386,26 +370,25 @@ def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
 
 
 def _nominal(ax, row: xr.Dataset, name: str, text: str) -> None:
-    """Line at a nominal stress, where it is known."""
+    """Draw a line at a nominal stress, where it is known."""
     if name in row and np.isfinite(row[name].item()) and row[name].item() > 0.0:
         ax.axhline(row[name].item() * 1e-6, color=BLACK, linewidth=1.2, linestyle="-.", label=text)
 
 
-def _four_gears(stress: xr.Dataset):
-    """Title, rows and whether it is internal, of sun, planet on both sides, and ring."""
+def _four_gears(stress: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Name sun, planet on both sides, and ring of the planet with the largest tension, with their rows."""
     tension = stress["root_tension"].max([dim for dim in stress["root_tension"].dims if dim != "mesh"])
     n = _worst_planet(stress, tension.values)
-    sides = (
-        ("sun", f"planet {n + 1}, sun side"),
-        (f"planet {n + 1}, ring side", "ring"),
-    )
-    for kind, titles in zip(KINDS, sides):
-        for gear, title in enumerate(titles):
-            yield title, _mesh_of(stress, kind, n).isel(gear=gear), title == "ring"
+    titles = ("sun", f"planet {n + 1}, sun side"), (f"planet {n + 1}, ring side", "ring")
+    return [
+        (title, _mesh_of(stress, kind, n).isel(gear=gear))
+        for kind, pair in zip(_KINDS, titles)
+        for gear, title in enumerate(pair)
+    ]
 
 
 def _crossing(slope, arc, angle) -> float | None:
-    """First place at which the slope passes an angle; None when it does not."""
+    """Find the first place at which the slope passes an angle; None when it does not."""
     above = np.flatnonzero((slope[:-1] < angle) & (slope[1:] >= angle))
     if not len(above):
         return None
@@ -413,189 +396,8 @@ def _crossing(slope, arc, angle) -> float | None:
     return float(arc[i] + (arc[i + 1] - arc[i]) * (angle - slope[i]) / (slope[i + 1] - slope[i]))
 
 
-def has_profiles(deviations: SetDeviations, planetary_set: PlanetarySet) -> bool:
-    """Whether any loaded flank differs from its involute, so that `profile_chart` shows something."""
-    d, s = deviations, planetary_set
-    forms = ((d.sun, s.sun), (d.planet_sun_side, s.planet), (d.planet_ring_side, s.planet), (d.ring, s.ring))
-    return any(form_deviation(form, gear, _stations(form, gear)).any() for form, gear in forms)
-
-
-def has_pitches(deviations: SetDeviations) -> bool:
-    """Whether any tooth stands off its place, so that `pitch_chart` shows something."""
-    d = deviations
-    return any(p.any() for p in (d.sun_pitch, d.planet_pitch, d.planet_ring_side_pitch, d.ring_pitch))
-
-
-def _four_flanks(draw: Callable[[int, Any], str]) -> Figure:
-    """Deviations of the flanks of sun, planets (twice) and ring, drawn one each on common axes.
-
-    ``draw`` is called with the number of the flank and its axes, and returns the title.
-    """
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
-    for number, ax in enumerate(axes):
-        label(ax, title=draw(number, ax))
-    for ax in axes[::2]:
-        label(ax, y="deviation [µm], material positive")
-    low, high = axes[0].get_ylim()
-    axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
-    legend_below(figure, columns=5)
-    return figure
-
-
-def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
-    """Profiles of the four kinds of loaded flanks over the roll angle, positive with more material.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
-
-    Returns
-    -------
-    Figure
-        The involute is the zero line; the part that meets the mate is marked.
-    """
-    d, s = deviations, planetary_set
-    active = active_rolls(s)
-    flanks = (
-        ("sun", d.sun, s.sun),
-        ("planet, sun side", d.planet_sun_side, s.planet),
-        ("planet, ring side", d.planet_ring_side, s.planet),
-        ("ring", d.ring, s.ring),
-    )
-
-    def draw(number: int, ax) -> str:
-        name, form, gear = flanks[number]
-        roll = _stations(form, gear)
-        ax.plot(_degrees(gear, roll), -1e6 * form_deviation(form, gear, roll), color=BLUE, label="profile")
-        ax.axhline(0.0, color=BLACK, linewidth=0.8, label="involute")
-        ax.axvspan(*_degrees(gear, np.array(active[number])), color="0.93", label="meets the mate")
-        for place, end, dash in (("form circle", gear.form_roll, ":"), ("tip circle", gear.tip_roll, "--")):
-            ax.axvline(float(_degrees(gear, end)), color=GREY, linestyle=dash, label=place)
-        label(ax, "roll angle [deg]")
-        return name
-
-    return _four_flanks(draw)
-
-
-def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
-    """Cumulative pitch deviations of the loaded flanks over the tooth number, positive with more material.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
-
-    Returns
-    -------
-    Figure
-        Along the line of action; a line for each planet and flank that has any.
-    """
-    d, N = deviations, planetary_set.n_planets
-    rows = (
-        ("sun", [("sun", d.sun_pitch)]),
-        ("planets, sun side", [(f"planet {n + 1}", d.planet_pitch[n]) for n in range(N)]),
-        ("planets, ring side", [(f"planet {n + 1}", d.planet_ring_side_pitch[n]) for n in range(N)]),
-        ("ring", [("ring", d.ring_pitch)]),
-    )
-
-    def draw(number: int, ax) -> str:
-        title, lines = rows[number]
-        for i, (name, values) in enumerate(lines):
-            # sun, ring and planets differ in the common legend
-            style = line_style(i if len(lines) > 1 else N + (title == "ring"))
-            ax.step(np.arange(len(values)), -1e6 * values, where="mid", label=name, **style)
-        label(ax, "tooth number [1]")
-        return title
-
-    return _four_flanks(draw)
-
-
-def active_rolls(planetary_set: PlanetarySet) -> tuple[tuple[float, float], ...]:
-    """Roll lengths [m] of the parts of the flanks that rigid gears use: sun, planet twice, ring.
-
-    From the path of contact: ``r_b tan(alpha_w)`` and the path coordinate, which runs down the flank of a
-    driven external gear.
-    """
-    s = planetary_set
-    sun_side, ring_side = (
-        math.tan(s.working_pressure_angle_sun_planet),
-        math.tan(s.working_pressure_angle_planet_ring),
-    )
-    (a, b), (c, e) = s.path_sun_planet, s.path_planet_ring
-    planet = s.planet.base_radius
-    return (
-        (s.sun.base_radius * sun_side + a, s.sun.base_radius * sun_side + b),
-        (planet * sun_side - b, planet * sun_side - a),
-        (planet * ring_side + c, planet * ring_side + e),
-        (s.ring.base_radius * ring_side + c, s.ring.base_radius * ring_side + e),
-    )
-
-
-def _stations(form, gear: Gear) -> np.ndarray:
-    """Roll lengths close enough for curves, the corners of all laws and the measured points among them."""
-    low, high = sorted((gear.form_roll, gear.tip_roll))
-    corners = [getattr(m, "roll", None) or (m.start, m.end) for m in form.modifications]
-    extra = [roll for pair in corners for roll in pair if roll is not None and low < roll < high]
-    return np.unique(np.concatenate([np.linspace(low, high, 301), extra]))
-
-
-def _degrees(gear: Gear, roll):
-    return np.degrees(np.asarray(roll) / gear.base_radius)
-
-
-def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 4)) -> Figure:
-    """Phases of sun and ring meshes as hands of a dial at every planet, one picture a harmonic.
-
-    Parameters
-    ----------
-    phasing : MeshPhasing
-    harmonics : sequence of int
-        A hand upwards has phase zero; phase grows counter-clockwise.
-    """
-    table, factors = phasing_table(phasing, list(harmonics)), phase_factors(phasing, list(harmonics))
-    columns = min(4, len(harmonics))
-    rows = -(-len(harmonics) // columns)
-    figure, axes = new_figure(rows=rows, columns=columns, width=2.9 * columns, height=3.4 * rows + 0.5)
-    centres = np.exp(1j * phasing.planet_angles)
-    nearest = np.abs(np.diff([*centres, centres[0]])).min() if phasing.n_planets > 1 else 1.0
-    dial = min(0.44 * nearest, 0.42)
-    for ax in axes:
-        ax.set_axis_off()
-        ax.set_aspect("equal")
-    for h, (ax, row) in enumerate(zip(axes, factors)):
-        ax.plot(*_xy(_CIRCLE), color="0.85", linewidth=1.0)
-        for n, centre in enumerate(centres):
-            ax.plot(*_xy(centre + dial * _CIRCLE), color=GREY, linewidth=1.0)
-            number = centre * (1.0 + 1.35 * dial)
-            ax.text(*_xy(number), str(n + 1), ha="center", va="center", fontsize=SIZE - 2)
-            ends = centre + 0.9j * dial * row[[n, phasing.n_planets + n]]
-            ax.plot(*_xy(np.array([centre, ends[0]])), color=BLUE, linewidth=3.6, label="sun mesh")
-            ax.plot(*_xy(np.array([centre, ends[1]])), color=ORANGE, linewidth=1.6, label="ring mesh")
-        ax.text(0.0, 0.0, _verdict(table, h), ha="center", va="center", fontsize=SIZE - 2)
-        ax.set_title(f"harmonic {table.harmonics[h]}: {table.kind[h]}", fontsize=SIZE - 1)
-        ax.set_xlim(-1.05 - 1.6 * dial, 1.05 + 1.6 * dial)
-        ax.set_ylim(-1.05 - 1.6 * dial, 1.05 + 1.6 * dial)
-    legend_below(figure, columns=2)
-    return figure
-
-
-def _verdict(table: PhasingTable, row: int) -> str:
-    """What is left of the mesh forces on sun and ring."""
-    torque, lateral = table.members[row, :2, :2].max(axis=0)
-    left = [
-        f"{name} {100 * size:.0f} %"
-        for name, size in (("torque", torque), ("lateral", lateral))
-        if size > 1e-9
-    ]
-    return "\n".join(left) or "nothing on\nsun and ring"
-
-
-def _xy(points):
-    return np.real(points), np.imag(points)
-
-
 def _static_figures(drawn: Drawn) -> dict[str, Figure]:
+    """Draw the figures of static.nc."""
     static = drawn.data["static"]
     return {
         "static_transmission_error": static_transmission_error(static),
@@ -606,7 +408,7 @@ def _static_figures(drawn: Drawn) -> dict[str, Figure]:
 
 
 def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
-    """Figures of stress.nc; distributions and turns are not in records of several mesh periods."""
+    """Draw the figures of stress.nc; distributions and turns are not in records of several mesh periods."""
     stress = drawn.data["stress"]
     figures = {
         "root_stress": root_stress_history(stress),
@@ -621,7 +423,7 @@ def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
 
 
 def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
-    """Charts of profiles and pitches; none of a kind that the set does not have."""
+    """Draw charts of profiles and pitches; none of a kind that the set does not have."""
     gears, deviations = planetary_set(drawn.case), set_deviations(drawn.case)
     figures = {}
     if has_profiles(deviations, gears):
@@ -632,14 +434,7 @@ def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
 
 
 def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
-    """The whole set deformed by the static loads of position zero, as VTU and picture."""
-    from femgear.contact.bodies import make_sectors
-    from femgear.contact.cycle import walk_mesh_cycle
-    from femgear.contact.flank_pairs import mirrored_set
-    from femgear.contact.tooth_loads import deformed_set
-    from femgear.fe.grid import copy_nodes, rotated_copies
-    from femgear.report.scene import assemble_set, deformed_picture, placed, write_vtu
-
+    """Write the whole set deformed by the static loads of position zero, as VTU and picture."""
     static, case = drawn.results.get("static"), drawn.case
     if static is None or not static.cycle.force.any():
         return []
@@ -662,14 +457,8 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         sector = getattr(sectors, body.kind)
         count = sector.gear.teeth
         numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
-        displacement = np.zeros((len(whole.points), 2))
-        for k in range(count):
-            angle = 2 * np.pi * k / count
-            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-            displacement[numbers[k]] = body.displacement[k] @ turn.T
-        bodies.append(
-            placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=displacement)
-        )
+        moved = whole_field(np.asarray(body.displacement), numbers)
+        bodies.append(placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=moved))
     if side < 0:
         bodies = [_reflected(body) for body in bodies]
     grid = assemble_set(bodies)
@@ -679,8 +468,8 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     return ["deformed_set.vtu", "deformed_set.png"]
 
 
-def _reflected(body):
-    """A body seen from behind: y reversed, and the triangles turned round with it."""
+def _reflected(body: Body) -> Body:
+    """Turn a body to be seen from behind: y reversed, and the triangles turned round with it."""
     flip = np.array([1.0, -1.0])
     return replace(
         body,

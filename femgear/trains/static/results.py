@@ -7,14 +7,15 @@ nominal stresses of ISO 6336.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.case.dependencies import Entries
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
-from femgear.report.tables import Block
-from femgear.storage.dataset import dataset
+from femgear.errors import Finding
+from femgear.report.tables import Block, tabulate
+from femgear.storage.dataset import dataset, declared
 from femgear.trains.static.description import static_warnings
 
 if TYPE_CHECKING:
@@ -26,9 +27,99 @@ if TYPE_CHECKING:
     from femgear.contact.tooth_loads import LoadSpectrum
     from femgear.gears.planetary import PlanetarySet
 
-COUNTING = (
+_COUNTING = (
     "one load cycle an engagement, from zero to the largest load of the tooth (peak counting between "
     "crossings of zero, ASTM E1049)"
+)
+_PIN_FORCE = "force of the pin on the planet in the frame of the carrier"
+STATIC_VARIABLES = {
+    "ste": ("mesh position", "m", "static transmission error of the mesh"),
+    "ste_overall": ("planet position", "m", "static transmission error from sun to ring"),
+    "mesh_force": ("mesh position", "N", "mesh force along the line of action"),
+    "back_force": ("mesh position", "N", "force on the back flanks of the mesh"),
+    "member_motion": ("member position", "m", "displacement of the axis of a member that moves"),
+    "bearing_force": (
+        "planet axis position",
+        "N",
+        "force of the pin on the planet in the frame of the carrier",
+    ),
+    "mesh_stiffness": ("mesh position", "N/m", "tangent mesh stiffness"),
+    "mesh_stiffness_secant": ("mesh position", "N/m", "secant mesh stiffness"),
+    "tooth_load": ("mesh tooth position", "N", "load of a tooth pair"),
+    "back_tooth_load": ("mesh tooth position", "N", "load of a tooth pair on its back flanks"),
+    "load_share": ("planet position", "1", "share of the planet in the torque"),
+    "max_pressure": ("mesh position", "Pa", "largest contact pressure away from flank ends"),
+    "edge_contact": ("mesh position", "1", "whether a contact reaches the end of a flank"),
+    "residual": ("position", "1", "residual of contact conditions and equilibrium"),
+    "iterations": ("position", "1", "steps of the active set"),
+}
+"""Variables of static.nc: dimensions, unit, and what they are."""
+_ATTRIBUTES = {
+    "ste": "deflection",
+    "ste_overall": "overall_deflection",
+    "mesh_force": "force",
+    "mesh_stiffness": "stiffness",
+    "mesh_stiffness_secant": "secant_stiffness",
+}
+"""Attributes of the mesh cycle whose variables have another name."""
+_PRESSURE = "contact pressure in the cells of a tooth pair"
+_CELL_PLACE = "place of a cell along the common tangent from the middle of its window"
+_TIME_SHARE = "share of the time under load that a tooth spends in the load class"
+_CYCLE_SHARE = "share of the load cycles whose largest load lies in the load class"
+_CYCLES = "load cycles of this flank of a tooth per turn of the gear against the carrier"
+_HIGHEST = "largest stress over a turn at the point of the root with the widest range"
+_TURN = "stress over a turn at the point of the planet's root with the widest range"
+_OF_TOOTH = "stress of every tooth at the point of its root with the widest range"
+STRESS_VARIABLES = {
+    "root_tension": ("mesh gear step", "Pa", "largest stress in the root of the loaded flank"),
+    "root_compression": ("mesh gear step", "Pa", "lowest stress in the root of the back flank"),
+    "root_path": ("mesh gear step", "1", "path from the pitch point in base pitches"),
+    "root_load": ("mesh gear step", "N", "load of the tooth pair"),
+    "root_profile": ("mesh gear root point", "Pa", "stress along the root at the largest tension"),
+    "root_arc": ("mesh gear point", "m", "arc length from the end of the flank"),
+    "root_slope": ("mesh gear point", "rad", "angle of the root to the centreline of the tooth"),
+    "root_worst": ("mesh gear", "Pa", "largest stress in the root of the loaded flank"),
+    "root_worst_arc": ("mesh gear", "m", "its arc length from the end of the flank"),
+    "root_worst_slope": ("mesh gear", "rad", "its angle of the root to the centreline of the tooth"),
+    "root_worst_position": ("mesh gear", "1", "its position in mesh periods"),
+    "root_worst_path": ("mesh gear", "1", "its path from the pitch point in base pitches"),
+    "root_range_maximum": ("mesh gear", "Pa", _HIGHEST),
+    "root_range_minimum": ("mesh gear", "Pa", "smallest stress there"),
+    "root_range_arc": ("mesh gear", "m", "arc length of that point from the end of the flank"),
+    "planet_root_stress": ("mesh turn", "Pa", _TURN),
+    "tooth_root_maximum": ("mesh gear tooth", "Pa", f"largest {_OF_TOOTH}"),
+    "tooth_root_minimum": ("mesh gear tooth", "Pa", f"smallest {_OF_TOOTH}"),
+    "contact_pressure": ("mesh position", "Pa", "largest contact pressure away from flank ends"),
+    "pressure_distribution": (
+        "mesh pair cell position",
+        "Pa",
+        "contact pressure in the cells of a tooth pair",
+    ),
+    "pressure_offset": ("mesh cell", "m", _CELL_PLACE),
+    "pressure_centre": ("mesh pair position", "m", "middle of the window from the path point"),
+    "pressure_path": ("mesh pair position", "m", "path of the tooth pair from the pitch point"),
+    "load_bin_low": ("load_bin", "N", "lower limit of the load class"),
+    "load_bin_high": ("load_bin", "N", "upper limit of the load class"),
+    "load_time_share": ("mesh load_bin", "1", _TIME_SHARE),
+    "load_cycle_share": ("mesh load_bin", "1", _CYCLE_SHARE),
+    "load_cycles": ("mesh gear", "1", _CYCLES),
+    "loaded_contact_ratio": ("mesh", "1", "mesh periods a tooth pair is loaded"),
+    "iso_contact_stress": ("mesh", "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
+    "iso_root_stress": ("mesh gear", "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
+}
+"""Variables of stress.nc; records of one mesh period have none of single teeth, longer ones no pressures."""
+
+
+_STRESS_COLUMNS = (
+    "[MPa]",
+    "FE",
+    "ISO 6336",
+    "FE/ISO",
+    "position",
+    "arc [mm]",
+    "tangent [°]",
+    "range",
+    "cycles",
 )
 
 
@@ -48,21 +139,18 @@ class StaticResult:
     period_message: str = ""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Finding, ...]:
         """What an engineer should not overlook in this result."""
-        return static_warnings(self.cycle, self.planetary_set.sun.module)
+        return tuple(static_warnings(self.dataset(), self.planetary_set.sun.module))
 
     def dataset(self) -> xr.Dataset:
         """Contents of static.nc."""
         cycle, gears = self.cycle, self.planetary_set
         bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
-        variables = {
-            name: (dims, getattr(cycle, _ATTRIBUTES.get(name, name)), unit, words)
-            for name, (dims, unit, words) in CYCLE_VARIABLES.items()
-        }
+        values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in STATIC_VARIABLES}
         teeth, planets = cycle.tooth_load.shape[1], gears.n_planets
-        return dataset(
-            variables,
+        found = dataset(
+            declared(STATIC_VARIABLES, values),
             coords={
                 "mesh": ("mesh", list(gears.mesh_names), "1", "gear mesh"),
                 "position": ("position", cycle.position, "1", "position in mesh periods"),
@@ -89,9 +177,10 @@ class StaticResult:
                 "pressure_cells": cycle.unknowns,
                 "unknowns": np.array([body.unknowns for body in bodies]),
                 "message": cycle.message,
-                "warnings": " ".join(self.warnings),
             },
         )
+        found.attrs["warnings"] = " ".join(map(str, static_warnings(found, gears.sun.module)))
+        return found
 
 
 @dataclass(frozen=True)
@@ -153,21 +242,30 @@ class StressResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of stress.nc."""
-        cycle, edges, names = self.cycle, self.spectrum.edges, self.planetary_set.mesh_names
-        variables = {
-            **_root_entries(self.roots, names),
-            **_worst_entries(self),
-            **_range_entries(self),
-            **_pressure_entries(cycle),
-            **_load_entries(self.spectrum),
-            **_nominal_entries(self),
+        cycle, edges = self.cycle, self.spectrum.edges
+        values: dict[str, Any] = {
+            **root_values(self.roots),
+            **self._worst(),
+            **self._ranges(),
+            **self._loads(),
         }
-        coords = _root_coordinates(names) | {
+        values["contact_pressure"] = cycle.max_pressure
+        if cycle.pressure is not None:
+            values |= {
+                "pressure_distribution": cycle.pressure,
+                "pressure_offset": cycle.pressure_offset,
+                "pressure_centre": cycle.pressure_centre,
+                "pressure_path": cycle.path,
+            }
+        coords = {
+            "mesh": ("mesh", list(self.planetary_set.mesh_names), "1", "gear mesh"),
+            "gear": ("gear", ["first", "second"], "1", "gear of the mesh"),
+            "root": ("root", ["loaded", "back"], "1", "flank above the root"),
             "position": ("position", cycle.position, "1", "position in mesh periods"),
             "load_bin": ("load_bin", 0.5 * (edges[1:] + edges[:-1]), "N", "middle of the load class"),
         }
-        if "planet_root_stress" in variables:
-            n = variables["planet_root_stress"][1].shape[1]
+        if "planet_root_stress" in values:
+            n = values["planet_root_stress"].shape[1]
             words = "turns of the planet against the carrier since the pitch point with the sun"
             coords["turn"] = ("turn", (np.arange(n) - n // 4) / n, "1", words)
         attributes = {
@@ -175,239 +273,102 @@ class StressResult:
             "sun_torque": self.sun_torque,
             "mesh_periods": cycle.periods,
             "repeats": int(self.closes),
-            "load_counting": COUNTING,
+            "load_counting": _COUNTING,
             "iso": self.nominal.message,
         }
-        return dataset(variables, coords, attributes)
+        return dataset(declared(STRESS_VARIABLES, values), coords, attributes)
+
+    def _worst(self) -> dict[str, np.ndarray]:
+        """Largest stress in the root of the loaded flank of every gear in every mesh, and where it is."""
+        rows, position = [], self.cycle.position
+        each = len(position) // self.cycle.periods
+        for root, first in zip(self.roots, self.first_period, strict=True):
+            slot, at, point = root.worst
+            instant = position[(first * each + at) % len(position)]
+            place = root.arc[point], root.slope[point]
+            rows.append((root.tension[slot, at], *place, instant, root.path[slot, at]))
+        names = ("root_worst", *(f"root_worst_{name}" for name in ("arc", "slope", "position", "path")))
+        return dict(zip(names, (_by_gear(column) for column in zip(*rows)), strict=True))
+
+    def _ranges(self) -> dict[str, np.ndarray]:
+        """Stress ranges over a turn, of single teeth where they differ, and the history of planets' roots."""
+        ranges = self.ranges
+        values = {
+            "root_range_maximum": _by_gear([one.maximum for one in ranges]),
+            "root_range_minimum": _by_gear([one.minimum for one in ranges]),
+            "root_range_arc": _by_gear([r.arc[one.point] for r, one in zip(self.roots, ranges, strict=True)]),
+        }
+        planets = [one.history for one in ranges if one.kind == "planet"]
+        if planets[0] is not None:
+            values["planet_root_stress"] = np.array(planets)
+        if self.cycle.periods > 1:
+            values["tooth_root_maximum"] = _by_gear([one.tooth_maximum for one in ranges])
+            values["tooth_root_minimum"] = _by_gear([one.tooth_minimum for one in ranges])
+        return values
+
+    def _loads(self) -> dict[str, np.ndarray]:
+        """Load classes, how often the teeth are in them, and nominal stresses, the same for every planet."""
+        spectrum, nominal, N = self.spectrum, self.nominal, self.planetary_set.n_planets
+        return {
+            "load_bin_low": spectrum.edges[:-1],
+            "load_bin_high": spectrum.edges[1:],
+            "load_time_share": spectrum.time,
+            "load_cycle_share": spectrum.engagements,
+            "load_cycles": spectrum.cycles,
+            "loaded_contact_ratio": spectrum.duration,
+            "iso_contact_stress": np.repeat(nominal.contact, N),
+            "iso_root_stress": np.repeat(nominal.root, N, axis=0),
+        }
 
 
-CYCLE_VARIABLES = {
-    "ste": ("mesh position", "m", "static transmission error of the mesh"),
-    "ste_overall": ("planet position", "m", "static transmission error from sun to ring"),
-    "mesh_force": ("mesh position", "N", "mesh force along the line of action"),
-    "back_force": ("mesh position", "N", "force on the back flanks of the mesh"),
-    "member_motion": ("member position", "m", "displacement of the axis of a member that moves"),
-    "bearing_force": (
-        "planet axis position",
-        "N",
-        "force of the pin on the planet in the frame of the carrier",
-    ),
-    "mesh_stiffness": ("mesh position", "N/m", "tangent mesh stiffness"),
-    "mesh_stiffness_secant": ("mesh position", "N/m", "secant mesh stiffness"),
-    "tooth_load": ("mesh tooth position", "N", "load of a tooth pair"),
-    "back_tooth_load": ("mesh tooth position", "N", "load of a tooth pair on its back flanks"),
-    "load_share": ("planet position", "1", "share of the planet in the torque"),
-    "max_pressure": ("mesh position", "Pa", "largest contact pressure away from flank ends"),
-    "edge_contact": ("mesh position", "1", "whether a contact reaches the end of a flank"),
-    "residual": ("position", "1", "residual of contact conditions and equilibrium"),
-    "iterations": ("position", "1", "steps of the active set"),
-}
-"""Variables of static.nc: dimensions, unit, and what they are."""
-_ATTRIBUTES = {
-    "ste": "deflection",
-    "ste_overall": "overall_deflection",
-    "mesh_force": "force",
-    "mesh_stiffness": "stiffness",
-    "mesh_stiffness_secant": "secant_stiffness",
-}
-"""Attributes of the mesh cycle whose variables have another name."""
-
-
-def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
-    """Root stresses as they are stored and drawn.
+def root_values(roots: tuple[RootCycle, ...]) -> dict[str, np.ndarray]:
+    """Follow the worst tooth of every gear through every mesh: stresses of both roots and loads.
 
     Parameters
     ----------
     roots : tuple of RootCycle
         As `femgear.contact.root_stress.root_stress_cycle` gives them.
-    mesh_names : sequence of str
-        Label of each mesh.
 
     Returns
     -------
-    xarray.Dataset
-        ``root_tension`` and ``root_compression`` (mesh, gear, step) [Pa]: extremes along the root of the
-        loaded and of the back flank of one tooth on its way through the mesh, with ``root_path`` [1] and
-        ``root_load`` [N]; ``root_profile`` (mesh, gear, root, point) [Pa] along both roots when the tension
-        is largest, with ``root_arc`` [m] and ``root_slope`` [rad] (mesh, gear, point). The tooth is the one
-        with the largest stress. Points that a root does not have are NaN.
+    dict of str to array
+        Variables of `STRESS_VARIABLES`; points that a root does not have are NaN.
     """
-    title = {"title": "root stresses over the mesh cycle"}
-    return dataset(_root_entries(roots, mesh_names), _root_coordinates(mesh_names), title)
-
-
-def _root_coordinates(mesh_names) -> dict:
+    histories = [root.history() for root in roots]
     return {
-        "mesh": ("mesh", list(mesh_names), "1", "gear mesh"),
-        "gear": ("gear", ["first", "second"], "1", "gear of the mesh"),
-        "root": ("root", ["loaded", "back"], "1", "flank above the root"),
+        "root_tension": _by_gear([one.stress[:, LOADED].max(axis=-1) for one in histories]),
+        "root_compression": _by_gear([one.stress[:, BACK].min(axis=-1) for one in histories]),
+        "root_path": _by_gear([one.path for one in histories]),
+        "root_load": _by_gear([one.load for one in histories]),
+        "root_profile": _by_gear([root.stress[root.worst[:2]] for root in roots]),
+        "root_arc": _by_gear([root.arc for root in roots]),
+        "root_slope": _by_gear([root.slope for root in roots]),
     }
 
 
-def _root_entries(roots: tuple[RootCycle, ...], mesh_names) -> dict:
-    """Stresses of both roots of one tooth of every gear in every mesh."""
-    words = {
-        "root_tension": ("mesh gear step", "Pa", "largest stress in the root of the loaded flank"),
-        "root_compression": ("mesh gear step", "Pa", "lowest stress in the root of the back flank"),
-        "root_path": ("mesh gear step", "1", "path from the pitch point in base pitches"),
-        "root_load": ("mesh gear step", "N", "load of the tooth pair"),
-        "root_profile": ("mesh gear root point", "Pa", "stress along the root at the largest tension"),
-        "root_arc": ("mesh gear point", "m", "arc length from the end of the flank"),
-        "root_slope": ("mesh gear point", "rad", "angle of the root to the centreline of the tooth"),
-    }
-    points = max(len(root.arc) for root in roots)
-    rows = [_row(root, points) for root in roots]
-    entries = {}
-    for name, (dims, units, text) in words.items():
-        values = np.array([row[name] for row in rows])
-        entries[name] = (dims, values.reshape(len(mesh_names), 2, *values.shape[1:]), units, text)
-    return entries
+def _by_gear(rows) -> np.ndarray:
+    """Stack rows of gear 1 and 2 of mesh 0, of mesh 1, ... as (mesh, gear, ...); shorter ones end in NaN."""
+    rows = [np.asarray(row) for row in rows]
+    if rows[0].ndim:
+        longest = max(row.shape[-1] for row in rows)
+        missing = [(0, 0)] * (rows[0].ndim - 1)
+        rows = [np.pad(row, [*missing, (0, longest - row.shape[-1])], constant_values=np.nan) for row in rows]
+    values = np.array(rows)
+    return values.reshape(-1, 2, *values.shape[1:])
 
 
-def _load_entries(spectrum: LoadSpectrum) -> dict:
-    """Load classes, and how often the teeth of every mesh are in them."""
-    words = {
-        "time": "share of the time under load that a tooth spends in the load class",
-        "cycle": "share of the load cycles whose largest load lies in the load class",
-        "cycles": "load cycles of this flank of a tooth per turn of the gear against the carrier",
-    }
-    return {
-        "load_bin_low": ("load_bin", spectrum.edges[:-1], "N", "lower limit of the load class"),
-        "load_bin_high": ("load_bin", spectrum.edges[1:], "N", "upper limit of the load class"),
-        "load_time_share": ("mesh load_bin", spectrum.time, "1", words["time"]),
-        "load_cycle_share": ("mesh load_bin", spectrum.engagements, "1", words["cycle"]),
-        "load_cycles": ("mesh gear", spectrum.cycles, "1", words["cycles"]),
-        "loaded_contact_ratio": ("mesh", spectrum.duration, "1", "mesh periods a tooth pair is loaded"),
-    }
-
-
-def _nominal_entries(result: StressResult) -> dict:
-    """Nominal stresses of both kinds of mesh, repeated for every planet."""
-    nominal, N = result.nominal, result.planetary_set.n_planets
-    contact, root = np.repeat(nominal.contact, N), np.repeat(nominal.root, N, axis=0)
-    return {
-        "iso_contact_stress": ("mesh", contact, "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
-        "iso_root_stress": ("mesh gear", root, "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
-    }
-
-
-def _worst_entries(result: StressResult) -> dict:
-    """Largest stress in the root of the loaded flank of every gear in every mesh, and where it is."""
-    rows = []
-    each = len(result.cycle.position) // result.cycle.periods
-    for root, first in zip(result.roots, result.first_period, strict=True):
-        slot, position, point = root.worst
-        record = (first * each + position) % len(result.cycle.position)
-        place = root.arc[point], root.slope[point]
-        rows.append(
-            (root.tension[slot, position], *place, result.cycle.position[record], root.path[slot, position])
-        )
-    values = np.array(rows).reshape(-1, 2, 5)
-    words = {
-        "root_worst": ("Pa", "largest stress in the root of the loaded flank"),
-        "root_worst_arc": ("m", "its arc length from the end of the flank"),
-        "root_worst_slope": ("rad", "its angle of the root to the centreline of the tooth"),
-        "root_worst_position": ("1", "its position in mesh periods"),
-        "root_worst_path": ("1", "its path from the pitch point in base pitches"),
-    }
-    return {name: ("mesh gear", values[..., i], *words[name]) for i, name in enumerate(words)}
-
-
-def _range_entries(result: StressResult) -> dict:
-    """Stress ranges over a turn, of single teeth where they differ, and the history of the planets' roots."""
-    ranges = result.ranges
-
-    def table(values):
-        values = np.array(values)
-        return values.reshape(-1, 2, *values.shape[1:])
-
-    high, low = (table([getattr(one, name) for one in ranges]) for name in ("maximum", "minimum"))
-    arcs = table([root.arc[one.point] for root, one in zip(result.roots, ranges, strict=True)])
-    highest = "largest stress over a turn at the point of the root with the widest range"
-    entries = {
-        "root_range_maximum": ("mesh gear", high, "Pa", highest),
-        "root_range_minimum": ("mesh gear", low, "Pa", "smallest stress there"),
-        "root_range_arc": ("mesh gear", arcs, "m", "arc length of that point from the end of the flank"),
-    }
-    planets = [one.history for one in ranges if one.kind == "planet"]
-    if planets[0] is not None:
-        words = "stress over a turn at the point of the planet's root with the widest range"
-        entries["planet_root_stress"] = ("mesh turn", np.array(planets), "Pa", words)
-    if result.cycle.periods > 1:
-        longest = max(len(one.tooth_maximum) for one in ranges)
-        for name, words in (("maximum", "largest"), ("minimum", "smallest")):
-            rows = [getattr(one, f"tooth_{name}") for one in ranges]
-            padded = [np.pad(row, (0, longest - len(row)), constant_values=np.nan) for row in rows]
-            long_name = f"{words} stress of every tooth at the point of its root with the widest range"
-            entries[f"tooth_root_{name}"] = ("mesh gear tooth", table(padded), "Pa", long_name)
-    return entries
-
-
-def _pressure_entries(cycle: MeshCycle) -> dict:
-    """Largest pressures, and the distributions where the cycle has them."""
-    largest = "largest contact pressure away from flank ends"
-    entries = {"contact_pressure": ("mesh position", cycle.max_pressure, "Pa", largest)}
-    if cycle.pressure is None:
-        return entries
-    pressure = "contact pressure in the cells of a tooth pair"
-    offset = "place of a cell along the common tangent from the middle of its window"
-    centre = "middle of the window from the path point"
-    path = "path of the tooth pair from the pitch point"
-    return entries | {
-        "pressure_distribution": ("mesh pair cell position", cycle.pressure, "Pa", pressure),
-        "pressure_offset": ("mesh cell", cycle.pressure_offset, "m", offset),
-        "pressure_centre": ("mesh pair position", cycle.pressure_centre, "m", centre),
-        "pressure_path": ("mesh pair position", cycle.path, "m", path),
-    }
-
-
-def _row(root: RootCycle, points: int) -> dict[str, np.ndarray]:
-    """Variables of one gear of one mesh, points padded with NaN."""
-    slot, position, _ = root.worst
-    history = root.history()
-
-    def padded(values):
-        missing = [(0, 0)] * (values.ndim - 1) + [(0, points - values.shape[-1])]
-        return np.pad(values, missing, constant_values=np.nan)
-
-    return {
-        "root_tension": history.stress[:, LOADED].max(axis=-1),
-        "root_compression": history.stress[:, BACK].min(axis=-1),
-        "root_path": history.path,
-        "root_load": history.load,
-        "root_profile": padded(root.stress[slot, position]),
-        "root_arc": padded(root.arc),
-        "root_slope": padded(root.slope),
-    }
-
-
-def describe_static(data: xr.Dataset) -> Block:
-    """Transmission errors, stiffnesses and load sharing of static.nc."""
-    rows = []
-    for mesh in data.mesh.values:
-        one = data.sel(mesh=mesh)
-        ste = one.ste.values
-        rows.append(
-            (
-                str(mesh),
-                f"{ste.mean() * 1e6:.4f}",
-                f"{np.ptp(ste) * 1e6:.4f}",
-                f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
-                f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
-                f"{one.mesh_force.values.mean():.3f}",
-                f"{one.max_pressure.values.max() / 1e6:.1f}" if one.max_pressure.values.any() else "-",
-            )
-        )
+def describe_static(data: xr.Dataset, module: float) -> Block:
+    """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
     share = data.load_share.values
-    header = (
-        "mesh",
-        "STE mean [um]",
-        "STE p-p [um]",
-        "k mean [N/um]",
-        "k p-p [N/um]",
-        "force [N]",
-        "p max [MPa]",
-    )
+    columns = {
+        "mesh": lambda one: str(one.mesh.item()),
+        "STE mean [um]": lambda one: f"{one.ste.values.mean() * 1e6:.4f}",
+        "STE p-p [um]": lambda one: f"{np.ptp(one.ste.values) * 1e6:.4f}",
+        "k mean [N/um]": lambda one: f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
+        "k p-p [N/um]": lambda one: f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
+        "force [N]": lambda one: f"{one.mesh_force.values.mean():.3f}",
+        "p max [MPa]": lambda one: f"{p.max() / 1e6:.1f}" if (p := one.max_pressure.values).any() else "-",
+    }
     notes = [
         f"load share of a planet {share.min():.4f} to {share.max():.4f} "
         f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
@@ -415,13 +376,12 @@ def describe_static(data: xr.Dataset) -> Block:
     notes += _stiffness_notes(elastic=data.sizes.get("member", 0) > 0)
     if data.attrs.get("mesh_periods", 1) > 1:
         notes.append(str(data.attrs["period"]))
-    if warnings := str(data.attrs.get("warnings", "")):
-        notes += [f"[{text.strip()}" for text in warnings.split("[") if text]
-    return Block("Static", header, tuple(rows), tuple(notes))
+    notes += map(str, static_warnings(data, module))
+    return tabulate("Static", [data.sel(mesh=mesh) for mesh in data.mesh.values], columns, notes)
 
 
 def _stiffness_notes(*, elastic: bool) -> list[str]:
-    """What the columns k and STE of the static table contain."""
+    """Tell what the columns k and STE of the static table contain."""
     held = "k: tangent stiffness dF/dx of teeth and bodies"
     if not elastic:
         return [f"{held}, held at their bores and at the outer surface of the ring"]
@@ -432,17 +392,9 @@ def _stiffness_notes(*, elastic: bool) -> list[str]:
 
 
 def describe_stress(data: xr.Dataset) -> Block:
-    """Largest stresses of all meshes beside the nominal ones, with place and range.
+    """Tabulate the largest stresses of stress.nc beside the nominal ones, with place and range.
 
-    Parameters
-    ----------
-    data : Dataset
-        Contents of stress.nc.
-
-    Returns
-    -------
-    Block
-        One row for the contact and one for the root of every kind of gear, each of its worst mesh.
+    One row for the contact and one for the root of every kind of gear, each of its worst mesh.
     """
     names = [str(name) for name in data["mesh"].values]
     kinds = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
@@ -451,21 +403,6 @@ def describe_stress(data: xr.Dataset) -> Block:
         meshes = [i for i, name in enumerate(names) if ("ring" in name) == (kind == "planet-ring")]
         contact.append(_contact_row(kind, data.isel(mesh=meshes)))
         roots += [_root_row(title, data.isel(mesh=meshes, gear=g)) for g, title in enumerate(titles)]
-    header = (
-        "[MPa]",
-        "FE",
-        "ISO 6336",
-        "FE/ISO",
-        "position",
-        "arc [mm]",
-        "tangent [°]",
-        "range",
-        "cycles",
-    )
-    return Block("Stresses", header, (*contact, *roots), _notes(data))
-
-
-def _notes(data: xr.Dataset) -> tuple[str, ...]:
     notes = [
         "ISO 6336: nominal stresses sigma_H0 and sigma_F0 (method B) with equal load on all planets and no "
         "load factors; FE: largest contact pressure away from flank ends, and largest tension in the root",
@@ -477,10 +414,11 @@ def _notes(data: xr.Dataset) -> tuple[str, ...]:
         notes.append(f"outside the range of ISO 6336: {data.attrs['iso']}")
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
-    return tuple(notes)
+    return Block("Stresses", _STRESS_COLUMNS, (*contact, *roots), tuple(notes))
 
 
 def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:
+    """Write the largest contact pressure of a kind of mesh."""
     pressure = data["contact_pressure"].values
     mesh, position = np.unravel_index(pressure.argmax(), pressure.shape)
     found, nominal = float(pressure[mesh, position]), float(data["iso_contact_stress"][mesh])
@@ -489,28 +427,25 @@ def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:
 
 
 def _root_row(title: str, data: xr.Dataset) -> tuple[str, ...]:
+    """Write the largest root stress of a gear in its worst mesh."""
     mesh = int(data["root_worst"].values.argmax())
-    one = data.isel(mesh=mesh)
-    found = float(one["root_worst"])
-    low, high = (float(one[f"root_range_{name}"]) for name in ("minimum", "maximum"))
-    place = ["-"] * 3
+    one = {name: float(values) for name, values in data.isel(mesh=mesh).items() if not values.dims}
+    found, place = one["root_worst"], ["-"] * 3
     if found:
-        place = [
-            f"{float(one['root_worst_position']):.3f}",
-            f"{float(one['root_worst_arc']) * 1e3:.3f}",
-            f"{np.degrees(float(one['root_worst_slope'])):.1f}",
-        ]
+        arc, slope = one["root_worst_arc"] * 1e3, np.degrees(one["root_worst_slope"])
+        place = [f"{one['root_worst_position']:.3f}", f"{arc:.3f}", f"{slope:.1f}"]
+    low, high = one["root_range_minimum"] * 1e-6, one["root_range_maximum"] * 1e-6
     return (
         f"root {title}",
-        *_compared(found, float(one["iso_root_stress"])),
+        *_compared(found, one["iso_root_stress"]),
         *place,
-        f"{low * 1e-6:.1f} to {high * 1e-6:.1f}",
-        f"{float(one['load_cycles']):g}",
+        f"{low:.1f} to {high:.1f}",
+        f"{one['load_cycles']:g}",
     )
 
 
 def _compared(found: float, nominal: float) -> tuple[str, str, str]:
-    """Both values in MPa and their ratio; a dash where there is none."""
+    """Write both values in MPa and their ratio; a dash where there is none."""
     known = np.isfinite(nominal)
     ratio = f"{found / nominal:.2f}" if known and nominal else "-"
     return f"{found * 1e-6:.1f}", f"{nominal * 1e-6:.1f}" if known else "-", ratio

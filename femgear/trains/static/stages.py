@@ -10,18 +10,30 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.sections import Case
-from femgear.contact.root_stress import root_ranges
+from femgear.contact.bodies import Bodies, Sector, Sectors, make_bodies, make_sectors
+from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
+from femgear.contact.root_stress import (
+    RootStresses,
+    observed_root_stress,
+    root_ranges,
+    root_stress,
+    root_stress_cycle,
+)
+from femgear.contact.supports import RIGID, Supports
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
 from femgear.errors import GeometryError
-from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Progress, Stage
+from femgear.fe.elasticity import foundation
+from femgear.gears.deviations import common_period
+from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
+from femgear.gears.kinematics import torques
+from femgear.gears.planetary import PlanetarySet
+from femgear.trains.protocol import Progress, Stage, one_blas_thread
 from femgear.trains.static.description import check_motions
 from femgear.trains.static.results import (
     NominalStresses,
@@ -31,26 +43,18 @@ from femgear.trains.static.results import (
     describe_stress,
 )
 
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies, Sector, Sectors
-    from femgear.contact.cycle import MeshCycle
-    from femgear.contact.root_stress import RootStresses
-    from femgear.contact.supports import Supports
-    from femgear.fe.elasticity import Material
-    from femgear.gears.planetary import PlanetarySet
-
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
 # would take a quarter of a gigabyte for three planets
 WHOLE_RECORD = 16
 # longer than any record: the true common period of a set
-UNLIMITED = 10**12
+_UNLIMITED = 10**12
 
 
 @one_blas_thread()
 def solve_static(
     case: Case, *, cache: Path | None = None, progress: Progress | None = None, steps: Steps | None = None
 ) -> StaticResult:
-    """Static transmission error, load sharing and mesh stiffness over one mesh period.
+    """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
 
     Parameters
     ----------
@@ -66,10 +70,6 @@ def solve_static(
     ------
     GeometryError, GridError, ContactError
     """
-    from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-    from femgear.gears.deviations import common_period
-    from femgear.gears.kinematics import torques
-
     gears, deviations = planetary_set(case), set_deviations(case)
     steps = steps or Steps()
     sectors, bodies = steps.take(
@@ -100,7 +100,7 @@ def solve_static(
 def flank_compliances(
     case: Case, gears: PlanetarySet, *, cache: Path | None = None
 ) -> tuple[Sectors, Bodies]:
-    """Sector grids of all gears and their flank compliances, the ring held or on its foundation.
+    """Make the sector grids of all gears and their flank compliances, the ring held or on its foundation.
 
     Parameters
     ----------
@@ -110,8 +110,6 @@ def flank_compliances(
     cache : path, optional
         Folder of generated grids.
     """
-    from femgear.contact.bodies import make_bodies, make_sectors
-
     material = material_of(case)
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
     foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
@@ -120,7 +118,7 @@ def flank_compliances(
 
 @one_blas_thread()
 def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None = None) -> StressResult:
-    """Root stresses of every gear in every mesh, stress ranges over a turn, load spectra, nominal stresses.
+    """Find root stresses of every gear in every mesh, their ranges over a turn, load and nominal stresses.
 
     The static solution need not have pressures (`StaticResult.cycle.pressure`); where it has, they are part
     of the result.
@@ -138,14 +136,12 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
     GridError
         When the root of a tooth is not one chain of edges or a body can move freely.
     """
-    from femgear.gears.deviations import common_period
-
     check_entries(static, StaticResult, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
     influences = _influences(case, static)
     if progress is not None:
         progress("stress", 1, 2)
-    repeats, _ = common_period(set_deviations(case), gears, limit=UNLIMITED)
+    repeats, _ = common_period(set_deviations(case), gears, limit=_UNLIMITED)
     closes = repeats == cycle.periods
     teeth = loaded_teeth(cycle, reverse=reverse)
     ranges = root_ranges(gears, influences, teeth, closes=closes)
@@ -169,7 +165,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
 def nominal_stresses(
     planetary_set: PlanetarySet, sun_torque: float, youngs_modulus: float, poisson_ratio: float
 ) -> NominalStresses:
-    """sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
+    """Compute sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
 
     Parameters
     ----------
@@ -179,8 +175,6 @@ def nominal_stresses(
     youngs_modulus, poisson_ratio : float
         [Pa, 1]
     """
-    from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
-
     s = planetary_set
     # torque over reference radius: the same at all three gears
     force = abs(sun_torque) / (s.n_planets * s.sun.reference_radius)
@@ -191,52 +185,33 @@ def nominal_stresses(
     )
     for i, (one, two, angle, ratio) in enumerate(meshes):
         small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
+        load = {"contact_ratio": ratio, "tangential_force": force}
+        elastic = {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio}
         try:
-            contact[i] = nominal_contact_stress(
-                small,
-                large,
-                working_angle=angle,
-                contact_ratio=ratio,
-                tangential_force=force,
-                youngs_modulus=youngs_modulus,
-                poisson_ratio=poisson_ratio,
-            ).stress
+            contact[i] = nominal_contact_stress(small, large, working_angle=angle, **load, **elastic).stress
         except GeometryError as error:
             messages.append(f"{one.name}-{two.name}: {error.message}")
         for j, gear in enumerate((one, two)):
             try:
-                root[i, j] = nominal_root_stress(gear, contact_ratio=ratio, tangential_force=force).stress
+                root[i, j] = nominal_root_stress(gear, **load).stress
             except GeometryError as error:
                 messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
     return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
 
 
-def material_of(case: Case) -> Material:
-    """Material of the gears of a case."""
-    from femgear.fe.elasticity import Material
-
-    return Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-
-
 def ring_foundation(case: Case, sector: Sector):
-    """Elastic foundation of one sector of the ring, a sparse matrix [N/m]."""
-    from femgear.fe.elasticity import foundation
-
+    """Assemble the elastic foundation of one sector of the ring, a sparse matrix [N/m]."""
     ring, width = case.ring, sector.gear.face_width
     return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
 
 
 def static_supports(case: Case) -> Supports:
-    """Supports of the static problem: rigid, or those of the bodies of the case."""
-    from femgear.contact.supports import RIGID
-
+    """Choose the supports of the static problem: rigid, or those of the bodies of the case."""
     return RIGID if case.static.members == "fixed" else case_supports(case)
 
 
 def case_supports(case: Case) -> Supports:
-    """Supports of sun, carrier and planets with the stiffnesses and the bearing clearance of the case."""
-    from femgear.contact.supports import Supports
-
+    """Make the supports of sun, carrier and planets, with the bearing clearance of the case."""
     return Supports(
         sun=case.sun.support_stiffness,
         carrier=case.carrier.support_stiffness,
@@ -246,19 +221,17 @@ def case_supports(case: Case) -> Supports:
 
 
 def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
-    """Normal backlash of all 2N meshes [m]."""
+    """List the normal backlash of all 2N meshes [m]."""
     n = gears.n_planets
     return np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], n)
 
 
 def _influences(case: Case, static: StaticResult) -> RootStresses:
-    """Root influences of the bodies as the static solution holds them.
+    """Find the root influences of the bodies as the static solution holds them.
 
     Sun and planet were observed with their flanks; only the ring, whose contact has two plane states, is
     solved again.
     """
-    from femgear.contact.root_stress import RootStresses, observed_root_stress, root_stress
-
     sectors, bodies = static.sectors, static.bodies
     assert bodies.sun.root is not None and bodies.planet.root is not None
     sun = observed_root_stress(sectors.sun.gear, bodies.sun.root)
@@ -270,9 +243,7 @@ def _influences(case: Case, static: StaticResult) -> RootStresses:
 
 
 def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
-    """Root stress of every gear in every mesh, and the mesh period with which each begins."""
-    from femgear.contact.root_stress import root_stress_cycle
-
+    """Find the root stress of every gear in every mesh, and the mesh period with which each begins."""
     if cycle.periods <= WHOLE_RECORD:
         roots = root_stress_cycle(gears, influences, cycle, reverse=reverse)
         return roots, np.zeros(len(roots), int)
@@ -292,7 +263,7 @@ def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
 
 
 def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
-    """Loads of some mesh periods of a cycle; tooth numbers stay those of its first period."""
+    """Take the loads of some mesh periods of a cycle; tooth numbers stay those of its first period."""
     each = len(cycle.position) // cycle.periods
     take = (start * each + np.arange(length * each)) % len(cycle.position)
     names = ("tooth_load", "path", "back_tooth_load", "back_path", "back_force")
@@ -301,13 +272,13 @@ def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
 
 
 def static_verdict(result: StaticResult) -> dict:
-    """Residual, message and kind of contact of a static solution, for the manifest."""
+    """Tell residual, message and kind of contact of a static solution, for the manifest."""
     cycle = result.cycle
     return {"residual": float(cycle.residual.max()), "message": cycle.message, "contact": cycle.contact}
 
 
 def response_verdict(result) -> dict:
-    """Convergence and stability of a periodic response, for the manifest."""
+    """Tell convergence and stability of a periodic response, for the manifest."""
     return {
         "converged": bool(np.all(result.response.converged)),
         "stable": bool(np.all(result.stability.stable)),
@@ -321,7 +292,7 @@ STATIC = Stage(
     title="Static",
     solve=lambda case, _, context: solve_static(case, cache=context.cache, progress=context.progress),
     verdict=static_verdict,
-    describe=lambda results: describe_static(results.static),
+    describe=lambda results: describe_static(results.static, planetary_set(results.case).sun.module),
     check=planetary_set,
 )
 
@@ -331,9 +302,10 @@ STRESS = Stage(
     title="Stresses",
     solve=lambda case, results, context: solve_stress(case, results["static"], progress=context.progress),
     verdict=lambda result: {
-        "root_points": sum(len(root.arc) for root in result.roots), "iso": result.nominal.message,
+        "root_points": sum(len(root.arc) for root in result.roots),
+        "iso": result.nominal.message,
     },
     describe=lambda results: describe_stress(results.stress),
     wanted=lambda case: case.static.stresses,
     needs=lambda case: ("static",),
-)  # fmt: skip
+)

@@ -82,7 +82,13 @@ def solve_free_vibration(
         y, period = _closer(moving, y, period, free, update, np.abs(defect).max(), integrator)
     found = _result(moving, y, maps[0], period, chosen, integrator, history)
     # the phase is free, and so is the amplitude of a conservative system
-    return _judged(moving, found, chosen, trivial=2 if conservative else 1)
+    trivial = 2 if conservative else 1
+    found = _judged(moving, found, chosen, trivial=trivial)
+    if not found.solution.converged:
+        return found
+    note = f", without {trivial} of phase{' and amplitude' if conservative else ''} that are one"
+    verdict = replace(found.verdict, message=found.verdict.message + note)
+    return replace(found, solution=replace(found.solution, verdict=verdict))
 
 
 def _closer(moving: Flow, y, period, free, update, before, options):

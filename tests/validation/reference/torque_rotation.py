@@ -23,7 +23,7 @@ from validation.reference.torque_balance import balanced_loads
 
 from femgear.errors import ContactError
 from femgear.gears.gear import half_thickness_angle
-from femgear.threads import one_blas_thread
+from femgear.trains.protocol import one_blas_thread
 
 if TYPE_CHECKING:
     from validation.reference.substructure import Substructure

@@ -38,6 +38,8 @@ from femgear.system.system import HarmonicForce, NonlinearSystem
 SENSE = {"sun": 1, "planet": -1, "ring": -1}
 # base radii of published sets are rounded; ratios of teeth that differ by more are another set
 _RADII = 1e-2
+# difference of two line frequencies, relative to the highest one, below which they are one
+_COINCIDE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -179,34 +181,42 @@ class TransmissionErrors:
         return np.stack([turned, -1j * sense * turned], axis=-1)
 
 
-def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
-    """Tooth errors (2N, H) of one wave of each kind, shifted by the mesh phases.
+def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np.ndarray, np.ndarray]:
+    """Lines of a series at given base frequencies, ascending; lines that coincide are added.
 
     Parameters
     ----------
-    sun_planet, planet_ring : (H,) complex arrays
-        Harmonics 1 to H at phase zero [m].
-    phases : (2N,) array
-        Fractions of the mesh period, see `femgear.trains.planar.model.phased_series`.
+    series : FourierSeries or SummedSeries
+    frequency : float or (n_bases,) array
+        [rad/s]
 
-    Raises
-    ------
-    CaseError
-        An odd number of phases, values that are not finite numbers (E-SHAPE).
+    Returns
+    -------
+    line_frequency : (L,) array
+        Not negative; the mean first [rad/s].
+    amplitude : (n, L) complex array
+        ``Re sum_l A_l exp(i omega_l t)``.
     """
-    waves = [
-        np.atleast_1d(checked_numbers(wave, name, code="E-SHAPE", unit="m", kind=complex))
-        for name, wave in (("sun_planet", sun_planet), ("planet_ring", planet_ring))
-    ]
-    phases, count = checked_numbers(phases, "phases", code="E-SHAPE", unit=""), max(map(len, waves))
-    finite = all(np.all(np.isfinite(values)) for values in (*waves, phases))
-    if phases.ndim != 1 or not len(phases) or len(phases) % 2 or max(w.ndim for w in waves) > 1 or not finite:
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
+    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
         raise CaseError(
-            f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
-            limit="two a planet, finite: sun-planet meshes, then planet-ring meshes",
+            f"base frequencies of shape {frequency.shape}", code="E-RANGE", key="frequency",
+            limit="finite numbers, one a base",
         )  # fmt: skip
-    table = np.repeat([np.pad(wave, (0, count - len(wave))) for wave in waves], len(phases) // 2, axis=0)
-    return table * np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
+    parts = series.parts if isinstance(series, SummedSeries) else (series,)
+    rates, lines = [np.zeros(1)], [np.zeros((len(parts[0].amplitudes), 1), complex)]
+    for part in parts:
+        base = float(np.dot(part.orders[: len(frequency)], frequency[: len(part.orders)]))
+        rate = base * np.arange(part.amplitudes.shape[1])
+        rates.append(np.abs(rate))
+        lines.append(np.where(rate < 0.0, part.amplitudes.conj(), part.amplitudes))
+    rates, lines = np.concatenate(rates), np.concatenate(lines, axis=1)
+    order = np.argsort(rates, kind="stable")
+    rates, lines = rates[order], lines[:, order]
+    first = np.flatnonzero(np.diff(rates, prepend=-np.inf) > _COINCIDE * rates.max(initial=0.0))
+    total = np.add.reduceat(lines, first, axis=1)
+    total[:, 0] = np.real(total[:, 0])
+    return rates[first], total
 
 
 def with_errors(
