@@ -21,42 +21,41 @@ def torsional_matrices(train: Drivetrain) -> tuple[np.ndarray, np.ndarray, np.nd
         for number, stage in enumerate(train.planetary):
             if stage.carrier == body.name:
                 prefix = "planet" if len(train.planetary) == 1 else f"planet of {body.name}"
-                at[number] = len(names) + np.arange(len(stage.planet_angles))
-                names += [f"{prefix} {p + 1}: rotation" for p in range(len(stage.planet_angles))]
+                at[number] = len(names) + np.arange(len(stage.angles))
+                names += [f"{prefix} {p + 1}: rotation" for p in range(len(stage.angles))]
     M, K = np.zeros((2, len(names), len(names)))
     for body in train.bodies:
         M[at[body.name], at[body.name]] += body.inertia
     for shaft in train.shafts:
-        ends = [at[shaft.first], at[shaft.second]]
+        ends = [at[name] for name in shaft.between]
         K[np.ix_(ends, ends)] += shaft.springs.torsion * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    for bearing in train.bearings:
-        K[at[bearing.body], at[bearing.body]] += bearing.torsion
     spin = _senses(train)
     columns = []
     for number, stage in enumerate(train.planetary):
-        cosine, sense = math.cos(stage.pressure_angle), stage.flank * spin[stage.carrier]
+        (radius, planet), cosine = stage.pitch_radii, math.cos(stage.pressure_angle)
+        sense = stage.flank * spin[stage.carrier]
         c, s, planets = at[stage.carrier], at[stage.sun], at[number]
         M[c, c] += len(planets) * stage.planet_mass * stage.centre_distance**2
         sun, ring = np.zeros((2, len(planets), len(names)))
         for p, place in enumerate(planets):
             M[place, place] += stage.planet_inertia
             # the pin pushes the planet: its flanks approach sun and ring ahead of it
-            sun[p, [c, s, place]] = stage.centre_distance, -stage.sun_radius, -stage.planet_radius
-            ring[p, [c, place]] = stage.centre_distance, stage.planet_radius
+            sun[p, [c, s, place]] = stage.centre_distance, -radius, -planet
+            ring[p, [c, place]] = stage.centre_distance, planet
         columns += list(sense * cosine * sun) + list(sense * cosine * ring)
     for stage in train.parallel:
         row = np.zeros(len(names))
-        row[[at[stage.first], at[stage.second]]] = stage.first_radius, stage.second_radius
+        row[[at[name] for name in stage.between]] = stage.pitch_radii
         lean = math.hypot(1.0, math.tan(stage.helix_angle) * math.cos(stage.pressure_angle))
-        columns.append(stage.flank * spin[stage.first] * math.cos(stage.pressure_angle) / lean * row)
+        columns.append(stage.flank * spin[stage.between[0]] * math.cos(stage.pressure_angle) / lean * row)
     return M, K, np.array(columns).reshape(-1, len(names)).T, tuple(names)
 
 
 def _senses(train: Drivetrain) -> dict[str, float]:
     """Sense of rotation of every body, the first one positive: external gears turn it round."""
     sense = {train.bodies[0].name: 1.0}
-    links = [(one.first, one.second, 1.0) for one in train.shafts]
-    links += [(one.first, one.second, -1.0) for one in train.parallel]
+    links = [(*one.between, 1.0) for one in train.shafts]
+    links += [(*one.between, -1.0) for one in train.parallel]
     links += [(one.carrier, one.sun, 1.0) for one in train.planetary]
     for _ in train.bodies:
         for first, second, factor in links:

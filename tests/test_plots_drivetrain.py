@@ -9,19 +9,8 @@ import numpy as np
 import pytest
 
 from femgear.report.style import png_bytes
-from femgear.trains.drivetrain.figures import (
-    Layout,
-    ModeView,
-    Wheel,
-    band,
-    drivetrain_pictures,
-    mode_pictures,
-    over_time,
-    spectra,
-    spectrum_figures,
-    stiffness_series,
-    transient_figures,
-)
+from femgear.trains.drivetrain.figures import band, over_time, spectra, spectrum_figures, transient_figures
+from femgear.trains.drivetrain.pictures import Layout, ModeView, Wheel, drivetrain_pictures, mode_pictures
 from femgear.trains.drivetrain.stages import remarks
 from femgear.trains.reading import read_case, with_value
 
@@ -36,10 +25,6 @@ def drawn(figure):
 
 
 def test_curves_and_units():
-    wave = 1e8 * (1.0 + 0.2 * np.sin(TIME))
-    stiffness = drawn(stiffness_series(TIME, [("mesh", wave)], [("mesh", 0.9 * wave)]))
-    assert np.allclose(stiffness[0][0][:, 1], 90.0 * (1.0 + 0.2 * np.sin(TIME)))
-    assert np.allclose(stiffness[0][1][:, 1], 1e-6 * wave)
     panels = [("one", [("a", TIME), ("b", 2.0 * TIME)]), ("two", [("a", TIME**2)])]
     motion = drawn(over_time(TIME, panels, unit="mrad", factor=1e3))
     assert len(motion) == 2 and np.allclose(motion[0][1][:, 1], 2e3 * TIME)
@@ -210,11 +195,11 @@ def test_picture_of_a_mode(tmp_path):
 def test_modes_have_the_numbers_of_the_table(tmp_path, monkeypatch):
     import xarray as xr
 
-    from femgear.trains.drivetrain import figures
+    from femgear.trains.drivetrain import pictures
     from femgear.trains.drivetrain.checks import case_model
 
     model, drawn = case_model(read_case(CASE)), []
-    monkeypatch.setattr(figures, "drivetrain_pictures", lambda views, _: drawn.extend(views))
+    monkeypatch.setattr(pictures, "drivetrain_pictures", lambda views, _: drawn.extend(views))
     kinds, hertz = ["rigid", "bending", "torsional"], [0.0, 5.0, 7.0]
     shapes = np.eye(len(model.rigid))[:, :3]
     data = {"kind": ("mode", kinds), "frequency": ("mode", hertz), "shape": (("dof", "mode"), shapes)}

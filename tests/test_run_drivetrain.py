@@ -289,8 +289,6 @@ def test_a_shaft_without_gears_has_no_spectrum(own, tmp_path):
     assert (speed[-1] - speed[0]).mean() == pytest.approx(2.0, rel=0.05)
     with pytest.raises(CaseError, match="no gears"):
         stages_of(parse_case(text), "spectrum")
-    with pytest.raises(CaseError, match=r"E-SPECTRUM.*no gears"):
-        solve_spectrum(parse_case(text), solve_transient_run(parse_case(text)))
 
 
 def test_command_line(tmp_path, capsys, own):

@@ -95,7 +95,7 @@ def transient(
             "speed": (("variant", "time", "body"), np.full((1, 3, 1), 10.0)),
         },
         {"variant": ["with bending"], "mesh": ["a-b"], "body": ["a"]},
-        {"steps": 40_000, "step": 5e-5, "every": 1, "contact": contact},
+        {"steps": 40_000, "step": 5e-5, "every": 1, "contact": contact, "damping_ratio": 0.02},
     )  # fmt: skip
 
 

@@ -14,13 +14,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from femgear.trains.drivetrain.data import (
-    ChainBearing,
-    ChainBody,
-    ChainShaft,
+    BearingSection,
+    BodySection,
     Drivetrain,
-    MeshWave,
-    ParallelStage,
-    PlanetaryStage,
+    MeshSection,
+    ParallelSection,
+    PlanetarySection,
+    ShaftSection,
 )
 
 RPM = math.pi / 30.0
@@ -136,32 +136,68 @@ def wind_turbine_drivetrain(assumed: Assumed = ASSUMED, *, gravity: float = 9.80
 
     def wheel(name, inertia, radius, *, tilts=True):
         # a flat disc: mass 2 I / r^2, half the polar inertia about a diameter
-        return ChainBody(name, 2.0 * inertia / radius**2, inertia, 0.5 * inertia, tilts)
+        return BodySection.in_si(
+            name=name,
+            mass=2.0 * inertia / radius**2,
+            inertia=inertia,
+            transverse_inertia=0.5 * inertia,
+            tilts=tilts,
+        )
 
     def mesh(stiffness, ratio, phase=0.0):
-        return MeshWave(stiffness, ratio, phase=phase, backlash=a.backlash)
+        return MeshSection.in_si(stiffness=stiffness, contact_ratio=ratio, phase=phase, backlash=a.backlash)
 
     def shaft(first, second, name, springs):
-        return ChainShaft(first, second, length[name], *springs, shear_ratio=a.shear_ratio)
+        bending, torsion = springs
+        return ShaftSection.in_si(
+            between=(first, second),
+            length=length[name],
+            bending=bending,
+            torsion=torsion,
+            shear_ratio=a.shear_ratio,
+        )
+
+    def stage(first, second, radii, teeth, wave, direction):
+        # the second gear has the whole number of teeth nearest to the ratio of the radii
+        return ParallelSection.in_si(
+            between=(first, second),
+            teeth=(teeth, round(teeth * radii[1] / radii[0])),
+            radii=radii,
+            mesh=wave,
+            pressure_angle=p.pressure_angle,
+            direction=direction,
+        )
 
     bodies = (
         # a rotor of three blades or more has half its polar inertia about a diameter
-        ChainBody("rotor", a.rotor_mass, p.rotor, 0.5 * p.rotor),
+        BodySection.in_si(name="rotor", mass=a.rotor_mass, inertia=p.rotor, transverse_inertia=0.5 * p.rotor),
         wheel("carrier", p.carrier, p.carrier_radius),
         wheel("sun", p.sun, p.sun_radius),
         wheel("gear 1", p.gear_1, p.gear_1_radius),
         wheel("gear 2", p.gear_2, p.gear_2_radii[1], tilts=False),
         wheel("gear 3", p.gear_3, p.gear_3_radius),
-        ChainBody("generator", a.generator_mass, p.generator, a.generator_transverse),
+        BodySection.in_si(
+            name="generator",
+            mass=a.generator_mass,
+            inertia=p.generator,
+            transverse_inertia=a.generator_transverse,
+        ),
     )
-    planets = PlanetaryStage(
-        "carrier", "sun", p.sun_radius, p.planet_radius, a.ring_teeth, a.sun_teeth,
-        2.0 * p.planet / p.planet_radius**2, p.planet, 0.5 * p.planet,
-        mesh(p.planetary_mesh, a.planetary_contact_ratio),
-        mesh(p.planetary_mesh, a.ring_contact_ratio, a.ring_phase), pressure_angle=p.pressure_angle,
-    )  # fmt: skip
-    angle = {"pressure_angle": p.pressure_angle}
-    r2, r22 = p.gear_2_radii
+    planets = PlanetarySection.in_si(
+        carrier="carrier",
+        sun="sun",
+        sun_radius=p.sun_radius,
+        planet_radius=p.planet_radius,
+        ring_teeth=a.ring_teeth,
+        sun_teeth=a.sun_teeth,
+        planet_mass=2.0 * p.planet / p.planet_radius**2,
+        planet_inertia=p.planet,
+        planet_transverse_inertia=0.5 * p.planet,
+        sun_mesh=mesh(p.planetary_mesh, a.planetary_contact_ratio),
+        ring_mesh=mesh(p.planetary_mesh, a.ring_contact_ratio, a.ring_phase),
+        pressure_angle=p.pressure_angle,
+    )
+    small, large = p.gear_2_radii
     return Drivetrain(
         bodies,
         (
@@ -170,28 +206,36 @@ def wind_turbine_drivetrain(assumed: Assumed = ASSUMED, *, gravity: float = 9.80
             shaft("gear 3", "generator", "high", p.high_speed),
         ),
         (
-            ParallelStage(
-                "gear 1", "gear 2", p.gear_1_radius, r2, a.gear_1_teeth,
-                mesh(p.mesh_12, a.contact_ratio_12), direction=a.direction_12, **angle,
+            stage(
+                "gear 1",
+                "gear 2",
+                (p.gear_1_radius, small),
+                a.gear_1_teeth,
+                mesh(p.mesh_12, a.contact_ratio_12),
+                a.direction_12,
             ),
-            ParallelStage(
-                "gear 2", "gear 3", r22, p.gear_3_radius, a.gear_2_teeth,
-                mesh(p.mesh_23, a.contact_ratio_23), direction=a.direction_23, **angle,
+            stage(
+                "gear 2",
+                "gear 3",
+                (large, p.gear_3_radius),
+                a.gear_2_teeth,
+                mesh(p.mesh_23, a.contact_ratio_23),
+                a.direction_23,
             ),
         ),
         (planets,),
         (
-            ChainBearing("rotor", a.rotor_bearing, a.rotor_tilt),
-            ChainBearing("carrier", a.carrier_bearing, a.tilt_bearing),
-            ChainBearing("sun", a.sun_bearing),
-            ChainBearing("gear 1", a.gear_bearing, a.tilt_bearing),
-            ChainBearing("gear 2", a.gear_bearing),
-            ChainBearing("gear 3", a.gear_bearing, a.tilt_bearing),
-            ChainBearing("generator", a.generator_bearing, a.tilt_bearing),
+            BearingSection.in_si(body="rotor", radial=a.rotor_bearing, tilt=a.rotor_tilt),
+            BearingSection.in_si(body="carrier", radial=a.carrier_bearing, tilt=a.tilt_bearing),
+            BearingSection.in_si(body="sun", radial=a.sun_bearing),
+            BearingSection.in_si(body="gear 1", radial=a.gear_bearing, tilt=a.tilt_bearing),
+            BearingSection.in_si(body="gear 2", radial=a.gear_bearing),
+            BearingSection.in_si(body="gear 3", radial=a.gear_bearing, tilt=a.tilt_bearing),
+            BearingSection.in_si(body="generator", radial=a.generator_bearing, tilt=a.tilt_bearing),
         ),
         gravity,
         a.damping_ratio,
-    )  # fmt: skip
+    )
 
 
 def paper_torques(*, balanced: bool = False) -> dict[str, float]:

@@ -19,36 +19,34 @@ from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.assembler import gear_set_system
 from femgear.system.fourier import FourierSeries
-from femgear.system.shaft import ShaftSection
 from femgear.trains.drivetrain.data import (
-    ChainBearing,
-    ChainBody,
-    ChainShaft,
+    BearingSection,
+    BodySection,
     Drivetrain,
-    MeshWave,
-    ParallelStage,
-    PlanetaryStage,
+    MeshSection,
+    ShaftSection,
 )
+from femgear.trains.drivetrain.geometry import planar_of
 from femgear.trains.drivetrain.model import (
     drivetrain_model,
-    planar_of,
     rectangular_series,
-    stiffness_levels,
     torsional_model,
 )
-from femgear.trains.drivetrain.stages import averaged_spectrum
 from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
-SHORT_CUT = ChainShaft("rotor", "generator", 3.0, 1e6, 1e6)
+SHORT_CUT = ShaftSection.in_si(between=("rotor", "generator"), length=3.0, bending=1e6, torsion=1e6)
 
 
 def gear_set(**changes):
     """One planetary stage alone, in bearings."""
-    stage = replace(TRAIN.planetary[0], **changes)
+    stage = TRAIN.planetary[0].changed(**changes)
     bodies = tuple(b for b in TRAIN.bodies if b.name in ("carrier", "sun"))
-    bodies = tuple(replace(b, tilts=False) for b in bodies)
-    bearings = (ChainBearing("carrier", 2e8), ChainBearing("sun", 3e7))
+    bodies = tuple(b.changed(tilts=False) for b in bodies)
+    bearings = (
+        BearingSection.in_si(body="carrier", radial=2e8),
+        BearingSection.in_si(body="sun", radial=3e7),
+    )
     return Drivetrain(bodies, planetary=(stage,), bearings=bearings, gravity=0.0)
 
 
@@ -60,9 +58,15 @@ def test_36_coordinates_by_body():
         body = "planets" if body.startswith("planet ") else body
         count[body] = count.get(body, 0) + 1
     assert count == {
-        "rotor": 5, "carrier": 5, "planets": 3, "sun": 5, "gear 1": 5, "gear 2": 3, "gear 3": 5,
+        "rotor": 5,
+        "carrier": 5,
+        "planets": 3,
+        "sun": 5,
+        "gear 1": 5,
+        "gear 2": 3,
+        "gear 3": 5,
         "generator": 5,
-    }  # fmt: skip
+    }
     # one free spin, and it strains nothing
     modes = solve_modes(model.still, model.mean_stiffness)
     assert np.count_nonzero(modes.frequency < 1e-6) == 1
@@ -100,8 +104,8 @@ def test_teeth_and_mesh_lines():
 
 def test_rectangular_stiffness_against_its_closed_form():
     """Contact ratio 1.635, stiffness 1 or 0.65: mean 0.87225 and harmonics of the rectangle."""
-    wave = MeshWave(0.87225, 1.635, low_share=0.65)
-    assert stiffness_levels(wave)[:2] == pytest.approx((0.65, 1.0), rel=1e-12)
+    wave = MeshSection.in_si(stiffness=0.87225, contact_ratio=1.635, low_share=0.65)
+    assert wave.levels[:2] == pytest.approx((0.65, 1.0), rel=1e-12)
     lines = rectangular_series(wave, 15)
     wanted = (0.87225, 0.2030760713, -0.0835687122, -0.0218390532, 0.0552649850)
     assert np.abs(lines[:5] - wanted).max() < 1e-8
@@ -111,20 +115,20 @@ def test_rectangular_stiffness_against_its_closed_form():
     waves = np.exp(-2j * np.pi * h[:, None] * edges) / (-2j * np.pi * h[:, None])
     integral = 2.0 * (np.diff(waves, axis=1) @ np.array([0.65, 1.0, 0.65]))
     assert np.abs(lines[1:] - integral).max() < 1e-12
-    ahead = rectangular_series(replace(wave, phase=0.2), 15)
+    ahead = rectangular_series(wave.changed(phase=0.2), 15)
     assert np.abs(ahead[1:] - lines[1:] * np.exp(2j * np.pi * h * 0.2)).max() < 1e-14
 
 
 def gibbs_overshoot(wave, harmonics):
     """Largest overshoot of the cut series beyond the upper stiffness, over the jump, on a fine grid."""
-    low, high, _ = stiffness_levels(wave)
+    low, high, _ = wave.levels
     phase = np.linspace(0.0, 2.0 * np.pi, 400 * harmonics + 1)[:, None]
     return (FourierSeries(rectangular_series(wave, harmonics)).at(phase).max() - high) / (high - low)
 
 
 def test_gibbs_overshoot_of_a_long_series():
     """Si(pi) / pi - 1 / 2 of the jump, for a single edge far from the next; J. W. Gibbs, Nature 59, 1899."""
-    wave = MeshWave(1.0, 1.5)
+    wave = MeshSection.in_si(stiffness=1.0, contact_ratio=1.5)
     assert gibbs_overshoot(wave, 15) == pytest.approx(0.0895, abs=0.006)
     assert gibbs_overshoot(wave, 101) == pytest.approx(0.08949, abs=5e-4)
 
@@ -141,7 +145,10 @@ def test_stiff_bearings_tend_to_the_torsional_model():
     M, K, W, _ = torsional_matrices(TRAIN)
     errors = []
     for stiff in (1e13, 1e14):
-        bearings = tuple(ChainBearing(b.name, stiff, stiff if b.tilts else 0.0) for b in TRAIN.bodies)
+        bearings = tuple(
+            BearingSection.in_si(body=b.name, radial=stiff, tilt=stiff if b.tilts else 0.0)
+            for b in TRAIN.bodies
+        )
         model = drivetrain_model(replace(TRAIN, bearings=bearings, damping_ratio=0.0))
         k, system = model.mean_stiffness, model.system
         wanted = eigh(K + (W * k) @ W.T, M, eigvals_only=True)[1:]
@@ -190,9 +197,15 @@ def test_turning_directions_against_the_carrier_frame():
     start[model.index("sun: x")] = 1e-5
     times = np.linspace(0.0, 0.05, 101)
     run = march_drivetrain(
-        model, (), duration=0.05, step=2.5e-6, records=Records(200), speed=speed,
-        start=(start, 0.0 * start), outputs=("sun: x", "sun: y", "carrier: x"),
-    )  # fmt: skip
+        model,
+        (),
+        duration=0.05,
+        step=2.5e-6,
+        records=Records(200),
+        speed=speed,
+        start=(start, 0.0 * start),
+        outputs=("sun: x", "sun: y", "carrier: x"),
+    )
     from scipy.linalg import expm
 
     n = len(system.M)
@@ -215,40 +228,60 @@ def test_turning_directions_against_the_carrier_frame():
 
 
 def test_beam_shafts_tend_to_the_joint_of_springs():
-    section = ShaftSection(0.16, 0.05, density=0.0)
-    ends = (ChainBody("one", 40.0, 0.5, 0.3), ChainBody("two", 60.0, 0.9, 0.5))
-    bearings = (ChainBearing("one", 1e7, 1e5), ChainBearing("two", 2e7, 1e5))
+    section = {"outer_diameter": 0.16, "inner_diameter": 0.05, "density": 0.0}
+    ends = (
+        BodySection.in_si(name="one", mass=40.0, inertia=0.5, transverse_inertia=0.3),
+        BodySection.in_si(name="two", mass=60.0, inertia=0.9, transverse_inertia=0.5),
+    )
+    bearings = (
+        BearingSection.in_si(body="one", radial=1e7, tilt=1e5),
+        BearingSection.in_si(body="two", radial=2e7, tilt=1e5),
+    )
     joint = drivetrain_model(
-        Drivetrain(ends, (ChainShaft("one", "two", 0.6, section=section),), (), (), bearings)
+        Drivetrain(
+            ends, (ShaftSection.in_si(between=("one", "two"), length=0.6, **section),), (), (), bearings
+        )
     )
     beam = drivetrain_model(
-        Drivetrain(ends, (ChainShaft("one", "two", 0.6, section=section, elements=1),), (), (), bearings)
+        Drivetrain(
+            ends,
+            (ShaftSection.in_si(between=("one", "two"), length=0.6, elements=1, **section),),
+            (),
+            (),
+            bearings,
+        )
     )
     assert np.abs(joint.system.K - beam.system.K).max() < 1e-9 * np.abs(joint.system.K).max()
-    heavy = replace(section, density=7850.0)
-    train = Drivetrain(ends, (ChainShaft("one", "two", 0.6, section=heavy, elements=8),), (), (), bearings)
+    heavy = section | {"density": 7850.0}
+    train = Drivetrain(
+        ends,
+        (ShaftSection.in_si(between=("one", "two"), length=0.6, elements=8, **heavy),),
+        (),
+        (),
+        bearings,
+    )
     K = drivetrain_model(train).system.K
     assert len(K) == 10 + 35 and np.abs(K - K.T).max() == 0.0
 
 
 def test_rigid_joints_leave_fewer_coordinates():
-    shafts = tuple(replace(s, bending=math.inf, torsion=math.inf, shear=math.inf) for s in TRAIN.shafts)
+    shafts = tuple(s.changed(bending=math.inf, torsion=math.inf, shear=math.inf) for s in TRAIN.shafts)
     rigid = drivetrain_model(replace(TRAIN, shafts=shafts, damping_ratio=0.0))
     assert len(rigid.rigid) == 36 - 15
-    stiff = tuple(replace(s, bending=1e11, torsion=1e11, shear=1e12) for s in TRAIN.shafts)
+    stiff = tuple(s.changed(bending=1e11, torsion=1e11, shear=1e12) for s in TRAIN.shafts)
     near = drivetrain_model(replace(TRAIN, shafts=stiff, damping_ratio=0.0))
     ours, wanted = (solve_modes(m.still, m.mean_stiffness).frequency[1:13] for m in (rigid, near))
     assert ours == pytest.approx(wanted, rel=5e-3)
 
 
 def test_spherical_joint_of_the_paper_ties_displacements_only():
-    shafts = tuple(replace(s, shear=math.inf) for s in TRAIN.shafts)
+    shafts = tuple(s.changed(shear=math.inf) for s in TRAIN.shafts)
     assert len(drivetrain_model(replace(TRAIN, shafts=shafts)).rigid) == 36 - 6
 
 
 def test_tilted_and_helical_mesh_by_virtual_work():
     """Force and moments of a mesh from its point and normal: power balance of every rigid motion."""
-    stage = replace(TRAIN.parallel[0], helix_angle=0.3, first_offset=0.05, second_offset=-0.02, direction=0.7)
+    stage = TRAIN.parallel[0].changed(helix_angle=0.3, direction=0.7, offsets=(0.05, -0.02))
     model = drivetrain_model(replace(TRAIN, parallel=(stage, TRAIN.parallel[1]), damping_ratio=0.0))
     w = model.system.W[:, model.meshes.index("gear 1-gear 2")]
     part = {a: w[model.index(f"gear 1: {a}")] for a in ("x", "y", "tilt x", "tilt y", "rotation")}
@@ -265,42 +298,22 @@ def test_tilted_and_helical_mesh_by_virtual_work():
     )
 
 
-# inside a shaft that has no elements
-NOWHERE = ChainBearing("rotor", 1e8, other="carrier", station=1)
-
-
 @pytest.mark.parametrize(
     ("make", "code"),
     [
-        (lambda: ChainBody("a", -1.0, 1.0), "E-DRIVETRAIN"),
-        (lambda: ChainBody("a", 1.0, 1.0), "E-DRIVETRAIN"),
-        (lambda: ChainShaft("a", "b", 1.0), "E-DRIVETRAIN"),
-        (lambda: ChainShaft("a", "b", 1.0, -1.0, 1.0), "E-DRIVETRAIN"),
-        (lambda: MeshWave(1e8, 0.9), "E-DRIVETRAIN"),
-        (lambda: MeshWave(math.nan, 1.5), "E-DRIVETRAIN"),
-        (lambda: MeshWave(1e8, 1.5, low_share=0.0), "E-DRIVETRAIN"),
-        (lambda: ChainBearing("a", math.inf, offset=0.1), "E-DRIVETRAIN"),
-        (lambda: replace(TRAIN, shafts=TRAIN.shafts[1:]), "E-DRIVETRAIN"),
-        (lambda: replace(TRAIN, bearings=(ChainBearing("b", 1.0),)), "E-DRIVETRAIN"),
-        (lambda: drivetrain_model(replace(TRAIN, bearings=(NOWHERE,))), "E-DRIVETRAIN"),
-        (lambda: replace(TRAIN, bodies=TRAIN.bodies + TRAIN.bodies[:1]), "E-DRIVETRAIN"),
-        (lambda: replace(TRAIN.planetary[0], sun_radius=0.0), "E-DRIVETRAIN"),
-        (lambda: gear_set(planet_angles=(0.0, 7.0)), "E-DRIVETRAIN"),
+        (lambda: drivetrain_model(replace(TRAIN, shafts=TRAIN.shafts[1:])), "E-DRIVETRAIN"),
         (lambda: drivetrain_model(gear_set(planet_angles=(0.0, 2.0, 4.0))), "E-TURNING"),
         (lambda: drivetrain_model(gear_set(planet_bearing=1e8)), "E-TURNING"),
         (lambda: drivetrain_model(replace(TRAIN, shafts=(*TRAIN.shafts, SHORT_CUT))), "E-DRIVETRAIN"),
         (lambda: march_drivetrain(drivetrain_model(TRAIN), (), duration=1.0, step=2.0, speed=0.6), "E-RANGE"),
-        (lambda: averaged_spectrum(np.zeros(100), 1e-3, resolution=1.0), "E-SPECTRUM"),
     ],
-)  # fmt: skip
+)
 def test_refusals(make, code):
     with pytest.raises(CaseError, match=code):
         make()
 
 
-def test_planetary_stage_is_a_plain_dataclass():
-    """Every entry maps on a case file: numbers, names, one list of angles."""
-    for data in (TRAIN.bodies[0], TRAIN.shafts[0], TRAIN.parallel[0], TRAIN.bearings[0], TRAIN.planetary[0]):
-        for value in vars(data).values():
-            assert value is None or isinstance(value, str | float | int | bool | MeshWave | tuple)
-    assert isinstance(TRAIN.parallel[0], ParallelStage) and isinstance(TRAIN.planetary[0], PlanetaryStage)
+def test_parts_made_in_python_have_all_their_entries_and_no_others():
+    assert TRAIN.bodies[0].changed(mass=1.0).mass == 1.0 and TRAIN.bodies[0].mass > 1.0
+    with pytest.raises(TypeError, match="missing or unknown inertia, weight"):
+        BodySection.in_si(name="a", mass=1.0, weight=9.8)

@@ -9,11 +9,11 @@ from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivet
 
 from femgear.solvers.time.transient import solve_transient
 from femgear.trains.drivetrain.data import (
-    ChainBearing,
-    ChainBody,
+    BearingSection,
+    BodySection,
     Drivetrain,
-    MeshWave,
-    ParallelStage,
+    MeshSection,
+    ParallelSection,
     TorqueHistory,
     constant_torques,
 )
@@ -32,12 +32,23 @@ K, SOFT, STIFF = 3e8, 2e7, 1e8
 
 def pair(*, backlash, direction=0.0, gravity=0.0, helix=0.0, offset=0.0, damping=0.0):
     """A pinion in soft bearings and a wheel."""
-    bodies = ChainBody("pinion", 400.0, 0.25, 1.0), ChainBody("wheel", 160.0, 18.0, 10.0)
-    stage = ParallelStage(
-        "pinion", "wheel", RADIUS, 0.1065, 23, MeshWave(K, 1.5, 0.8, 0.0, backlash), helix_angle=helix,
-        direction=direction, first_offset=offset,
-    )  # fmt: skip
-    bearings = ChainBearing("pinion", SOFT, 1e6), ChainBearing("wheel", STIFF, 1e6)
+    bodies = (
+        BodySection.in_si(name="pinion", mass=400.0, inertia=0.25, transverse_inertia=1.0),
+        BodySection.in_si(name="wheel", mass=160.0, inertia=18.0, transverse_inertia=10.0),
+    )
+    stage = ParallelSection.in_si(
+        between=("pinion", "wheel"),
+        teeth=(23, 23),
+        radii=(RADIUS, 0.1065),
+        mesh=MeshSection.in_si(stiffness=K, contact_ratio=1.5, low_share=0.8, phase=0.0, backlash=backlash),
+        helix_angle=helix,
+        direction=direction,
+        offsets=(offset, 0.0),
+    )
+    bearings = (
+        BearingSection.in_si(body="pinion", radial=SOFT, tilt=1e6),
+        BearingSection.in_si(body="wheel", radial=STIFF, tilt=1e6),
+    )
     train = Drivetrain(bodies, parallel=(stage,), bearings=bearings, gravity=gravity, damping_ratio=damping)
     return drivetrain_model(train, harmonics=0)
 
@@ -45,18 +56,18 @@ def pair(*, backlash, direction=0.0, gravity=0.0, helix=0.0, offset=0.0, damping
 def other_drivers(train):
     return replace(
         train,
-        planetary=tuple(replace(one, driver=one.sun) for one in train.planetary),
-        parallel=tuple(replace(one, driver=one.second) for one in train.parallel),
+        planetary=tuple(one.changed(driver=one.sun) for one in train.planetary),
+        parallel=tuple(one.changed(driver=one.between[1]) for one in train.parallel),
     )
 
 
 def helical(train):
-    parallel = tuple(replace(one, helix_angle=0.2, first_offset=0.03) for one in train.parallel)
+    parallel = tuple(one.changed(helix_angle=0.2, offsets=(0.03, 0.0)) for one in train.parallel)
     return replace(train, parallel=parallel, damping_ratio=0.0)
 
 
 def on_elastic_pins(train):
-    return replace(train, planetary=(replace(train.planetary[0], planet_bearing=1e9),))
+    return replace(train, planetary=(train.planetary[0].changed(planet_bearing=1e9),))
 
 
 @pytest.mark.parametrize(
@@ -103,7 +114,7 @@ def test_held_axes_mirror_the_rotation_only():
 
 
 def test_no_back_flank_without_backlash():
-    stage = replace(TRAIN.parallel[0], mesh=replace(TRAIN.parallel[0].mesh, backlash=math.inf))
+    stage = TRAIN.parallel[0].changed(mesh=TRAIN.parallel[0].mesh.changed(backlash=math.inf))
     model = drivetrain_model(replace(TRAIN, parallel=(stage, TRAIN.parallel[1])))
     assert model.contacts.mesh.tolist() == [*range(8), 0, 1, 2, 3, 4, 5, 7]
     assert np.all(model.contacts.gap[8:] == np.delete(model.backlash, 6))
@@ -120,9 +131,14 @@ def test_teeth_wedge_under_a_radial_load(torque):
     backlash, a = 2e-5, 20.0
     model = pair(backlash=backlash, direction=-0.5 * math.pi, gravity=a)
     run = march_drivetrain(
-        model, constant_torques(balanced_torque(model, "pinion", torque, "wheel")), duration=0.01, step=1e-5,
-        speed=20.0, outputs=model.system.dofs, contact_loss=True,
-    )  # fmt: skip
+        model,
+        constant_torques(balanced_torque(model, "pinion", torque, "wheel")),
+        duration=0.01,
+        step=1e-5,
+        speed=20.0,
+        outputs=model.system.dofs,
+        contact_loss=True,
+    )
     s = math.sin(ALPHA)
     way = a * (400.0 / SOFT - 160.0 / STIFF)
     total = (2.0 * K * s * way - K * backlash) / (1.0 + 2.0 * K * s**2 * (1.0 / SOFT + 1.0 / STIFF))
@@ -144,9 +160,14 @@ def test_back_flanks_push_the_gears_apart():
     model, load = pair(backlash=1e-5), 60.0
     for sign in (1.0, -1.0):
         run = march_drivetrain(
-            model, constant_torques(balanced_torque(model, "pinion", sign * load, "wheel")), duration=0.01,
-            step=1e-5, speed=20.0, outputs=("pinion: x", "pinion: y", "wheel: x"), contact_loss=True,
-        )  # fmt: skip
+            model,
+            constant_torques(balanced_torque(model, "pinion", sign * load, "wheel")),
+            duration=0.01,
+            step=1e-5,
+            speed=20.0,
+            outputs=("pinion: x", "pinion: y", "wheel: x"),
+            contact_loss=True,
+        )
         push = load / RADIUS
         wanted = [-push * math.tan(ALPHA) / SOFT, -sign * push / SOFT, push * math.tan(ALPHA) / STIFF]
         assert run.motion[-1] == pytest.approx(wanted, rel=1e-6)
@@ -158,9 +179,14 @@ def test_reversed_torque_against_an_adaptive_integrator():
     model = pair(backlash=1e-5, helix=0.2, offset=0.05, damping=0.02)
     there, back = (balanced_torque(model, "pinion", sign * 60.0, "wheel") for sign in (1.0, -1.0))
     held = march_drivetrain(
-        model, constant_torques(there), duration=1e-5, step=1e-5, speed=20.0, outputs=model.system.dofs,
+        model,
+        constant_torques(there),
+        duration=1e-5,
+        step=1e-5,
+        speed=20.0,
+        outputs=model.system.dofs,
         contact_loss=True,
-    )  # fmt: skip
+    )
     start = held.motion[0], np.zeros(len(model.rigid))
     runs = [
         march_drivetrain(

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from published.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
 
-from femgear.system.shaft import ShaftSection
-from femgear.trains.drivetrain.data import ChainBearing, ChainBody, ChainShaft, Drivetrain
-from femgear.trains.drivetrain.figures import beam_shape, drivetrain_layout, layout_motion, shaft_lines
+from femgear.trains.drivetrain.data import BearingSection, BodySection, Drivetrain, ShaftSection
 from femgear.trains.drivetrain.model import drivetrain_model
+from femgear.trains.drivetrain.pictures import beam_shape, drivetrain_layout, layout_motion, shaft_lines
 
 TRAIN = wind_turbine_drivetrain()
 MODEL, LAYOUT = drivetrain_model(TRAIN), drivetrain_layout(TRAIN)
@@ -53,15 +52,18 @@ def test_tilting_carrier_takes_the_planets_along():
         assert move[at] == pytest.approx([0.0, 0.0, arm[1]]) and turn[at, 0] == 1.0
 
 
-SECTION, LENGTH, ELEMENTS = ShaftSection(0.07), 0.6, 3
+DIAMETER, LENGTH, ELEMENTS = 0.07, 0.6, 3
 
 
 def shaft_of(**options):
     """Two bodies on a shaft, and its layout."""
     train = Drivetrain(
-        (ChainBody("a", 1.0, 1.0, 1.0), ChainBody("b", 1.0, 1.0, 1.0)),
-        shafts=(ChainShaft("a", "b", LENGTH, **options),),
-        bearings=tuple(ChainBearing(name, 1e8, 1e6) for name in "ab"),
+        (
+            BodySection.in_si(name="a", mass=1.0, inertia=1.0, transverse_inertia=1.0),
+            BodySection.in_si(name="b", mass=1.0, inertia=1.0, transverse_inertia=1.0),
+        ),
+        shafts=(ShaftSection.in_si(between=("a", "b"), length=LENGTH, **options),),
+        bearings=tuple(BearingSection.in_si(body=name, radial=1e8, tilt=1e6) for name in "ab"),
     )
     return drivetrain_model(train), drivetrain_layout(train)
 
@@ -98,7 +100,7 @@ def test_beam_between_stations_is_a_cantilever(shear_ratio):
 
 
 def test_beams_bend_through_their_stations():
-    model, layout = shaft_of(section=SECTION, elements=ELEMENTS)
+    model, layout = shaft_of(outer_diameter=DIAMETER, elements=ELEMENTS)
     # pure bending: a parabola, which a joint in the middle does not have
     z, x = moved(model, layout, lambda z: 0.5 * z**2, lambda z: z)
     assert len(z) > 4 * ELEMENTS and z[-1] == pytest.approx(LENGTH)
@@ -110,7 +112,7 @@ def test_beams_bend_through_their_stations():
 @pytest.mark.parametrize(
     "options",
     [
-        {"section": SECTION},
+        {"outer_diameter": DIAMETER},
         {"bending": 2e5, "torsion": 1e5, "shear_ratio": 0.7},
         {"bending": 2e5, "torsion": 1e5, "shear": np.inf},
         {"bending": 2e5, "torsion": 1e5, "shear": 1e4},

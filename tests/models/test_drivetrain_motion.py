@@ -11,7 +11,7 @@ from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbi
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import FourierSeries, distinct_lines
-from femgear.trains.drivetrain.data import ChainBearing, Drivetrain, TorqueHistory, constant_torques
+from femgear.trains.drivetrain.data import BearingSection, Drivetrain, TorqueHistory, constant_torques
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
@@ -26,10 +26,13 @@ TRAIN = wind_turbine_drivetrain()
 
 def gear_set(**changes):
     """One planetary stage alone, in bearings."""
-    stage = replace(TRAIN.planetary[0], **changes)
+    stage = TRAIN.planetary[0].changed(**changes)
     bodies = tuple(b for b in TRAIN.bodies if b.name in ("carrier", "sun"))
-    bodies = tuple(replace(b, tilts=False) for b in bodies)
-    bearings = (ChainBearing("carrier", 2e8), ChainBearing("sun", 3e7))
+    bodies = tuple(b.changed(tilts=False) for b in bodies)
+    bearings = (
+        BearingSection.in_si(body="carrier", radial=2e8),
+        BearingSection.in_si(body="sun", radial=3e7),
+    )
     return Drivetrain(bodies, planetary=(stage,), bearings=bearings, gravity=0.0)
 
 

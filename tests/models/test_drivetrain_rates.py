@@ -16,11 +16,11 @@ from femgear.trains.drivetrain.checks import (
     speed_range,
 )
 from femgear.trains.drivetrain.data import (
-    ChainBearing,
-    ChainBody,
+    BearingSection,
+    BodySection,
     Drivetrain,
-    MeshWave,
-    ParallelStage,
+    MeshSection,
+    ParallelSection,
     TorqueHistory,
     constant_torques,
 )
@@ -111,9 +111,22 @@ def test_records_keep_the_third_harmonic(rate, highest):
 def held_pair(stiffness=2e8):
     """Two wheels on held axes, one mesh, one elastic coordinate of known frequency."""
     train = Drivetrain(
-        (ChainBody("a", 10.0, 0.2, tilts=False), ChainBody("b", 20.0, 0.9, tilts=False)),
-        parallel=(ParallelStage("a", "b", 0.05, 0.1, 20, MeshWave(stiffness, 1.5)),),
-        bearings=(ChainBearing("a", np.inf), ChainBearing("b", np.inf)),
+        (
+            BodySection.in_si(name="a", mass=10.0, inertia=0.2, tilts=False),
+            BodySection.in_si(name="b", mass=20.0, inertia=0.9, tilts=False),
+        ),
+        parallel=(
+            ParallelSection.in_si(
+                between=("a", "b"),
+                teeth=(20, 20),
+                radii=(0.05, 0.1),
+                mesh=MeshSection.in_si(stiffness=stiffness, contact_ratio=1.5),
+            ),
+        ),
+        bearings=(
+            BearingSection.in_si(body="a", radial=np.inf),
+            BearingSection.in_si(body="b", radial=np.inf),
+        ),
     )
     base = np.array([0.05, 0.1]) * np.cos(np.radians(20.0))
     return drivetrain_model(train), np.sqrt(stiffness * np.sum(base**2 / [0.2, 0.9])) / (2.0 * np.pi)

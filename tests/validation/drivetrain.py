@@ -20,17 +20,17 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.system.assembler import gear_set_system
 from femgear.system.shaft import ShaftSection
 from femgear.trains.drivetrain.data import (
-    ChainBearing,
-    ChainBody,
+    BearingSection,
+    BodySection,
     Drivetrain,
-    MeshWave,
-    ParallelStage,
+    MeshSection,
+    ParallelSection,
     constant_torques,
 )
+from femgear.trains.drivetrain.geometry import planar_of
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
-    planar_of,
     rectangular_series,
     torsional_model,
 )
@@ -157,7 +157,9 @@ def base_line() -> tuple[Row, ...]:
 
 def stiffness() -> tuple[Row, ...]:
     """Rectangular mesh stiffness, contact ratio 1.635, 1 or 0.65."""
-    lines = rectangular_series(MeshWave(0.87225, 1.635, low_share=0.65), 15).real
+    lines = rectangular_series(
+        MeshSection.in_si(stiffness=0.87225, contact_ratio=1.635, low_share=0.65), 15
+    ).real
     wanted = [0.87225] + [0.7 / (math.pi * h) * math.sin(math.pi * h * 0.635) for h in range(1, 16)]
     error = np.abs(lines - wanted).max()
     return (
@@ -172,11 +174,14 @@ def reductions() -> tuple[Row, ...]:
     parts = zip((model.system.M, model.system.K, model.system.W), torsional_matrices(train)[:3])
     error = max(np.abs(ours - wanted).max() / np.abs(wanted).max() for ours, wanted in parts)
     stage = train.planetary[0]
-    bodies = tuple(replace(b, tilts=False) for b in train.bodies if b.name in ("carrier", "sun"))
+    bodies = tuple(b.changed(tilts=False) for b in train.bodies if b.name in ("carrier", "sun"))
     alone = Drivetrain(
         bodies,
         planetary=(stage,),
-        bearings=(ChainBearing("carrier", 2e8), ChainBearing("sun", 3e7)),
+        bearings=(
+            BearingSection.in_si(body="carrier", radial=2e8),
+            BearingSection.in_si(body="sun", radial=3e7),
+        ),
         gravity=0.0,
     )
     lumped = planar_of(alone, stage)
@@ -231,9 +236,17 @@ def torques() -> tuple[Row, ...]:
 
 def _pair(harmonics: int):
     """Two wheels on held axes, one mesh, and its natural frequency [rad/s]."""
-    stage = ParallelStage("a", "b", 0.05, 0.1, TEETH, MeshWave(STIFFNESS, 1.5, 0.8))
-    bodies = (ChainBody("a", 10.0, 0.2, tilts=False), ChainBody("b", 20.0, 0.9, tilts=False))
-    held = (ChainBearing("a", math.inf), ChainBearing("b", math.inf))
+    stage = ParallelSection.in_si(
+        between=("a", "b"),
+        teeth=(TEETH, TEETH),
+        radii=(0.05, 0.1),
+        mesh=MeshSection.in_si(stiffness=STIFFNESS, contact_ratio=1.5, low_share=0.8),
+    )
+    bodies = (
+        BodySection.in_si(name="a", mass=10.0, inertia=0.2, tilts=False),
+        BodySection.in_si(name="b", mass=20.0, inertia=0.9, tilts=False),
+    )
+    held = (BearingSection.in_si(body="a", radial=math.inf), BearingSection.in_si(body="b", radial=math.inf))
     model = drivetrain_model(
         Drivetrain(bodies, parallel=(stage,), bearings=held, gravity=0.0), harmonics=harmonics
     )

@@ -11,22 +11,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import linalg
 
 from femgear.case.units import FREQUENCY, SPEED, TIME
 from femgear.errors import CaseError, Finding
+from femgear.solvers.linear.modal import solve_modes
 from femgear.storage.dataset import RPM
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import ChainBearing, ChainShaft, Drivetrain, TorqueHistory
-from femgear.trains.drivetrain.model import (
-    DrivetrainModel,
-    coordinates_of,
-    drivetrain_model,
-    rigid_rotation,
-    torsional_model,
-)
+from femgear.trains.drivetrain.data import Drivetrain, TorqueHistory
+from femgear.trains.drivetrain.geometry import speed_ratios, springs_of
+from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model, torsional_model
 from femgear.trains.drivetrain.section import (
     FASTEST_RATE,
     DrivetrainCase,
@@ -65,8 +63,6 @@ LEAST_RECORDS = 64
 
 # Force of a mesh, over the sum of what the single torques would give, that is rounding.
 _NO_FORCE = 1e-6
-# Torsional stiffness that stands for a rigid shaft, over that of the stiffest mesh.
-_RIGID = 1e3
 
 
 def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
@@ -79,20 +75,22 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
     """
     build = drivetrain_model if variant == BENDING else torsional_model
     options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
-    try:
+    with _located(case):
         train = drivetrain_of(case)
         torques = torque_histories(case, speed_ratios(train))
         return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
+
+
+@contextmanager
+def _located(case: DrivetrainCase) -> Iterator[None]:
+    """Let the refusals of a model name the entries of the case file and their lines."""
+    try:
+        yield
     except CaseError as error:
-        raise _located(error, case) from None
-
-
-def _located(error: CaseError, case: DrivetrainCase) -> CaseError:
-    """The error of a model in terms of the case file."""
-    if error.code == "E-TURNING":
-        error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
-    error.file = case.location(error.key or "")
-    return error
+        if error.code == "E-TURNING":
+            error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
+        error.file = case.location(error.key or "")
+        raise
 
 
 def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
@@ -119,34 +117,18 @@ def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duratio
     Raises
     ------
     CaseError
-        A duration that is not above zero (E-RANGE), a torque on no body (E-DRIVETRAIN), stages that leave no
-        single spin (E-DRIVETRAIN).
+        A torque on no body, stages that leave no single spin (E-DRIVETRAIN).
     """
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise CaseError(f"a run of {duration} s", code="E-RANGE", key="duration", limit="above 0 s, finite")
-    stages = (*train.planetary, *train.parallel)
+    stages = train.stages
     if not torques or all(one.driver is not None for one in stages):
         return train
     force = _stage_forces(train, torques, duration)
-    found = [
-        replace(one, driver=one.ends[1]) if one.driver is None and value < 0.0 else one
+    found: list = [
+        one.changed(driver=one.ends[1]) if one.driver is None and value < 0.0 else one
         for one, value in zip(stages, force)
     ]
     planets = len(train.planetary)
     return replace(train, planetary=tuple(found[:planets]), parallel=tuple(found[planets:]))
-
-
-def speed_ratios(train: Drivetrain) -> dict[str, float]:
-    """Speed of every body over that of the first one.
-
-    Raises
-    ------
-    CaseError
-        Stages that leave no single spin (E-DRIVETRAIN).
-    """
-    place = coordinates_of(train)
-    spin = rigid_rotation(train, place)
-    return {name: float(spin[first + 4]) for name, first in place.body.items()}
 
 
 def mean_torque(history: TorqueHistory, duration: float) -> float:
@@ -158,7 +140,7 @@ def mean_torque(history: TorqueHistory, duration: float) -> float:
 
 def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration: float) -> np.ndarray:
     """Sum of the mean mesh forces of every stage [N]; zero where they are rounding."""
-    model = torsional_model(_elastic(train), harmonics=0, turning=False)
+    model = torsional_model(replace(train, damping_ratio=0.0), harmonics=0, turning=False)
     W, k, carried = model.system.W, model.mean_stiffness, model.system.M @ model.rigid
     force = np.zeros((len(k), len(torques)))
     for column, one in enumerate(torques):
@@ -166,24 +148,12 @@ def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration:
         load[model.index(f"{one.body}: rotation")] = mean_torque(one, duration)
         load -= carried * (model.rigid @ load) / model.inertia
         force[:, column] = k * (W.T @ static_deviations(model, W, k, load))
-    sums = np.zeros((len(train.planetary) + len(train.parallel), len(torques)))
+    sums = np.zeros((len(train.stages), len(torques)))
     np.add.at(sums, model.geometry.stage, force)
     total = sums.sum(axis=1)
     # the model's flanks are those of the drivers that are given
-    default = [one.flank for one in (*train.planetary, *train.parallel)]
+    default = [one.flank for one in train.stages]
     return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)
-
-
-def _elastic(train: Drivetrain) -> Drivetrain:
-    """The chain without damping, shafts that do not twist made stiff: a torque may act on either end."""
-    meshes = [one.mesh.stiffness * one.first_radius**2 for one in train.parallel]
-    meshes += [one.ring_mesh.stiffness * one.ring_radius**2 for one in train.planetary]
-    torsion = _RIGID * max(meshes, default=1.0)
-    shafts = tuple(
-        replace(one, torsion=torsion) if not one.elements and math.isinf(one.springs.torsion) else one
-        for one in train.shafts
-    )
-    return replace(train, shafts=shafts, damping_ratio=0.0)
 
 
 @dataclass(frozen=True)
@@ -247,10 +217,10 @@ def speed_range(
     return SpeedRange(*map(float, (speeds[0], speeds[-1], every.min(), every.max(), mean)))
 
 
-def case_speeds(case: DrivetrainCase, model: DrivetrainModel) -> SpeedRange:
-    """Speeds of the first body over the run, without its deviation."""
-    torques = torque_histories(case, model.ratio)
-    return speed_range(model, torques, duration=case.simulation.duration, speed=case.operation.speed)
+def case_speeds(case: DrivetrainCase, model: DrivetrainModel, *, start: float = 0.0) -> SpeedRange:
+    """Speeds of the first body from `start` [s] to the end of the run, without its deviation."""
+    torques, duration = torque_histories(case, model.ratio), case.simulation.duration
+    return speed_range(model, torques, duration=duration, speed=case.operation.speed, start=start)
 
 
 def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
@@ -288,18 +258,9 @@ def mesh_mode(model: DrivetrainModel, limit: float) -> float:
     limit : float
         The highest line of the mesh stiffness [Hz]; modes above answer it as springs do, without resonance.
     """
-    from scipy import linalg
-
-    if not len(model.meshes):
-        return 0.0
-    rows, stiffness = model.system.W, model.mean_stiffness
-    total = model.system.K + (rows * stiffness) @ rows.T
-    values, shapes = linalg.eigh(total, model.system.M)
-    # the free spin is the first
-    values, shapes = np.maximum(values[1:], 0.0), shapes[:, 1:]
-    hertz = np.sqrt(values) / (2.0 * math.pi)
-    driven = stiffness @ (rows.T @ shapes) ** 2 > MESH_SHARE * values
-    return float(hertz[driven & (hertz <= limit)].max(initial=0.0))
+    modes, stiffness = solve_modes(model.still, model.mean_stiffness), model.mean_stiffness
+    driven = stiffness @ modes.mesh_deflection**2 > MESH_SHARE * (2.0 * math.pi * modes.frequency) ** 2
+    return float(modes.frequency[driven & (modes.frequency <= limit)].max(initial=0.0))
 
 
 def frequency_shift(hertz: float, rate: float) -> float:
@@ -320,18 +281,8 @@ def shift_rate(hertz: float, share: float) -> float:
 def default_record_rate(rate: float, highest: float) -> float:
     """Records a second where none are given: few, but with the third harmonic of the highest mesh.
 
-    Parameters
-    ----------
-    rate : float
-        Steps a second [Hz].
-    highest : float
-        Highest mesh frequency of the run [Hz].
-
-    Returns
-    -------
-    float
-        The rate over the largest whole number for which the pass band of the records holds that harmonic and
-        there are 1000 a second; at most the rate.
+    The steps a second `rate` [Hz] over the largest whole number for which the pass band of the records holds
+    that harmonic of the frequency `highest` [Hz] and there are 1000 a second; at most the rate.
     """
     # a hair more, so that rounding of the speed does not push the harmonic out
     needed = max(LEAST_RECORD_RATE, 2.0 * KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
@@ -348,24 +299,24 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
         natural frequencies too far apart for double precision (E-STIFFNESS); steps that cannot follow the
         meshes (E-RATE); records that are too many (E-RANGE).
     """
-    try:
-        count, names = loose_motions(drivetrain_of(case), turning=case.simulation.turning)
-    except CaseError as error:
-        raise _located(error, case) from None
-    if count:
-        raise CaseError(
-            f"nothing holds {count} motion{'s' if count > 1 else ''}, such as {', '.join(names[:3])}",
-            code="E-MECHANISM", key="bearing", file=case.location("bearing"),
-            limit="bearings and shafts that leave the common rotation alone free",
-            remedy="add a [[bearing]] or its stiffness, or tilts = false",
-        )  # fmt: skip
-    check_spread(case, drivetrain_of(case))
-    model = case_model(case)
-    _check_stiffness(case, model)
-    _check_rate(case, model)
-    if case.simulation.record is None:
-        for problem in record_problems(case, record_rate(case, model)):
-            raise _located(problem, case)
+    with _located(case):
+        train = drivetrain_of(case)
+        count, names = loose_motions(train, turning=case.simulation.turning)
+        if count:
+            raise CaseError(
+                f"nothing holds {count} motion{'s' if count > 1 else ''}, such as {', '.join(names[:3])}",
+                code="E-MECHANISM",
+                key="bearing",
+                limit="bearings and shafts that leave the common rotation alone free",
+                remedy="add a [[bearing]] or its stiffness, or tilts = false",
+            )
+        _check_spread(train, turning=case.simulation.turning)
+        model = case_model(case)
+        _check_stiffness(case, model)
+        _check_rate(case, model)
+        if case.simulation.record is None:
+            for problem in record_problems(case, record_rate(case, model)):
+                raise problem
     return model
 
 
@@ -375,45 +326,36 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
     Raises
     ------
     CaseError
-        Records that are too few, a resolution that they do not have (E-RANGE); no meshes, or a first body
-        that nearly stops or turns back in the part that the spectra take (E-SPECTRUM).
+        Records that are too few, a resolution that they do not have (E-RANGE); a first body that nearly stops
+        or turns back in the part that the spectra take (E-SPECTRUM).
     """
-    if not len(model.meshes):
-        raise CaseError(
-            "the chain has no gears, and therefore no mesh forces",
-            code="E-SPECTRUM",
-            limit="one mesh or more",
-        )
-    for problem in _spectrum_problems(case, record_rate(case, model)):
-        raise _located(problem, case)
-    s = case.simulation
-    late = speed_range(
-        model, torque_histories(case, model.ratio), duration=s.duration, speed=case.operation.speed,
-        start=settle_time(case),
-    )  # fmt: skip
-    try:
+    with _located(case):
+        _check_records(case, record_rate(case, model))
+        late = case_speeds(case, model, start=settle_time(case))
         check_turning(late.lowest, late.mean)
-    except CaseError as error:
-        raise _located(error, case) from None
 
 
-def _spectrum_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
-    """Why the records of a run have no spectra; `record` a second [Hz]."""
+def _check_records(case: DrivetrainCase, record: float) -> None:
+    """Refuse records, so many a second [Hz], that have no spectra."""
     s = case.simulation
     late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
     if late * record < LEAST_RECORDS:
-        yield CaseError(
-            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
-            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
+        raise CaseError(
+            f"{late * record:.3g} records are too few for the spectra",
+            code="E-RANGE",
+            key=f"simulation.{key}",
+            value=TIME.show(getattr(s, key)),
             limit=f"{LEAST_RECORDS} records or more after simulation.settle",
             remedy="take a longer duration, a shorter settle or more records, or write --only transient",
-        )  # fmt: skip
-    elif s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
-        yield CaseError(
-            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
+        )
+    if s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
+        raise CaseError(
+            "the record has no such resolution",
+            code="E-RANGE",
+            key="simulation.resolution",
             value=FREQUENCY.show(s.resolution),
             limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
-        )  # fmt: skip
+        )
 
 
 def check_turning(lowest: float, mean: float) -> None:
@@ -437,16 +379,11 @@ def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
     wrong = np.flatnonzero(least <= 0.0)
     if not len(wrong):
         return
-    keys = []
-    for i, one in enumerate(model.train.planetary):
-        for which in ("sun_mesh", "ring_mesh"):
-            keys += [f"planetary[{i}].{which}.low_share"] * len(one.planet_angles)
-    keys += [f"parallel[{i}].mesh.low_share" for i in range(len(model.train.parallel))]
-    key = keys[wrong[0]]
+    key = f"{model.train.meshes[wrong[0]].key}.low_share"
     raise CaseError(
         f"the series of the stiffness of {model.meshes[wrong[0]]} falls to {least[wrong[0]]:.3g} N/m: with "
         f"{case.simulation.harmonics} terms it overshoots the jump by about 9 %",
-        code="E-STIFFNESS", key=key, file=case.location(key), limit="above 0 N/m at any time",
+        code="E-STIFFNESS", key=key, limit="above 0 N/m at any time",
         remedy="give a larger low_share",
     )  # fmt: skip
 
@@ -467,7 +404,7 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
     raise CaseError(
         f"{rate / hertz:.3g} steps a period ({FREQUENCY.show(rate)}) cannot follow the {name}, "
         f"{FREQUENCY.show(hertz)} at {SPEED.show(speeds.fastest)} of {first}",
-        code="E-RATE", key=key, value=value, file=case.location(key),
+        code="E-RATE", key=key, value=value,
         limit=f"{LEAST_STEPS} steps a period at any time: {FREQUENCY.show(LEAST_STEPS * hertz)} or more",
         remedy=remedy,
     )  # fmt: skip
@@ -483,13 +420,13 @@ def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = No
     """
     model = model or check_drivetrain(case)
     speeds = case_speeds(case, model)
-    warned = (
-        _runaway(case, speeds),
-        _rates(case, model, speeds),
-        _spectra(case, model),
-        _undamped(case),
+    return (
+        *case.notices,
+        *_runaway(case, speeds),
+        *_rates(case, model, speeds),
+        *_spectra(case, model),
+        *_undamped(case),
     )
-    return (*case.notices, *(finding for some in warned for finding in some))
 
 
 def _undamped(case: DrivetrainCase) -> Iterator[Finding]:
@@ -584,24 +521,23 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     ----------
     train : Drivetrain
     turning : bool
-        As of `drivetrain_model`.
+        As of `drivetrain_model`, whose refusals apply.
 
     Returns
     -------
     count : int
     names : tuple of str
         Coordinates of those motions, the largest first, rotations last.
-
-    Raises
-    ------
-    CaseError
-        As `drivetrain_model`.
     """
-    from scipy import linalg
-
-    model = drivetrain_model(_like_springs(train), harmonics=1, turning=turning)
-    system = model.system
-    stiffness = system.K + (system.W * model.mean_stiffness) @ system.W.T
+    model = drivetrain_model(replace(train, damping_ratio=0.0), harmonics=0, turning=turning)
+    lengths = [one.length for one in train.shafts]
+    lengths += [one.pitch_radii[0] for one in (*train.parallel, *train.planetary)]
+    arm = math.exp(np.mean(np.log(lengths))) if lengths else 1.0
+    stiffness = model.system.W @ model.system.W.T
+    for one in springs_of(train, model.place):
+        there = (one.stiffness > 0.0) & np.isfinite(one.stiffness)
+        rows = (one.rows * np.where(one.turns, arm, 1.0)[:, None])[there] @ model.free[one.places]
+        stiffness += rows.T @ rows
     own = np.diag(stiffness)
     size = np.sqrt(np.where(own > 0.0, own, 1.0))
     # the spin is known, and held
@@ -610,117 +546,54 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     count = int(np.count_nonzero(linalg.eigvalsh(scaled) < _NOT_RESISTED))
     if not count:
         return 0, ()
-    return count, _names(train, model, linalg.eigh(scaled, subset_by_index=(0, count - 1))[1])
+    moved = np.abs(linalg.eigh(scaled, subset_by_index=(0, count - 1))[1]).max(axis=1)
+    order = [i for i in np.argsort(-moved, kind="stable") if moved[i] > _MOVED * moved.max()]
+    bodies, names = {body.name for body in train.bodies}, [model.system.dofs[i] for i in order]
+    # coordinates of bodies before those of planets and shaft stations, rotations last
+    names.sort(key=lambda name: (name.endswith("rotation"), name.split(":")[0] not in bodies))
+    return count, tuple(names[:_NAMED])
 
 
-def _names(train: Drivetrain, model: DrivetrainModel, motions) -> tuple[str, ...]:
-    """Coordinates of bodies before those of planets and shaft stations, rotations last."""
-    size, bodies = np.abs(motions).max(axis=1), {body.name for body in train.bodies}
-    order = [i for i in np.argsort(-size, kind="stable") if size[i] > _MOVED * size.max()]
-    names = [model.system.dofs[i] for i in order]
-    return tuple(
-        sorted(names, key=lambda n: (n.endswith("rotation"), n.split(":")[0] not in bodies))[:_NAMED]
-    )
+def _check_spread(train: Drivetrain, *, turning: bool) -> None:
+    """Refuse slow motions that rounding hides beside the free spin (E-STIFFNESS).
 
-
-def _like_springs(train: Drivetrain) -> Drivetrain:
-    """The chain with springs that are all alike, without weight and damping."""
-    lengths = [one.length for one in train.shafts]
-    lengths += [one.first_radius for one in train.parallel] + [one.sun_radius for one in train.planetary]
-    arm = math.exp(np.mean(np.log(lengths))) if lengths else 1.0
-    return replace(
-        train,
-        shafts=tuple(_shaft(one, arm) for one in train.shafts),
-        parallel=tuple(replace(one, mesh=replace(one.mesh, stiffness=1.0)) for one in train.parallel),
-        planetary=tuple(
-            replace(
-                one,
-                sun_mesh=replace(one.sun_mesh, stiffness=1.0),
-                ring_mesh=replace(one.ring_mesh, stiffness=1.0),
-                planet_bearing=_unit(one.planet_bearing),
-            )
-            for one in train.planetary
-        ),
-        bearings=tuple(_bearing(one, arm) for one in train.bearings),
-        gravity=0.0,
-        damping_ratio=0.0,
-    )
-
-
-def _unit(stiffness: float, unit: float = 1.0) -> float:
-    """The unit in place of a spring that is there and not rigid."""
-    return stiffness if stiffness == 0.0 or math.isinf(stiffness) else unit
-
-
-def _bearing(one: ChainBearing, arm: float) -> ChainBearing:
-    return replace(
-        one, radial=_unit(one.radial), tilt=_unit(one.tilt, arm**2), torsion=_unit(one.torsion, arm**2)
-    )
-
-
-def _shaft(one: ChainShaft, arm: float) -> ChainShaft:
-    if not one.elements:
-        springs = one.springs
-        return replace(
-            one, section=None, bending=_unit(springs.bending, arm**2), torsion=_unit(springs.torsion, arm**2),
-            shear=_unit(springs.shear),
-        )  # fmt: skip
-    # a slender shaft of 12 E I / l^3 = 1 N/m
-    diameter = 0.1 * one.length
-    modulus = one.length**3 / (12.0 * math.pi * diameter**4 / 64.0)
-    assert one.section is not None  # elements need one
-    section = replace(one.section, outer_diameter=diameter, inner_diameter=0.0, young=modulus)
-    return replace(one, section=section)
-
-
-def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
-    """Refuse slow motions that rounding hides beside the free spin.
-
-    Raises
-    ------
-    CaseError
-        E-STIFFNESS, with the softest support where that is the cause, else with the fastest and the slowest
-        coordinate.
+    The softest support is named where that is the cause, else the fastest and the slowest coordinate.
     """
-    from scipy import linalg
-
-    model = drivetrain_model(replace(train, damping_ratio=0.0), turning=case.simulation.turning)
-    n, mass = len(model.rigid), model.system.M
-    stiffness = model.system.K + (model.system.W * model.mean_stiffness) @ model.system.W.T
+    model = drivetrain_model(replace(train, damping_ratio=0.0), turning=turning)
+    n, mass, stiffness = len(model.rigid), model.system.M, model.total_stiffness
     values = linalg.eigvalsh(stiffness, mass)
     # what the modes take for rigid: a share of a norm, which is up to sqrt(n) above the largest
     share = math.sqrt(n) * max(1e-12, 10.0 * n * np.finfo(float).eps)
     if n == 1 or values[1] > share * values[-1]:
         return
     own = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
-    fast = int(np.argmax(own))
+    fast = model.system.dofs[int(np.argmax(own))]
     factor = f"a factor of {1.0 / math.sqrt(share):.1g}"
-    shown = {"code": "E-STIFFNESS", "limit": f"frequencies within {factor}"}
-    words = "natural frequencies are too far apart for double precision: "
-    words += f"{model.system.dofs[fast]} by itself has {own[fast]:.3g} Hz, and "
-    soft, (place, name), value = _softest(train)
+    soft, key, body, value = _softest(train)
     # a support is the cause where it lies further from the middle than the fastest coordinate does
-    if soft * 2.0 * math.pi * own[fast] < (2.0 * math.pi * np.median(own)) ** 2:
-        raise CaseError(
-            f"{words}{name} on its bearings alone has {soft / (2.0 * math.pi):.3g} Hz, slower by more than "
-            f"{factor}",
-            key=place, value=value, file=case.location(place), **shown,
-            remedy=f"stiffen the bearings of {name}: theirs are the softest",
-        )  # fmt: skip
-    second = _slowest(model, stiffness)
-    names = [body.name for body in case.body]
-    members = [name.split(":")[0] for name in (model.system.dofs[fast], second)]
-    key = f"body[{names.index(members[0])}]" if members[0] in names else "shaft"
+    if soft * own.max() < np.median(own) ** 2:
+        slow = f"{body} on its bearings alone has {soft:.3g} Hz, slower"
+        remedy = f"stiffen the bearings of {body}: theirs are the softest"
+    else:
+        second = _slowest(model, stiffness)
+        names, member = [body.name for body in train.bodies], fast.split(":")[0]
+        key, value = f"body[{names.index(member)}]" if member in names else "shaft", None
+        slow = f"{second} moves slower"
+        remedy = f"give {member} more mass or inertia or rigid springs, or stiffen what holds "
+        remedy += second.split(":")[0]
     raise CaseError(
-        f"{words}{second} moves slower by more than {factor}", key=key, file=case.location(key), **shown,
-        remedy=f"give {members[0]} more mass or inertia or rigid springs, or stiffen what holds {members[1]}",
-    )  # fmt: skip
+        "natural frequencies are too far apart for double precision: "
+        f"{fast} by itself has {own.max():.3g} Hz, and {slow} by more than {factor}",
+        code="E-STIFFNESS",
+        key=key,
+        value=value,
+        limit=f"frequencies within {factor}",
+        remedy=remedy,
+    )
 
 
 def _slowest(model: DrivetrainModel, stiffness) -> str:
     """Coordinate with most of the kinetic energy of the slowest motion besides the free spin."""
-    from scipy import linalg
-
     mass = model.system.M
     slow = linalg.eigh(stiffness, mass, subset_by_index=(0, 1))[1]
     slow = slow - np.outer(model.rigid, model.rigid @ mass @ slow) / model.inertia
@@ -728,16 +601,16 @@ def _slowest(model: DrivetrainModel, stiffness) -> str:
     return model.system.dofs[int(np.argmax(energy))]
 
 
-def _softest(train: Drivetrain) -> tuple[float, tuple[str, str], str]:
-    """Slowest body on its own bearings: frequency [rad/s], key and body, stiffness; infinite without any."""
-    found = [(math.inf, ("", ""), "")]
+def _softest(train: Drivetrain) -> tuple[float, str, str, str]:
+    """Slowest body on its own bearings: frequency [Hz], key, body and stiffness; infinite without any."""
+    found = [(math.inf, "", "", "")]
     for body in train.bodies:
-        places = [i for i, one in enumerate(train.bearings) if one.body == body.name and not one.station]
+        places = [i for i, one in enumerate(train.bearings) if one.body == body.name]
         inertias = ("radial", body.mass, "N/m"), ("tilt", body.transverse_inertia, "N m/rad")
         for kind, inertia, unit in inertias if body.tilts else inertias[:1]:
             springs = [getattr(train.bearings[i], kind) for i in places]
             if sum(springs) > 0.0:
-                first = places[int(np.argmax(springs))]
-                speed = math.sqrt(sum(springs) / inertia)
-                found.append((speed, (f"bearing[{first}].{kind}", body.name), f"{max(springs):g} {unit}"))
+                key = f"bearing[{places[int(np.argmax(springs))]}].{kind}"
+                hertz = math.sqrt(sum(springs) / inertia) / (2.0 * math.pi)
+                found.append((hertz, key, body.name, f"{max(springs):g} {unit}"))
     return min(found)

@@ -1,297 +1,251 @@
-"""Data of a drivetrain: bodies on parallel axes, what joins them, and torques over time.
+"""Parts of a drivetrain: bodies on parallel axes, what joins and drives them, and torques over time.
 
-All axes are parallel to z; rotations are positive about z. The classes of the chain map one to one on the
-tables of a case file: numbers, names of bodies, no arrays but the planet angles. Torques are constant or a
-series; that of a CSV file is read by `femgear.trains.drivetrain.section`. Names stay apart where two stages
-join the same bodies (`numbered`), and the data refuse what no drivetrain can be.
+All axes are parallel to z; rotations are positive about z. The tables of a case file are the data
+themselves. A file gives numbers as texts with units, within the windows that stand beside the entries; in
+Python `Part.in_si` takes SI numbers, radians and names, and `Part.changed` other ones. What follows from the
+entries, such as pitch radii and springs, are properties. Contradictions between entries are refused where a
+file is read (`femgear.trains.drivetrain.section`).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, ValidationInfo
 
-from femgear.errors import CaseError
-from femgear.system.shaft import JointSprings, ShaftSection, beam_element, joint_springs
+from femgear.case.fields import Count, Number, Quantity, Section, StiffnessOrRigid, described, refuse
+from femgear.case.units import ANGLE, DENSITY, INERTIA, LENGTH, MASS, MODULUS, STIFFNESS, TORSION
+from femgear.gears.planetary import equal_planet_angles
+from femgear.system import shaft as shafts
 
-# Stiffness against the spin, over that of the rotations, that is rounding.
-_FREE = 1e-9
-
-
-@dataclass(frozen=True)
-class ChainBody:
-    """A rigid body that turns about an axis.
-
-    Parameters
-    ----------
-    name : str
-    mass : float
-        [kg]
-    inertia : float
-        About its axis [kg m^2].
-    transverse_inertia : float
-        About a diameter [kg m^2]; for the carrier without the planets.
-    tilts : bool
-        Whether it tilts: x, y, two tilts and the rotation, else x, y and the rotation.
-    """
-
-    name: str
-    mass: float
-    inertia: float
-    transverse_inertia: float = 0.0
-    tilts: bool = True
-
-    def __post_init__(self):
-        check_numbers(f"body {self.name}", self, positive=("mass", "inertia"), least=("transverse_inertia",))
-        if self.tilts and not self.transverse_inertia > 0.0:
-            raise CaseError(
-                f"body {self.name} tilts but has no transverse inertia", code="E-DRIVETRAIN",
-                key="transverse_inertia", limit="above 0 kg m^2", remedy="give it one, or set tilts = false",
-            )  # fmt: skip
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
 
 
-@dataclass(frozen=True)
-class ChainShaft:
-    """A shaft between the bodies at its ends: two rigid links with a joint of springs, or a beam.
+def _name(value: object) -> str:
+    if not isinstance(value, str):
+        raise refuse(f"a name is needed, not {described(value)}", code="E-TYPE", value=value)
+    if not _NAME.fullmatch(value) or value != value.strip() or re.match(r"(planet|shaft)\b", value):
+        raise refuse(
+            "not a name for a body",
+            code="E-CHOICE",
+            value=value,
+            limit="40 letters, digits, blanks, - or _; planet and shaft are taken as first words",
+        )
+    return value
 
-    Parameters
-    ----------
-    first, second : str
-        Bodies.
-    length : float
-        [m]
-    bending, torsion : float, optional
-        Springs of the joint [N m/rad]; of the section where not given. Infinite holds the two together.
-    shear : float, optional
-        Of the joint [N/m]; where not given that of a Timoshenko shaft of this bending stiffness and
-        ``shear_ratio``; infinite is the spherical joint.
-    shear_ratio : float
-        ``Phi`` of the shaft, used where the shear spring is not given.
-    section : ShaftSection, optional
-    elements : int
-        Timoshenko elements of the section; 0 takes the joint of springs, without mass.
-    """
 
-    first: str
-    second: str
-    length: float
-    bending: float | None = None
-    torsion: float | None = None
-    shear: float | None = None
-    shear_ratio: float = 0.0
-    section: ShaftSection | None = None
-    elements: int = 0
+def _two(value: object) -> object:
+    if not isinstance(value, list) or len(value) != 2:
+        what = f"{len(value)} entries" if isinstance(value, list) else described(value)
+        raise refuse(
+            f"two entries are needed, not {what}",
+            code="E-COUNT",
+            limit="a list of two: for the first and for the second body",
+        )
+    return value
 
-    def __post_init__(self):
-        name = f"shaft {self.first} to {self.second}"
-        check_numbers(name, self, positive=("length",), least=("shear_ratio",))
-        given = (self.bending, self.torsion)
-        if self.section is None and (None in given or self.elements):
-            raise CaseError(
-                f"{name} has no section", code="E-DRIVETRAIN",
-                limit="bending and torsion, or a section; elements need a section",
-            )  # fmt: skip
-        if self.elements and any(value is not None for value in (*given, self.shear)):
-            raise CaseError(f"{name} has elements and springs", code="E-DRIVETRAIN", limit="one of them")
-        for key in ("bending", "torsion", "shear"):
-            value = getattr(self, key)
-            if value is not None and not value > 0.0:
-                raise CaseError(f"{key} of {name} is {value}", code="E-DRIVETRAIN", limit="above 0")
-        if int(self.elements) != self.elements or self.elements < 0:
-            raise CaseError(f"{name} has {self.elements} elements", code="E-DRIVETRAIN", limit="0 or more")
+
+def _driver(value: str | None, info: ValidationInfo) -> str | None:
+    """The driver of a stage; where the ends themselves are wrong, they alone are refused."""
+    ends = info.data.get("between", ()) or [info.data[key] for key in ("carrier", "sun") if key in info.data]
+    if value is not None and len(ends) == 2 and value not in ends:
+        raise refuse(
+            "the driver is none of the two bodies of its stage",
+            code="E-CHOICE",
+            value=value,
+            limit=" or ".join(ends),
+        )
+    return value
+
+
+Name = Annotated[str, BeforeValidator(_name)]
+Driver = Annotated[str | None, AfterValidator(_driver)]
+Mass = Annotated[float, Quantity(MASS, 1e-6, 1e8)]
+Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e11)]
+TransverseInertia = Annotated[float, Quantity(INERTIA, 0.0, 1e11)]
+Radius = Annotated[float, Quantity(LENGTH, 1e-4, 100.0)]
+Length = Annotated[float, Quantity(LENGTH, 1e-4, 1e3)]
+Offset = Annotated[float, Quantity(LENGTH, -100.0, 100.0)]
+Module = Annotated[float, Quantity(LENGTH, 5e-5, 0.5)]
+Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
+PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
+Teeth = Annotated[int, Count(4, 5000)]
+Joint = Annotated[float, StiffnessOrRigid(TORSION, 1e-3, 1e15)]
+BOTH = BeforeValidator(_two)
+"""Of entries of the first and the second body, in `Annotated`."""
+
+
+class Part(Section):
+    """A table of the case file, which is the data of a part of the chain."""
+
+    @classmethod
+    def in_si(cls, **values: Any) -> Self:
+        """Make the part from SI numbers, radians and names, whose sizes are not checked."""
+        needed = {name for name, field in cls.model_fields.items() if field.is_required()}
+        if wrong := (needed - values.keys()) | (values.keys() - cls.model_fields.keys()):
+            raise TypeError(f"{cls.__name__}: missing or unknown {', '.join(sorted(wrong))}")
+        return cls.model_construct(**values)
+
+    def changed(self, **values: Any) -> Self:
+        """Copy the part with other values, as of `in_si`."""
+        return self.model_copy(update=values)
+
+
+class BodySection(Part):
+    """A rigid body on its axis; the first body gives the speed."""
+
+    name: Name
+    inertia: Inertia
+    mass: Mass
+    transverse_inertia: TransverseInertia = 0.0
+    """About a diameter; for the carrier without the planets."""
+    tilts: StrictBool = True
+    """x, y, two tilts and the rotation, else x, y and the rotation."""
+
+
+class ShaftSection(Part):
+    """A shaft between two bodies: springs of its joint, or a round section."""
+
+    between: Annotated[tuple[str, ...], BOTH]
+    length: Length
+    bending: Joint | None = None
+    torsion: Joint | None = None
+    shear: Annotated[float, StiffnessOrRigid(STIFFNESS, 1.0, 1e15)] | None = None
+    """Where not given that of a Timoshenko shaft of the bending stiffness and the shear ratio."""
+    shear_ratio: Annotated[float, Number(0.0, 100.0)] = 0.0
+    outer_diameter: Radius | None = None
+    inner_diameter: Annotated[float, Quantity(LENGTH, 0.0, 100.0)] = 0.0
+    youngs_modulus: Annotated[float, Quantity(MODULUS, 1e6, 1e12)] = 2.06e11
+    poisson_ratio: Annotated[float, Number(0.0, 0.5, open_high=True)] = 0.3
+    density: Annotated[float, Quantity(DENSITY, 0.0, 25000.0)] = 7850.0
+    elements: Annotated[int, Count(0, 100)] = 0
+    """Timoshenko elements of the section; 0 takes two rigid links and a joint of springs, without mass."""
 
     @property
-    def springs(self) -> JointSprings:
+    def section(self) -> shafts.ShaftSection:
+        """Round section, of a shaft that has one."""
+        assert self.outer_diameter is not None
+        return shafts.ShaftSection(
+            self.outer_diameter, self.inner_diameter, self.youngs_modulus, self.poisson_ratio, self.density
+        )
+
+    @property
+    def springs(self) -> shafts.JointSprings:
         """Of the joint."""
-        bending, torsion, shear = self.bending, self.torsion, self.shear
-        if self.section is not None:
-            own = joint_springs(self.section, self.length)
-            shear = own.shear if bending is None and shear is None else shear
-            bending = own.bending if bending is None else bending
-            torsion = own.torsion if torsion is None else torsion
-        assert bending is not None and torsion is not None  # or there is a section
+        if self.bending is None or self.torsion is None:
+            return shafts.joint_springs(self.section, self.length)
+        shear = self.shear
         if shear is None:
-            shear = 12.0 * bending / ((1.0 + self.shear_ratio) * self.length**2)
-        return JointSprings(bending, torsion, shear)
+            shear = 12.0 * self.bending / ((1.0 + self.shear_ratio) * self.length**2)
+        return shafts.JointSprings(self.bending, self.torsion, shear)
+
+
+class MeshSection(Part):
+    """Rectangular mesh stiffness by the number of tooth pairs in contact."""
+
+    stiffness: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
+    """Mean over the mesh period."""
+    contact_ratio: Annotated[float, Number(1.0, 20.0)]
+    low_share: Annotated[float, Number(0.0, 1.0, open_low=True)] | None = None
+    """Stiffness with the smaller number of pairs over that with the larger; else all pairs are alike."""
+    phase: Annotated[float, Number(-1000.0, 1000.0)] = 0.0
+    """Fraction of the mesh period by which the wave is ahead."""
+    backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.05)] | None = None
+    """Along the line of action; where not given there is no back flank."""
 
     @property
-    def element_matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Mass, stiffness, and gyroscopic matrix per unit speed, of one element (10, 10)."""
-        assert self.section is not None  # elements need one
-        return beam_element(self.section, self.length / self.elements)
+    def levels(self) -> tuple[float, float, float]:
+        """Lower and upper stiffness [N/m], and the share of the period with the upper one."""
+        pairs = math.floor(self.contact_ratio)
+        share = self.contact_ratio - pairs
+        ratio = pairs / (pairs + 1.0) if self.low_share is None else self.low_share
+        high = self.stiffness / (ratio + (1.0 - ratio) * share)
+        return ratio * high, high, share
 
 
-@dataclass(frozen=True)
-class MeshWave:
-    """Rectangular mesh stiffness by the number of tooth pairs in contact.
+class ParallelSection(Part):
+    """Two external gears; sizes by pitch radii, base radii, or the transverse module."""
 
-    Parameters
-    ----------
-    stiffness : float
-        Mean over the mesh period [N/m].
-    contact_ratio : float
-        Mean number of pairs in contact, 1 or more.
-    low_share : float, optional
-        Stiffness with the smaller number of pairs over that with the larger; where not given, every pair is
-        as stiff as another: the number of pairs over that number and one.
-    phase : float
-        Fraction of the mesh period by which the wave is ahead.
-    backlash : float
-        Along the line of action [m]; infinite without back side.
-    """
+    between: Annotated[tuple[str, ...], BOTH]
+    teeth: Annotated[tuple[Teeth, ...], BOTH]
+    radii: Annotated[tuple[Radius, ...], BOTH] | None = None
+    base_radii: Annotated[tuple[Radius, ...], BOTH] | None = None
+    module: Module | None = None
+    mesh: MeshSection
+    pressure_angle: PressureAngle = math.radians(20.0)
+    """In the transverse section."""
+    helix_angle: Annotated[float, Quantity(ANGLE, -math.radians(60), math.radians(60))] = 0.0
+    """A positive one pushes the second gear along z where the first drives, else against z."""
+    direction: Angle = 0.0
+    """Of the line from the first to the second axis, from x."""
+    offsets: Annotated[tuple[Offset, ...], BOTH] = (0.0, 0.0)
+    """Place of the mesh along z from the centre of either body, which tilts it."""
+    driver: Driver = None
+    """The body whose teeth push, which makes its leading flanks the loaded ones; else the first."""
 
-    stiffness: float
-    contact_ratio: float
-    low_share: float | None = None
-    phase: float = 0.0
-    backlash: float = math.inf
-
-    def __post_init__(self):
-        check_numbers("mesh", self, positive=("stiffness", "contact_ratio"), least=())
-        share = self.low_share
-        if self.contact_ratio < 1.0 or not math.isfinite(self.phase) or not self.backlash >= 0.0:
-            raise CaseError(
-                f"a mesh {self}", code="E-DRIVETRAIN",
-                limit="contact ratio of 1 or more, a finite phase, a backlash of 0 m or more",
-            )  # fmt: skip
-        if share is not None and not 0.0 < share <= 1.0:
-            raise CaseError(f"low_share of {share}", code="E-DRIVETRAIN", limit="above 0, up to 1")
-
-
-@dataclass(frozen=True)
-class ParallelStage:
-    """Two external gears on parallel axes.
-
-    Parameters
-    ----------
-    first, second : str
-        Bodies.
-    first_radius, second_radius : float
-        Pitch radii [m].
-    first_teeth : int
-        Teeth of the first gear, for the mesh frequency.
-    mesh : MeshWave
-    pressure_angle, helix_angle : float
-        Transverse pressure angle, helix angle [rad]. A positive helix angle pushes the second gear along z
-        where the first drives, against z where the second does.
-    direction : float
-        Angle of the line from the first to the second axis, from x [rad].
-    first_offset, second_offset : float
-        Place of the mesh along z from the centre of either body [m], which tilts it.
-    driver : str, optional
-        The body whose teeth push, which makes its leading flanks the loaded ones; the first where not given.
-    """
-
-    first: str
-    second: str
-    first_radius: float
-    second_radius: float
-    first_teeth: int
-    mesh: MeshWave
-    pressure_angle: float = math.radians(20.0)
-    helix_angle: float = 0.0
-    direction: float = 0.0
-    first_offset: float = 0.0
-    second_offset: float = 0.0
-    driver: str | None = None
-
-    def __post_init__(self):
-        name = f"stage {self.first} to {self.second}"
-        check_numbers(name, self, positive=("first_radius", "second_radius", "first_teeth"), least=())
-        angles = self.pressure_angle, self.helix_angle
-        if not (0.0 < angles[0] < 0.5 * math.pi and abs(angles[1]) < 0.5 * math.pi):
-            raise CaseError(f"angles {angles} rad of {name}", code="E-DRIVETRAIN", limit="within 90 degrees")
-        check_driver(name, self.driver, self.ends)
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Both bodies; the first drives where nothing else is said."""
+        return self.between
 
     @property
     def name(self) -> str:
-        return f"{self.first}-{self.second}"
-
-    @property
-    def ends(self) -> tuple[str, str]:
-        """Both bodies; the first drives where nothing else is said."""
-        return self.first, self.second
+        return "-".join(self.between)
 
     @property
     def flank(self) -> int:
-        """1 where the first of the ends drives, else -1."""
-        return -1 if self.driver == self.second else 1
+        """1 where the first body drives, else -1."""
+        return -1 if self.driver == self.between[1] else 1
+
+    @property
+    def pitch_radii(self) -> tuple[float, ...]:
+        """Of both gears [m]."""
+        if self.module is not None:
+            return tuple(0.5 * self.module * teeth for teeth in self.teeth)
+        return self.radii or tuple(one / math.cos(self.pressure_angle) for one in self.base_radii or ())
 
 
-@dataclass(frozen=True)
-class PlanetaryStage:
-    """Carrier, sun and planets on the axis of both, with a ring that the housing holds.
-
-    Parameters
-    ----------
-    carrier, sun : str
-        Bodies.
-    sun_radius, planet_radius : float
-        Pitch radii [m]; the ring's is ``sun + 2 planet``.
-    ring_teeth, sun_teeth : int
-        For mesh frequency and phases.
-    planet_mass, planet_inertia : float
-        [kg], about its own axis [kg m^2].
-    planet_transverse_inertia : float
-        [kg m^2]
-    sun_mesh, ring_mesh : MeshWave
-        Of one planet; their phases are those of the first one.
-    planet_angles : tuple of float
-        Ascending, from x when the carrier's phase is zero [rad].
-    pressure_angle : float
-        [rad]
-    planet_bearing : float
-        [N/m]; infinite fixes the planets' axes to their pins, so that each has its rotation only.
-    driver : str, optional
-        Carrier or sun, the one that drives the other; the carrier where not given.
-    """
+class PlanetarySection(Part):
+    """Carrier, sun and planets in a ring that the housing holds."""
 
     carrier: str
     sun: str
-    sun_radius: float
-    planet_radius: float
-    ring_teeth: int
-    sun_teeth: int
-    planet_mass: float
-    planet_inertia: float
-    planet_transverse_inertia: float
-    sun_mesh: MeshWave
-    ring_mesh: MeshWave
-    planet_angles: tuple[float, ...] = (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)
-    pressure_angle: float = math.radians(20.0)
-    planet_bearing: float = math.inf
-    driver: str | None = None
+    ring_teeth: Teeth
+    sun_teeth: Teeth
+    planet_teeth: Teeth | None = None
+    sun_radius: Radius | None = None
+    planet_radius: Radius | None = None
+    sun_base_radius: Radius | None = None
+    planet_base_radius: Radius | None = None
+    module: Module | None = None
+    planets: Annotated[int, Count(1, 24)] = 3
+    planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
+    """Ascending, from x when the carrier's phase is zero."""
+    planet_mass: Mass
+    planet_inertia: Inertia
+    planet_transverse_inertia: TransverseInertia = 0.0
+    planet_bearing: Annotated[float, StiffnessOrRigid(STIFFNESS, 1.0, 1e15)] = math.inf
+    """An infinite one fixes the planets' axes to their pins, so that each has its rotation only."""
+    sun_mesh: MeshSection
+    """Of one planet, as the ring's; the phases are those of the first planet."""
+    ring_mesh: MeshSection
+    pressure_angle: PressureAngle = math.radians(20.0)
+    driver: Driver = None
+    """Carrier or sun, the one that drives the other; else the carrier."""
 
-    def __post_init__(self):
-        positive = (
-            "sun_radius", "planet_radius", "ring_teeth", "sun_teeth", "planet_mass", "planet_inertia",
-        )  # fmt: skip
-        check_numbers(self.name, self, positive=positive, least=("planet_transverse_inertia",))
-        check_driver(f"stage {self.carrier} to {self.sun}", self.driver, self.ends)
-        angles = self.planet_angles
-        if not angles or not all(math.isfinite(a) for a in angles) or not self.planet_bearing > 0.0:
-            raise CaseError(
-                f"planets of {self.name}", code="E-DRIVETRAIN",
-                limit="one finite angle or more, a bearing stiffness above 0 N/m or infinite",
-            )  # fmt: skip
-        if any(b <= a for a, b in itertools.pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi:
-            raise CaseError(
-                f"planet angles {angles} rad of {self.name}", code="E-DRIVETRAIN",
-                limit="ascending within one turn",
-            )  # fmt: skip
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Carrier and sun; the carrier drives where nothing else is said."""
+        return self.carrier, self.sun
 
     @property
     def name(self) -> str:
         return f"{self.carrier}-{self.sun}"
-
-    @property
-    def ends(self) -> tuple[str, str]:
-        """Carrier and sun; the carrier drives where nothing else is said."""
-        return self.carrier, self.sun
 
     @property
     def flank(self) -> int:
@@ -299,55 +253,58 @@ class PlanetaryStage:
         return -1 if self.driver == self.sun else 1
 
     @property
+    def angles(self) -> tuple[float, ...]:
+        """Of the planets (N,) [rad]."""
+        return self.planet_angles or equal_planet_angles(self.planets)
+
+    @property
+    def pitch_radii(self) -> tuple[float, float]:
+        """Of sun and planet [m]."""
+        if self.module is not None:
+            # half teeth of the planet are a matter of its profile shift
+            teeth = self.sun_teeth, 0.5 * (self.ring_teeth - self.sun_teeth)
+            return 0.5 * self.module * teeth[0], 0.5 * self.module * teeth[1]
+        if self.sun_base_radius is not None and self.planet_base_radius is not None:
+            cosine = math.cos(self.pressure_angle)
+            return self.sun_base_radius / cosine, self.planet_base_radius / cosine
+        assert self.sun_radius is not None and self.planet_radius is not None  # one of three ways
+        return self.sun_radius, self.planet_radius
+
+    @property
     def centre_distance(self) -> float:
         """[m]"""
-        return self.sun_radius + self.planet_radius
+        sun, planet = self.pitch_radii
+        return sun + planet
 
     @property
     def ring_radius(self) -> float:
-        """[m]"""
-        return self.sun_radius + 2.0 * self.planet_radius
+        """Pitch radius [m]."""
+        sun, planet = self.pitch_radii
+        return sun + 2.0 * planet
+
+
+class BearingSection(Part):
+    """Bearing in the housing, of a body or of a station inside a shaft of several elements."""
+
+    body: str | None = None
+    shaft: Annotated[tuple[str, ...], BOTH] | None = None
+    station: Annotated[int, Count(1, 99)] | None = None
+    """Number of the station inside the shaft, from 1 beside the first body."""
+    radial: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, 1e15)] = 0.0
+    tilt: Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)] = 0.0
+    offset: Offset = 0.0
+    """Place along z from the centre of the body."""
 
 
 @dataclass(frozen=True)
-class ChainBearing:
-    """Bearing in the housing, of a body or of a station inside a shaft of several elements.
+class Mesh:
+    """A mesh of a stage: its name, the stage, its entry in the case file, the data and the planet, from 0."""
 
-    Parameters
-    ----------
-    body : str
-        Of a station the first body of its shaft.
-    radial : float
-        Along x and y [N/m]; infinite holds the body (with no offset).
-    tilt : float
-        Against tilts [N m/rad]; infinite holds them.
-    offset : float
-        Place along z from the centre of the body [m].
-    torsion : float
-        Against rotation [N m/rad], for modes alone: `check_free_spin` refuses it elsewhere.
-    other : str, optional
-        Second body of the shaft.
-    station : int
-        Number of the station inside the shaft, from 1 beside the first body; 0 is the body itself.
-    """
-
-    body: str
-    radial: float
-    tilt: float = 0.0
-    offset: float = 0.0
-    torsion: float = 0.0
-    other: str | None = None
-    station: int = 0
-
-    def __post_init__(self):
-        values = (self.radial, self.tilt, self.torsion)
-        if not all(value >= 0.0 for value in values) or not math.isfinite(self.offset + self.torsion):
-            raise CaseError(f"a bearing {self}", code="E-DRIVETRAIN", limit="stiffnesses of 0 or more")
-        if math.isinf(self.radial) and self.offset:
-            raise CaseError(
-                f"an infinitely stiff bearing beside the centre of {self.body}", code="E-DRIVETRAIN",
-                key="offset", limit="0 m where radial is infinite", remedy="give a finite stiffness",
-            )  # fmt: skip
+    name: str
+    stage: int
+    key: str
+    section: MeshSection
+    planet: int = 0
 
 
 @dataclass(frozen=True)
@@ -356,58 +313,45 @@ class Drivetrain:
 
     Parameters
     ----------
-    bodies : tuple of ChainBody
-    shafts : tuple of ChainShaft
-    parallel : tuple of ParallelStage
-    planetary : tuple of PlanetaryStage
-    bearings : tuple of ChainBearing
+    bodies : tuple of BodySection
+    shafts : tuple of ShaftSection
+    parallel : tuple of ParallelSection
+    planetary : tuple of PlanetarySection
+    bearings : tuple of BearingSection
         Several of a body add.
     gravity : float
         Along -y [m/s^2].
     damping_ratio : float
         Of all elastic modes with mean mesh stiffnesses.
-
-    Raises
-    ------
-    CaseError
-        Unknown or repeated names, a chain in pieces or with a loop that does not turn (E-DRIVETRAIN).
     """
 
-    bodies: tuple[ChainBody, ...]
-    shafts: tuple[ChainShaft, ...] = ()
-    parallel: tuple[ParallelStage, ...] = ()
-    planetary: tuple[PlanetaryStage, ...] = ()
-    bearings: tuple[ChainBearing, ...] = ()
+    bodies: tuple[BodySection, ...]
+    shafts: tuple[ShaftSection, ...] = ()
+    parallel: tuple[ParallelSection, ...] = ()
+    planetary: tuple[PlanetarySection, ...] = ()
+    bearings: tuple[BearingSection, ...] = ()
     gravity: float = 9.80665
     damping_ratio: float = 0.0
 
-    def __post_init__(self):
-        names = [body.name for body in self.bodies]
-        if not names or len(set(names)) < len(names):
-            raise CaseError(f"bodies {names}", code="E-DRIVETRAIN", limit="one body or more, no name twice")
-        links = [(one.first, one.second) for one in self.shafts]
-        links += [one.ends for one in (*self.parallel, *self.planetary)]
-        for first, second in (*links, *((one.body, one.body) for one in self.bearings)):
-            for name in (first, second):
-                if name not in names:
-                    raise CaseError(f"there is no body {name!r}", code="E-DRIVETRAIN", limit=", ".join(names))
-        if any(first == second for first, second in links):
-            raise CaseError("a shaft or stage joins a body to itself", code="E-DRIVETRAIN")
-        reached = {names[0]}
-        for _ in names:
-            reached |= {end for link in links if reached & set(link) for end in link}
-        if set(names) - reached:
-            raise CaseError(
-                f"nothing joins {', '.join(sorted(set(names) - reached))} to {names[0]}", code="E-DRIVETRAIN",
-                remedy="add a shaft or a gear stage",
-            )  # fmt: skip
-        if not 0.0 <= self.damping_ratio < 1.0 or not math.isfinite(self.gravity):
-            raise CaseError(
-                f"damping ratio {self.damping_ratio}, gravity {self.gravity} m/s^2", code="E-DRIVETRAIN",
-                limit="a ratio from 0 to below 1, finite gravity",
-            )  # fmt: skip
+    @property
+    def stages(self) -> tuple[PlanetarySection | ParallelSection, ...]:
+        """Planetary, then parallel ones."""
+        return (*self.planetary, *self.parallel)
 
-    def body(self, name: str) -> ChainBody:
+    @property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """Of the stages in their order; of a planetary one those of the sun before those of the ring."""
+        found = []
+        for i, one in enumerate(self.planetary):
+            suns = [f"{one.sun}-planet {p + 1}" for p in range(len(one.angles))]
+            rings = [f"planet {p + 1}-ring of {one.carrier}" for p in range(len(one.angles))]
+            for names, entry, mesh in ((suns, "sun_mesh", one.sun_mesh), (rings, "ring_mesh", one.ring_mesh)):
+                found += [Mesh(name, i, f"planetary[{i}].{entry}", mesh, p) for p, name in enumerate(names)]
+        for i, one in enumerate(self.parallel):
+            found.append(Mesh(one.name, len(self.planetary) + i, f"parallel[{i}].mesh", one.mesh))
+        return tuple(found)
+
+    def body(self, name: str) -> BodySection:
         """The body of that name."""
         return next(one for one in self.bodies if one.name == name)
 
@@ -430,19 +374,8 @@ class TorqueHistory:
     values: np.ndarray
 
     def __post_init__(self):
-        times, values = (
-            np.atleast_1d(np.array(self.times, float)),
-            np.atleast_1d(np.array(self.values, float)),
-        )
-        fits = times.ndim == 1 and times.shape == values.shape and len(times) > 0
-        if not fits or not np.all(np.isfinite([times, values])) or np.any(np.diff(times) <= 0.0):
-            raise CaseError(
-                f"the torque history of {self.body} has {times.size} instants and {values.size} values",
-                code="E-TORQUE", limit="as many finite values as ascending instants, one or more",
-            )  # fmt: skip
-        for name, array in (("times", times), ("values", values)):
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        object.__setattr__(self, "times", np.array(self.times, float))
+        object.__setattr__(self, "values", np.array(self.values, float))
 
     def at(self, times) -> np.ndarray:
         """Torque [N m] at any instants [s]."""
@@ -450,12 +383,12 @@ class TorqueHistory:
 
 
 def constant_torques(torques: dict[str, float]) -> tuple[TorqueHistory, ...]:
-    """Histories of constant torques on bodies [N m]."""
+    """Make histories of constant torques on bodies [N m]."""
     return tuple(TorqueHistory(body, np.zeros(1), np.array([value])) for body, value in torques.items())
 
 
 def numbered(names: Sequence[str]) -> list[str]:
-    """Names in their order; one that was there before gets the next free number: ``a-b``, ``a-b 2``."""
+    """Number names that come again with the next free number: ``a-b``, ``a-b 2``."""
     found: list[str] = []
     for name in names:
         number, text = 1, name
@@ -464,34 +397,3 @@ def numbered(names: Sequence[str]) -> list[str]:
             text = f"{name} {number}"
         found.append(text)
     return found
-
-
-def check_numbers(name: str, data, *, positive, least) -> None:
-    """Refuse numbers that are not finite, not above zero, or below zero."""
-    for key in (*positive, *least):
-        value = getattr(data, key)
-        if not math.isfinite(value) or value < 0.0 or (key in positive and value == 0.0):
-            raise CaseError(
-                f"{key} of {name} is {value}", code="E-DRIVETRAIN", key=key,
-                limit="finite, above 0" if key in positive else "finite, 0 or more",
-            )  # fmt: skip
-
-
-def check_driver(name: str, driver: str | None, ends: tuple[str, str]) -> None:
-    """Refuse a driver that is none of the two bodies of its stage."""
-    if driver is not None and driver not in ends:
-        raise CaseError(
-            f"{driver!r} drives {name}", code="E-DRIVETRAIN", key="driver", limit=" or ".join(ends),
-            remedy="name the body that drives, or leave it out",
-        )  # fmt: skip
-
-
-def check_free_spin(model) -> None:
-    """Refuse a chain that turns in bearings with a torsion spring, which would not see the spin."""
-    K, rigid = model.system.K, model.rigid
-    if np.any(np.abs(K @ rigid) > _FREE * (np.abs(K) @ np.abs(rigid)).max(initial=0.0)):
-        raise CaseError(
-            "a bearing holds the rotation of a chain that turns", code="E-BEARING", key="bearing.torsion",
-            limit="no torsion stiffness against the housing",
-            remedy="leave it out; a torque on the body takes its place",
-        )  # fmt: skip

@@ -18,7 +18,7 @@ from femgear.errors import Finding
 from femgear.report.tables import Block
 from femgear.storage.dataset import RPM, dataset
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
-from femgear.trains.drivetrain.data import TorqueHistory, numbered
+from femgear.trains.drivetrain.data import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
 from femgear.trains.drivetrain.time import BALANCE, PASS_BAND, DrivetrainRun
@@ -63,32 +63,36 @@ class DrivetrainModesResult:
         """Contents of modes.nc."""
         modes, model, found = self.modes, self.model, self.campbell
         members, energy, rotation = _energies(model, modes.shape)
-        bases, mode, base, crossing = np.unique(model.mesh_base), ("mode",), ("base",), ("crossing",)
-        orders, critical = model.base_ratio[bases], found.critical
+        bases = np.unique(model.mesh_base)
+        orders = model.base_ratio[bases]
+        critical = found.critical
+        line = orders * self.speed / (2 * np.pi)
         variables = {
-            "frequency": (mode, modes.frequency, "Hz", "undamped natural frequency"),
-            "damping_ratio": (mode, modes.damping_ratio, "1", "fraction of critical damping"),
-            "kind": (mode, _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
-            "rotation_share": (mode, rotation, "1", "share of rotations in the kinetic energy"),
-            "energy": (("member", "mode"), energy, "1", "share of the member in the kinetic energy"),
-            "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
-            "mesh_stiffness": (("mesh",), model.mean_stiffness, "N/m", "mean mesh stiffness"),
-            "mesh_deflection": (
-                ("mesh", "mode"), modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode",
-            ),
-            "ratio": (("body",), list(model.ratio.values()), "1", "speed over that of the first body"),
-            "base_order": (base, orders, "1", "mesh frequency over the first body's turn"),
-            "mesh_frequency": (
-                base, orders * self.speed / (2 * np.pi), "Hz", "mesh frequency at the speed of the operation",
-            ),
+            "frequency": ("mode", modes.frequency, "Hz", "undamped natural frequency"),
+            "damping_ratio": ("mode", modes.damping_ratio, "1", "fraction of critical damping"),
+            "kind": ("mode", _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
+            "rotation_share": ("mode", rotation, "1", "share of rotations in the kinetic energy"),
+            "energy": ("member mode", energy, "1", "share of the member in the kinetic energy"),
+            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+            "mesh_stiffness": ("mesh", model.mean_stiffness, "N/m", "mean mesh stiffness"),
+            "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
+            "ratio": ("body", list(model.ratio.values()), "1", "speed over that of the first body"),
+            "base_order": ("base", orders, "1", "mesh frequency over the first body's turn"),
+            "mesh_frequency": ("base", line, "Hz", "mesh frequency at the speed of the operation"),
             "campbell_frequency": (
-                ("campbell_speed", "branch"), found.frequency, "Hz", "natural frequency over the speed",
+                "campbell_speed branch",
+                found.frequency,
+                "Hz",
+                "natural frequency over the speed",
             ),
             "critical_speed": (
-                crossing, [c.speed / RPM for c in critical], "rpm", "speed of a mesh line on a branch",
+                "crossing",
+                [c.speed / RPM for c in critical],
+                "rpm",
+                "speed of a mesh line on a branch",
             ),
-            "critical_frequency": (crossing, [c.frequency for c in critical], "Hz", "frequency there"),
-        }  # fmt: skip
+            "critical_frequency": ("crossing", [c.frequency for c in critical], "Hz", "frequency there"),
+        }
         coords = {
             "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
             "dof": _names("dof", model.system.dofs, "degree of freedom"),
@@ -235,33 +239,25 @@ class SpectrumResult:
         length = min(len(one.frequency) for one in tracked.values())
         order = tracked[variants[0]].frequency[:length]
         lines, distance = self.lines, self.order_distance
+        amplitude = [self.spectra[v].amplitude for v in variants]
+        by_order = [tracked[v].amplitude[:, :length] for v in variants]
+        averaged = (
+            "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values"
+        )
+        single = "amplitude of the mesh force over orders of the first body, one segment, peak values"
+        line, orders = [self.amplitudes[v] for v in variants], np.array([one.order for one in lines])
+        hertz, multiples = orders * self.speed / (2 * np.pi), [one.orders for one in lines]
+        of_line = "amplitude of the line, peak value; NaN beyond the pass band"
         variables = {
-            "amplitude": (
-                ("variant", "mesh", "frequency"), [self.spectra[v].amplitude for v in variants], "N",
-                "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values",
-            ),
-            "order_amplitude": (
-                ("variant", "mesh", "order"), [tracked[v].amplitude[:, :length] for v in variants], "N",
-                "amplitude of the mesh force over orders of the first body, one segment, peak values",
-            ),
-            "line_order": (("line",), [line.order for line in lines], "1", "order of the first body"),
-            "line_frequency": (
-                ("line",), [line.order * self.speed / (2 * np.pi) for line in lines], "Hz",
-                "frequency at the mean speed",
-            ),
-            "line_amplitude": (
-                ("variant", "line", "mesh"), [self.amplitudes[v] for v in variants], "N",
-                "amplitude of the line, peak value; NaN beyond the pass band",
-            ),
-            "line_orders": (
-                ("line", "base"), [line.orders for line in lines], "1", "multiples of the base frequencies",
-            ),
-            "mesh_base": (("mesh",), model.mesh_base, "1", "number of the base of the mesh stiffness"),
-            "resolved": (
-                ("line",), self.resolved, "1",
-                "whether the record parts the line from its neighbours",
-            ),
-        }  # fmt: skip
+            "amplitude": ("variant mesh frequency", amplitude, "N", averaged),
+            "order_amplitude": ("variant mesh order", by_order, "N", single),
+            "line_order": ("line", orders, "1", "order of the first body"),
+            "line_frequency": ("line", hertz, "Hz", "frequency at the mean speed"),
+            "line_amplitude": ("variant line mesh", line, "N", of_line),
+            "line_orders": ("line base", multiples, "1", "multiples of the base frequencies"),
+            "mesh_base": ("mesh", model.mesh_base, "1", "number of the base of the mesh stiffness"),
+            "resolved": ("line", self.resolved, "1", "whether the record parts the line from its neighbours"),
+        }
         coords = {
             "variant": _names("variant", variants, "model"),
             "mesh": _names("mesh", model.meshes, "gear mesh"),
@@ -323,7 +319,10 @@ def transient_warnings(data: xr.Dataset) -> Iterator[Finding]:
                 f"{-1e-3 * least[v, lowest]:.4g} kN: real teeth would part (simulation.contact_loss)"
             )
             yield Finding("W-PULL", "", text)
-    yield from _parted_warnings(data)
+    for variant, lost in zip(data["variant"].values, data["lost"].values):
+        if names := [str(mesh) for mesh, share in zip(data["mesh"].values, lost) if share >= 1.0]:
+            text = f"{variant}: the teeth of {', '.join(names)} never touch and transmit nothing"
+            yield Finding("W-PARTED", "", text, remedy="give torques or a start that close the flanks")
     yield from _growth_warnings(data)
     for name, words in (("energy_error", "energy"), ("momentum_error", "angular momentum")):
         if not (error := float(data[name].max())) <= BALANCE:
@@ -331,33 +330,26 @@ def transient_warnings(data: xr.Dataset) -> Iterator[Finding]:
             yield Finding("W-BALANCE", "", text)
 
 
-def _parted_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """Meshes whose flanks are apart at every step."""
-    if not separating(data):
-        return
-    meshes = data["mesh"].values
-    for variant, lost in zip(data["variant"].values, data["lost"].values):
-        if names := [str(mesh) for mesh, share in zip(meshes, lost) if share >= 1.0]:
-            text = f"{variant}: the teeth of {', '.join(names)} never touch and transmit nothing"
-            yield Finding("W-PARTED", "", text, remedy="give torques or a start that close the flanks")
-
-
 def _growth_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    if separating(data):
-        yield from _chaos_warnings(data)
-        return
-    duration, gains = float(data.attrs["steps"]) * float(data.attrs["step"]), largest_gains(data)
+    """Parametric resonances; with contact loss motions that depend on every detail, steps included."""
+    duration, parts = float(data.attrs["steps"]) * float(data.attrs["step"]), separating(data)
     pulls = data["least_force"].values.min(axis=1, initial=0.0) < -_NOTHING
-    for (variant, rate), pulled in zip(growth_rates(data), pulls):
-        gain = gains.get(variant, math.nan)
-        if rate * duration > math.log(GROWN):
-            times = shown_factor(rate * duration / math.log(10.0))
-            found = f"grows with {rate:.4g} 1/s, {times} times over the run"
-        elif gain > _GAINED:
-            way = "grows slowly" if rate > 0.0 else "decays"
-            found = f"{way} in the mean, but grows {shown_factor(math.log10(gain))} times on the way"
-        else:
+    for (variant, rate, gain), pulled in zip(_growth(data), pulls):
+        grows = rate * duration > math.log(GROWN)
+        if grows and parts:
+            text = (
+                f"{variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
+                "and peaks depend on every detail, the steps included"
+            )
+            yield Finding("W-CHAOS", "", text, remedy="compare two values of simulation.rate")
+        if parts or not (grows or gain > _GAINED):
             continue
+        if grows:
+            times = _shown_factor(rate * duration / math.log(10.0))
+            found = f"grows with {rate:.4g} 1/s, {times} times over the run"
+        else:
+            way = "grows slowly" if rate > 0.0 else "decays"
+            found = f"{way} in the mean, but grows {_shown_factor(math.log10(gain))} times on the way"
         senseless = gain > _GAINED and pulled
         text = (
             f"{variant}: the free motion {found}: a parametric resonance"
@@ -367,37 +359,18 @@ def _growth_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("W-GROWTH", "", text, remedy=remedy)
 
 
-def _chaos_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """Motions with contact loss that depend on every detail, steps included."""
-    duration = float(data.attrs["steps"]) * float(data.attrs["step"])
-    for variant, rate in growth_rates(data):
-        if rate * duration > math.log(GROWN):
-            text = (
-                f"{variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
-                "and peaks depend on every detail, the steps included"
-            )
-            yield Finding("W-CHAOS", "", text, remedy="compare two values of simulation.rate")
-
-
 def separating(data: xr.Dataset) -> bool:
     """Whether the meshes of transient.nc lose contact."""
-    return data.attrs.get("contact", "linear") == "separating"
+    return data.attrs["contact"] == "separating"
 
 
-def growth_rates(data: xr.Dataset) -> Iterator[tuple[str, float]]:
-    """Variants and the rates of their free motions [1/s]; results of earlier runs have none."""
-    if "growth" in data:
-        yield from zip(map(str, data["variant"].values), map(float, data["growth"].values))
+def _growth(data: xr.Dataset) -> Iterator[tuple[str, float, float]]:
+    """Variants, rates [1/s] and largest growths of their free motions."""
+    found = (data[name].values.tolist() for name in ("growth", "gain"))
+    yield from zip(map(str, data["variant"].values), *found)
 
 
-def largest_gains(data: xr.Dataset) -> dict[str, float]:
-    """Largest growth of the free motion within the run, by variant; results of earlier runs have none."""
-    if "gain" not in data:
-        return {}
-    return dict(zip(map(str, data["variant"].values), map(float, data["gain"].values)))
-
-
-def shown_factor(power: float) -> str:
+def _shown_factor(power: float) -> str:
     """Ten to a power that may be beyond all numbers."""
     return f"{10.0**power:.3g}" if power < 300.0 else f"1e{power:.0f}" if math.isfinite(power) else "1e308"
 
@@ -424,7 +397,8 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
     rows = []
     for body in model.train.bodies:
-        held = [one for one in model.train.bearings if one.body == body.name]
+        # a bearing inside a shaft counts with its first body
+        held = [one for one in model.train.bearings if body.name in (one.body, *(one.shaft or ())[:1])]
         rows.append(
             (
                 body.name,
@@ -452,7 +426,7 @@ def _shafts(model: DrivetrainModel) -> Block:
         s = one.springs
         kind = f"beam, {one.elements} elements" if one.elements else "joint"
         values = (_spring(value, 4) for value in (s.bending, s.torsion, s.shear))
-        rows.append((f"{one.first} - {one.second}", f"{one.length:.4g}", *values, kind))
+        rows.append((" - ".join(one.between), f"{one.length:.4g}", *values, kind))
     header = ("", "length [m]", "bending [N m/rad]", "torsion [N m/rad]", "shear [N/m]", "model")
     return Block("Shafts", header, tuple(rows))
 
@@ -464,25 +438,26 @@ def _spring(stiffness: float, digits: int) -> str:
 def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
     train, hertz = model.train, model.frequencies(case.operation.speed) / (2.0 * np.pi)
     rows = []
-    for i, (one, given) in enumerate(zip(train.planetary, case.planetary)):
-        teeth = f"{given.sun_teeth} / {given.ring_teeth}, {len(one.planet_angles)} planets"
-        radii = f"{1e3 * one.sun_radius:.4f}, {1e3 * one.planet_radius:.4f}, {1e3 * one.ring_radius:.4f}"
-        contact = f"{one.sun_mesh.contact_ratio:.4g}, {one.ring_mesh.contact_ratio:.4g}"
-        stiffness = f"{one.sun_mesh.stiffness:.4g}, {one.ring_mesh.stiffness:.4g}"
-        ratio = model.ratio[one.sun] / model.ratio[one.carrier]
-        driver, line = one.driver or one.ends[0], f"{hertz[2 * i + 1]:.4f}"
-        rows.append((one.name, driver, teeth, radii, f"{ratio:.5g}", contact, stiffness, line))
-    for i, (one, given) in enumerate(zip(train.parallel, case.parallel)):
-        radii = f"{1e3 * one.first_radius:.4f}, {1e3 * one.second_radius:.4f}"
-        ratio = model.ratio[one.second] / model.ratio[one.first]
-        line = hertz[2 * len(train.planetary) + i]
+    for number, one in enumerate(train.stages):
+        meshes = [i for i, mesh in enumerate(train.meshes) if mesh.stage == number and not mesh.planet]
+        waves, radii, (first, second) = [train.meshes[i].section for i in meshes], one.pitch_radii, one.ends
+        if isinstance(one, PlanetarySection):
+            teeth = f"{one.sun_teeth} / {one.ring_teeth}, {len(one.angles)} planets"
+            radii = (*radii, one.ring_radius)
+        else:
+            teeth = f"{one.teeth[0]} / {one.teeth[1]}"
         rows.append(
             (
-                one.name, one.driver or one.ends[0], f"{given.teeth[0]} / {given.teeth[1]}", radii,
-                f"{ratio:.5g}",
-                f"{one.mesh.contact_ratio:.4g}", f"{one.mesh.stiffness:.4g}", f"{line:.4f}",
+                one.name,
+                one.driver or first,
+                teeth,
+                ", ".join(f"{1e3 * radius:.4f}" for radius in radii),
+                f"{model.ratio[second] / model.ratio[first]:.5g}",
+                ", ".join(f"{wave.contact_ratio:.4g}" for wave in waves),
+                ", ".join(f"{wave.stiffness:.4g}" for wave in waves),
+                f"{hertz[model.mesh_base[meshes[0]]]:.4f}",
             )
-        )  # fmt: skip
+        )
     header = (
         "stage", "driver", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]",
         "mesh [Hz]",
@@ -552,11 +527,15 @@ def describe_transient(data: xr.Dataset) -> Block:
     records = ("least recorded [kN]", "largest recorded [kN]") if thinned else ()
     header = ("model", "mesh", "mean [kN]", "least [kN]", "largest [kN]", *records, *shares)
     speed, body = data["speed"].values[0], str(data["body"].values[0])
+    recorded = [
+        f"recorded: what is left of them in files and pictures, every {data.attrs['every']}th step "
+        f"behind a low pass that ends at {pass_band(data):.4g} Hz"
+    ] * thinned
     notes = [
         f"{data.attrs['steps']} steps, at any of which least and largest force may be; {body} from "
         f"{speed[0, 0] / RPM:.4f} to {speed[-1, 0] / RPM:.4f} rpm",
-        *_recorded(data, thinned),
-        *([_damping(float(data.attrs["damping_ratio"]))] if "damping_ratio" in data.attrs else []),
+        *recorded,
+        _damping(float(data.attrs["damping_ratio"])),
         f"energy balance {float(data['energy_error'].max()):.1e}, angular momentum "
         f"{float(data['momentum_error'].max()):.1e}",
         *_growth_notes(data),
@@ -566,21 +545,13 @@ def describe_transient(data: xr.Dataset) -> Block:
     return Block("Transient", header, tuple(rows), tuple(notes))
 
 
-def _recorded(data: xr.Dataset, thinned: bool) -> Iterator[str]:
-    if thinned:
-        yield (
-            f"recorded: what is left of them in files and pictures, every {data.attrs['every']}th step "
-            f"behind a low pass that ends at {pass_band(data):.4g} Hz"
-        )
-
-
 def pass_band(data: xr.Dataset) -> float:
     """End of the pass band of the records of transient.nc [Hz]."""
     return 0.5 * PASS_BAND / (float(data.attrs["step"]) * int(data.attrs["every"]))
 
 
 def _growth_notes(data: xr.Dataset) -> Iterator[str]:
-    for variant, rate in growth_rates(data):
+    for variant, rate, gain in _growth(data):
         if not math.isfinite(rate):
             continue
         if separating(data):
@@ -589,13 +560,11 @@ def _growth_notes(data: xr.Dataset) -> Iterator[str]:
         else:
             way = "grows" if rate > 0.0 else "decays"
             text = f"{variant}: the free motion {way} with {abs(rate):.4g} 1/s in the mean"
-            gain = largest_gains(data).get(variant, math.nan)
-            yield f"{text}, at most {shown_factor(math.log10(gain))} times" if gain > GROWN else text
+            yield f"{text}, at most {_shown_factor(math.log10(gain))} times" if gain > GROWN else text
 
 
 def describe_spectrum(data: xr.Dataset) -> Block:
     """Table of spectrum.nc: amplitudes of the named lines, of one mesh of every kind."""
-
     meshes, amplitude = chosen_meshes(data), data["line_amplitude"].values
     names, variants = symbols(data), [str(name) for name in data["variant"].values]
     rows = []

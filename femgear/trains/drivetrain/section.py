@@ -1,9 +1,9 @@
-"""The sections of a case file with ``model = "drivetrain"``: bodies, and what joins and drives them.
+"""The case file with ``model = "drivetrain"``: its chain, operation and simulation, and what it refuses.
 
 `build_drivetrain` reads such a case from the tables of a file; a torque series in a CSV file that the case
-names is read once and kept inside the case. `cross_check` refuses entries that contradict one another: names,
-chain, teeth and radii, places of the planets, torques, times. `notices` says what is allowed but deserves a
-look. `drivetrain_of` and `torque_histories` are the data of the chain that the entries stand for.
+names is read once and kept inside the case. What no entry shows alone is refused: names, chain, teeth and
+radii, places of the planets, torques, times; what is allowed but deserves a look is a notice. `drivetrain_of`
+and `torque_histories` are the chain and the torques of a case.
 """
 
 from __future__ import annotations
@@ -11,238 +11,63 @@ from __future__ import annotations
 import difflib
 import math
 import os
-import re
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, StrictBool, ValidationError, ValidationInfo, field_validator
+from pydantic import Field, StrictBool
 
-from femgear.case.fields import (
-    Count,
-    Number,
-    Quantity,
-    Section,
-    StiffnessOrRigid,
-    Title,
-    described,
-    refuse,
-)
-from femgear.case.problems import combine, translate
+from femgear.case.fields import Count, Number, Quantity, Section, Title
+from femgear.case.problems import checked_case, combine
 from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase, text_with_points
-from femgear.case.units import (
-    ACCELERATION,
-    ANGLE,
-    DENSITY,
-    FREQUENCY,
-    INERTIA,
-    LENGTH,
-    MASS,
-    MODULUS,
-    SPEED,
-    STIFFNESS,
-    TIME,
-    TORQUE,
-    TORSION,
-)
+from femgear.case.units import ACCELERATION, FREQUENCY, LENGTH, SPEED, TIME, TORQUE
 from femgear.errors import CaseError, Finding
-from femgear.system import shaft as shafts
 from femgear.trains.drivetrain.data import (
-    ChainBearing,
-    ChainBody,
-    ChainShaft,
+    BearingSection,
+    BodySection,
     Drivetrain,
-    MeshWave,
-    ParallelStage,
-    PlanetaryStage,
+    ParallelSection,
+    PlanetarySection,
+    ShaftSection,
     TorqueHistory,
 )
 
 MODEL = "drivetrain"
-FORMAT = 1
-MOST_PARTS = 200
-MOST_POINTS = 20_000
-LARGEST_TORQUE, LATEST, FASTEST_RATE = 1e9, 1e6, 1e7
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
+FASTEST_RATE = 1e7
+_MOST_PARTS = 200
+_MOST_POINTS = 20_000
+_LARGEST_TORQUE, _LATEST = 1e9, 1e6
 
 # Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
-RATIO_TOLERANCE = 0.01
-# Teeth of a planet that profile shifts may add or take.
-_SHIFTED = 2
-
+_RATIO_TOLERANCE = 0.01
 # Ratios of radii and teeth that differ by more are worth a remark.
 _REMARK = 1e-4
+# Teeth of a planet that profile shifts may add or take.
+_SHIFTED = 2
+# Entries that give the sizes of the gears of a stage, each way whole, and the same in words.
+_WAYS = {
+    "parallel": ((("radii",), ("base_radii",), ("module",)), "radii, base_radii or module"),
+    "planetary": (
+        (("sun_radius", "planet_radius"), ("sun_base_radius", "planet_base_radius"), ("module",)),
+        "sun_radius and planet_radius, sun_base_radius and planet_base_radius, or module",
+    ),
+}
 
-MOST_STEPS = 1e8
-MOST_VALUES = 2.5e8
-MOST_COORDINATES = 1500
+_MOST_STEPS = 1e8
+_MOST_VALUES = 2.5e8
+_MOST_COORDINATES = 1500
+_MESHES = ("mesh", "sun_mesh", "ring_mesh")
 
 _DIMENSIONS = {"time": TIME, "torque": TORQUE}
-_LIMITS = {"time": (0.0, LATEST), "torque": (-LARGEST_TORQUE, LARGEST_TORQUE)}
+_LIMITS = {"time": (0.0, _LATEST), "torque": (-_LARGEST_TORQUE, _LARGEST_TORQUE)}
 _COLUMNS = "the first line names two columns: time [s] and torque [N m] (or other units)"
 # Times and torques are written into the case with so many digits.
 _DIGITS = ".13g"
 
-
-def _name(value: object) -> str:
-    if not isinstance(value, str):
-        raise refuse(f"a name is needed, not {described(value)}", code="E-TYPE", value=value)
-    if not _NAME.fullmatch(value) or value != value.strip() or re.match(r"(planet|shaft)\b", value):
-        raise refuse(
-            "not a name for a body",
-            code="E-CHOICE",
-            value=value,
-            limit="40 letters, digits, blanks, - or _; planet and shaft are taken as first words",
-        )
-    return value
-
-
-def _reference(value: object) -> str:
-    if not isinstance(value, str):
-        raise refuse(f"the name of a body is needed, not {described(value)}", code="E-TYPE", value=value)
-    return value
-
-
-Name = Annotated[str, BeforeValidator(_name)]
-Reference = Annotated[str, BeforeValidator(_reference)]
-Mass = Annotated[float, Quantity(MASS, 1e-6, 1e8)]
-Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e11)]
-Radius = Annotated[float, Quantity(LENGTH, 1e-4, 100.0)]
-Length = Annotated[float, Quantity(LENGTH, 1e-4, 1e3)]
-Offset = Annotated[float, Quantity(LENGTH, -100.0, 100.0)]
-Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
-PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
-Teeth = Annotated[int, Count(4, 5000)]
-Joint = Annotated[float, StiffnessOrRigid(TORSION, 1e-3, 1e15)]
-Torque = Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
-Time = Annotated[float, Quantity(TIME, 0.0, LATEST)]
-Frequency = Annotated[float, Quantity(FREQUENCY, 1e-3, 1e7)]
-
-
-def _two(value: object) -> object:
-    if not isinstance(value, list) or len(value) != 2:
-        what = f"{len(value)} entries" if isinstance(value, list) else described(value)
-        raise refuse(
-            f"two entries are needed, not {what}",
-            code="E-COUNT",
-            limit="a list of two: for the first and for the second body",
-        )
-    return value
-
-
-BOTH = BeforeValidator(_two)
-"""Of entries of the first and the second body, in `Annotated`."""
-
-
-def _driver(value: str | None, ends) -> str | None:
-    """The driver of a stage; where the ends themselves are wrong, they alone are refused."""
-    if value is not None and len(ends) == 2 and value not in ends:
-        raise refuse(
-            "the driver is none of the two bodies of its stage", code="E-CHOICE", value=value,
-            limit=" or ".join(ends),
-        )  # fmt: skip
-    return value
-
-
-class BodySection(Section):
-    """A rigid body on its axis; the first body gives the speed."""
-
-    name: Name
-    inertia: Inertia
-    mass: Mass
-    transverse_inertia: Annotated[float, Quantity(INERTIA, 0.0, 1e11)] = 0.0
-    tilts: StrictBool = True
-
-
-class ShaftSection(Section):
-    """A shaft between two bodies: springs of its joint, or a round section."""
-
-    between: Annotated[tuple[Reference, ...], BOTH]
-    length: Length
-    bending: Joint | None = None
-    torsion: Joint | None = None
-    shear: Annotated[float, StiffnessOrRigid(STIFFNESS, 1.0, 1e15)] | None = None
-    shear_ratio: Annotated[float, Number(0.0, 100.0)] = 0.0
-    outer_diameter: Radius | None = None
-    inner_diameter: Annotated[float, Quantity(LENGTH, 0.0, 100.0)] = 0.0
-    youngs_modulus: Annotated[float, Quantity(MODULUS, 1e6, 1e12)] = 2.06e11
-    poisson_ratio: Annotated[float, Number(0.0, 0.5, open_high=True)] = 0.3
-    density: Annotated[float, Quantity(DENSITY, 0.0, 25000.0)] = 7850.0
-    elements: Annotated[int, Count(0, 100)] = 0
-
-
-class MeshSection(Section):
-    """Rectangular mesh stiffness by the number of tooth pairs in contact."""
-
-    stiffness: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
-    contact_ratio: Annotated[float, Number(1.0, 20.0)]
-    low_share: Annotated[float, Number(0.0, 1.0, open_low=True)] | None = None
-    phase: Annotated[float, Number(-1000.0, 1000.0)] = 0.0
-    backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.05)] | None = None
-
-
-class ParallelSection(Section):
-    """Two external gears; sizes by pitch radii, base radii, or the transverse module."""
-
-    between: Annotated[tuple[Reference, ...], BOTH]
-    teeth: Annotated[tuple[Teeth, ...], BOTH]
-    radii: Annotated[tuple[Radius, ...], BOTH] | None = None
-    base_radii: Annotated[tuple[Radius, ...], BOTH] | None = None
-    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.5)] | None = None
-    mesh: MeshSection
-    pressure_angle: PressureAngle = math.radians(20.0)
-    helix_angle: Annotated[float, Quantity(ANGLE, -math.radians(60), math.radians(60))] = 0.0
-    direction: Angle = 0.0
-    offsets: Annotated[tuple[Offset, ...], BOTH] = (0.0, 0.0)
-    driver: Reference | None = None
-
-    @field_validator("driver")
-    @classmethod
-    def _one_of_two(cls, value, info: ValidationInfo):
-        return _driver(value, info.data.get("between", ()))
-
-
-class PlanetarySection(Section):
-    """Carrier, sun and planets in a ring that the housing holds."""
-
-    carrier: Reference
-    sun: Reference
-    ring_teeth: Teeth
-    sun_teeth: Teeth
-    planet_teeth: Teeth | None = None
-    sun_radius: Radius | None = None
-    planet_radius: Radius | None = None
-    sun_base_radius: Radius | None = None
-    planet_base_radius: Radius | None = None
-    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.5)] | None = None
-    planets: Annotated[int, Count(1, 24)] = 3
-    planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
-    planet_mass: Mass
-    planet_inertia: Inertia
-    planet_transverse_inertia: Annotated[float, Quantity(INERTIA, 0.0, 1e11)] = 0.0
-    planet_bearing: Annotated[float, StiffnessOrRigid(STIFFNESS, 1.0, 1e15)] = math.inf
-    sun_mesh: MeshSection
-    ring_mesh: MeshSection
-    pressure_angle: PressureAngle = math.radians(20.0)
-    driver: Reference | None = None
-
-    @field_validator("driver")
-    @classmethod
-    def _one_of_two(cls, value, info: ValidationInfo):
-        return _driver(value, [info.data[key] for key in ("carrier", "sun") if key in info.data])
-
-
-class BearingSection(Section):
-    """Bearing in the housing, of a body or of a station inside a shaft of several elements."""
-
-    body: Reference | None = None
-    shaft: Annotated[tuple[Reference, ...], BOTH] | None = None
-    station: Annotated[int, Count(1, 99)] | None = None
-    radial: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, 1e15)] = 0.0
-    tilt: Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)] = 0.0
-    offset: Offset = 0.0
+_Torque = Annotated[float, Quantity(TORQUE, -_LARGEST_TORQUE, _LARGEST_TORQUE)]
+_Time = Annotated[float, Quantity(TIME, 0.0, _LATEST)]
 
 
 class GravitySection(Section):
@@ -254,11 +79,11 @@ class GravitySection(Section):
 class TorqueSection(Section):
     """Torque on a body: constant, a series, or a share of what balances the others."""
 
-    body: Reference
-    torque: Torque | None = None
+    body: str
+    torque: _Torque | None = None
     file: Title | None = None
-    times: Annotated[tuple[Time, ...], Field(min_length=1, max_length=MOST_POINTS)] | None = None
-    torques: Annotated[tuple[Torque, ...], Field(min_length=1, max_length=MOST_POINTS)] | None = None
+    times: Annotated[tuple[_Time, ...], Field(min_length=1, max_length=_MOST_POINTS)] | None = None
+    torques: Annotated[tuple[_Torque, ...], Field(min_length=1, max_length=_MOST_POINTS)] | None = None
     share: Annotated[float, Number(0.0, 10.0)] | None = None
 
 
@@ -266,7 +91,7 @@ class OperationSection(Section):
     """Speed of the first body at the start, and the torques."""
 
     speed: Annotated[float, Quantity(SPEED, 1e-3 * SPEED.scale, 1e6 * SPEED.scale)]
-    torque: Annotated[tuple[TorqueSection, ...], Field(max_length=MOST_PARTS)] = ()
+    torque: Annotated[tuple[TorqueSection, ...], Field(max_length=_MOST_PARTS)] = ()
 
 
 class SimulationSection(Section):
@@ -282,8 +107,8 @@ class SimulationSection(Section):
     torsional: StrictBool = False
     contact_loss: StrictBool = False
     modes: Annotated[int, Count(0, 24)] = 4
-    settle: Time | None = None
-    resolution: Frequency | None = None
+    settle: _Time | None = None
+    resolution: Annotated[float, Quantity(FREQUENCY, 1e-3, 1e7)] | None = None
 
 
 class DrivetrainCase(Section, ReadCase):
@@ -293,21 +118,21 @@ class DrivetrainCase(Section, ReadCase):
     deserves to be said.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = FORMAT
+    format: Annotated[int, Count(1, 2**31)] = 1
     model: Literal["drivetrain"]
     title: Title
-    body: Annotated[tuple[BodySection, ...], Field(min_length=1, max_length=MOST_PARTS)]
-    shaft: Annotated[tuple[ShaftSection, ...], Field(max_length=MOST_PARTS)] = ()
-    parallel: Annotated[tuple[ParallelSection, ...], Field(max_length=MOST_PARTS)] = ()
+    body: Annotated[tuple[BodySection, ...], Field(min_length=1, max_length=_MOST_PARTS)]
+    shaft: Annotated[tuple[ShaftSection, ...], Field(max_length=_MOST_PARTS)] = ()
+    parallel: Annotated[tuple[ParallelSection, ...], Field(max_length=_MOST_PARTS)] = ()
     planetary: Annotated[tuple[PlanetarySection, ...], Field(max_length=20)] = ()
-    bearing: Annotated[tuple[BearingSection, ...], Field(max_length=MOST_PARTS)] = ()
+    bearing: Annotated[tuple[BearingSection, ...], Field(max_length=_MOST_PARTS)] = ()
     gravity: GravitySection | None = None
     operation: OperationSection
     simulation: SimulationSection
 
 
 def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True) -> DrivetrainCase:
-    """Case of the tables of a TOML text that names a model.
+    """Build the case of the tables of a TOML text that names a model.
 
     Parameters
     ----------
@@ -333,13 +158,8 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
     files = embed_torques(data, name)
     if files:
         text = text_with_points(data, name, points="torque series", remedy="give them at fewer points")
-    try:
-        case = DrivetrainCase.model_validate(data)
-    except ValidationError as error:
-        raise combine(translate(error, DrivetrainCase), lines, name) from None
-    if problems := cross_check(case):
-        raise combine(problems, lines, name)
-    case.read_from(text, lines, name, notices=notices(case), profile_files=files)
+    case = checked_case(DrivetrainCase, data, lines, name, check=_cross_check)
+    case.read_from(text, lines, name, notices=_notices(case), profile_files=files)
     return case
 
 
@@ -349,7 +169,7 @@ def is_drivetrain(data: dict) -> bool:
 
 
 def need_drivetrain(case: object) -> DrivetrainCase:
-    """The case, refused where it is no drivetrain (E-MODEL)."""
+    """Return the case, refused where it is no drivetrain (E-MODEL)."""
     if not isinstance(case, DrivetrainCase):
         raise CaseError(
             "this is no drivetrain",
@@ -363,90 +183,10 @@ def need_drivetrain(case: object) -> DrivetrainCase:
 
 
 def drivetrain_of(case: DrivetrainCase) -> Drivetrain:
-    """The chain of a case.
-
-    Parameters
-    ----------
-    case : DrivetrainCase
-
-    Returns
-    -------
-    Drivetrain
-    """
-    return Drivetrain(
-        bodies=tuple(ChainBody(**body.model_dump()) for body in case.body),
-        shafts=tuple(_shaft(one) for one in case.shaft),
-        parallel=tuple(_parallel(one) for one in case.parallel),
-        planetary=tuple(_planetary(one) for one in case.planetary),
-        bearings=tuple(_bearing(one) for one in case.bearing),
-        gravity=0.0 if case.gravity is None else case.gravity.acceleration,
-        damping_ratio=case.simulation.damping_ratio,
-    )
-
-
-def _shaft(one: ShaftSection) -> ChainShaft:
-    first, second = one.between
-    section = None
-    if one.outer_diameter is not None:
-        section = shafts.ShaftSection(
-            one.outer_diameter, one.inner_diameter, one.youngs_modulus, one.poisson_ratio, one.density
-        )
-    springs = one.bending, one.torsion, one.shear
-    return ChainShaft(first, second, one.length, *springs, one.shear_ratio, section, one.elements)
-
-
-def _wave(one: MeshSection) -> MeshWave:
-    backlash = math.inf if one.backlash is None else one.backlash
-    return MeshWave(one.stiffness, one.contact_ratio, one.low_share, one.phase, backlash)
-
-
-def _bearing(one: BearingSection) -> ChainBearing:
-    body, other = one.shaft or (one.body or "", None)
-    return ChainBearing(body, one.radial, one.tilt, one.offset, other=other, station=one.station or 0)
-
-
-def _parallel(one: ParallelSection) -> ParallelStage:
-    if one.module is not None:
-        radii = [0.5 * one.module * teeth for teeth in one.teeth]
-    else:
-        radii = one.radii or [radius / math.cos(one.pressure_angle) for radius in one.base_radii or ()]
-    return ParallelStage(
-        first=one.between[0],
-        second=one.between[1],
-        first_radius=radii[0],
-        second_radius=radii[1],
-        first_teeth=one.teeth[0],
-        mesh=_wave(one.mesh),
-        pressure_angle=one.pressure_angle,
-        helix_angle=one.helix_angle,
-        direction=one.direction,
-        first_offset=one.offsets[0],
-        second_offset=one.offsets[1],
-        driver=one.driver,
-    )
-
-
-def _planetary(one: PlanetarySection) -> PlanetaryStage:
-    if one.module is not None:
-        # half teeth of the planet are a matter of its profile shift
-        teeth = one.sun_teeth, 0.5 * (one.ring_teeth - one.sun_teeth)
-        sun, planet = (0.5 * one.module * number for number in teeth)
-    elif one.sun_base_radius is not None and one.planet_base_radius is not None:
-        cosine = math.cos(one.pressure_angle)
-        sun, planet = one.sun_base_radius / cosine, one.planet_base_radius / cosine
-    else:
-        assert one.sun_radius is not None and one.planet_radius is not None  # one of three ways
-        sun, planet = one.sun_radius, one.planet_radius
-    same = ("carrier", "sun", "ring_teeth", "sun_teeth", "pressure_angle", "planet_bearing", "driver")
-    same += ("planet_mass", "planet_inertia", "planet_transverse_inertia")
-    return PlanetaryStage(
-        sun_radius=sun,
-        planet_radius=planet,
-        sun_mesh=_wave(one.sun_mesh),
-        ring_mesh=_wave(one.ring_mesh),
-        planet_angles=one.planet_angles or tuple(2.0 * math.pi * p / one.planets for p in range(one.planets)),
-        **{name: getattr(one, name) for name in same},
-    )
+    """The chain of a case."""
+    gravity = 0.0 if case.gravity is None else case.gravity.acceleration
+    parts = case.body, case.shaft, case.parallel, case.planetary, case.bearing
+    return Drivetrain(*parts, gravity, case.simulation.damping_ratio)
 
 
 def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[TorqueHistory, ...]:
@@ -462,13 +202,12 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
     -------
     tuple of TorqueHistory
     """
-    entries = case.operation.torque
     found = [
         TorqueHistory(one.body, np.array(one.times or [0.0]), np.array(one.torques or [one.torque]))
-        for one in entries
+        for one in case.operation.torque
         if one.share is None
     ]
-    for one in entries:
+    for one in case.operation.torque:
         if one.share is not None:
             times = np.unique(np.concatenate([history.times for history in found]))
             power = np.sum([ratio[history.body] * history.at(times) for history in found], axis=0)
@@ -476,14 +215,21 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
     return tuple(found)
 
 
-def cross_check(case: DrivetrainCase) -> list[CaseError]:
+def settle_time(case: DrivetrainCase) -> float:
+    """Start that the spectra leave out [s]: as given, or three tenths."""
+    s = case.simulation
+    return 0.3 * s.duration if s.settle is None else s.settle
+
+
+def _cross_check(case: DrivetrainCase) -> list[CaseError]:
     """What no entry shows alone."""
     names = list(_names(case))
-    found = [*names, *(problem for check in _CHECKS for problem in check(case))]
+    checks = (_bodies, _bearings, _shafts, _sizes, _torques, _simulation, _coordinates)
+    found = [*names, *(problem for check in checks for problem in check(case))]
     return found if names else [*found, *_chain(case)]
 
 
-def joints(case: DrivetrainCase) -> list[tuple[str, ...]]:
+def _joints(case: DrivetrainCase) -> list[tuple[str, ...]]:
     """Key, and the two bodies, of every shaft and gear stage."""
     found = [(f"shaft[{i}].between", *one.between) for i, one in enumerate(case.shaft)]
     found += [(f"parallel[{i}].between", *one.between) for i, one in enumerate(case.parallel)]
@@ -495,7 +241,7 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
     for i, name in enumerate(names):
         if name in names[:i]:
             yield CaseError("two bodies have one name", code="E-DUPLICATE", key=f"body[{i}].name", value=name)
-    used = [(key, name) for key, *ends in joints(case) if ".between" in key for name in ends]
+    used = [(key, name) for key, *ends in _joints(case) if ".between" in key for name in ends]
     for i, stage in enumerate(case.planetary):
         used += [(f"planetary[{i}].carrier", stage.carrier), (f"planetary[{i}].sun", stage.sun)]
     used += [(f"bearing[{i}].body", one.body) for i, one in enumerate(case.bearing) if one.body is not None]
@@ -511,37 +257,33 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
                 limit=", ".join(names[:20]),
                 remedy=f"did you mean {near[0]}?" if near else "name a body of a [[body]] table",
             )
-    for key, first, second in joints(case):
+    for key, first, second in _joints(case):
         if first == second:
             yield CaseError("a body is joined to itself", code="E-CHOICE", key=key, value=first)
 
 
 def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
     """Everything hangs together, and shafts alone close no loop."""
-    group = {body.name: body.name for body in case.body}
-
-    def root(name: str) -> str:
-        while group[name] != name:
-            name = group[name]
-        return name
-
-    for key, first, second in joints(case):
-        one, two = root(first), root(second)
-        if one == two and key.startswith("shaft"):
-            yield CaseError(
-                f"the shaft closes a loop: {first} and {second} are joined already",
-                code="E-DRIVETRAIN",
-                key=key,
-                limit="one way by shafts from body to body",
-                remedy="leave one of the shafts out",
-            )
-        group[two] = one
-    start = root(case.body[0].name)
-    apart = [(i, body.name) for i, body in enumerate(case.body) if root(body.name) != start]
+    groups = {body.name: {body.name} for body in case.body}
+    for key, first, second in _joints(case):
+        if groups[first] is groups[second]:
+            if key.startswith("shaft"):
+                yield CaseError(
+                    f"the shaft closes a loop: {first} and {second} are joined already",
+                    code="E-DRIVETRAIN",
+                    key=key,
+                    limit="one way by shafts from body to body",
+                    remedy="leave one of the shafts out",
+                )
+            continue
+        groups[first] |= groups[second]
+        groups |= dict.fromkeys(groups[second], groups[first])
+    start = case.body[0].name
+    apart = [(i, body.name) for i, body in enumerate(case.body) if body.name not in groups[start]]
     if apart:
         i, name = apart[0]
         yield CaseError(
-            f"nothing joins {', '.join(name for _, name in apart)} to {case.body[0].name}",
+            f"nothing joins {', '.join(name for _, name in apart)} to {start}",
             code="E-DRIVETRAIN",
             key=f"body[{i}].name",
             value=name,
@@ -553,10 +295,14 @@ def _bodies(case: DrivetrainCase) -> Iterator[CaseError]:
     for i, body in enumerate(case.body):
         if body.tilts and body.transverse_inertia == 0.0:
             yield CaseError(
-                "a body that tilts needs an inertia about a diameter", code="E-KEY-MISSING",
+                "a body that tilts needs an inertia about a diameter",
+                code="E-KEY-MISSING",
                 key=f"body[{i}].transverse_inertia",
                 remedy="give it (a flat disc has half its inertia about the axis), or tilts = false",
-            )  # fmt: skip
+            )
+
+
+def _bearings(case: DrivetrainCase) -> Iterator[CaseError]:
     elements = {shaft.between: shaft.elements for shaft in case.shaft}
     for i, one in enumerate(case.bearing):
         inside = (one.shaft is not None, one.station is not None)
@@ -635,8 +381,8 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
     shares, bodies = [], []
     for i, one in enumerate(case.operation.torque):
         key = f"operation.torque[{i}]"
-        series = len(given_of(one, ("times", "torques")))
-        given = given_of(one, ("torque", "file", "share")) + ["times"] * bool(series)
+        series = len(_given(one, ("times", "torques")))
+        given = _given(one, ("torque", "file", "share")) + ["times"] * bool(series)
         if len(given) != 1 or series == 1:
             yield CaseError(
                 "the torque on a body is given in one way",
@@ -668,10 +414,10 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
 def _simulation(case: DrivetrainCase) -> Iterator[CaseError]:
     s = case.simulation
     steps = s.duration * s.rate
-    if steps > MOST_STEPS:
+    if steps > _MOST_STEPS:
         yield CaseError(
             f"{steps:.3g} steps are too many", code="E-RANGE", key="simulation.duration",
-            value=TIME.show(s.duration), limit=f"{MOST_STEPS:g} steps: {TIME.show(MOST_STEPS / s.rate)}",
+            value=TIME.show(s.duration), limit=f"{_MOST_STEPS:g} steps: {TIME.show(_MOST_STEPS / s.rate)}",
             remedy="take a shorter duration or a lower simulation.rate",
         )  # fmt: skip
     if s.settle is not None and not s.settle < s.duration:
@@ -701,207 +447,164 @@ def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
             remedy=f"take {FREQUENCY.show(s.rate / max(1, round(ratio)))}",
         )  # fmt: skip
     # motion, velocity and torque of a body, a force and an approach of a mesh
-    meshes = len(case.parallel) + sum(2 * _planets(stage) for stage in case.planetary)
+    meshes = len(case.parallel) + sum(2 * len(stage.angles) for stage in case.planetary)
     size = s.duration * record * (2 * len(case.body) + 2 * meshes + 2)
-    if size > MOST_VALUES:
+    if size > _MOST_VALUES:
         yield CaseError(
             f"{size:.3g} kept numbers are too many", code="E-RANGE", key="simulation.record",
-            value=FREQUENCY.show(record), limit=f"{MOST_VALUES:g} numbers",
-            remedy=f"take {FREQUENCY.show(record * MOST_VALUES / size)} or less, or a shorter duration",
+            value=FREQUENCY.show(record), limit=f"{_MOST_VALUES:g} numbers",
+            remedy=f"take {FREQUENCY.show(record * _MOST_VALUES / size)} or less, or a shorter duration",
         )  # fmt: skip
 
 
-def _planets(stage: PlanetarySection) -> int:
-    return stage.planets if stage.planet_angles is None else len(stage.planet_angles)
-
-
-def _size(case: DrivetrainCase) -> Iterator[CaseError]:
+def _coordinates(case: DrivetrainCase) -> Iterator[CaseError]:
     """The matrices are dense."""
     stations = [max(shaft.elements - 1, 0) for shaft in case.shaft]
-    planets = sum(_planets(stage) for stage in case.planetary)
+    planets = sum(len(stage.angles) for stage in case.planetary)
     count = 5 * len(case.body) + 5 * sum(stations) + 3 * planets
-    if count > MOST_COORDINATES:
+    if count > _MOST_COORDINATES:
         longest = stations.index(max(stations)) if any(stations) else None
         yield CaseError(
-            f"{count} coordinates are too many", code="E-RANGE",
+            f"{count} coordinates are too many",
+            code="E-RANGE",
             key="body" if longest is None else f"shaft[{longest}].elements",
-            limit=f"{MOST_COORDINATES}: 5 a body and a station inside a shaft, 3 a planet",
+            limit=f"{_MOST_COORDINATES}: 5 a body and a station inside a shaft, 3 a planet",
             remedy="take fewer elements",
-        )  # fmt: skip
+        )
 
 
-def settle_time(case: DrivetrainCase) -> float:
-    """Start that the spectra leave out [s]: as given, or three tenths."""
-    s = case.simulation
-    return 0.3 * s.duration if s.settle is None else s.settle
-
-
-def check_sizes(case: DrivetrainCase) -> Iterator[CaseError]:
+def _sizes(case: DrivetrainCase) -> Iterator[CaseError]:
     """Radii against teeth, and whether planets assemble beside one another."""
     for i, stage in enumerate(case.parallel):
-        key, given = f"parallel[{i}]", given_of(stage, ("radii", "base_radii", "module"))
-        if len(given) != 1:
-            yield _one_of(f"{key}.{given[0] if given else 'radii'}", "radii, base_radii or module")
-            continue
-        radii = stage.radii or stage.base_radii
-        if radii and (problem := _mismatch(radii[1] / radii[0], stage.teeth[1] / stage.teeth[0])):
-            yield _unfit(f"{key}.teeth", problem)
+        yield from _gear_sizes(stage, "parallel", f"parallel[{i}]")
     for i, stage in enumerate(case.planetary):
-        yield from _planetary_sizes(stage, f"planetary[{i}]")
+        key = f"planetary[{i}]"
+        yield from _gear_sizes(stage, "planetary", key)
+        if not stage.sun_teeth < stage.ring_teeth:
+            yield CaseError(
+                "the ring has no more teeth than the sun",
+                code="E-TEETH",
+                key=f"{key}.ring_teeth",
+                value=stage.ring_teeth,
+                limit=f"more than {stage.sun_teeth}",
+            )
+        yield from _assembly(stage, key)
 
 
-def _planetary_sizes(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
-    pitch = given_of(stage, ("sun_radius", "planet_radius"))
-    base = given_of(stage, ("sun_base_radius", "planet_base_radius"))
-    ways = [pitch, base, given_of(stage, ("module",))]
-    if [len(way) for way in ways] not in ([2, 0, 0], [0, 2, 0], [0, 0, 1]):
-        words = "sun_radius and planet_radius, sun_base_radius and planet_base_radius, or module"
-        yield _one_of(f"{key}.{next((way[0] for way in ways if way), 'sun_radius')}", words)
-    elif pitch or base:
-        sun, planet = (getattr(stage, name) for name in (pitch or base))
-        pairs = [("ring_teeth", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)]
-        if stage.planet_teeth is not None:
-            pairs.append(("planet_teeth", planet / sun, stage.planet_teeth / stage.sun_teeth))
-        for name, radii, teeth in pairs:
-            if problem := _mismatch(radii, teeth):
-                yield _unfit(f"{key}.{name}", problem)
-    elif stage.planet_teeth is not None:
+def _gear_sizes(stage: ParallelSection | PlanetarySection, kind: str, key: str) -> Iterator[CaseError]:
+    """One way of giving the sizes of the gears, and teeth that fit it."""
+    ways, words = _WAYS[kind]
+    given = [name for way in ways for name in _given(stage, way)]
+    if tuple(given) not in ways:
+        yield CaseError(
+            "the sizes of the gears are needed once",
+            code="E-CHOICE",
+            key=f"{key}.{given[0] if given else ways[0][0]}",
+            limit=words,
+        )
+        return
+    for name, radii, teeth in _ratios(stage):
+        if abs(teeth / radii - 1.0) > _RATIO_TOLERANCE:
+            yield CaseError(
+                f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}",
+                code="E-TEETH",
+                key=f"{key}.{name}",
+                limit=f"ratios within {_RATIO_TOLERANCE:.0%} of one another",
+                remedy="correct the teeth or the radii, or give module in place of the radii",
+            )
+    if isinstance(stage, PlanetarySection) and stage.module is not None and stage.planet_teeth is not None:
         between = 0.5 * (stage.ring_teeth - stage.sun_teeth)
         if abs(stage.planet_teeth - between) > _SHIFTED:
             yield CaseError(
-                "the planet has other teeth than fit between sun and ring", code="E-TEETH",
-                key=f"{key}.planet_teeth", value=stage.planet_teeth,
+                "the planet has other teeth than fit between sun and ring",
+                code="E-TEETH",
+                key=f"{key}.planet_teeth",
+                value=stage.planet_teeth,
                 limit=f"{between:g}, or up to {_SHIFTED} more or less with profile shift",
-            )  # fmt: skip
-    if not stage.sun_teeth < stage.ring_teeth:
-        yield CaseError(
-            "the ring has no more teeth than the sun",
-            code="E-TEETH",
-            key=f"{key}.ring_teeth",
-            value=stage.ring_teeth,
-            limit=f"more than {stage.sun_teeth}",
-        )
-    yield from _assembly(stage, key)
+            )
+
+
+def _ratios(stage: ParallelSection | PlanetarySection) -> list[tuple[str, float, float]]:
+    """Entry, ratio of the radii and ratio of the teeth, where radii are given."""
+    if stage.module is not None:
+        return []
+    if isinstance(stage, ParallelSection):
+        first, second = stage.radii or stage.base_radii or (0.0, 0.0)
+        return [("teeth", second / first, stage.teeth[1] / stage.teeth[0])]
+    sun, planet = (stage.sun_radius, stage.planet_radius)
+    if sun is None or planet is None:
+        sun, planet = stage.sun_base_radius or 0.0, stage.planet_base_radius or 0.0
+    found = [("ring_teeth", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)]
+    if stage.planet_teeth is not None:
+        found.append(("planet_teeth", planet / sun, stage.planet_teeth / stage.sun_teeth))
+    return found
 
 
 def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
-    both, angles = stage.ring_teeth + stage.sun_teeth, stage.planet_angles
-    if angles is None:
-        if both % stage.planets:
-            yield CaseError(
-                f"{stage.planets} equally spaced planets do not assemble",
-                code="E-ASSEMBLY",
-                key=f"{key}.planets",
-                value=stage.planets,
-                limit=f"a divisor of ring_teeth + sun_teeth = {both}",
-            )
-        yield from _neighbours(stage, key, 2.0 * math.pi / stage.planets)
-        return
+    """Planets at ascending angles, in mesh with sun and ring, whose pitch circles do not overlap."""
+    both, angles, equal = stage.ring_teeth + stage.sun_teeth, stage.angles, stage.planet_angles is None
+    key = f"{key}.{'planets' if equal else 'planet_angles'}"
     if any(b <= a for a, b in pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi - 1e-9:
-        yield CaseError(
-            "the planet angles do not ascend within one turn", code="E-RANGE", key=f"{key}.planet_angles"
-        )
-    yield from _neighbours(stage, key, min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi))))
-    steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
-    if any(abs(step - round(step)) > 1e-3 for step in steps):
-        yield CaseError(
-            "the planets do not assemble at these angles",
-            code="E-ASSEMBLY",
-            key=f"{key}.planet_angles",
-            limit=f"whole multiples of 360 deg / {both} from one another",
-        )
-
-
-def _neighbours(stage: PlanetarySection, key: str, apart: float) -> Iterator[CaseError]:
-    """Pitch circles of neighbouring planets must not overlap; sizes by the teeth."""
-    share = (stage.ring_teeth - stage.sun_teeth) / (stage.ring_teeth + stage.sun_teeth)
+        yield CaseError("the planet angles do not ascend within one turn", code="E-RANGE", key=key)
+    # sizes by the teeth
+    share = (stage.ring_teeth - stage.sun_teeth) / both
+    apart = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
     if share > 0.0 and math.sin(0.5 * min(apart, math.pi)) <= share:
-        most = math.degrees(2.0 * math.asin(share))
         yield CaseError(
             "neighbouring planets overlap",
             code="E-NEIGHBOURS",
-            key=f"{key}.{'planets' if stage.planet_angles is None else 'planet_angles'}",
+            key=key,
             value=f"{math.degrees(apart):.4g} deg from one to the next",
-            limit=f"more than {most:.4g} deg",
+            limit=f"more than {math.degrees(2.0 * math.asin(share)):.4g} deg",
             remedy="take fewer planets, or smaller ones",
+        )
+    steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
+    if any(abs(step - round(step)) > 1e-3 for step in steps):
+        yield CaseError(
+            f"{len(angles)} equally spaced planets do not assemble"
+            if equal
+            else "the planets do not assemble at these angles",
+            code="E-ASSEMBLY",
+            key=key,
+            value=stage.planets if equal else None,
+            limit=f"a divisor of ring_teeth + sun_teeth = {both}"
+            if equal
+            else f"whole multiples of 360 deg / {both} from one another",
         )
 
 
-def given_of(section, names) -> list[str]:
+def _given(section, names) -> list[str]:
     """Those of the names that a section gives."""
     return [name for name in names if getattr(section, name) is not None]
 
 
-def _one_of(key: str, words: str) -> CaseError:
-    return CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=words)
-
-
-def _mismatch(radii: float, teeth: float) -> str:
-    if abs(teeth / radii - 1.0) <= RATIO_TOLERANCE:
-        return ""
-    return f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}"
-
-
-def _unfit(key: str, message: str) -> CaseError:
-    return CaseError(
-        message,
-        code="E-TEETH",
-        key=key,
-        limit=f"ratios within {RATIO_TOLERANCE:.0%} of one another",
-        remedy="correct the teeth or the radii, or give module in place of the radii",
-    )
-
-
-_CHECKS = (_bodies, _shafts, check_sizes, _torques, _simulation, _size)
-
-
-def notices(case: DrivetrainCase) -> tuple[Finding, ...]:
+def _notices(case: DrivetrainCase) -> Iterator[Finding]:
     """Remarks on a case that was checked."""
-    found = []
-    for i, stage in enumerate(case.parallel):
-        radii = stage.radii or stage.base_radii
-        if radii:
-            found.append((f"parallel[{i}]", radii[1] / radii[0], stage.teeth[1] / stage.teeth[0]))
-    for i, stage in enumerate(case.planetary):
-        for sun, planet in (
-            (stage.sun_radius, stage.planet_radius),
-            (stage.sun_base_radius, stage.planet_base_radius),
-        ):
-            if sun is not None and planet is not None:
-                found.append(
-                    (f"planetary[{i}]", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)
+    stages = [(f"parallel[{i}]", stage) for i, stage in enumerate(case.parallel)]
+    stages += [(f"planetary[{i}]", stage) for i, stage in enumerate(case.planetary)]
+    for key, stage in stages:
+        for _, radii, teeth in _ratios(stage)[:1]:
+            if abs(teeth / radii - 1.0) > _REMARK:
+                yield Finding(
+                    "W-TEETH",
+                    f"{key}.teeth",
+                    f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
+                    "the radii, mesh frequencies the teeth of the first gear or of the ring",
                 )
-    said = [
-        Finding(
-            "W-TEETH",
-            f"{key}.teeth",
-            f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
-            "the radii, mesh frequencies the teeth of the first gear or of the ring",
-        )
-        for key, radii, teeth in found
-        if abs(teeth / radii - 1.0) > _REMARK
-    ]
     if not case.bearing:
-        said.append(Finding("W-BEARING", "", "there is no [[bearing]]"))
-    return (*said, *_open_backs(case))
-
-
-def _open_backs(case: DrivetrainCase) -> Iterator[Finding]:
-    """Meshes whose teeth part but find no back flank."""
+        yield Finding("W-BEARING", "", "there is no [[bearing]]")
     if not case.simulation.contact_loss:
         return
-    meshes = [(f"parallel[{i}].mesh", one.mesh) for i, one in enumerate(case.parallel)]
-    for i, one in enumerate(case.planetary):
-        meshes += [(f"planetary[{i}].sun_mesh", one.sun_mesh), (f"planetary[{i}].ring_mesh", one.ring_mesh)]
-    if bare := [key for key, mesh in meshes if mesh.backlash is None]:
+    if not stages:
+        yield Finding("W-BACKLASH", "simulation.contact_loss", "there are no meshes that could part")
+    meshes = [(f"{key}.{name}", getattr(stage, name, None)) for key, stage in stages for name in _MESHES]
+    if bare := [key for key, mesh in meshes if mesh is not None and mesh.backlash is None]:
         yield Finding(
             "W-BACKLASH",
             ", ".join(bare),
             "without backlash given there is no back side: with "
             "simulation.contact_loss these teeth part and meet no back flank",
         )
-    if not meshes:
-        yield Finding("W-BACKLASH", "simulation.contact_loss", "there are no meshes that could part")
 
 
 def embed_torques(data: dict, name: str) -> dict[str, str]:
@@ -931,7 +634,7 @@ def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
         columns or units, numbers that are none, not finite or beyond the limits of a case file,
         decimal commas beside decimal points, times that do not ascend.
     """
-    found = read_columns(path, _DIMENSIONS, least=1, most=MOST_POINTS, remedy=_COLUMNS)
+    found = read_columns(path, _DIMENSIONS, least=1, most=_MOST_POINTS, remedy=_COLUMNS)
     times, torques = (_column(found, key) for key in ("time", "torque"))
     for (before, after), line in zip(pairwise(times), found.lines[1:], strict=True):
         if not after > before:

@@ -16,8 +16,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import welch, windows
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import ConvergenceError
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.tracking import campbell_data
 from femgear.trains.drivetrain.checks import (
     BENDING,
     TORSIONAL,
@@ -60,20 +64,17 @@ _SPEEDS, _FASTEST, _HIGHEST, _MOST_BRANCHES = 21, 10.0 / 3.0, 2.5, 40
 # Orders are read off up to this share of the record rate: beyond it the interpolation takes more than 1.4 %.
 _ORDERS = 0.25
 # Mesh harmonics and side bands of the carrier's turn that have names.
-HARMONICS, SIDE_BANDS = 3, 3
+_HARMONICS, _SIDE_BANDS = 3, 3
 # Of the spectra, and half the width of its main lobe in lines (F. J. Harris, Proc. IEEE 66, 1978, 51-83).
-WINDOW, _LOBE = "hann", 2.0
+_WINDOW, _LOBE = "hann", 2.0
 # Growth of the free motion from which linear meshes are asked whether the motion means anything, and the
 # vibration of a body over its own speed that means nothing.
-GROWN, _WILD = 1e3, 100.0
+_GROWN, _WILD = 1e3, 100.0
 
 
 @one_blas_thread()
 def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
     """Natural frequencies and modes, and the Campbell diagram with the mesh lines."""
-    from femgear.solvers.linear.modal import solve_modes
-    from femgear.solvers.linear.tracking import campbell_data
-
     model, speed = check_drivetrain(case), case.operation.speed
     modes = solve_modes(model.still, model.mean_stiffness)
     still = replace(model.still, gyroscopic=model.system.gyroscopic)
@@ -132,7 +133,7 @@ def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
 
 def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
     """Refuse motions that have grown beyond sense, however exact their balances are."""
-    if not run.gain > GROWN:
+    if not run.gain > _GROWN:
         return
     fastest = np.abs(run.spin_speed).max() * np.abs(ratio)
     vibration = np.abs(run.velocity).max(axis=0)
@@ -208,9 +209,9 @@ def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
         text = model.bases[base]
         if base < 2 * planets:
             add(model.bases[base - 1], {base - 1: 1})
-        for h in range(1, HARMONICS + 1):
+        for h in range(1, _HARMONICS + 1):
             add(text if h == 1 else f"{h} x {text}", {base: h})
-        for k in (*range(-SIDE_BANDS, 0), *range(1, SIDE_BANDS + 1)) if base < 2 * planets else ():
+        for k in (*range(-_SIDE_BANDS, 0), *range(1, _SIDE_BANDS + 1)) if base < 2 * planets else ():
             words = f"{'+' if k > 0 else '-'} {abs(k)} turn{'s' if abs(k) > 1 else ''}"
             add(f"{text} {words}", {base: 1, base - 1: k})
     for one, two in itertools.combinations(meshes, 2):
@@ -268,29 +269,20 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     step : float
         [s], or turns for orders.
     resolution : float
-        Wanted distance of lines [Hz]; the segments take ``1 / resolution`` seconds.
+        Wanted distance of lines [Hz]; the segments take ``1 / resolution`` seconds of the signal.
     """
-    from scipy.signal import get_window
-
     signal = np.asarray(signal, float)
-    length = round(1.0 / (resolution * step)) if resolution > 0.0 and step > 0.0 else 0
-    if not 8 <= length <= len(signal):
-        raise CaseError(
-            f"segments of {length} of {len(signal)} samples", code="E-SPECTRUM",
-            limit="8 samples up to the whole signal", remedy="take a coarser resolution or a longer signal",
-        )  # fmt: skip
-    weight = np.asarray(get_window(WINDOW, length))
+    length = round(1.0 / (resolution * step))
     hop = max(1, round(0.5 * length))
-    starts = range(0, len(signal) - length + 1, hop)
-    power = 0.0
-    for start in starts:
-        part = signal[start : start + length]
-        line = np.fft.rfft((part - part.mean(axis=0)).T * weight, axis=-1)
-        power = power + np.abs(line) ** 2
-    amplitude = 2.0 * np.sqrt(power / len(starts)) / weight.sum()
-    bandwidth = np.sum(weight**2) / weight.sum() ** 2 / step
+    weight = np.asarray(windows.get_window(_WINDOW, length))
+    options = {"window": weight, "noverlap": length - hop, "detrend": "constant", "scaling": "spectrum"}
+    frequency, power = welch(signal, 1.0 / step, nperseg=length, axis=0, return_onesided=False, **options)
+    kept = length // 2 + 1
+    amplitude = 2.0 * np.sqrt(np.moveaxis(power[:kept], 0, -1))
+    bandwidth = float(np.sum(weight**2) / weight.sum() ** 2 / step)
+    segments = (len(signal) - length) // hop + 1
     return AveragedSpectrum(
-        np.fft.rfftfreq(length, step), amplitude, 1.0 / (length * step), float(bandwidth), WINDOW, len(starts)
+        np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, _WINDOW, segments
     )
 
 
@@ -304,19 +296,13 @@ def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> Averag
     ----------
     signal : (n, ...) array
     angle : (n,) array
-        Ascending [rad].
+        Ascending, 4 samples or more [rad].
     resolution : float
         Distance of orders.
     per_turn : int
         Samples a turn, more than twice the highest order; orders above a half of it alias.
     """
-    from scipy.interpolate import CubicSpline
-
     angle = np.asarray(angle, float)
-    if len(angle) < 4 or np.any(np.diff(angle) <= 0.0):
-        raise CaseError(
-            "the angle of order tracking must ascend", code="E-SPECTRUM", limit="4 samples or more"
-        )
     count = int((angle[-1] - angle[0]) / (2.0 * np.pi) * per_turn)
     even = angle[0] + 2.0 * np.pi / per_turn * np.arange(count)
     tracked = CubicSpline(angle, np.asarray(signal, float))(even)
@@ -331,10 +317,6 @@ def _transient_verdict(result: TransientResult) -> dict:
         "momentum": max(run.momentum for run in runs),
         "pulling": {variant: float(np.max(run.pulling, initial=0.0)) for variant, run in result.runs.items()},
     }
-
-
-def _check(case: DrivetrainCase) -> None:
-    check_drivetrain(case)
 
 
 def _figures() -> Mapping[str, Figures]:
@@ -366,7 +348,7 @@ DRIVETRAIN = Train(
                 "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
             },
             describe=lambda results: describe_drivetrain_modes(results.modes),
-            check=_check,
+            check=check_drivetrain,
         ),
         Stage(
             name="transient",
@@ -374,7 +356,7 @@ DRIVETRAIN = Train(
             solve=lambda case, _, context: solve_transient_run(case, progress=context.progress),
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
-            check=_check,
+            check=check_drivetrain,
         ),
         Stage(
             name="spectrum",

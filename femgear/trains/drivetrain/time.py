@@ -1,20 +1,7 @@
 """Newmark's method for a drivetrain through time, with meshes that are linear or separate.
 
-`march_drivetrain` takes the steps. What it works with stands below it: the start, one step with the loads and
-meshes of many, flanks that part, the free motion, the balances of energy and momentum, and the records.
-
-A step is a linear map of the state and the loads. The meshes, few against the coordinates, enter by the
-Woodbury formula: with ``A = M + gamma h C + beta h^2 K`` factorised once and ``F = beta h^2 U^T A^-1 U`` the
-approaches at the end of a step are ``S^T x - S^T F S f`` with x the motion without the mesh forces f there,
-so that only small matrices, made for many instants at once, change from step to step. The free spin is
-integrated apart: it takes the mean acceleration, turns the mesh phases, and cannot drift into the deviations.
-
-Meshes that separate add the search for the flanks that touch. Drive and back flanks are contacts of their own
-(`femgear.trains.drivetrain.model`) with the force ``k max(u, 0)`` of their overlap u, the approach less the
-gap. With the contacts known that touch, the overlaps at the end of a step obey a small linear system. The
-forces do not fall with the overlap and the flexibility takes no energy back, so that there is one solution.
-Changing the wrong contacts and solving again mostly ends after one round; where it does not, only the first
-wrong one changes, which always ends (K. G. Murty, Opsearch 11, 1974, 123-130).
+`march_drivetrain` takes the steps of `femgear.trains.drivetrain.scheme`. What else it works with stands below
+it: the start, the free motion, the balances of energy and momentum, and the records.
 
 Beside the motion goes the free one without loads, whose growth tells a parametric resonance. It takes the
 same steps, with the tangents of the meshes, and is brought back to size one every few steps; the slope of the
@@ -30,12 +17,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import firwin, kaiserord, savgol_coeffs, upfirdn
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.time.steps import AVERAGE_ACCELERATION
-from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import TorqueHistory, check_free_spin
+from femgear.trains.drivetrain.data import TorqueHistory
 from femgear.trains.drivetrain.model import DrivetrainModel, FlankContacts, contact_model
+from femgear.trains.drivetrain.scheme import (
+    Block,
+    MeshBlock,
+    Scheme,
+    Separating,
+    Spin,
+    march_closed,
+    solve_overlaps,
+)
 
 # Errors of the balances, relative, beyond which a run is refused.
 BALANCE = 1e-6
@@ -49,25 +44,15 @@ _SIZES = 30
 # Share of the run in which the strongest motion wins.
 _START = 1.0 / 3.0
 
-# The pass band ends at this share of half the record rate, where the stop band begins.
-PASS_BAND = 0.8
-# Attenuation of the stop band [dB].
-STOP = 80.0
-
-# Points of the table of a mesh period, between which the stiffness is linear.
-_TABLE = 8192
-
-# Rounding of an overlap relative to the largest one without mesh forces.
-_OVERLAP_ROUNDING = 1e-12
-# Rounds of changing all wrong contacts, and of changing one.
-_ROUNDS, _SINGLE = 12, 10_000
-# Steps that are tried at once with all drive flanks and no others in touch, first and last.
-_FEW, _MANY = 8, 64
-
 # Stiffness of a parted mesh over its own: bodies that it alone holds stay findable.
 _SLIGHT = 1e-12
 # Force that this stiffness may carry, over those of the loads.
 _CARRIED = 1e-6
+
+# The pass band ends at this share of half the record rate, where the stop band begins.
+PASS_BAND = 0.8
+# Attenuation of the stop band [dB].
+_STOP = 80.0
 
 # Steps whose loads and meshes are made at once.
 _BLOCK = 4096
@@ -186,12 +171,15 @@ def march_drivetrain(
     Raises
     ------
     CaseError
-        Steps and durations that are none (E-RANGE), a start that does not fit (E-START), bearings that hold
-        the rotation (E-BEARING), a negative stiffness of meshes that separate (E-STIFFNESS).
+        Steps and durations that are none (E-RANGE); loads that part flanks behind which nothing holds the
+        gears (E-START).
     ConvergenceError
         The motion outgrows the numbers (E-DIVERGED); no flanks fit a step (E-CONTACT).
     """
-    _check(model, duration, step, records.every)
+    if not 0.0 < step <= duration < np.inf:
+        raise CaseError(
+            f"{duration} s in steps of {step} s", code="E-RANGE", limit="0 < step <= duration", key="step"
+        )
     count = max(1, round(duration / step))
     stepped = contact_model(model) if contact_loss else model
     spin = Spin(stepped, torques, step, speed)
@@ -199,33 +187,21 @@ def march_drivetrain(
     if outputs is None:
         outputs = [name for name in model.system.dofs if name.endswith("rotation")]
     at = np.array([model.index(name) for name in outputs], int)
-    if contact_loss:
-        check_pushing(model, spin.table)
-    record = Record(model, count, records, at, contact_loss=contact_loss)
+    record = _Record(model, count, records, at, contact_loss=contact_loss)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = _Motion(model, scheme, spin, start, count, contact_loss)
-        balances = Balances(stepped, scheme, spin, motion.state)
+        balances = _Balances(stepped, scheme, spin, motion.state)
         for first in range(0, count, _BLOCK):
             states, block = motion.block(first, min(_BLOCK, count - first))
             balances.add(states, block)
             balances.check(states, block, first, free=motion.free, contact_loss=contact_loss)
-            record.take(first, len(states) - 1, states, block)
+            record.take(first, states, block)
             motion.state = balances.without_drift(states[-1])
     return DrivetrainRun(
         outputs=tuple(outputs), **record.columns(step), meshes=model.meshes, energy_balance=balances.works(),
         drift=balances.drift, momentum=balances.momentum_error(), steps=count, step=step,
         contact_loss=contact_loss, growth=motion.free.growth(), gain=motion.free.gain(),
     )  # fmt: skip
-
-
-def _check(model: DrivetrainModel, duration: float, step: float, every: int) -> None:
-    if not (np.isfinite(duration) and np.isfinite(step) and 0.0 < step <= duration):
-        raise CaseError(
-            f"{duration} s in steps of {step} s", code="E-RANGE", limit="0 < step <= duration", key="step"
-        )
-    if int(every) != every or every < 1:
-        raise CaseError(f"every {every} steps", code="E-RANGE", key="every", limit="1 or more")
-    check_free_spin(model)
 
 
 class _Motion:
@@ -235,7 +211,7 @@ class _Motion:
         self.scheme, self.spin, self.meshes = scheme, spin, len(model.meshes)
         # steps between two sizes of the free motion
         self.piece = max(1, min(PIECE, count // _SIZES))
-        self.state = start_state(model, scheme, spin, start, model.contacts if contact_loss else None)
+        self.state = _start_state(model, scheme, spin, start, model.contacts if contact_loss else None)
         self.free = FreeMotion(model, scheme)
         self.free_row = self.free.start()
         self.march = march_closed
@@ -258,16 +234,10 @@ class _Motion:
         return scheme.states(rows[:, 0]), block
 
 
-def start_state(
+def _start_state(
     model: DrivetrainModel, scheme: Scheme, spin: Spin, start, contacts: FlankContacts | None
 ) -> np.ndarray:
-    """State ``(q, v, g)`` at the first instant; with `contacts` meshes separate.
-
-    Raises
-    ------
-    CaseError
-        A start that is none, or loads that part flanks behind which nothing holds the gears (E-START).
-    """
+    """State ``(q, v, g)`` at the first instant; with `contacts` meshes separate."""
     n, U = scheme.n, scheme.basic
     angle, speed = spin.angle, spin.speed
     block = spin.block(0, 1)
@@ -279,12 +249,8 @@ def start_state(
             load = spin.directions @ block.loads[0]
             load = load - spin.carried * (model.rigid @ load) / spin.inertia
             q = static_deviations(model, U @ S, k, load, contacts=contacts)
-        elif start != "zero":
-            raise CaseError(f"a start {start!r}", code="E-START", limit="static, zero or two arrays")
     else:
         q, v = (np.asarray(one, float) for one in start)
-        if q.shape != (n,) or v.shape != (n,):
-            raise CaseError(f"a start of shapes {q.shape}, {v.shape}", code="E-START", limit=f"two ({n},)")
     approach = (U @ S).T @ q
     force = k * (approach if contacts is None else np.maximum(approach - contacts.gap, 0.0))
     return np.concatenate([q, v, S @ force])
@@ -323,350 +289,19 @@ def static_deviations(model: DrivetrainModel, W, k, load, *, contacts: FlankCont
     return q - drawn @ (np.where(closed, touching, parted) * u)
 
 
-@dataclass(frozen=True)
-class Block:
-    """Loads and meshes at the instants of a block of steps, its start included.
-
-    Parameters
-    ----------
-    loads : (t, d) array
-        One for the weight, then the torques [N m].
-    selection : (t, m, n_meshes) array
-        ``S`` of `femgear.trains.drivetrain.model.MeshGeometry`.
-    stiffness : (t, n_meshes) array
-        [N/m]
-    angle, speed : (t,) arrays
-        Of the spin [rad], [rad/s].
-    torque : (t,) array
-        On the spin [N m].
-    effort : (t,) array
-        The same without regard to signs [N m].
-    """
-
-    loads: np.ndarray
-    selection: np.ndarray
-    stiffness: np.ndarray
-    angle: np.ndarray
-    speed: np.ndarray
-    torque: np.ndarray
-    effort: np.ndarray
-
-
-class Spin:
-    """The free spin, exact for torques that are linear in a step, and the loads that are left."""
-
-    def __init__(self, model: DrivetrainModel, torques: Sequence[TorqueHistory], step: float, speed: float):
-        self.model, self.torques, self.step = model, tuple(torques), step
-        self.angle, self.speed = 0.0, float(speed)
-        carried = model.system.M @ model.rigid
-        self.inertia = float(model.rigid @ carried)
-        columns = [np.eye(len(carried))[model.index(f"{t.body}: rotation")] for t in self.torques]
-        self.carried = carried
-        self.share = np.array([column @ model.rigid for column in columns])
-        kept = [c - carried * (s / self.inertia) for c, s in zip(columns, self.share)]
-        self.directions = np.column_stack([model.system.load, *kept])
-        self.table = np.zeros((_TABLE + 1, 0))
-        if len(model.meshes):
-            phase = 2.0 * np.pi * np.arange(_TABLE + 1)[:, None] / _TABLE
-            self.table = np.array(FourierSeries(model.stiffness).at(phase))
-
-    def block(self, first: int, count: int) -> Block:
-        """The next `count` steps, which begin with step `first`; the spin moves on to their end."""
-        times = self.step * np.arange(first, first + count + 1)
-        values = np.zeros((count + 1, len(self.torques)))
-        for column, one in enumerate(self.torques):
-            values[:, column] = one.at(times)
-        torque, h = values @ self.share, self.step
-        rate = torque / self.inertia
-        speed = self.speed + np.append(0.0, np.cumsum(0.5 * h * (rate[1:] + rate[:-1])))
-        moved = h * speed[:-1] + h * h * (2.0 * rate[:-1] + rate[1:]) / 6.0
-        angle = self.angle + np.append(0.0, np.cumsum(moved))
-        self.angle, self.speed = angle[-1], speed[-1]
-        loads = np.hstack([np.ones((count + 1, 1)), values])
-        effort = np.abs(values) @ np.abs(self.share)
-        return Block(loads, *self._meshes(angle), angle, speed, torque, effort)
-
-    def _meshes(self, angle):
-        model = self.model
-        planets = len(model.geometry.even)
-        turns = angle[:, None] * model.base_ratio[: 2 * planets : 2] * float(model.turning)
-        place = (np.abs(angle[:, None] * model.base_ratio[model.mesh_base]) / (2.0 * np.pi) % 1.0) * _TABLE
-        low = np.minimum(place.astype(int), _TABLE - 1)
-        part, column = place - low, np.arange(len(model.mesh_base))
-        k = (1.0 - part) * self.table[low, column] + part * self.table[low + 1, column]
-        return model.geometry.selection(turns), k
-
-
-@dataclass(frozen=True)
-class Scheme:
-    """One step, mesh forces g on the simple motions at its end left open.
-
-    Rows ``z = (q, v without g, g)`` go on by ``(q, v without g, x without g) = z advance + loads``; the state
-    is ``(q, v) = z[:2n] - drawn g``, and ``x = U^T q`` becomes ``x without g - flexibility g``.
-    """
-
-    advance: np.ndarray
-    loads_before: np.ndarray
-    loads_after: np.ndarray
-    drawn: np.ndarray
-    flexibility: np.ndarray
-    basic: np.ndarray
-    n: int
-
-    @classmethod
-    def of(cls, model: DrivetrainModel, h: float, speed: float, directions) -> Scheme:
-        """Factorise average acceleration in steps h [s] at a speed of the first body [rad/s]."""
-        from scipy import linalg
-
-        rule, system, U = AVERAGE_ACCELERATION, model.system, model.geometry.basic
-        M, K, n = system.M, system.K, len(system.M)
-        D = system.C if system.gyroscopic is None else system.C + speed * system.gyroscopic
-        # columns: q, v, g, loads before, loads after, mesh forces after
-        ends = np.cumsum([n, n, U.shape[1], directions.shape[1], directions.shape[1], U.shape[1]])
-        blank = np.zeros((n, ends[-1]))
-        q, v, force, after = blank.copy(), blank.copy(), blank.copy(), blank.copy()
-        q[:, :n], v[:, n : ends[1]] = np.eye(n), np.eye(n)
-        force[:, ends[1] : ends[2]], force[:, ends[2] : ends[3]] = -U, directions
-        after[:, ends[3] : ends[4]], after[:, ends[4] :] = directions, -U
-        begin = linalg.solve(M, force - D @ v - K @ q, assume_a="pos")
-        q_free = q + h * v + h * h * (0.5 - rule.beta) * begin
-        v_free = v + h * (1.0 - rule.gamma) * begin
-        A = M + rule.gamma * h * D + rule.beta * h * h * K
-        end = linalg.solve(A, after - D @ v_free - K @ q_free)
-        q_end, v_end = q_free + rule.beta * h * h * end, v_free + rule.gamma * h * end
-        whole = np.vstack([q_end, v_end, U.T @ q_end])
-        drawn = -whole[: 2 * n, ends[4] :]
-        moved = whole[:, : 2 * n]
-        advance = np.hstack([moved, whole[:, 2 * n : ends[2]] - moved @ drawn])
-        return cls(
-            np.ascontiguousarray(advance.T), whole[:, ends[2] : ends[3]].T,
-            whole[:, ends[3] : ends[4]].T, np.ascontiguousarray(drawn.T),
-            -whole[2 * n :, ends[4] :], U, n,
-        )  # fmt: skip
-
-    def states(self, rows) -> np.ndarray:
-        """``(q, v, g)`` of rows ``z`` (..., 2 n + m)."""
-        out = np.array(rows)
-        out[..., : 2 * self.n] -= rows[..., 2 * self.n :] @ self.drawn
-        return out
-
-    def row(self, state) -> np.ndarray:
-        """``z`` of states ``(q, v, g)``."""
-        out = np.array(state)
-        out[..., : 2 * self.n] += state[..., 2 * self.n :] @ self.drawn
-        return out
-
-
-@dataclass(frozen=True)
-class MeshBlock:
-    """Small matrices of the ends of the steps of a block.
-
-    Parameters
-    ----------
-    selection : (t, m, c) array
-        Of the meshes, or of all contacts of those that separate.
-    stiffness : (t, c) array
-    closed : (t, m, m) array
-        From x without mesh forces (a row) to the forces on the simple motions when all drive flanks touch.
-    """
-
-    selection: np.ndarray
-    stiffness: np.ndarray
-    closed: np.ndarray
-
-    @classmethod
-    def of(cls, scheme: Scheme, block: Block, meshes: int) -> MeshBlock:
-        """Of a block whose first `meshes` contacts are drive flanks."""
-        S, k = np.ascontiguousarray(block.selection[1:, :, :meshes]), block.stiffness[1:, :meshes]
-        St = np.swapaxes(S, 1, 2)
-        # transposed: x S k (1 + (S^T F S)^T k)^-1 S^T
-        inner = np.matmul(np.swapaxes(np.matmul(scheme.flexibility, S), 1, 2), S) * k[:, None, :]
-        inner[:, np.arange(inner.shape[1]), np.arange(inner.shape[1])] += 1.0
-        forces = np.linalg.solve(np.swapaxes(inner, 1, 2), k[:, :, None] * St)
-        closed = np.matmul(np.swapaxes(forces, 1, 2), St)
-        return cls(block.selection[1:], block.stiffness[1:], closed)
-
-
-def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
-    """Fill ``rows[i + 1]`` (2, 2 n + m), the motion and the free motion, from ``rows[i]`` for i in `steps`.
-
-    All meshes are linear; `loads` (t, 2 n + m) act on the motion alone.
-    """
-    advance, closed, at = scheme.advance, meshes.closed, 2 * scheme.n
-    dot = np.dot
-    for i in steps:
-        after = rows[i + 1]
-        dot(rows[i], advance, out=after)
-        after[0] += loads[i]
-        drawn = after[:, at:]
-        drawn[:] = dot(drawn, closed[i])
-
-
-def solve_overlaps(
-    flexibility, free, closed, touching, parted: np.ndarray | float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Overlaps and the contacts that touch (n,), with ``u + flexibility force(u) = free``.
-
-    Parameters
-    ----------
-    flexibility : (n, n) array
-        With a symmetric part that is not negative [m/N].
-    free : (n,) array
-        Overlaps without the forces [m].
-    closed : (n,) bool array
-        First guess.
-    touching, parted : (n,) arrays
-        Forces over overlaps of contacts that touch, and of the others [N/m].
-
-    Raises
-    ------
-    ConvergenceError
-        No contacts fit (E-CONTACT).
-    """
-    rounding = _OVERLAP_ROUNDING * np.abs(free).max(initial=0.0)
-    for number in range(_ROUNDS + _SINGLE):
-        slopes = np.where(closed, touching, parted)
-        u = np.linalg.solve(np.eye(len(free)) + flexibility * slopes, free)
-        found = changed(u, closed, rounding)
-        wrong = np.flatnonzero(found != closed)
-        if not len(wrong):
-            return u, closed
-        # all that are wrong, or the first one alone
-        wrong = wrong if number < _ROUNDS else wrong[:1]
-        closed = closed.copy()
-        closed[wrong] = found[wrong]
-    raise ConvergenceError(
-        "no contacts of the meshes fit the end of a step", code="E-CONTACT",
-        remedy="take shorter steps, or the start \"zero\"",
-    )  # fmt: skip
-
-
-def changed(u, closed, rounding: float) -> np.ndarray:
-    """The contacts that touch with overlaps u; within rounding as before."""
-    return np.where(closed, u >= -rounding, u > rounding)
-
-
-def check_pushing(model, table) -> None:
-    """Refuse meshes that separate and whose stiffness, samples (t, n_meshes), is negative anywhere."""
-    least = table.min(axis=0, initial=np.inf)
-    if np.any(least < 0.0):
-        mesh = int(np.argmin(least))
-        raise CaseError(
-            f"the stiffness of mesh {model.meshes[mesh]} falls to {least[mesh]:.4g} N/m: parted teeth do not"
-            " pull", code="E-STIFFNESS", limit="0 N/m or more at any phase",
-            remedy="take another number of harmonics, or a larger low_share",
-        )  # fmt: skip
-
-
-class Separating:
-    """Steps of meshes that separate, beside the tangent that the free motion takes.
-
-    Parameters
-    ----------
-    gap : (n,) array
-        Of all contacts [m].
-    meshes : int
-        Number of the first contacts, which are the drive flanks.
-    """
-
-    def __init__(self, gap, meshes: int):
-        from scipy.linalg import get_lapack_funcs
-
-        self.gap = gap
-        (self.dgesv,) = get_lapack_funcs(("gesv",), dtype=float)
-        self.drive = np.arange(len(gap)) < meshes
-        # what leaves the drive flanks, and no others, in touch is not below zero
-        self.sense = np.where(self.drive, 1.0, -1.0)
-        self.tries = _FEW
-        self._take(self.drive)
-
-    def _take(self, closed) -> None:
-        """Keep the contacts that touch, and the overlaps from `least` to `most` that fit them."""
-        self.closed, self.drives = closed, np.array_equal(closed, self.drive)
-        self.touching = np.flatnonzero(closed)
-        self.play = self.gap[self.touching]
-        self.least = np.where(closed, 0.0, -np.inf)
-        self.most = np.where(closed, np.inf, 0.0)
-
-    def march(self, scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
-        """As `march_closed`, with the contacts that touch."""
-        i, stop = steps.start, steps.stop
-        while i < stop:
-            if self.drives:
-                tried = range(i, min(i + self.tries, stop))
-                march_closed(scheme, meshes, loads, rows, tried)
-                kept = self._kept(scheme, meshes, rows, tried)
-                i += kept
-                self.tries = min(2 * self.tries, _MANY)
-                if kept == len(tried):
-                    continue
-                self.tries = _FEW
-            self._step(scheme, i, meshes, loads, rows)
-            i += 1
-
-    def _kept(self, scheme, meshes, rows, steps) -> int:
-        """Steps until the first drive flank parts or back flank touches."""
-        at, n = 2 * scheme.n, scheme.n
-        z = rows[steps.start + 1 : steps.stop + 1, 0]
-        x = z[:, :n] @ scheme.basic - z[:, at:] @ scheme.flexibility.T
-        approach = np.einsum("tmj,tm->tj", meshes.selection[steps.start : steps.stop], x)
-        wrong = ((approach - self.gap) * self.sense < 0.0).any(axis=1)
-        return int(np.argmax(wrong)) if wrong.any() else len(z)
-
-    def _step(self, scheme, i, meshes, loads, rows) -> None:
-        after = rows[i + 1]
-        np.dot(rows[i], scheme.advance, out=after)
-        after[0] += loads[i]
-        drawn = after[:, 2 * scheme.n :]
-        drawn[:] = self._forces(scheme, meshes, i, drawn)
-
-    def _forces(self, scheme, meshes, i, x):
-        """Forces and their tangents (2, m) on the simple motions from these motions (2, m) without them."""
-        forces, u = self._solved(scheme, meshes, i, x)
-        if ((u >= self.least) & (u <= self.most)).all():
-            return forces
-        if not np.isfinite(x).all():
-            return np.full_like(x, np.nan)
-        S = meshes.selection[i]
-        free = np.dot(x[0], S) - self.gap
-        found = changed(u, self.closed, _OVERLAP_ROUNDING * np.abs(free).max())
-        if np.array_equal(found, self.closed):
-            return forces
-        flexibility = np.dot(S.T, np.dot(scheme.flexibility, S))
-        self._take(solve_overlaps(flexibility, free, found, meshes.stiffness[i])[1])
-        return self._solved(scheme, meshes, i, x)[0]
-
-    def _solved(self, scheme, meshes, i, x):
-        """Forces and tangents with the present contacts, and the overlaps (n,) that they lead to."""
-        S, k = meshes.selection[i], meshes.stiffness[i][self.touching]
-        if not len(k):
-            return np.zeros_like(x), np.dot(x[0], S) - self.gap
-        own, flexible = S.take(self.touching, axis=1), scheme.flexibility.T
-        inner = np.dot(np.dot(own.T, flexible), own) * k
-        inner.ravel()[:: len(k) + 1] += 1.0
-        right = np.dot(x, own)
-        right[0] -= self.play
-        right *= k
-        # rows in C order are columns in that of Fortran: nothing is copied
-        forces = np.dot(self.dgesv(inner.T, right.T, overwrite_a=True, overwrite_b=True)[2].T, own.T)
-        return forces, np.dot(x[0] - np.dot(forces[0], flexible), S) - self.gap
-
-
 class FreeMotion:
     """Size of the free motion: the root of twice its energy, meshes included and the spin left out."""
 
-    def __init__(self, model: DrivetrainModel, scheme: Scheme, *, seed: int = 0):
+    def __init__(self, model: DrivetrainModel, scheme: Scheme):
         self.system, self.rigid, self.scheme = model.system, model.rigid, scheme
-        self.carried, self.inertia, self.seed = model.system.M @ model.rigid, model.inertia, seed
+        self.carried, self.inertia = model.system.M @ model.rigid, model.inertia
         self.times, self.sizes = [0.0], [0.0]
 
     def start(self) -> np.ndarray:
         """Row ``z`` (2 n + m,) of random velocities of like energy."""
         n = self.scheme.n
         state = np.zeros(len(self.scheme.advance))
-        state[n : 2 * n] = np.random.default_rng(self.seed).standard_normal(n) / np.sqrt(
-            np.diag(self.system.M)
-        )
+        state[n : 2 * n] = np.random.default_rng(0).standard_normal(n) / np.sqrt(np.diag(self.system.M))
         return self._scaled(state)[0]
 
     def renewed(self, row, time: float) -> np.ndarray:
@@ -734,7 +369,7 @@ class EnergyBalance:
         return abs(rest) / size
 
 
-class Balances:
+class _Balances:
     """Energy and momentum of the deviations and of the spin."""
 
     def __init__(self, model: DrivetrainModel, scheme: Scheme, spin: Spin, state):
@@ -800,13 +435,7 @@ class Balances:
         return self.missed / size if self.missed else 0.0
 
     def check(self, states, block: Block, first: int, *, free: FreeMotion, contact_loss: bool) -> None:
-        """Refuse a motion that has outgrown the numbers, states (t, 2 n + m) from step `first` on.
-
-        Raises
-        ------
-        ConvergenceError
-            Momentum or energy are lost, or the motion is beyond all numbers (E-DIVERGED).
-        """
+        """Refuse motions that have outgrown the numbers (E-DIVERGED), states (t, 2 n + m) from `first` on."""
         finite = np.isfinite(states).all(axis=1)
         energy, momentum = self.works().error, self.momentum_error()
         if finite.all() and energy <= BALANCE and momentum <= BALANCE:
@@ -862,18 +491,20 @@ class Decimator:
     """
 
     def __init__(self, every: int, count: int):
-        from scipy.signal import firwin, kaiserord
-
         self.every, self.count, self.seen = every, count, 0
         self.rows = count // every + 1
-        length, beta = kaiserord(STOP, (1.0 - PASS_BAND) / every)
+        length, beta = kaiserord(_STOP, (1.0 - PASS_BAND) / every)
         # the continuation needs as many rows as it adds
         half = min(length // 2, count) if every > 1 else 0
         self.half = half
         middle = 0.5 * (1.0 + PASS_BAND) / every
         window = ("kaiser", beta)
         self.weights = firwin(2 * half + 1, middle, window=window) if half else np.ones(1)  # type: ignore
-        self.slope = _end_slope(min(half, 2 * every)) if half else np.zeros(1)
+        # of rows for the slope, at the first one, of their parabola; of a line for two
+        steps = min(half, 2 * every)
+        slope = savgol_coeffs(steps + 1, min(2, steps), deriv=1, pos=0, use="dot") if half else np.zeros(1)
+        # ramps exactly, whatever the least squares round
+        self.slope = slope / (slope @ np.arange(steps + 1.0)) if half else slope
         self.buffer, self.first, self.done = np.zeros((0, 0)), 0, 0
 
     def push(self, rows) -> np.ndarray:
@@ -898,8 +529,6 @@ class Decimator:
 
     def _filtered(self) -> np.ndarray:
         """Records whose whole window is in the buffer."""
-        from scipy.signal import upfirdn
-
         reach = self.first + len(self.buffer) - 1 - self.half
         stop = min(reach // self.every + 1, self.rows)
         if stop <= self.done:
@@ -917,16 +546,7 @@ class Decimator:
         return found
 
 
-def _end_slope(steps: int) -> np.ndarray:
-    """Weights (steps + 1,) of rows for the slope, at the first one, of their parabola; of a line for two."""
-    from scipy.signal import savgol_coeffs
-
-    weights = savgol_coeffs(steps + 1, min(2, steps), deriv=1, pos=0, use="dot")
-    # ramps exactly, whatever the least squares round
-    return weights / (weights @ np.arange(steps + 1.0))
-
-
-class Record:
+class _Record:
     """What a run keeps: coordinates, meshes, spin."""
 
     def __init__(self, model: DrivetrainModel, count: int, records: Records, at, *, contact_loss: bool):
@@ -942,8 +562,8 @@ class Record:
         self.extremes = np.array([np.full(meshes, np.inf), np.full(meshes, -np.inf)])
         self.pulled, self.lost = np.zeros((2, meshes))
 
-    def take(self, first: int, number: int, states, block: Block) -> None:
-        """Rows of a block of `number` steps; that of its start comes with the first block alone."""
+    def take(self, first: int, states, block: Block) -> None:
+        """Rows of the states and the `Block` of some steps; that of their start with the first one alone."""
         begin = min(first, 1)
         approach = np.einsum("tmj,tm->tj", block.selection, states[:, : len(self.basic)] @ self.basic)
         force, touched = block.stiffness * approach, np.ones((1, 1), bool)

@@ -1,0 +1,413 @@
+"""Pictures of the lowest elastic modes of a drivetrain: discs on shafts, at rest and moved.
+
+`drivetrain_layout` places the bodies in space, `layout_motion` and `shaft_lines` move them, and
+`drivetrain_pictures` draws them.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from femgear.report.scene import add_coloured, load_pyvista
+from femgear.report.style import VERMILION
+from femgear.storage.files import replace_file
+from femgear.trains.drivetrain.data import Drivetrain
+from femgear.trains.drivetrain.model import DrivetrainModel
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Radius of bodies that carry no gear, and distance of wheels side by side, over the largest gear radius.
+_PLAIN, _WHEEL_GAP = 0.9, 0.45
+# Phi of a shaft that shears and hardly bends: more does not show.
+_SHEAR_ALONE = 1e6
+
+_EDGES = {"boundary_edges": True, "feature_edges": True, "manifold_edges": False, "non_manifold_edges": False}
+_REST, _MOVED = "#B0B0B0", VERMILION
+_COLOURS = "displacement over the largest"
+_VIEW = np.array([1.0, 0.55, -0.9])
+# Lines stand this share of the size in front of the faces that they lie on; from afar nothing is shifted.
+_FRONT = 3e-3
+# Height of the picture over its width.
+_HEIGHT = 0.72
+# Shares of the height between which the drivetrain stands.
+_ROOM = (0.22, 0.88)
+# Largest displacement over the size of the drivetrain.
+_SHARE = 0.12
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A disc: name, centre (3,), radius and width [m]; index of the body's centre in `Layout.centre`."""
+
+    name: str
+    centre: np.ndarray
+    radius: float
+    width: float
+    body: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Discs, shafts between body centres, and places of all bodies.
+
+    ``centre`` (n_bodies, 3) [m], planets after the bodies; ``shafts`` pairs of body numbers. The drawing is a
+    scheme: bodies without gears get a radius, and two wheels of one body stand side by side.
+    """
+
+    names: tuple[str, ...]
+    centre: np.ndarray
+    wheels: tuple[Wheel, ...]
+    shafts: tuple[tuple[int, int], ...]
+
+
+def drivetrain_layout(train: Drivetrain) -> Layout:
+    """Places along z by shaft lengths, across it by centre distances."""
+    names = [body.name for body in train.bodies]
+    gears = [radius for s in train.parallel for radius in s.pitch_radii]
+    gears += [stage.centre_distance for stage in train.planetary]
+    size = max(gears, default=0.3)
+    places = {names[0]: np.zeros(3)}
+    links = [(*s.between, np.array([0.0, 0.0, s.length])) for s in train.shafts]
+    seconds = [s.between[1] for s in train.parallel]
+    for s in train.parallel:
+        apart, beside = sum(s.pitch_radii), _WHEEL_GAP * size if s.between[0] in seconds else 0.0
+        across = apart * math.cos(s.direction), apart * math.sin(s.direction)
+        links.append((*s.between, np.array([*across, s.offsets[0] - s.offsets[1] + beside])))
+    links += [(s.carrier, s.sun, np.zeros(3)) for s in train.planetary]
+    for _ in names:
+        for first, second, arm in links:
+            if first in places:
+                places.setdefault(second, places[first] + arm)
+            elif second in places:
+                places[first] = places[second] - arm
+    centre = [places[name] for name in names]
+    wheels = _wheels(train, places, size)
+    for stage in train.planetary:
+        prefix = "planet" if len(train.planetary) == 1 else f"planet of {stage.carrier}"
+        for p, angle in enumerate(stage.angles, start=1):
+            arm = stage.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
+            centre.append(places[stage.carrier] + arm)
+            wheels.append(Wheel(f"planet {p}", centre[-1], stage.pitch_radii[1], 0.2 * size, len(names)))
+            names.append(f"{prefix} {p}")
+    shafts = tuple((names.index(s.between[0]), names.index(s.between[1])) for s in train.shafts)
+    return Layout(tuple(names), np.array(centre), tuple(wheels), shafts)
+
+
+def _wheels(train: Drivetrain, places, size: float) -> list[Wheel]:
+    order = [body.name for body in train.bodies]
+    found = []
+    for stage in train.planetary:
+        plate = places[stage.carrier] - np.array([0.0, 0.0, 0.2 * size])
+        found.append((stage.carrier, plate, stage.centre_distance, 0.06 * size))
+        found.append((stage.sun, places[stage.sun], stage.pitch_radii[0], 0.2 * size))
+    for stage in train.parallel:
+        first, second = (places[name] for name in stage.between)
+        # in the plane of the second gear
+        centres = np.array([first[0], first[1], second[2]]), second
+        found += [(*one, 0.2 * size) for one in zip(stage.between, centres, stage.pitch_radii)]
+    geared = {name for name, *_ in found}
+    found += [(n, places[n], _PLAIN * size, 0.3 * size) for n in order if n not in geared]
+    return [Wheel(name, centre, radius, width, order.index(name)) for name, centre, radius, width in found]
+
+
+def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.ndarray, np.ndarray]:
+    """Translation and rotation vector (n, 3) of every place of the layout under a motion (n_free,).
+
+    Planets fixed to their pins follow the carrier, at its angle zero.
+    """
+    train, place, full = model.train, model.place, model.free @ shape
+    move, turn = np.zeros((2, len(layout.names), 3))
+    for row, body in enumerate(train.bodies):
+        x, y, *turns = full[place.body[body.name] : place.body[body.name] + 5]
+        move[row], turn[row] = (x, y, 0.0), turns
+    row = len(train.bodies)
+    for stage, planets in zip(train.planetary, place.planets):
+        at = [body.name for body in train.bodies].index(stage.carrier)
+        for planet in planets:
+            arm = layout.centre[row] - layout.centre[at]
+            move[row] = move[at] + np.cross(turn[at], arm)
+            turn[row] = *turn[at][:2], full[planet[2]]
+            row += 1
+    return move, turn
+
+
+def shaft_lines(
+    model: DrivetrainModel, layout: Layout, shape, *, points: int = 8
+) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """Centre lines of the shafts under a motion: places at rest and displacements, (k, 3) each.
+
+    A shaft passes through its stations, between them by the shape functions of its elements; one that is
+    modelled as a joint is drawn as the one element whose static stiffness the joint stands for.
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+    layout : Layout
+        Of ``model.train``.
+    shape : (n_free,) array
+        Motion of the free coordinates.
+    points : int
+        Pieces of an element of a beam.
+
+    Returns
+    -------
+    tuple of (rest, displacement)
+        In the order of the shafts of the chain [m].
+    """
+    place, full = model.place, model.free @ shape
+    found = []
+    for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
+        one, two = (place.body[name] for name in shaft.between)
+        first = np.array([one, *inner, two])
+        stations = full[first[:, None] + np.arange(5)]
+        share, across = _beam_line(shaft, stations, points if shaft.elements else 3 * points)
+        one, two = layout.centre[list(ends)]
+        rest = one + share[:, None] * (two - one)
+        found.append((rest, np.column_stack([across, np.zeros(len(share))])))
+    return tuple(found)
+
+
+def _beam_line(shaft, stations, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the length (k,) and displacements (k, 2) of a beam through its stations (n + 1, 5)."""
+    count = max(shaft.elements, 1)
+    length = shaft.length / count
+    share = np.linspace(0.0, 1.0, count * points + 1)
+    element = np.minimum(np.arange(len(share)) // points, count - 1)
+    ratio = shaft.section.shear_ratio(length) if shaft.elements else _joint_shear_ratio(shaft)
+    N = beam_shape(share * count - element, length, ratio)
+    # a tilt about y is the slope of x, one about x minus that of y
+    ends = np.stack([stations[element], stations[element + 1]], axis=1)
+    x = np.einsum("kn,kn->k", N, ends[:, :, [0, 3]].reshape(-1, 4))
+    y = np.einsum("kn,kn->k", N, (ends[:, :, [1, 2]] * np.array([1.0, -1.0])).reshape(-1, 4))
+    return share, np.column_stack([x, y])
+
+
+def _joint_shear_ratio(shaft) -> float:
+    """Phi of the Timoshenko shaft whose static stiffness is that of a joint's springs.
+
+    Bending ``E I / l`` and shear ``12 E I / ((1 + Phi) l^3)``, `femgear.system.shaft.joint_springs`. Under a
+    spherical joint no force crosses the shaft, which then bends to a parabola whatever Phi is.
+    """
+    springs = shaft.springs
+    if math.isinf(springs.shear):
+        return 0.0
+    return float(np.clip(12.0 * springs.bending / (springs.shear * shaft.length**2) - 1.0, 0.0, _SHEAR_ALONE))
+
+
+def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
+    """Deflection (k, 4) of a Timoshenko element per unit of (w, slope) at its first and second end.
+
+    Exact for an element without load; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
+    These are the functions behind the consistent mass of `femgear.system.shaft.beam_element`
+    (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 11.3; Z. Friedman and
+    J. B. Kosmatka, Comput. Struct. 47, 1993, 473-481).
+    """
+    xi, phi = np.asarray(xi, float), shear_ratio
+    rest = 1.0 - xi
+    return np.stack([
+        1.0 - 3.0 * xi**2 + 2.0 * xi**3 + phi * rest,
+        length * (xi * rest**2 + 0.5 * phi * xi * rest),
+        3.0 * xi**2 - 2.0 * xi**3 + phi * xi,
+        -length * (xi**2 * rest + 0.5 * phi * xi * rest),
+    ], axis=-1) / (1.0 + phi)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ModeView:
+    """One picture of a mode shape.
+
+    Parameters
+    ----------
+    path : Path
+        PNG file.
+    title : str
+    move, turn : (n, 3) arrays
+        Translation and rotation vector of every place, in the proportions of the mode.
+    shafts : sequence of (rest (k, 3), displacement (k, 3))
+        Centre lines [m].
+    """
+
+    path: Path
+    title: str
+    move: np.ndarray
+    turn: np.ndarray
+    shafts: Sequence[tuple[np.ndarray, np.ndarray]] = ()
+
+
+def drivetrain_pictures(views: Iterable[ModeView], layout: Layout, *, size: int = 1000) -> list[float]:
+    """Pictures of mode shapes: every disc moves as a rigid body, shafts are the lines that they are given.
+
+    Parameters
+    ----------
+    views : iterable of ModeView
+    layout : Layout
+        Discs, and the names of the places that are written beside them.
+    size : int
+        Width in pixels.
+
+    Returns
+    -------
+    list of float
+        The factors of the shapes.
+
+    Raises
+    ------
+    FemgearError
+        See `load_pyvista`.
+    StorageError
+        When a file cannot be written.
+    """
+    pv = load_pyvista()
+    discs = [_disc(pv, wheel) for wheel in layout.wheels]
+    # one window for all: opening it takes as long as drawing
+    plotter = pv.Plotter(off_screen=True, window_size=[size, round(_HEIGHT * size)])
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.set_background("white")  # type: ignore[call-arg]
+    plotter.enable_parallel_projection()  # type: ignore[call-arg]
+    found = []
+    try:
+        for view in views:
+            plotter.suppress_rendering = True
+            plotter.clear()
+            scale, points = _add_shape(pv, plotter, view, discs, layout, size)
+            _add_texts(plotter, view.title, layout, size)
+            _frame(plotter, points)
+            plotter.suppress_rendering = False
+            plotter.render()
+            _write(plotter, view.path)
+            found.append(scale)
+    finally:
+        plotter.close()
+    return found
+
+
+def _add_shape(pv, plotter, view: ModeView, discs, layout: Layout, size: int):
+    """Discs and shafts, at rest and moved; the factor of the shape, and all points of the discs (n, 3)."""
+    move, turn = np.asarray(view.move, float), np.asarray(view.turn, float)
+    centres, places = layout.centre, [wheel.body for wheel in layout.wheels]
+    lines = [tuple(np.asarray(one, float) for one in pair) for pair in view.shafts]
+    fields = [move[p] + np.cross(turn[p], d.points - centres[p]) for d, p in zip(discs, places)]
+    lengths = [np.linalg.norm(one, axis=1) for one in (*fields, *(across for _, across in lines))]
+    extent = np.ptp(np.vstack([disc.points for disc in discs]), axis=0).max()
+    # a shaft may move more than any disc
+    reach = max(length.max() for length in lengths)
+    scale = _SHARE * extent / reach if reach > 0.0 else 0.0
+    moves = [(centres[p], scale * move[p], scale * turn[p]) for p in places]
+    rest, whole = pv.merge(discs, merge_points=False), pv.merge(discs, merge_points=False)
+    whole.points = np.vstack([_moved(disc.points, *own) for disc, own in zip(discs, moves)])
+    length = np.concatenate(lengths[: len(discs)])
+    whole[_COLOURS] = length / (length.max() or 1.0)
+    add_coloured(plotter, whole, _COLOURS, size, cmap="cividis", limits=(0.0, 1.0))
+    spokes = [_spoke(wheel) for wheel in layout.wheels]
+    turned = [_moved(spoke, *own) for spoke, own in zip(spokes, moves)]
+    for mesh, colour, width, front in (
+        (rest.extract_feature_edges(**_EDGES), _REST, 2.0, 0.0),
+        (_polylines(pv, [*spokes, *(line for line, _ in lines)]), _REST, 3.0, 0.0),
+        (whole.extract_feature_edges(**_EDGES), "black", 2.0, _FRONT),
+        (_polylines(pv, turned), _MOVED, 6.0, _FRONT),
+        (_polylines(pv, [line + scale * across for line, across in lines]), _MOVED, 9.0, 0.0),
+    ):
+        if mesh.n_points:
+            mesh.points = mesh.points + front * extent * _VIEW
+            plotter.add_mesh(mesh, color=colour, line_width=width, lighting=False)
+    return float(scale), np.vstack([rest.points, whole.points])
+
+
+def _add_texts(plotter, title: str, layout: Layout, size: int) -> None:
+    """Title, names beside the places, and the colour bar where this flat picture has room for it."""
+    height = round(_HEIGHT * size)
+    plotter.scalar_bars[" "].SetPosition(0.2, 0.065)
+    radius = np.zeros(len(layout.centre))
+    for wheel in layout.wheels:
+        radius[wheel.body] = max(radius[wheel.body], wheel.radius)
+    plotter.add_point_labels(
+        layout.centre + np.array([0.0, 1.0, 0.0]) * radius[:, None] * 1.15, list(layout.names),
+        font_size=max(size // 60, 10), shape="rect", shape_color="white", shape_opacity=0.6, margin=1,
+        show_points=False, text_color="black", always_visible=True,
+    )  # fmt: skip
+    if title:
+        place = (0.02 * size, height - 0.045 * size)
+        plotter.add_text(title, position=place, font_size=max(size / 75, 7.0), color="black", name="title")
+
+
+def _frame(plotter, points) -> None:
+    """Parallel view that holds all points (n, 3), with room for title and colour bar."""
+    away = _VIEW / np.linalg.norm(_VIEW)
+    right = np.cross([0.0, 1.0, 0.0], away)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(away, right), away])
+    low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+    half = 0.5 * (high - low)
+    camera, bottom, top = plotter.camera, *_ROOM
+    scale = max(half[1] / (top - bottom), 1.06 * _HEIGHT * half[0])
+    middle = 0.5 * (low + high) - [0.0, (bottom + top - 1.0) * scale, 0.0]
+    camera.focal_point = middle @ axes
+    camera.position = camera.focal_point + 10.0 * half.max() * away
+    camera.up, camera.parallel_scale = (0.0, 1.0, 0.0), scale
+    plotter.reset_camera_clipping_range()
+
+
+def _write(plotter, path) -> None:
+    """The picture whole or not at all; the window stays open."""
+    import imageio.v3 as iio
+
+    stream, image = io.BytesIO(), plotter.screenshot(filename=None, return_img=True)
+    iio.imwrite(stream, image, extension=".png", compress_level=4)
+    data = stream.getvalue()
+    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+
+
+def _moved(points, centre, shift, turn) -> np.ndarray:
+    """Points turned by a rotation vector about a centre, and shifted: rigid, however large the angle."""
+    return centre + Rotation.from_rotvec(turn).apply(points - centre) + shift
+
+
+def _spoke(wheel: Wheel) -> np.ndarray:
+    """A radius on the front face of a disc (2, 3), which shows how far it turns."""
+    face = np.asarray(wheel.centre) - np.array([0.0, 0.0, 0.51 * wheel.width])
+    return np.array([face, face + np.array([0.0, wheel.radius, 0.0])])
+
+
+def _disc(pv, wheel: Wheel):
+    """A disc with its axis along z."""
+    axis = (0.0, 0.0, 1.0)
+    disc = pv.Cylinder(
+        center=wheel.centre, direction=axis, radius=wheel.radius, height=wheel.width, resolution=48
+    )
+    return disc.triangulate()
+
+
+def _polylines(pv, lines):
+    """Several lines (k, 3) as one mesh."""
+    ends = np.cumsum([0, *(len(line) for line in lines)])
+    cells = [np.append(b - a, np.arange(a, b)) for a, b in itertools.pairwise(ends)]
+    return pv.PolyData(np.vstack(lines), lines=np.concatenate(cells)) if lines else pv.PolyData()
+
+
+def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
+    """The lowest elastic modes as PNG files; returns their names.
+
+    Modes have the numbers of the table: the free spin, which is not drawn, is the first.
+    """
+    layout = drivetrain_layout(model.train)
+    kinds, hertz = modes["kind"].values.astype(str), modes["frequency"].values
+    names, views = [], []
+    for mode in np.flatnonzero(kinds != "rigid")[:count].tolist():
+        shape = modes["shape"].values[:, mode]
+        title = f"mode {mode + 1}: {hertz[mode]:.2f} Hz, {kinds[mode]}"
+        names.append(f"drivetrain_mode_{mode + 1}.png")
+        moved = layout_motion(model, layout, shape)
+        views.append(ModeView(folder / names[-1], title, *moved, shaft_lines(model, layout, shape)))
+    if views:
+        drivetrain_pictures(views, layout)
+    return names

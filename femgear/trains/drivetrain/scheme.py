@@ -1,0 +1,328 @@
+"""Average acceleration for a drivetrain: the free spin, one step with the meshes of many, flanks that part.
+
+A step is a linear map of the state and the loads. The meshes, few against the coordinates, enter by the
+Woodbury formula: with ``A = M + gamma h C + beta h^2 K`` factorised once and ``F = beta h^2 U^T A^-1 U`` the
+approaches at the end of a step are ``S^T x - S^T F S f`` with x the motion without the mesh forces f there,
+so that only small matrices, made for many instants at once, change from step to step. The free spin is
+integrated apart: it takes the mean acceleration, turns the mesh phases, and cannot drift into the deviations.
+
+Meshes that separate add the search for the flanks that touch. Drive and back flanks are contacts of their own
+(`femgear.trains.drivetrain.geometry`) with the force ``k max(u, 0)`` of their overlap u, the approach less
+the gap. With the contacts known that touch, the overlaps at the end of a step obey a small linear system. The
+forces do not fall with the overlap and the flexibility takes no energy back, so that there is one solution.
+Changing the wrong contacts and solving again mostly ends after one round; where it does not, only the first
+wrong one changes, which always ends (K. G. Murty, Opsearch 11, 1974, 123-130).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from femgear.errors import ConvergenceError
+from femgear.solvers.time.steps import AVERAGE_ACCELERATION
+from femgear.system.fourier import FourierSeries
+from femgear.trains.drivetrain.data import TorqueHistory
+from femgear.trains.drivetrain.model import DrivetrainModel
+
+# Points of the table of a mesh period, between which the stiffness is linear.
+_TABLE = 8192
+# Rounding of an overlap relative to the largest one without mesh forces.
+_OVERLAP_ROUNDING = 1e-12
+# Rounds of changing all wrong contacts, and of changing one.
+_ROUNDS, _SINGLE = 12, 10_000
+# Steps that are tried at once with all drive flanks and no others in touch, first and last.
+_FEW, _MANY = 8, 64
+
+
+@dataclass(frozen=True)
+class Block:
+    """Loads and meshes at the instants (t,) of a block of steps, its start included.
+
+    ``loads`` (t, d): one for the weight, then the torques [N m]; ``selection`` (t, m, n_meshes): ``S`` of
+    `MeshGeometry`; ``stiffness`` (t, n_meshes) [N/m]; of the spin ``angle`` [rad], ``speed`` [rad/s],
+    ``torque`` and, without regard to signs, ``effort`` [N m].
+    """
+
+    loads: np.ndarray
+    selection: np.ndarray
+    stiffness: np.ndarray
+    angle: np.ndarray
+    speed: np.ndarray
+    torque: np.ndarray
+    effort: np.ndarray
+
+
+class Spin:
+    """The free spin, exact for torques that are linear in a step, and the loads that are left."""
+
+    def __init__(self, model: DrivetrainModel, torques: Sequence[TorqueHistory], step: float, speed: float):
+        self.model, self.torques, self.step = model, tuple(torques), step
+        self.angle, self.speed = 0.0, float(speed)
+        carried = model.system.M @ model.rigid
+        self.inertia = float(model.rigid @ carried)
+        columns = [np.eye(len(carried))[model.index(f"{t.body}: rotation")] for t in self.torques]
+        self.carried = carried
+        self.share = np.array([column @ model.rigid for column in columns])
+        kept = [c - carried * (s / self.inertia) for c, s in zip(columns, self.share)]
+        self.directions = np.column_stack([model.system.load, *kept])
+        self.table = np.zeros((_TABLE + 1, 0))
+        if len(model.meshes):
+            phase = 2.0 * np.pi * np.arange(_TABLE + 1)[:, None] / _TABLE
+            self.table = np.array(FourierSeries(model.stiffness).at(phase))
+
+    def block(self, first: int, count: int) -> Block:
+        """The next `count` steps, which begin with step `first`; the spin moves on to their end."""
+        times = self.step * np.arange(first, first + count + 1)
+        values = np.zeros((count + 1, len(self.torques)))
+        for column, one in enumerate(self.torques):
+            values[:, column] = one.at(times)
+        torque, h = values @ self.share, self.step
+        rate = torque / self.inertia
+        speed = self.speed + np.append(0.0, np.cumsum(0.5 * h * (rate[1:] + rate[:-1])))
+        moved = h * speed[:-1] + h * h * (2.0 * rate[:-1] + rate[1:]) / 6.0
+        angle = self.angle + np.append(0.0, np.cumsum(moved))
+        self.angle, self.speed = angle[-1], speed[-1]
+        loads = np.hstack([np.ones((count + 1, 1)), values])
+        effort = np.abs(values) @ np.abs(self.share)
+        return Block(loads, *self._meshes(angle), angle, speed, torque, effort)
+
+    def _meshes(self, angle):
+        model = self.model
+        planets = len(model.geometry.even)
+        turns = angle[:, None] * model.base_ratio[: 2 * planets : 2] * float(model.turning)
+        place = (np.abs(angle[:, None] * model.base_ratio[model.mesh_base]) / (2.0 * np.pi) % 1.0) * _TABLE
+        low = np.minimum(place.astype(int), _TABLE - 1)
+        part, column = place - low, np.arange(len(model.mesh_base))
+        k = (1.0 - part) * self.table[low, column] + part * self.table[low + 1, column]
+        return model.geometry.selection(turns), k
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """One step, mesh forces g on the simple motions at its end left open.
+
+    Rows ``z = (q, v without g, g)`` go on by ``(q, v without g, x without g) = z advance + loads``; the state
+    is ``(q, v) = z[:2n] - drawn g``, and ``x = U^T q`` becomes ``x without g - flexibility g``.
+    """
+
+    advance: np.ndarray
+    loads_before: np.ndarray
+    loads_after: np.ndarray
+    drawn: np.ndarray
+    flexibility: np.ndarray
+    basic: np.ndarray
+    n: int
+
+    @classmethod
+    def of(cls, model: DrivetrainModel, h: float, speed: float, directions) -> Scheme:
+        """Factorise average acceleration in steps h [s] at a speed of the first body [rad/s]."""
+        rule, system, U = AVERAGE_ACCELERATION, model.system, model.geometry.basic
+        M, K, n = system.M, system.K, len(system.M)
+        D = system.C if system.gyroscopic is None else system.C + speed * system.gyroscopic
+        # columns: q, v, g, loads before, loads after, mesh forces after
+        ends = np.cumsum([n, n, U.shape[1], directions.shape[1], directions.shape[1], U.shape[1]])
+        blank = np.zeros((n, ends[-1]))
+        q, v, force, after = blank.copy(), blank.copy(), blank.copy(), blank.copy()
+        q[:, :n], v[:, n : ends[1]] = np.eye(n), np.eye(n)
+        force[:, ends[1] : ends[2]], force[:, ends[2] : ends[3]] = -U, directions
+        after[:, ends[3] : ends[4]], after[:, ends[4] :] = directions, -U
+        begin = linalg.solve(M, force - D @ v - K @ q, assume_a="pos")
+        q_free = q + h * v + h * h * (0.5 - rule.beta) * begin
+        v_free = v + h * (1.0 - rule.gamma) * begin
+        A = M + rule.gamma * h * D + rule.beta * h * h * K
+        end = linalg.solve(A, after - D @ v_free - K @ q_free)
+        q_end, v_end = q_free + rule.beta * h * h * end, v_free + rule.gamma * h * end
+        whole = np.vstack([q_end, v_end, U.T @ q_end])
+        drawn = -whole[: 2 * n, ends[4] :]
+        moved = whole[:, : 2 * n]
+        advance = np.hstack([moved, whole[:, 2 * n : ends[2]] - moved @ drawn])
+        return cls(
+            np.ascontiguousarray(advance.T), whole[:, ends[2] : ends[3]].T,
+            whole[:, ends[3] : ends[4]].T, np.ascontiguousarray(drawn.T),
+            -whole[2 * n :, ends[4] :], U, n,
+        )  # fmt: skip
+
+    def states(self, rows) -> np.ndarray:
+        """``(q, v, g)`` of rows ``z`` (..., 2 n + m)."""
+        out = np.array(rows)
+        out[..., : 2 * self.n] -= rows[..., 2 * self.n :] @ self.drawn
+        return out
+
+    def row(self, state) -> np.ndarray:
+        """``z`` of states ``(q, v, g)``."""
+        out = np.array(state)
+        out[..., : 2 * self.n] += state[..., 2 * self.n :] @ self.drawn
+        return out
+
+
+@dataclass(frozen=True)
+class MeshBlock:
+    """Small matrices of the ends of the t steps of a block, c contacts on m simple motions.
+
+    ``selection`` (t, m, c) and ``stiffness`` (t, c) of the meshes, or of all contacts of those that separate;
+    ``closed`` (t, m, m) from x without mesh forces (a row) to the forces on the simple motions when all drive
+    flanks touch.
+    """
+
+    selection: np.ndarray
+    stiffness: np.ndarray
+    closed: np.ndarray
+
+    @classmethod
+    def of(cls, scheme: Scheme, block: Block, meshes: int) -> MeshBlock:
+        """Of a block whose first `meshes` contacts are drive flanks."""
+        S, k = np.ascontiguousarray(block.selection[1:, :, :meshes]), block.stiffness[1:, :meshes]
+        St = np.swapaxes(S, 1, 2)
+        # transposed: x S k (1 + (S^T F S)^T k)^-1 S^T
+        inner = np.matmul(np.swapaxes(np.matmul(scheme.flexibility, S), 1, 2), S) * k[:, None, :]
+        inner[:, np.arange(inner.shape[1]), np.arange(inner.shape[1])] += 1.0
+        forces = np.linalg.solve(np.swapaxes(inner, 1, 2), k[:, :, None] * St)
+        closed = np.matmul(np.swapaxes(forces, 1, 2), St)
+        return cls(block.selection[1:], block.stiffness[1:], closed)
+
+
+def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+    """Fill ``rows[i + 1]`` (2, 2 n + m), the motion and the free motion, from ``rows[i]`` for i in `steps`.
+
+    All meshes are linear; `loads` (t, 2 n + m) act on the motion alone.
+    """
+    advance, closed, at = scheme.advance, meshes.closed, 2 * scheme.n
+    dot = np.dot
+    for i in steps:
+        after = rows[i + 1]
+        dot(rows[i], advance, out=after)
+        after[0] += loads[i]
+        drawn = after[:, at:]
+        drawn[:] = dot(drawn, closed[i])
+
+
+def solve_overlaps(
+    flexibility, free, closed, touching, parted: np.ndarray | float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve ``u + flexibility force(u) = free`` for overlaps u and the contacts that touch (n,).
+
+    Parameters
+    ----------
+    flexibility : (n, n) array
+        With a symmetric part that is not negative [m/N].
+    free : (n,) array
+        Overlaps without the forces [m].
+    closed : (n,) bool array
+        First guess.
+    touching, parted : (n,) arrays
+        Forces over overlaps of contacts that touch, and of the others [N/m].
+
+    Raises
+    ------
+    ConvergenceError
+        No contacts fit (E-CONTACT).
+    """
+    rounding = _OVERLAP_ROUNDING * np.abs(free).max(initial=0.0)
+    for number in range(_ROUNDS + _SINGLE):
+        slopes = np.where(closed, touching, parted)
+        u = np.linalg.solve(np.eye(len(free)) + flexibility * slopes, free)
+        found = _changed(u, closed, rounding)
+        wrong = np.flatnonzero(found != closed)
+        if not len(wrong):
+            return u, closed
+        # all that are wrong, or the first one alone
+        wrong = wrong if number < _ROUNDS else wrong[:1]
+        closed = closed.copy()
+        closed[wrong] = found[wrong]
+    raise ConvergenceError(
+        "no contacts of the meshes fit the end of a step", code="E-CONTACT",
+        remedy="take shorter steps, or the start \"zero\"",
+    )  # fmt: skip
+
+
+def _changed(u, closed, rounding: float) -> np.ndarray:
+    """The contacts that touch with overlaps u; within rounding as before."""
+    return np.where(closed, u >= -rounding, u > rounding)
+
+
+class Separating:
+    """Steps of meshes that separate; of the contacts with these gaps (n,) [m] the first are drive flanks."""
+
+    def __init__(self, gap, meshes: int):
+        self.gap = gap
+        (self.dgesv,) = linalg.get_lapack_funcs(("gesv",), dtype=float)
+        self.drive = np.arange(len(gap)) < meshes
+        # what leaves the drive flanks, and no others, in touch is not below zero
+        self.sense = np.where(self.drive, 1.0, -1.0)
+        self.tries = _FEW
+        self._take(self.drive)
+
+    def _take(self, closed) -> None:
+        """Keep the contacts that touch, and the overlaps from `least` to `most` that fit them."""
+        self.closed, self.drives = closed, np.array_equal(closed, self.drive)
+        self.touching = np.flatnonzero(closed)
+        self.play = self.gap[self.touching]
+        self.least = np.where(closed, 0.0, -np.inf)
+        self.most = np.where(closed, np.inf, 0.0)
+
+    def march(self, scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+        """As `march_closed`, with the contacts that touch."""
+        i, stop = steps.start, steps.stop
+        while i < stop:
+            if self.drives:
+                tried = range(i, min(i + self.tries, stop))
+                march_closed(scheme, meshes, loads, rows, tried)
+                kept = self._kept(scheme, meshes, rows, tried)
+                i += kept
+                self.tries = min(2 * self.tries, _MANY)
+                if kept == len(tried):
+                    continue
+                self.tries = _FEW
+            self._step(scheme, i, meshes, loads, rows)
+            i += 1
+
+    def _kept(self, scheme, meshes, rows, steps) -> int:
+        """Steps until the first drive flank parts or back flank touches."""
+        at, n = 2 * scheme.n, scheme.n
+        z = rows[steps.start + 1 : steps.stop + 1, 0]
+        x = z[:, :n] @ scheme.basic - z[:, at:] @ scheme.flexibility.T
+        approach = np.einsum("tmj,tm->tj", meshes.selection[steps.start : steps.stop], x)
+        wrong = ((approach - self.gap) * self.sense < 0.0).any(axis=1)
+        return int(np.argmax(wrong)) if wrong.any() else len(z)
+
+    def _step(self, scheme, i, meshes, loads, rows) -> None:
+        after = rows[i + 1]
+        np.dot(rows[i], scheme.advance, out=after)
+        after[0] += loads[i]
+        drawn = after[:, 2 * scheme.n :]
+        drawn[:] = self._forces(scheme, meshes, i, drawn)
+
+    def _forces(self, scheme, meshes, i, x):
+        """Forces and their tangents (2, m) on the simple motions from these motions (2, m) without them."""
+        forces, u = self._solved(scheme, meshes, i, x)
+        if ((u >= self.least) & (u <= self.most)).all():
+            return forces
+        if not np.isfinite(x).all():
+            return np.full_like(x, np.nan)
+        S = meshes.selection[i]
+        free = np.dot(x[0], S) - self.gap
+        found = _changed(u, self.closed, _OVERLAP_ROUNDING * np.abs(free).max())
+        if np.array_equal(found, self.closed):
+            return forces
+        flexibility = np.dot(S.T, np.dot(scheme.flexibility, S))
+        self._take(solve_overlaps(flexibility, free, found, meshes.stiffness[i])[1])
+        return self._solved(scheme, meshes, i, x)[0]
+
+    def _solved(self, scheme, meshes, i, x):
+        """Forces and tangents with the present contacts, and the overlaps (n,) that they lead to."""
+        S, k = meshes.selection[i], meshes.stiffness[i][self.touching]
+        if not len(k):
+            return np.zeros_like(x), np.dot(x[0], S) - self.gap
+        own, flexible = S.take(self.touching, axis=1), scheme.flexibility.T
+        inner = np.dot(np.dot(own.T, flexible), own) * k
+        inner.ravel()[:: len(k) + 1] += 1.0
+        right = np.dot(x, own)
+        right[0] -= self.play
+        right *= k
+        # rows in C order are columns in that of Fortran: nothing is copied
+        forces = np.dot(self.dgesv(inner.T, right.T, overwrite_a=True, overwrite_b=True)[2].T, own.T)
+        return forces, np.dot(x[0] - np.dot(forces[0], flexible), S) - self.gap
