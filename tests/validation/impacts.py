@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from trains import example_pair, level_crossings, lightly_loaded_pair
+from small_trains import example_pair, level_crossings, lightly_loaded_pair
 
 from femgear.solvers.continuation.branches import parameter_curve
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance

@@ -1,0 +1,38 @@
+"""docs/helical.md: stiffness and natural frequencies of the published train are those of its case."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear import read_case
+from femgear.trains.helical.stages import solve_helical_modes, solve_helical_static
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "helical.md").read_text(encoding="utf-8")
+NAMES = {
+    "sequential (pairs)": "sequentially phased 1",
+    "in phase": "in phase",
+    "counter-phased": "counter-phased",
+}
+
+
+@pytest.mark.slow
+def test_printed_stiffness_and_frequencies_are_those_of_the_case():
+    case = read_case(ROOT / "cases" / "helical_30_20_70.toml")
+    found = solve_helical_modes(case, solve_helical_static(case)).dataset()
+    k = 1e-6 * found["mesh_stiffness"].values
+    assert f"{k[0]:.0f} N/µm (sun-planet) and {k[4]:.0f} N/µm (planet-ring)" in PAGE
+    kind, rows = (
+        "",
+        re.findall(r"^\|\s*([^|]*?)\s*\| \d+ \| [\d.]+ \| ([\d.]+) \|$", PAGE, flags=re.MULTILINE),
+    )
+    assert len(rows) == 14
+    phasing, frequency = found["phasing"].values.astype(str), found["frequency"].values
+    for name, printed in rows:
+        kind = NAMES.get(name, kind)
+        nearest = min(frequency[phasing == kind], key=lambda f, p=float(printed): abs(f - p))
+        assert abs(nearest - float(printed)) < (0.051 if "." in printed else 0.51), (kind, printed)
+    fluctuation = np.ptp(found["helical_stiffness"].values[0]) / found["helical_stiffness"].values[0].mean()
+    assert f"leaves {fluctuation:.0%}".replace("%", " %") in PAGE

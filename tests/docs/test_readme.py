@@ -1,0 +1,185 @@
+"""README and docs: the example runs as printed, links lead somewhere, tables name what there is."""
+
+import contextlib
+import io
+import re
+from pathlib import Path
+from pkgutil import resolve_name
+
+import pytest
+
+from femgear.trains.reading import every_section
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", ROOT / "meshes" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def printed():
+    """What the example of the README prints when it is run as it stands, in the root of the repository."""
+    (example,) = blocks("python")
+    output = io.StringIO()
+    with contextlib.chdir(ROOT), contextlib.redirect_stdout(output):
+        exec(compile(example, "README.md", "exec"), {"__name__": "__main__"})
+    return output.getvalue()
+
+
+def test_the_example_prints_what_the_readme_says(printed):
+    assert blocks("text")[0] == printed
+
+
+def test_the_example_is_short():
+    (example,) = blocks("python")
+    assert len([line for line in example.splitlines() if line.strip()]) <= 12
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_files(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)", text) + re.findall(r'src="([^"]+)"', text)
+    missing = [t for t in targets if "://" not in t and not (page.parent / t).exists()]
+    assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_page_names_this_machine_or_unfinished_work(page):
+    assert not re.search(r"/home/|/tmp/|/work/|/root/|TODO|FIXME", page.read_text(encoding="utf-8"))
+
+
+def test_pictures_are_small():
+    for path in (ROOT / "docs" / "images").iterdir():
+        assert path.stat().st_size < 300_000, path.name
+
+
+def test_module_table_names_every_module():
+    """One row a folder, every module once, in the row of its folder; ``__init__`` files go without saying."""
+    rows = re.findall(r"^\| `(femgear/[\w/]*)` \| ([^|]+) \|", README, flags=re.MULTILINE)
+    named = [folder + name for folder, names in rows for name in re.findall(r"`(\w+)`", names)]
+    paths = [path for path in (ROOT / "femgear").rglob("*.py") if path.stem != "__init__"]
+    modules = [path.relative_to(ROOT).with_suffix("").as_posix() for path in paths]
+    assert len(rows) == len({folder for folder, _ in rows}) == len({path.parent for path in paths})
+    assert sorted(named) == sorted(modules)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_pages_name_modules_and_files_that_exist(page):
+    text = page.read_text(encoding="utf-8")
+    for name in set(re.findall(r"(?<![\w/.])femgear(?:\.\w+)+", text)):
+        resolve_name(name)
+    named = set(re.findall(r"\b(?:femgear|scripts|tests|benchmarks|cases)/[\w/]+(?:\.\w+)?", text))
+    assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_pages_name_commands_that_exist(page):
+    from femgear.cli import app
+
+    text = page.read_text(encoding="utf-8")
+    fenced = re.findall(r"^```.*?^```", text, flags=re.MULTILINE | re.DOTALL)
+    named = re.findall(r"`femgear ([a-z]+)", text)
+    named += re.findall(r"^(?:\S+/)?femgear ([a-z]+)", "\n".join(fenced), flags=re.MULTILINE)
+    assert set(named) <= set(app)
+
+
+def test_command_table_names_every_command_and_script():
+    from femgear.cli import app
+
+    commands = {name for name in app if not name.startswith("-")}
+    assert commands >= {"check", "run", "report", "sweep", "schema"}
+    assert commands <= set(re.findall(r"`femgear (\w+)", README))
+    assert "| `python tests/validation " in README
+    helpers = {"script_tools.py", "drivetrain_figures.py"}
+    scripts = {path.name for path in (ROOT / "scripts").glob("*.py")} - helpers
+    assert scripts <= set(re.findall(r"scripts/(\w+\.py)", README))
+
+
+def documented(page: str) -> set[str]:
+    """Names in the first columns of the tables of a page."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    cells = re.findall(r"^\|([^|]*)\|", text, flags=re.MULTILINE)
+    return {name for cell in cells for name in re.findall(r"`([\w.]+)`", cell)}
+
+
+def case_keys(model) -> set[str]:
+    """Names of the keys of a section and of those below it."""
+    from pydantic import BaseModel
+
+    found = set()
+    pending = [model]
+    while pending:
+        section = pending.pop()
+        for name, field in section.model_fields.items():
+            inner = [t for t in _types(field.annotation) if isinstance(t, type) and issubclass(t, BaseModel)]
+            pending += inner
+            if not inner or section is not every_section():
+                found.add(field.alias or name)
+    return found
+
+
+def _types(annotation):
+    from typing import get_args
+
+    yield annotation
+    for part in get_args(annotation):
+        yield from _types(part)
+
+
+def test_case_file_page_names_every_key():
+    text = (ROOT / "docs" / "case_file.md").read_text(encoding="utf-8")
+    assert [key for key in sorted(case_keys(every_section())) if f"`{key}`" not in text] == []
+    assert documented("case_file.md") <= case_keys(every_section())
+
+
+def test_case_file_page_has_every_section():
+    text = (ROOT / "docs" / "case_file.md").read_text(encoding="utf-8")
+    headings = " ".join(re.findall(r"^## (.+)$", text, flags=re.MULTILINE))
+    sections = set(every_section().model_fields) - {"format", "title"}
+    assert [name for name in sections if not re.search(rf"\b{name}\b", headings)] == []
+
+
+def test_results_page_names_every_variable():
+    import femgear
+    from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.static.stages import solve_static
+
+    case = femgear.read_case(ROOT / "cases" / "planetary_27_40_108.toml")
+    case = femgear.with_value(case, "static.flank_elements", 8)
+    case = femgear.with_value(case, "static.positions", 14)
+    static = solve_static(case)
+    modes = solve_modes(case, static)
+    dynamics = solve_dynamics(case, static, modes)
+    stages = {
+        "static": static,
+        "modes": modes,
+        "dynamics": dynamics,
+        "housing": solve_housing(case, dynamics),
+    }
+    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    for name, stage in stages.items():
+        section = text.split(f"## {name}.nc")[1].split("\n## ")[0]
+        data = stage.dataset()
+        rows = re.findall(r"^\|([^|]*)\|([^|]*)\|([^|]*)\|", section, flags=re.MULTILINE)[2:]
+        table = {
+            v: (dims.strip(), unit.strip()) for cell, dims, unit in rows for v in re.findall(r"`(\w+)`", cell)
+        }
+        assert table.keys() == set(data.data_vars)
+        for variable, (dims, unit) in table.items():
+            assert dims == ", ".join(data[variable].dims), variable
+            assert (unit or "1") == data[variable].attrs["units"], variable
+        for attribute in set(data.attrs) - {"title", "fourier_convention"}:
+            assert f"`{attribute}`" in text or name in ("modes", "dynamics"), attribute
+
+
+def test_public_names():
+    import femgear
+
+    for name in femgear.__all__:
+        assert getattr(femgear, name) is not None
+    assert set(femgear.__all__) <= set(dir(femgear))
+    with pytest.raises(AttributeError, match="no attribute 'compute'"):
+        femgear.compute  # noqa: B018

@@ -1,0 +1,520 @@
+"""Figures: what they draw, that nothing hides anything, and that every axis says its unit."""
+
+import importlib.util
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from scipy.ndimage import maximum_filter1d
+
+from femgear.errors import StorageError
+from femgear.report import response, style
+from femgear.report.response import campbell
+from femgear.report.style import COLOURS, distinct_lines
+from femgear.trains.elastic import figures as elastic_figures
+from femgear.trains.elastic.figures import _highest
+from femgear.trains.static import figures as static_figures
+
+_HERE = Path(__file__).parents[1]
+_SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
+synthetic = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(synthetic)
+TEETH = synthetic.RING
+
+
+def all_figures():
+    static, modes, dynamics, housing = (
+        getattr(synthetic, n)() for n in ("static", "modes", "dynamics", "housing")
+    )
+    gears = synthetic.planetary_set()
+    unequal = synthetic.static(defect=0.2)
+    return {
+        "ste": static_figures.static_transmission_error(static),
+        "ste unequal": static_figures.static_transmission_error(unequal),
+        "stiffness": static_figures.mesh_stiffness(static, face_width=synthetic.FACE_WIDTH),
+        "sharing": static_figures.load_sharing(static),
+        "sharing unequal": static_figures.load_sharing(unequal),
+        "teeth": static_figures.tooth_loads(static),
+        "shapes": response.mode_shapes(modes, gears),
+        "frequencies": elastic_figures.natural_frequencies(modes),
+        "dte": elastic_figures.transmission_error_period(dynamics, static),
+        "dte of four speeds": elastic_figures.transmission_error_period(
+            synthetic.dynamics(speeds=np.arange(500, 3000, 500))
+        ),
+        "dte spectrum": response.transmission_error_spectrum(dynamics),
+        "sweep": response.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
+        "deflection": elastic_figures.ring_mean_deflection(dynamics, gears),
+        "signal": elastic_figures.housing_signal(housing.isel(speed=[1]), ring_teeth=TEETH),
+        "orders": elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH),
+        "modulation": elastic_figures.modulation_polar(housing.isel(speed=[1]), ring_teeth=TEETH),
+    }
+
+
+@pytest.fixture(scope="module")
+def figures():
+    return all_figures()
+
+
+def drawn(figure):
+    """Renderer of a figure that was just laid out."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return canvas.renderer
+
+
+def test_every_figure_is_a_picture(figures):
+    for name, figure in figures.items():
+        data = style.png_bytes(figure)
+        assert data.startswith(b"\x89PNG"), name
+        assert 10_000 < len(data) < 600_000, name
+
+
+def test_every_axis_has_a_unit(figures):
+    for name, figure in figures.items():
+        for ax in figure.axes:
+            if ax.name == "polar":
+                assert "[" in ax.get_title() and "]" in ax.get_title(), name
+            elif ax.axison:
+                # axes that share a scale say it once, at the edge of the figure
+                for group, text in (
+                    (ax.get_shared_x_axes(), "get_xlabel"),
+                    (ax.get_shared_y_axes(), "get_ylabel"),
+                ):
+                    siblings = group.get_siblings(ax)
+                    assert any("[" in getattr(one, text)() for one in siblings), (name, text)
+
+
+def test_legends_stand_outside_the_axes(figures):
+    for name, figure in figures.items():
+        renderer = drawn(figure)
+        for legend in figure.legends:
+            box = legend.get_window_extent(renderer)
+            assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 + 1, name
+            for ax in figure.axes:
+                assert not box.overlaps(ax.get_window_extent(renderer)), name
+        assert all(ax.get_legend() is None for ax in figure.axes), name
+
+
+def test_texts_of_the_order_spectrum_do_not_overlap(figures):
+    figure = figures["orders"]
+    renderer = drawn(figure)
+    for ax in figure.axes:
+        boxes = [text.get_window_extent(renderer) for text in ax.texts]
+        for i, box in enumerate(boxes):
+            assert not any(box.overlaps(other) for other in boxes[:i])
+            assert box.y1 <= ax.get_window_extent(renderer).y1 + 2
+
+
+def test_order_labels_name_harmonic_and_nodal_diameter(figures):
+    texts = [text.get_text() for ax in figures["orders"].axes for text in ax.texts]
+    assert "537 = 5·108 −3" in texts and "543 = 5·108 +3" in texts and "540" in texts
+
+
+def test_identical_meshes_are_drawn_once():
+    values = np.ones((6, 8))
+    names = synthetic.MESHES
+    assert distinct_lines(names, values) == [
+        ("all sun-planet meshes (identical)", 0),
+        ("all planet-ring meshes (identical)", 3),
+    ]
+    values[1, 3] = 1.1
+    assert [text for text, _ in distinct_lines(names, values)] == [
+        *synthetic.MESHES[:3],
+        "all planet-ring meshes (identical)",
+    ]
+    alone = distinct_lines(["sun-planet 1", "planet 1-ring"], values[:2])
+    assert alone == [("sun-planet 1", 0), ("planet 1-ring", 1)]
+
+
+def test_meshes_of_a_family_that_agree_are_drawn_once():
+    names = [*(f"sun-planet {n}" for n in (1, 2, 3, 4)), *(f"planet {n}-ring" for n in (1, 2, 3, 4))]
+    one, other = np.sin(np.arange(9.0)), np.cos(np.arange(9.0))
+    lines = distinct_lines(names, [one, other, one, other, one, one, one, one], partly=True)
+    assert lines == [
+        ("sun-planet 1, sun-planet 3 (identical)", 0),
+        ("sun-planet 2, sun-planet 4 (identical)", 1),
+        ("all planet-ring meshes (identical)", 4),
+    ]
+    lines = distinct_lines(names, np.diag(np.arange(1.0, 9.0)), partly=True)
+    assert lines == [(name, row) for row, name in enumerate(names)]
+
+
+def line_of(figure, text):
+    return next(line for ax in figure.axes for line in ax.get_lines() if line.get_label() == text)
+
+
+def test_transmission_error_is_drawn_in_micrometres_over_a_closed_period(figures):
+    ste = synthetic.static()["ste"].values
+    line = line_of(figures["ste"], "all sun-planet meshes (identical)")
+    np.testing.assert_allclose(line.get_ydata(), np.append(ste[0], ste[0, 0]) * 1e6, rtol=1e-14)
+    assert line.get_xdata()[0] == 0 and line.get_xdata()[-1] == 1
+
+
+def test_stiffness_axes_agree(figures):
+    """500 N/µm on 25 mm are 20 N/(mm µm)."""
+    ax = figures["stiffness"].axes[0]
+    second = next(child for child in ax.child_axes)
+    low, high = ax.get_ylim()
+    np.testing.assert_allclose(second.get_ylim(), (low / 25, high / 25), rtol=1e-12)
+
+
+def test_one_tooth_pair_carries_over_the_contact_ratio(figures):
+    for ax, ratio in zip(figures["teeth"].axes, (1.5507, 1.9301)):
+        line = ax.get_lines()[0]
+        carrying = line.get_xdata()[line.get_ydata() > 0]
+        assert np.ptp(carrying) == pytest.approx(ratio, abs=2 / 64)
+
+
+def test_dynamic_error_over_the_period_is_the_fourier_sum(figures):
+    x = synthetic.dynamics()
+    dte = (x["dte_real"] + 1j * x["dte_imag"]).values[0, 0]
+    line = line_of(figures["dte"], "all sun-planet meshes (identical)")
+    tau = line.get_xdata()[37]
+    expected = sum((dte[h] * np.exp(2j * np.pi * h * tau)).real for h in range(1, 13)) * 1e6
+    assert line.get_ydata()[37] == pytest.approx(expected, rel=1e-12)
+
+
+def test_ring_deflection_of_two_nodal_diameters():
+    dynamics = synthetic.dynamics()
+    for part in ("real", "imag"):
+        dynamics[f"ring_{part}"].values[:] = 0
+    n = dynamics["circumferential"].values
+    dynamics["ring_real"].values[0, 0, np.abs(n) == 2] = 1e-6
+    figure = elastic_figures.ring_mean_deflection(dynamics, synthetic.planetary_set())
+    line = line_of(figure, "outer surface, outwards positive")
+    np.testing.assert_allclose(line.get_ydata(), 2 * np.cos(2 * line.get_xdata()), atol=1e-12)
+
+
+def test_ring_mode_of_three_nodal_diameters():
+    modes = synthetic.modes()
+    mode = int(np.flatnonzero(modes["nodal_diameter"].values == 3)[0])
+    figure = response.mode_shapes(modes, synthetic.planetary_set(), shown=[mode], scale=0.1)
+    x, y = line_of(figure, "ring, outer surface").get_data()
+    angle = np.arctan2(y, x)
+    np.testing.assert_allclose(np.hypot(x, y), 0.1 * (1 + 0.1 * np.cos(3 * angle)), rtol=1e-12)
+
+
+def test_rigid_modes_are_left_out(figures):
+    titles = [ax.get_title() for ax in figures["shapes"].axes]
+    assert titles[0].startswith("mode 2: 310 Hz")
+    assert len([title for title in titles if title]) == 12
+
+
+def modulated(depth: float, lobes: int):
+    """Housing data of an amplitude-modulated carrier at order 5 z."""
+    housing = synthetic.housing()
+    angle = 2 * np.pi * housing["time"].values
+    housing["acceleration"].values[:] = (1 + depth * np.cos(lobes * angle)) * np.cos(5 * TEETH * angle)
+    amplitude = np.zeros(housing["order_amplitude"].shape)
+    amplitude[:, 5 * TEETH] = 1.0
+    amplitude[:, [5 * TEETH - lobes, 5 * TEETH + lobes]] = depth / 2
+    housing["order_amplitude"].values[:] = amplitude
+    return housing
+
+
+def test_polar_modulation_of_an_amplitude_modulated_signal():
+    figure = elastic_figures.modulation_polar(modulated(0.8, 4), ring_teeth=TEETH)
+    ax = figure.axes[1]
+    assert "mesh harmonic 5: 4 lobes" in ax.get_title()
+    line = ax.get_lines()[0]
+    np.testing.assert_allclose(line.get_ydata(), 1 + 0.8 * np.cos(4 * line.get_xdata()), atol=1e-9)
+
+
+def test_envelope_of_the_housing_signal():
+    figure = elastic_figures.housing_signal(modulated(0.5, 6), ring_teeth=TEETH, harmonics=[5])
+    line = line_of(figure, "envelope")
+    angle = 2 * np.pi * line.get_xdata()
+    np.testing.assert_allclose(line.get_ydata(), 1 + 0.5 * np.cos(6 * angle), atol=1e-9)
+    assert "6 lobes (prominence above 10% of the largest)" in figure.axes[1].get_title(loc="left")
+
+
+def test_sweep_marks_speeds_without_convergence():
+    dynamics = synthetic.dynamics(speeds=np.linspace(100, 6000, 30))
+    dynamics["converged"].values[[3, 7]] = False
+    line = line_of(response.speed_sweep(dynamics), "not converged")
+    np.testing.assert_allclose(line.get_xdata(), dynamics["speed"].values[[3, 7]])
+
+
+def test_sweep_draws_the_rms_of_the_fluctuation(figures):
+    x = synthetic.dynamics(speeds=np.linspace(100, 6000, 60))
+    tau = np.arange(64) / 64
+    dte = (x["dte_real"] + 1j * x["dte_imag"]).values[11, 0]
+    signal = (dte[1:, None] * np.exp(2j * np.pi * np.arange(1, 13)[:, None] * tau)).real.sum(axis=0) * 1e6
+    line = line_of(figures["sweep"], "all sun-planet meshes (identical)")
+    assert line.get_ydata()[11] == pytest.approx(np.sqrt(np.mean(signal**2)), rel=1e-12)
+
+
+def test_colours_differ_for_deuteranopes():
+    """Vienot, Brettel and Mollon (1999): colours of lines stay apart when red and green are confused."""
+    to_lms = np.array(
+        [[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]]
+    )
+    rgb = np.array([[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in COLOURS]) ** 2.2
+    lms = rgb @ to_lms.T
+    lms[:, 1] = 0.494207 * lms[:, 0] + 1.24827 * lms[:, 2]
+    seen = np.clip(lms @ np.linalg.inv(to_lms).T, 0, 1) ** (1 / 2.2)
+    distance = np.linalg.norm(seen[:, None] - seen[None], axis=2) + np.eye(len(seen))
+    assert distance.min() > 0.15
+
+
+def test_a_figure_is_written_whole_or_not_at_all(tmp_path):
+    figure = static_figures.load_sharing(synthetic.static())
+    style.save_figure(figure, tmp_path / "a.png")
+    style.save_figure(figure, tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
+    with pytest.raises(StorageError):
+        style.save_figure(figure, tmp_path / "missing" / "a.png")
+
+
+def test_figures_do_without_pyplot():
+    package = Path(style.__file__).parents[1]
+    drawing = {path for path in package.rglob("*.py") if "matplotlib" in path.read_text(encoding="utf-8")}
+    drawing |= set(package.rglob("figures.py"))
+    names = [".".join(path.relative_to(package.parent).with_suffix("").parts) for path in sorted(drawing)]
+    assert {"femgear.report.style", "femgear.report.response"} <= set(names)
+    assert len([name for name in names if name.startswith("femgear.trains.")]) >= 7
+    code = f"import sys, {', '.join(names)}; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_campbell_diagram_names_its_lines_and_marks_the_critical_speeds():
+    speed = np.linspace(0, 300, 40)
+    modes = np.column_stack([743 - speed / 7, 743 + speed / 7, 1475 + 0 * speed])
+    figure = campbell(
+        speed, modes, orders=np.array([73, 146]) / (2 * np.pi), order_names=["mesh", "2 x mesh"],
+        critical=[(62.0, 735.0)], speed_unit="rpm",
+    )  # fmt: skip
+    (ax,) = figure.axes
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["mode", "mesh", "2 x mesh", "critical speed"]
+    assert ax.lines[1].get_ydata() == pytest.approx(modes[:, 1])
+    assert ax.lines[4].get_ydata()[-1] == pytest.approx(146 * 300 / (2 * np.pi))
+    assert ax.get_xlabel() == "speed [rpm]" and ax.get_ylabel() == "natural frequency [Hz]"
+    assert style.png_bytes(figure).startswith(b"\x89PNG")
+
+
+def test_unloaded_set_is_drawn_flat():
+    """Without torque everything is zero: figures show that, without warnings of divisions."""
+    static = synthetic.static()
+    for name in static.data_vars:
+        static[name].values[:] = 0.0
+    for draw in (
+        static_figures.static_transmission_error,
+        static_figures.mesh_stiffness,
+        static_figures.load_sharing,
+        static_figures.tooth_loads,
+    ):
+        assert style.png_bytes(draw(static)).startswith(b"\x89PNG")
+
+
+def test_silent_housing_is_drawn():
+    housing = synthetic.housing()
+    for name in ("acceleration", "order_amplitude", "order_amplitude_exact"):
+        housing[name].values[:] = 0.0
+    for draw in (
+        elastic_figures.housing_signal,
+        elastic_figures.order_spectrum,
+        elastic_figures.modulation_polar,
+    ):
+        assert style.png_bytes(draw(housing, ring_teeth=TEETH)).startswith(b"\x89PNG")
+
+
+def shifted(dataset, names):
+    """The dataset with every mesh its own: rows rolled by different amounts."""
+    found = dataset.copy(deep=True)
+    for name in names:
+        for row in range(found.sizes["mesh"]):
+            found[name].values[row] = np.roll(found[name].values[row], 3 * row + 1, axis=-1) * (
+                1 + 0.01 * row
+            )
+    return found
+
+
+def of_planets(dataset, planets):
+    """The dataset with so many planets, meshes repeated."""
+    rows = np.concatenate([np.zeros(planets, int), np.full(planets, dataset.sizes["mesh"] // 2)])
+    found = dataset.isel(mesh=rows)
+    names = [f"sun-planet {n + 1}" for n in range(planets)] + [f"planet {n + 1}-ring" for n in range(planets)]
+    return found.assign_coords(mesh=names)
+
+
+def looks(lines):
+    """Colour, dash and width of lines that hold something."""
+    return [
+        (one.get_color(), one.get_linestyle(), one.get_linewidth()) for one in lines if len(one.get_xdata())
+    ]
+
+
+@pytest.mark.parametrize("planets", [3, 4, 7])
+def test_meshes_that_differ_have_lines_that_differ(planets):
+    """Colour and dash of all meshes, thick and thin of both kinds of stiffness."""
+    static = shifted(
+        of_planets(synthetic.static(), planets), ("ste", "mesh_stiffness", "mesh_stiffness_secant")
+    )
+    left = static_figures.static_transmission_error(static).axes[0]
+    assert len(set(looks(left.get_lines()))) == 2 * planets
+    figure = static_figures.mesh_stiffness(static)
+    assert len(figure.axes) == 2
+    drawn = [look for ax in figure.axes for look in looks(ax.get_lines())]
+    assert len(set(drawn)) == len(drawn) == 4 * planets
+    dynamics = of_planets(synthetic.dynamics(), planets)
+    for row in range(2 * planets):
+        dynamics["dte_real"].values[:, row] *= 1.0 + 0.05 * row
+    figure = elastic_figures.transmission_error_period(dynamics, static)
+    for ax in figure.axes:
+        dynamic = [one for one in ax.get_lines() if one.get_linewidth() == 2.0]
+        assert len({look[:2] for look in looks(dynamic)}) == len(looks(dynamic)) == planets
+    renderer = drawn_with_legend(figure)
+    assert all(ax.get_window_extent(renderer).height > 150 for ax in figure.axes)
+
+
+def drawn_with_legend(figure):
+    renderer = drawn(figure)
+    (legend,) = figure.legends
+    box = legend.get_window_extent(renderer)
+    assert not any(box.overlaps(ax.get_window_extent(renderer)) for ax in figure.axes)
+    return renderer
+
+
+@pytest.mark.parametrize("harmonics", [12, 300])
+def test_no_line_is_drawn_where_there_is_none(harmonics):
+    """Lines at rounding are not there: neither bar nor marker, however many harmonics there are."""
+    dynamics = synthetic.dynamics()
+    h = np.arange(harmonics + 1)
+    lines = np.zeros((2, 6, harmonics + 1), complex)
+    lines[..., 1:] = 1e-6 / h[1:]
+    lines[:, :3, h % 3 == 0] = 1e-17
+    lines[:, 3:, h > 6] = 0.0
+    dynamics = dynamics.drop_dims("harmonic").assign_coords(harmonic=h)
+    dynamics["dte_real"] = (("speed", "mesh", "harmonic"), lines.real)
+    dynamics["dte_imag"] = (("speed", "mesh", "harmonic"), lines.imag)
+    figure = response.transmission_error_spectrum(dynamics)
+    for ax in figure.axes:
+        low, high = ax.get_ylim()
+        shown = {}
+        for container in ax.containers:
+            shown[container.get_label()] = sorted(
+                (round(bar.get_x() + bar.get_width() / 2), bar.get_height()) for bar in container.patches
+            )
+        for line in ax.get_lines():
+            shown[line.get_label()] = list(zip(line.get_xdata(), line.get_ydata()))
+        assert len(shown) == 2
+        sun = [(k, 1.0 / k) for k in h[1:] if k % 3]
+        ring = [(k, 1.0 / k) for k in range(1, 7)]
+        for drawn_lines, expected in zip(shown.values(), (sun, ring)):
+            np.testing.assert_allclose(np.array(drawn_lines), np.array(expected), rtol=1e-12)
+            assert low < min(y for _, y in drawn_lines) and max(y for _, y in drawn_lines) < high
+        left, right = ax.get_xlim()
+        assert left < 1 and sun[-1][0] < right < sun[-1][0] + 1
+    assert len(style.png_bytes(figure)) < 600_000
+
+
+def test_static_curve_has_the_harmonics_of_the_excitation():
+    """Ringing of cut series is in both curves; a static curve with all harmonics is the record itself."""
+    static, dynamics = synthetic.static(), synthetic.dynamics()
+    frequency = dynamics["mesh_frequency"].values
+    ste = static["ste"].values[0] - static["ste"].values[0].mean()
+    lines = np.fft.rfft(ste)[1:6] / len(ste) * 2.0
+    for limit, expected in ((5.5, 5), (1.0, 1)):
+        cut = dynamics.assign(excitation_limit=("speed", limit * frequency))
+        figure = elastic_figures.transmission_error_period(cut, static)
+        thin = next(one for one in figure.axes[0].get_lines() if one.get_linewidth() == 0.9)
+        tau = thin.get_xdata()
+        wave = np.exp(2j * np.pi * np.outer(np.arange(1, expected + 1), tau))
+        # the record is linear between its positions: lines h are lower by sinc^2(h / P)
+        size = np.sinc(np.arange(1, expected + 1) / len(ste)) ** 2
+        np.testing.assert_allclose(thin.get_ydata(), 1e6 * ((lines[:expected] * size) @ wave).real, atol=1e-9)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "static, harmonics of the excitation (thin)" in texts and "static, whole (pale)" in texts
+
+
+def test_both_panels_hold_their_tooth_loads():
+    """The panels share one scale: it holds the larger loads, whichever panel has them."""
+    for larger in (0, 3):
+        static = synthetic.static()
+        for name in ("tooth_load", "mesh_force"):
+            static[name].values[larger] *= 3.0
+        for ax in static_figures.tooth_loads(static).axes:
+            low, high = ax.get_ylim()
+            for line in ax.get_lines():
+                assert low <= np.min(line.get_ydata()) and np.max(line.get_ydata()) < high
+
+
+def test_a_tooth_pair_is_followed_through_several_mesh_periods():
+    """Three periods of a record that grows: a pair carries in the period of its place."""
+    one = synthetic.static()
+    three = one.isel(position=np.tile(np.arange(64), 3)).assign_coords(position=np.arange(192) / 64)
+    three.attrs["mesh_periods"] = 3
+    three["tooth_load"] = three["tooth_load"] * (1.0 + np.arange(192) // 64)
+    for ax, row in zip(static_figures.tooth_loads(three).axes, (0, 3)):
+        line = ax.get_lines()[0]
+        # positions follow one another by 1/64 and the loads of places are those of their own periods
+        assert np.diff(line.get_xdata()) == pytest.approx(1 / 64)
+        load = one["tooth_load"].values[row] * (1.0 + np.arange(one.sizes["tooth"]) % 3)[:, None]
+        assert np.max(line.get_ydata()) == pytest.approx(load.max())
+    ste = static_figures.static_transmission_error(three).axes[0].get_lines()[0].get_xdata()
+    assert np.all(np.diff(ste) > 0) and ste[-1] == 3.0
+
+
+def test_the_whole_signal_lies_between_its_extremes():
+    """An unsymmetric signal: its largest values above, its smallest below, no mirror image of either."""
+    housing = synthetic.housing()
+    wave = housing["acceleration"].values
+    wave[:] = np.maximum(wave, 0.2 * wave)
+    signal, high, low, *_ = (
+        elastic_figures.housing_signal(housing.isel(speed=[1]), ring_teeth=TEETH).axes[0].get_lines()
+    )
+    assert np.max(high.get_ydata()) == np.max(wave[1]) and np.min(low.get_ydata()) == np.min(wave[1])
+    assert np.all(high.get_ydata()[:-1] >= signal.get_ydata()) and np.all(
+        low.get_ydata()[:-1] <= signal.get_ydata()
+    )
+
+
+def test_spectra_of_hundreds_of_harmonics_stay_legible():
+    """Numbers of mesh harmonics above the order spectrum keep apart."""
+    housing = synthetic.housing()
+    order = np.arange(220 * TEETH)
+    lines = np.zeros((2, len(order)))
+    lines[:, TEETH * np.arange(1, 220) - 3] = 1.0 / np.arange(1, 220)
+    housing = housing.drop_dims("order").assign_coords(order=order)
+    for name in ("order_amplitude", "order_amplitude_exact"):
+        housing[name] = (("speed", "order"), lines)
+    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH)
+    renderer = drawn(figure)
+    (top,) = figure.axes[0].child_axes
+    boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
+    assert 5 < len(boxes) <= 20 and not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
+
+
+def test_order_spectra_draw_the_highest_of_lines_too_close_to_part():
+    order, floor = np.arange(200_000), 1e-4
+    amplitude = 1e-3 * np.random.default_rng(2).random(len(order))
+    amplitude[[7, 123_456]] = 1.0
+    kept = _highest(order, amplitude, amplitude > floor)
+    assert {7, 123_456} <= set(kept.tolist()) and len(kept) <= 4001 and np.all(np.diff(kept) > 0)
+    # nothing that is left out stands above what is drawn beside it
+    drawn_lines = np.zeros(len(order))
+    drawn_lines[kept] = amplitude[kept]
+    assert np.all(maximum_filter1d(drawn_lines, 101) >= amplitude * (amplitude > floor))
+    few = _highest(order[:3000], amplitude[:3000], amplitude[:3000] > floor)
+    assert few.tolist() == np.flatnonzero(amplitude[:3000] > floor).tolist()
+
+
+def test_order_spectrum_says_what_its_lines_are():
+    """Exact lines are called so and drawn once; how far the excitation reaches stands above."""
+    housing = synthetic.housing()
+    names = [
+        text.get_text()
+        for text in elastic_figures.order_spectrum(housing, ring_teeth=TEETH).legends[0].get_texts()
+    ]
+    assert names == ["Heaviside, linear interpolation", "exact circumferential Fourier"]
+    housing["order_amplitude"] = housing["order_amplitude_exact"]
+    housing["excitation_limit"] = ("speed", [1080.0, 2500.0])
+    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["exact circumferential Fourier"]
+    assert not any(ax.get_lines() for ax in figure.axes) and "excited up to 2.5 kHz" in figure.get_suptitle()

@@ -1,0 +1,70 @@
+"""scripts/optimise.py: what it writes, how it goes on, and what it refuses."""
+
+import csv
+from pathlib import Path
+
+import pytest
+from script_runs import run_script
+
+from femgear.trains.reading import read_case
+
+ROOT = Path(__file__).resolve().parents[2]
+CASE = ROOT / "cases" / "planetary_27_40_108.toml"
+
+
+def run(*arguments, folder):
+    return run_script("optimise.py", *arguments, folder=folder)
+
+
+def test_a_search_of_the_gears_and_its_continuation(tmp_path):
+    """Contact ratio over the planet's shift, which needs no finite elements; the limit stops it."""
+    text = CASE.read_text(encoding="utf-8").replace("profile_shift = 0.52681\n", "")
+    lines = [line for line in text.splitlines() if not line.startswith("profile_shift = 0.0         #")]
+    case = tmp_path / "case.toml"
+    case.write_text("\n".join(lines), encoding="utf-8")
+    arguments = [
+        case,
+        *("--vary", "planet.profile_shift=-0.05..0.25 +- 0.01", "--objective", "tip thickness planet"),
+        *("--limit", "tip thickness planet >= 0.72", "--method", "simplex", "--no-check"),
+        *("--of", "contact ratio sun-planet", "-o", tmp_path / "out"),
+    ]
+    done = run(*arguments, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "out" / "optimum.csv", newline="", encoding="utf-8") as stream:
+        rows = {row["quantity"]: row for row in csv.DictReader(stream)}
+    thickness = float(rows["tip thickness over module, planet"]["optimum"])
+    assert 0.72 <= thickness < 0.7202 and "contact ratio, sun-planet" in rows
+    best = read_case(tmp_path / "out" / "optimum.toml")
+    assert 0.15 < best.planet.profile_shift < 0.25 and best.static.positions == 64
+    assert (tmp_path / "out" / "tolerances.png").stat().st_size > 5000
+    again = run(*arguments, folder=tmp_path)
+    assert again.returncode == 0 and ", 0 computed now" in again.stdout
+    other = run(*arguments, "--torque", "50 N m", folder=tmp_path)
+    assert other.returncode == 4 and "E-JOURNAL" in other.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--vary", "sun.module"], "not a design variable"),
+        (["--vary", "sun.modul=1 mm..2 mm"], "sun.modul"),
+        (["--vary", "sun.mass=1 mm..2 mm"], "not a unit of mass"),
+        (["--objective", "noise"], "no such quantity"),
+        (["--limit", "root stress sun < 3"], "not a limit"),
+        (["--method", "magic"], "magic"),
+        (["--speeds", "3500 rpm", "1000 rpm"], "not a range of speeds"),
+        (["--positions", "4"], "static.positions"),
+        (["--samples", "0"], "--samples"),
+        (["--torque", "0 N m"], "without torque"),
+        ([str(ROOT / "cases" / "nrel_pgb.toml")], "planar.mesh_stiffness"),
+    ],
+)
+def test_bad_input_ends_in_a_message(arguments, message, tmp_path):
+    done = run(*arguments, folder=tmp_path)
+    assert done.returncode == 2 and message in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help():
+    done = run("--help", folder=ROOT)
+    assert done.returncode == 0 and "--vary" in done.stdout and "CASE" in done.stdout

@@ -1,0 +1,146 @@
+"""Contents of the four result files: names, dimensions, units, and that they say what was computed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.reading import read_case, with_value
+from femgear.trains.static.stages import solve_static
+
+ROOT = Path(__file__).parents[2]
+PLACES = {
+    "static": {
+        "ste": ("mesh", "position"),
+        "ste_overall": ("planet", "position"),
+        "mesh_force": ("mesh", "position"),
+        "mesh_stiffness": ("mesh", "position"),
+        "mesh_stiffness_secant": ("mesh", "position"),
+        "tooth_load": ("mesh", "tooth", "position"),
+        "load_share": ("planet", "position"),
+        "max_pressure": ("mesh", "position"),
+    },
+    "modes": {
+        "frequency": ("mode",),
+        "damping_ratio": ("mode",),
+        "kind": ("mode",),
+        "nodal_diameter": ("mode",),
+        "shape": ("dof", "mode"),
+        "ring_shape_real": ("mode", "circumferential"),
+        "ring_shape_imag": ("mode", "circumferential"),
+    },
+    "dynamics": {
+        "dte_real": ("speed", "mesh", "harmonic"),
+        "dte_imag": ("speed", "mesh", "harmonic"),
+        "mesh_force_real": ("speed", "mesh", "harmonic"),
+        "mesh_force_imag": ("speed", "mesh", "harmonic"),
+        "converged": ("speed",),
+        "iterations": ("speed",),
+        "spectral_radius": ("speed",),
+        "floquet_multiplier": ("speed",),
+        "mesh_frequency": ("speed",),
+        "ring_real": ("speed", "harmonic", "circumferential"),
+        "ring_tangential_imag": ("speed", "harmonic", "circumferential"),
+    },
+    "housing": {
+        "acceleration": ("speed", "time"),
+        "order_amplitude": ("speed", "order"),
+        "order_amplitude_exact": ("speed", "order"),
+        "seconds": ("speed", "time"),
+    },
+}
+UNITS = {"ste": "m", "mesh_force": "N", "mesh_stiffness": "N/m", "load_share": "1", "frequency": "Hz"}
+UNITS |= {"dte_real": "m", "mesh_force_real": "N", "acceleration": "m/s^2", "order_amplitude": "m/s^2"}
+
+
+@pytest.fixture(scope="module")
+def results():
+    case = with_value(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), "static.positions", 16)
+    case = with_value(case, "static.flank_elements", 8)
+    static = solve_static(case)
+    modes = solve_modes(case, static)
+    dynamics = solve_dynamics(case, static, modes)
+    return {
+        "static": static,
+        "modes": modes,
+        "dynamics": dynamics,
+        "housing": solve_housing(case, dynamics),
+    }
+
+
+@pytest.fixture(scope="module")
+def datasets(results):
+    return {name: result.dataset() for name, result in results.items()}
+
+
+@pytest.mark.parametrize("stage", PLACES)
+def test_names_and_dimensions(datasets, stage):
+    for name, dims in PLACES[stage].items():
+        assert datasets[stage][name].dims == dims, name
+
+
+@pytest.mark.parametrize("stage", PLACES)
+def test_everything_has_units_and_a_name_and_is_finite(datasets, stage):
+    for name, variable in datasets[stage].variables.items():
+        assert variable.attrs["units"] and variable.attrs["long_name"], name
+        assert variable.attrs["units"] == UNITS.get(name, variable.attrs["units"])
+        if variable.dtype.kind == "f":
+            assert np.isfinite(variable.values).all(), name
+
+
+def test_static_attributes_and_labels(datasets):
+    static = datasets["static"]
+    assert list(static.mesh.values) == [f"sun-planet {n}" for n in (1, 2, 3)] + [
+        f"planet {n}-ring" for n in (1, 2, 3)
+    ]
+    assert np.degrees(static.attrs["working_pressure_angle_sun_planet"]) == pytest.approx(22.1995, abs=5e-5)
+    assert np.degrees(static.attrs["working_pressure_angle_planet_ring"]) == pytest.approx(20.0, abs=5e-5)
+    assert static.attrs["contact_ratio_sun_planet"] == pytest.approx(1.5507, abs=5e-5)
+    assert static.attrs["contact_ratio_planet_ring"] == pytest.approx(1.9301, abs=5e-5)
+    assert static.attrs["contact"] == "profile"
+    assert list(static.position.values) == [i / 16 for i in range(16)]
+
+
+def test_static_variables_belong_together(datasets):
+    static = datasets["static"]
+    assert static.tooth_load.sum("tooth").values == pytest.approx(static.mesh_force.values, rel=1e-12)
+    assert static.load_share.sum("planet").values == pytest.approx(1.0, rel=1e-12)
+    assert (static.ste[:3].values + static.ste[3:].values) == pytest.approx(static.ste_overall.values)
+    secant = static.mesh_force / static.ste
+    assert secant.values == pytest.approx(static.mesh_stiffness_secant.values, rel=1e-12)
+
+
+def test_speeds_in_rpm_and_mesh_frequency(datasets):
+    dynamics = datasets["dynamics"]
+    assert dynamics.speed.values == pytest.approx([250.0, 3100.0], rel=1e-12)
+    assert dynamics.speed.attrs["units"] == "rpm"
+    assert dynamics.mesh_frequency.values == pytest.approx([90.0, 1116.0], rel=1e-12)
+    assert datasets["housing"].speed.values == pytest.approx([250.0, 3100.0], rel=1e-12)
+
+
+def test_ring_shapes_are_real_fields(datasets):
+    modes = datasets["modes"]
+    shape = modes.ring_shape_real.values + 1j * modes.ring_shape_imag.values
+    assert shape[:, ::-1] == pytest.approx(shape.conj(), abs=1e-12 * np.abs(shape).max())
+    assert list(modes.circumferential.values) == list(range(-26, 27))
+
+
+def test_housing_signal_is_the_sum_of_its_lines(datasets):
+    housing = datasets["housing"]
+    samples = housing.sizes["time"]
+    lines = np.abs(np.fft.rfft(housing.acceleration.values, axis=1)) * 2 / samples
+    lines[:, 0] /= 2
+    top = housing.sizes["order"]
+    expected = housing.order_amplitude.values
+    assert lines[:, :top] == pytest.approx(expected, abs=1e-9 * expected.max())
+    assert housing.seconds.values[:, -1] * samples / (samples - 1) == pytest.approx(
+        [108 / 90.0, 108 / 1116.0], rel=1e-12
+    )
+    assert housing.attrs["sensor_angle"] == 0.0
+
+
+@pytest.mark.parametrize("stage", PLACES)
+def test_results_cannot_be_changed(results, stage):
+    with pytest.raises(AttributeError):
+        results[stage].extra = 1

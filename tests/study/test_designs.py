@@ -1,0 +1,247 @@
+"""Variants of a case against the whole pipeline, and the numbers that are taken from them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.case.case import planetary_set
+from femgear.case.dependencies import Steps, compliance_entries, fingerprint, ring_entries
+from femgear.case.units import SPEED
+from femgear.errors import CaseError
+from femgear.study.objectives import (
+    Variant,
+    at_speeds,
+    contact_pressure,
+    contact_ratio,
+    forces_over_time,
+    housing_level,
+    mesh_force,
+    named_quantity,
+    root_stress,
+    tip_thickness,
+    transmission_error,
+)
+from femgear.study.problem import parse_limit, parse_variable, tip_reliefs
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.reading import read_case, with_values
+from femgear.trains.static.stages import solve_static
+
+CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
+RANGE = (1000.0 * SPEED.scale, 3500.0 * SPEED.scale, 6)
+SPEEDS = ("1000 rpm", "3500 rpm")
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    """The reference set with reliefs of no amount, coarse."""
+    case, _ = tip_reliefs(read_case(CASE))
+    return with_values(case, {"static.flank_elements": 4, "static.positions": 14, "static.stresses": False})
+
+
+@pytest.fixture(scope="module")
+def grids(tmp_path_factory):
+    return tmp_path_factory.mktemp("grids")
+
+
+@pytest.fixture(scope="module")
+def reused(coarse, grids):
+    """A variant with reliefs that takes compliances and dynamic model from the one without."""
+    steps = Steps()
+    first = Variant(coarse, steps, grids)
+    first.response(RANGE)
+    changes = {"sun.modifications[0].amount": "5 um", "planet.modifications[0].amount": "5 um"}
+    variant = Variant(with_values(coarse, changes), steps, grids)
+    variant.response(RANGE)
+    return first, variant
+
+
+@pytest.fixture(scope="module")
+def whole(reused, grids):
+    """The same variant by the stages of the pipeline, nothing reused."""
+    case = at_speeds(reused[1].case, RANGE)
+    static = solve_static(case, cache=grids)
+    modes = solve_modes(case, static)
+    dynamics = solve_dynamics(case, static, modes)
+    return case, static, dynamics, solve_housing(case, dynamics)
+
+
+def test_variants_are_what_the_pipeline_computes(reused, whole):
+    first, variant = reused
+    _, static, dynamics, _ = whole
+    assert variant.static().bodies is first.static().bodies
+    for name in ("sun_arc", "deflection", "force", "stiffness"):
+        np.testing.assert_array_equal(getattr(variant.static().cycle, name), getattr(static.cycle, name))
+    np.testing.assert_allclose(variant.response(RANGE).force, dynamics.response.force, rtol=1e-9, atol=1e-7)
+    assert np.ptp(variant.static().cycle.sun_arc) < 0.9 * np.ptp(first.static().cycle.sun_arc)
+
+
+def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
+    from femgear.trains.static.stages import solve_stress
+
+    variant, (case, static, dynamics, housing) = reused[1], whole
+    data, forces = static.dataset(), dynamics.dataset()
+    ste = np.ptp(data["ste"].values, axis=1)
+    assert transmission_error("sun-planet").compute(variant) == pytest.approx(ste[:3].max(), rel=1e-12)
+    assert transmission_error("planet-ring").compute(variant) == pytest.approx(ste[3:].max(), rel=1e-12)
+    overall = np.ptp(data["ste_overall"].values, axis=1).max()
+    assert transmission_error("overall").compute(variant) == pytest.approx(overall, rel=1e-12)
+    assert transmission_error().compute(variant) == pytest.approx(max(overall, ste.max()), rel=1e-12)
+    # a finer synthesis of the mesh forces, term by term
+    lines = forces["mesh_force_real"].values + 1j * forces["mesh_force_imag"].values
+    time = np.exp(2j * np.pi * np.outer(np.arange(lines.shape[-1]), np.arange(2000) / 2000))
+    history = np.real(lines @ time)
+    dynamic = np.abs(history - history.mean(axis=-1, keepdims=True)).max()
+    assert mesh_force(*SPEEDS, speeds=6).compute(variant) == pytest.approx(dynamic, rel=5e-3)
+    peak = mesh_force(*SPEEDS, speeds=6, part="peak").compute(variant)
+    assert peak == pytest.approx(history.max(), rel=1e-4)
+    level = housing.dataset()["order_amplitude_exact"].values.max()
+    assert housing_level(*SPEEDS, speeds=6).compute(variant) == pytest.approx(level, rel=1e-9)
+    worst = solve_stress(case, static).dataset()["root_worst"].values
+    stresses = [root_stress(gear).compute(variant) for gear in ("sun", "planet", "ring")]
+    expected = [worst[:3, 0].max(), max(worst[:3, 1].max(), worst[3:, 0].max()), worst[3:, 1].max()]
+    np.testing.assert_allclose(stresses, expected, rtol=1e-12)
+    assert contact_pressure().compute(variant) == data["max_pressure"].values.max()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"carrier.mass": "4 kg"},
+        {"operation.torque": "90 N m"},
+        {"operation.torque": "-90 N m"},
+        {"ring.foundation_radial": "2e10 N/m^3"},
+        {"static.members": "elastic"},
+        {"dynamics.up_to": "60 kHz"},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_shared_steps_change_no_number(coarse, grids, changes):
+    """A variant that differs in masses, loads or supports, with all that another one left behind."""
+    steps = Steps()
+    Variant(coarse, steps, grids).response(RANGE)
+    case = with_values(coarse, changes)
+    shared, alone = Variant(case, steps, grids), Variant(case, Steps(), grids)
+    np.testing.assert_array_equal(shared.static().cycle.deflection, alone.static().cycle.deflection)
+    np.testing.assert_array_equal(shared.response(RANGE).force, alone.response(RANGE).force)
+
+
+def test_quantities_of_the_gears(coarse):
+    variant = Variant(coarse, Steps())
+    gears = planetary_set(coarse)
+    assert contact_ratio("sun-planet").compute(variant) == gears.contact_ratio_sun_planet
+    # tooth thickness at the tip after ISO 21771: d_a (s/d + inv a - inv a_a)
+    alpha, x, z = np.radians(20), 0.52681, 27
+    tip = gears.sun.tip_radius / gears.sun.module
+    at_tip = np.arccos(0.5 * z * np.cos(alpha) / tip)
+    half = np.pi / (2 * z) + 2 * x * np.tan(alpha) / z + np.tan(alpha) - alpha
+    expected = 2 * tip * (half - np.tan(at_tip) + at_tip)
+    assert tip_thickness("sun").compute(variant) == pytest.approx(expected, rel=1e-9)
+
+
+def test_dynamic_part_and_peak_of_a_force():
+    force = np.zeros((1, 2, 4), complex)
+    force[0, 0] = 100.0, 0.0, 8.0, 0.0
+    force[0, 1] = 50.0, 0.0, 0.0, -3.0j
+    np.testing.assert_allclose(forces_over_time(force, dynamic=True), [[8.0, 3.0]], rtol=2e-2)
+    np.testing.assert_allclose(forces_over_time(force, dynamic=False), [[108.0, 53.0]], rtol=2e-2)
+
+
+def test_other_geometry_gets_grids_and_models_of_its_own(coarse):
+    def keys(**changes):
+        case = with_values(coarse, {k.replace("__", "."): v for k, v in changes.items()})
+        same = (fingerprint(of(case)) == fingerprint(of(coarse)) for of in (compliance_entries, ring_entries))
+        return tuple(same)
+
+    assert keys(sun__profile_shift=0.52680) == (False, False)
+    assert keys(material__youngs_modulus="200 GPa") == (False, False)
+    assert keys(static__flank_elements=5) == (False, False)
+    assert keys(static__members="elastic") == (False, False)
+    # a ring that is held does not feel its foundation
+    assert keys(ring__foundation_radial="2e10 N/m^3") == (True, False)
+    moving = {"static__members": "elastic", "ring__foundation_radial": "2e10 N/m^3"}
+    assert keys(**moving) == (False, False)
+    assert keys(carrier__mass="4 kg") == (True, True)
+    assert keys(operation__torque="90 N m") == (True, True)
+    assert keys(dynamics__damping_ratio=0.03) == (True, True)
+    assert keys(static__positions=32, set__backlash="0.1 mm")[0] is False
+    assert keys(sun__errors={"thickness_reduction": "1 um"}) == (True, True)
+
+
+def test_reliefs_are_on_the_loaded_flanks(coarse):
+    case, variables = tip_reliefs(coarse, largest="20 um")
+    assert len(case.sun.modifications) == 2 and len(case.planet.modifications) == 4
+    assert [v.name for v in variables][:2] == [
+        "sun.modifications[1].amount",
+        "sun.modifications[1].start_diameter",
+    ]
+    assert variables[0].bounds == (0.0, 20.0)
+    reverse, _ = tip_reliefs(with_values(read_case(CASE), {"operation.torque": "-100 N m"}))
+    assert [one.flank for one in reverse.planet.modifications] == ["ring side", "sun side"]
+    with pytest.raises(CaseError, match="not a plausible relief"):
+        tip_reliefs(coarse, largest="1 mm")
+
+
+def test_words_of_the_command_line():
+    assert named_quantity("STE  sun-planet").name == transmission_error("sun-planet").name
+    assert transmission_error(torque="50 N m").torque == 50.0
+    limit = parse_limit("root stress sun <= 300 MPa")
+    assert limit.high == 300e6 and limit.violation(330e6) == pytest.approx(0.1)
+    assert parse_limit("contact ratio planet-ring >= 1.3").low == 1.3
+    variable = parse_variable("sun.modifications[0].start_diameter = 43 mm..44 mm +- 50 um")
+    assert variable.bounds == (43.0, 44.0) and variable.tolerance_at(43.5) == pytest.approx(0.05)
+    assert parse_variable("sun.profile_shift=-0.1..0.3").bounds == (-0.1, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: named_quantity("noise"), "no such quantity"),
+        (lambda: named_quantity("mesh force"), "range of speeds"),
+        (lambda: transmission_error(torque="0 N m"), "no tooth bends"),
+        (lambda: transmission_error(torque="5 mm"), "not a unit of torque"),
+        (lambda: mesh_force("3500 rpm", "1000 rpm"), "not a range of speeds"),
+        (lambda: mesh_force(*SPEEDS, part="mean"), "no such part"),
+        (lambda: transmission_error("ring"), "no such mesh"),
+        (lambda: root_stress("carrier"), "no such gear"),
+        (lambda: parse_limit("root stress sun = 3 MPa"), "not a limit"),
+        (lambda: parse_limit("root stress sun <= 3 um"), "not a unit of stress"),
+        (lambda: parse_limit("contact ratio sun-planet >= much"), "not a number"),
+        (lambda: parse_variable("sun.profile_shift"), "not a design variable"),
+        (lambda: parse_variable("sun.profile_shift=1..0"), "wrong order"),
+    ],
+)
+def test_refusals(call, message):
+    with pytest.raises(CaseError, match=message):
+        call()
+
+
+def test_a_planar_case_has_no_ring_to_shake():
+    case = read_case(CASE.with_name("nrel_pgb.toml"))
+    with pytest.raises(CaseError, match="elastic ring"):
+        at_speeds(case, RANGE)
+
+
+def test_the_optimum_of_the_page_is_one():
+    """The rounded reliefs of docs/optimise.md on the grid of the case, which is not that of their search."""
+    import re
+
+    from femgear.run import grid_cache
+
+    page = (CASE.parents[1] / "docs" / "optimise.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    values = dict(re.findall(r'^(\S+) = "(.*)"$', block, flags=re.MULTILINE))
+    assert len(values) == 6
+    case, _ = tip_reliefs(read_case(CASE))
+    case = with_values(case, {"static.positions": 40, "static.stresses": False})
+    steps, cache = Steps(), grid_cache()
+    before, after = Variant(case, steps, cache), Variant(with_values(case, values), steps, cache)
+    for mesh in ("largest", "overall", "sun-planet"):
+        ste = transmission_error(mesh)
+        assert ste.compute(after) < 0.4 * ste.compute(before)
+    ste = transmission_error("planet-ring")
+    assert ste.compute(after) < ste.compute(before)
+    forces = [
+        forces_over_time(one.response(RANGE).force, dynamic=True).max(axis=1) for one in (before, after)
+    ]
+    assert np.all(forces[1] < forces[0]) and forces[1].max() < 0.5 * forces[0].max()

@@ -1,0 +1,262 @@
+"""The pipeline as a whole: limits that join its stages, mirrored torque, refusals."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from validation.cases import reference_case
+from validation.reference.sensor_in_time import symmetry_leakage
+
+from femgear.case import text as case_text
+from femgear.errors import CaseError
+from femgear.housing.orders import OrderSpectrum
+from femgear.system.fourier import harmonics_of, sample
+from femgear.trains.elastic.checks import max_nodal_diameter
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.reading import parse_case, read_case, with_value, with_values
+from femgear.trains.static.stages import solve_static
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def case():
+    coarse = with_value(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), "static.positions", 32)
+    return with_value(coarse, "static.flank_elements", 12)
+
+
+@pytest.fixture(scope="module")
+def static(case):
+    return solve_static(case)
+
+
+@pytest.fixture(scope="module")
+def dynamics(case, static):
+    return solve_dynamics(case, static, solve_modes(case, static))
+
+
+def test_the_validation_tables_take_the_case_of_the_repository():
+    file = read_case(ROOT / "cases" / "modulation_paper.toml").model_dump()
+    table = reference_case().model_dump()
+    # what the paper published is compared by the tables themselves
+    file["housing"]["published"], file["title"] = (), table["title"]
+    assert table == file
+
+
+def test_the_paper_and_the_reference_set_are_one_set_with_another_excitation_and_sensor():
+    one, two = (read_case(ROOT / "cases" / f"{n}.toml") for n in ("modulation_paper", "planetary_27_40_108"))
+    differ = {name for name, value in one if value != getattr(two, name)}
+    assert differ == {"title", "dynamics", "housing"}
+
+
+@pytest.mark.parametrize("torque", ["100 N m", "-60 N m"])
+def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_supports(case, torque):
+    """0.01 rpm, whatever static.members shows: mean and fluctuation of all meshes, and the forces."""
+    case = with_value(with_value(case, "operation.speeds", ["0.01 rpm"]), "operation.torque", torque)
+    static = solve_static(case)
+    modes = solve_modes(case, static)
+    result = solve_dynamics(case, static, modes)
+    # the kinks of the static curve have harmonics beyond the 512 of the excitation
+    ste = sample(harmonics_of(modes.state.resampled("deflection", 8192), 512), 2048)
+    dte = sample(result.dte[0], 2048)
+    assert np.abs(dte - ste).max(axis=1) == pytest.approx(0, abs=2e-4 * np.ptp(ste, axis=1).min())
+    assert dte.mean(axis=1) == pytest.approx(ste.mean(axis=1), rel=1e-4)
+    # gears that are held deflect by less than those on their supports
+    assert static.cycle.deflection[3:].mean() < 0.5 * ste[3:].mean()
+    moving = solve_static(with_value(case, "static.members", "elastic")).cycle.deflection
+    assert modes.state.resampled("deflection", 32) == pytest.approx(moving, rel=1e-7)
+    force = sample(result.response.force[0], 2048)
+    assert force == pytest.approx(abs(static.sun_torque) / static.planetary_set.sun.base_radius / 3, rel=1e-3)
+
+
+def test_planets_in_phase_leave_only_multiples_of_three(case, dynamics):
+    housing = solve_housing(case, dynamics)
+    for lines in (housing.exact, housing.lines):
+        for one in lines.acceleration:
+            assert symmetry_leakage(OrderSpectrum(lines.order, one), 3) < 1e-7
+
+
+def test_planets_out_of_phase_are_equal_and_leave_only_multiples_of_three(case):
+    """28/41/110 at the default 64 positions, which three planets would meet unequally: 66 are taken."""
+    data = case_text.parse(case.source, "")
+    data["sun"] |= {"teeth": 28}
+    data["planet"] |= {"teeth": 41, "profile_shift": 0.2}
+    data["ring"] |= {"teeth": 110}
+    data["static"] |= {"positions": 64}
+    for entry in (
+        (data["set"], "centre_distance"),
+        (data["sun"], "profile_shift"),
+        (data["housing"], "published"),
+    ):
+        entry[0].pop(entry[1])
+    other = parse_case(case_text.write(data))
+    static = solve_static(other)
+    assert len(static.cycle.position) == 66
+    means = static.cycle.stiffness.mean(axis=1)
+    assert np.ptp(means[:3]) < 1e-9 * means[0] and np.ptp(means[3:]) < 1e-9 * means[3]
+    housing = solve_housing(other, solve_dynamics(other, static, solve_modes(other, static)))
+    for lines in housing.lines.acceleration:
+        assert symmetry_leakage(OrderSpectrum(housing.lines.order, lines), 3) < 1e-8
+
+
+def test_the_default_signal_has_only_lines_of_the_ring(case, dynamics):
+    """No images of an interpolation: components (h, n) at orders 108 h - n, h up to 26 nodal diameters."""
+    housing = solve_housing(case, dynamics)
+    assert housing.form == "exact" and housing.lines is housing.exact
+    order, n_max = housing.lines.order, dynamics.ring_radial.shape[-1] // 2
+    far = np.abs(order / 108 - np.rint(order / 108)) * 108 > n_max + 0.5
+    assert far.sum() > 1000 and not housing.lines.acceleration[:, far].any()
+    linear = solve_housing(with_value(case, "housing.form", "linear"), dynamics)
+    assert linear.lines.method == "linear, 54 points" and linear.lines.acceleration[:, far].any()
+    assert np.array_equal(linear.exact.displacement, housing.lines.displacement)
+
+
+def test_mesh_harmonics_of_the_force_balance_the_torque(dynamics, static):
+    force = dynamics.response.force[:, :, 0].real
+    share = static.sun_torque / static.planetary_set.sun.base_radius / 3
+    assert force == pytest.approx(share, rel=1e-6)
+    assert np.all(np.abs(dynamics.stability.multiplier) < 1)
+
+
+def test_negative_torque_runs_the_cycle_backwards(case, static):
+    """The back flanks of a symmetric set are its mirror image."""
+    back_case = with_value(case, "operation.torque", "-100 N m")
+    back = solve_static(back_case)
+    turned = -np.arange(32) % 32
+    assert back.cycle.deflection == pytest.approx(static.cycle.deflection[:, turned], abs=1e-11)
+    modes = solve_modes(back_case, back)
+    assert modes.modes.frequency == pytest.approx(
+        solve_modes(case, static).modes.frequency, rel=1e-6, abs=1e-3
+    )
+    assert np.isfinite(solve_dynamics(back_case, back, modes).dte).all()
+
+
+def test_modes_need_a_fixed_ring(case):
+    freed = with_value(case, "operation.fixed", "carrier")
+    freed = with_value(freed, "static.positions", 13)
+    static = solve_static(freed)
+    with pytest.raises(CaseError, match="fixed ring") as caught:
+        solve_modes(freed, static)
+    assert caught.value.code == "E-FIXED-MEMBER" and "[planar]" in caught.value.remedy
+
+
+def test_without_torque_static_is_defined_and_modes_are_refused(case):
+    empty = with_value(with_value(case, "operation.torque", "0 N m"), "static.positions", 13)
+    static = solve_static(empty)
+    assert not static.cycle.force.any()
+    with pytest.raises(CaseError) as caught:
+        solve_modes(empty, static)
+    assert caught.value.code == "E-NO-LOAD"
+
+
+def test_progress_counts_the_positions(case):
+    seen = []
+    short = with_value(case, "static.positions", 13)
+    solve_static(short, progress=lambda *step: seen.append(step))
+    assert seen[-1] == ("contact", 13, 13)
+
+
+@pytest.mark.parametrize(("points", "teeth", "expected"), [(7, 108, 26), (1000, 108, 26), (54, 40, 19)])
+def test_nodal_diameters_do_not_depend_on_the_points_of_the_housing(case, points, teeth, expected):
+    changed = case.model_copy(
+        update={
+            "housing": case.housing.model_copy(update={"points": points}),
+            "ring": case.ring.model_copy(update={"teeth": teeth}),
+        }
+    )
+    assert max_nodal_diameter(changed) == expected
+
+
+def test_what_the_dynamics_cannot_represent_is_refused_before_computing(case):
+    from femgear.case.case import planetary_set
+    from femgear.errors import CaseError
+    from femgear.trains.elastic.checks import check_dynamic_case
+
+    for key, value, code in (
+        ("operation.fixed", "carrier", "E-FIXED-MEMBER"),
+        ("operation.torque", "0 N m", "E-NO-LOAD"),
+        ("operation.speeds", ["1e6 rpm"], "E-RANGE"),
+        ("sun.errors", {"runout_amplitude": "5 um"}, "E-PERIODS"),
+    ):
+        changed = with_value(case, key, value)
+        with pytest.raises(CaseError, match=code):
+            check_dynamic_case(changed, planetary_set(changed))
+    cut = with_value(with_value(case, "sun.errors", {"runout_amplitude": "5 um"}), "static.longest_record", 1)
+    with pytest.raises(CaseError, match="E-PERIODS"):
+        check_dynamic_case(cut, planetary_set(cut))
+    check_dynamic_case(case, planetary_set(case))
+
+
+def test_slow_sets_keep_their_modes(case, static):
+    slow = solve_modes(with_value(case, "operation.speeds", ["0.1 rpm"]), static)
+    assert len(slow.modes.frequency) > 15
+
+
+def test_overload_is_said(case):
+    overload = solve_static(
+        with_value(with_value(case, "operation.torque", "20000 N m"), "static.positions", 16)
+    )
+    words = " ".join(map(str, overload.warnings))
+    assert "W-PRESSURE" in words and "W-DEFLECTION] the teeth deflect by" in words
+
+
+def test_motion_of_the_ring_on_its_foundation_is_not_called_deflection_of_teeth(case):
+    """The foundation of 4e9 N/m^3 yields by more than 5 % of the module, the meshes of the sun do not."""
+    soft = with_values(
+        case,
+        {
+            "static.members": "elastic",
+            "static.positions": 16,
+            "ring.foundation_radial": "1e9 N/m^3",
+            "ring.foundation_tangential": "1e9 N/m^3",
+        },
+    )
+    static = solve_static(soft)
+    (words,) = [str(one) for one in static.warnings if one.code == "W-DEFLECTION"]
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(static.cycle.deflection, 2))
+    assert sun < 20.0 and ring > 75.0
+    assert f"{sun:.0f} um between sun and planets and by {ring:.0f} um between planets and ring" in words
+    assert "teeth deflect" not in words and "ring on its foundation" in words
+
+
+def test_motions_beyond_small_displacements_are_refused(case):
+    from femgear.errors import ContactError
+
+    coarse = with_value(case, "static.positions", 16)
+    with pytest.raises(ContactError, match="E-MOTION"):
+        solve_static(with_value(coarse, "operation.torque", "1e6 N m"))
+    soft = with_value(coarse, "static.members", "elastic")
+    with pytest.raises(ContactError, match="E-MOTION"):
+        solve_static(with_value(soft, "planet.bearing_stiffness", "1 N/m"))
+    loose = solve_static(with_value(soft, "planet.bearing_clearance", "0.5 mm"))
+    assert "W-MOTION" in [one.code for one in loose.warnings]
+
+
+def test_thick_teeth_wedge_without_any_other_error(case):
+    """Teeth thicker than the play allow load both flanks: errors of thickness alone reach the contact."""
+    coarse = with_value(with_value(case, "static.positions", 16), "static.back_flanks", True)
+    thick = with_value(coarse, "sun.errors", {"thickness_reduction": "-300 um"})
+    found = solve_static(thick)
+    assert found.cycle.wedged[:3].all()
+    assert found.cycle.force[:3].min() > 2 * solve_static(coarse).cycle.force.max()
+
+
+def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_errors(case):
+    """Unequal loads, every spring of the dynamic model in the static one: forces agree at 1 rpm."""
+    for key, value in {
+        "static.positions": 16,
+        "static.members": "elastic",
+        "operation.speeds": ["1 rpm"],
+        "dynamics": {"mesh_harmonics": 7, "response_harmonics": 14},
+        "set.pin_errors": [{"planet": 1, "tangential": "12 um"}, {"planet": 2, "radial": "6 um"}],
+    }.items():
+        case = with_value(case, key, value)
+    static = solve_static(case)
+    result = solve_dynamics(case, static, solve_modes(case, static))
+    assert np.ptp(static.cycle.load_share.mean(axis=1)) > 0.02
+    mean = static.cycle.force.mean(axis=1)
+    assert result.response.force[0, :, 0].real == pytest.approx(mean, rel=1e-4)
+    force = sample(result.response.force[0], 32)[:, ::2]
+    spectrum = np.fft.rfft(static.cycle.force, axis=1)
+    spectrum[:, 8] = 0.0
+    assert force == pytest.approx(np.fft.irfft(spectrum, 16, axis=1), rel=2e-3)

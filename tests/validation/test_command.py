@@ -1,0 +1,212 @@
+"""python tests/validation: verdicts, the page, exit codes, and every row that does not take long."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from femgear.errors import GridError, StorageError
+from validation import themes as validation_themes
+from validation.__main__ import main
+from validation.page import markdown, summary, write_page
+from validation.rows import at_most, counted, information, printed, within
+from validation.run import Theme, run_validation
+
+
+def validation(*rows, quick=False):
+    """Validation of one theme with the given rows."""
+    return run_validation((Theme("sample", "Sample", "Introduction.", (lambda: rows,)),), quick=quick)
+
+
+GOOD = within("A1", "closed form", "length [m]", 2.0, 2.0002, 1e-3)
+BAD = within("A2", "closed form", "width [m]", 2.0, 2.1, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("row", "verdict"),
+    [
+        (GOOD, "passes"),
+        (BAD, "FAILS"),
+        (within("x", "s", "q", 2.0, 2.1, 1e-3, explanation="misprint"), "differs"),
+        (within("x", "s", "q", 2.0, 2.001, 1e-3, relative=False), "passes"),
+        (within("x", "s", "q", 2.0, float("nan"), 1e-3), "FAILS"),
+        (printed("x", "s", "q", "1.55", 1.5549), "passes"),
+        (printed("x", "s", "q", "1.55", 1.5551), "FAILS"),
+        (printed("x", "s", "q", "1.55", 1.5551, digits=2), "passes"),
+        (printed("x", "s", "q", "4.5825e-3", 4.58254e-3), "passes"),
+        (printed("x", "s", "q", "4.5825e-3", 4.58256e-3), "FAILS"),
+        (at_most("x", "s", "q", 1e-9, -2e-9), "FAILS"),
+        (at_most("x", "s", "q", 0.0, 0.0), "passes"),
+        (counted("x", "s", "q", 6, 6.0), "passes"),
+        (counted("x", "s", "q", 6, 5), "FAILS"),
+        (information("x", "s", "q", 6.0, 5), "information"),
+    ],
+)
+def test_verdicts(row, verdict):
+    assert row.verdict == verdict
+
+
+def test_error_is_relative_where_the_row_says_so():
+    assert GOOD.error == pytest.approx(1e-4)
+    assert within("x", "s", "q", -2.0, -2.1, 1.0).error == pytest.approx(-0.05)
+    assert within("x", "s", "q", 2.0, 2.1, 1.0, relative=False).error == pytest.approx(0.1)
+
+
+def test_page_shows_every_row_and_its_verdict():
+    differs = within("B|1", "paper", "height [m]", 1.0, 1.5, 0.1, explanation="the paper has a misprint")
+    text = markdown(validation(GOOD, BAD, differs, at_most("C", "s", "rest", 1e-6, 3e-8)))
+    assert "4 rows: 2 passes, 1 FAILS, 1 differs." in text
+    assert "| A1 | length [m] | 2 | 2.0002 | +0.01 % | 0.1 % | passes | closed form. |" in text
+    assert (
+        "| B\\|1 | height [m] | 1 | 1.5 | +50 % | 10 % | differs | paper. the paper has a misprint. |" in text
+    )
+    assert "| C | rest | 0 | < 1e-7 |  | <= 1e-06 | passes | s. |" in text
+
+
+def test_page_has_no_dates_paths_or_machine():
+    text = markdown(validation(GOOD))
+    assert text == markdown(validation(GOOD))
+    assert not re.search(r"20\d\d-\d\d-\d\d|/home|/tmp|/work", text)
+
+
+def test_quick_page_says_so_and_leaves_slow_parts_out():
+    def never():
+        raise AssertionError
+
+    theme = Theme("sample", "Sample", "", (lambda: (GOOD,),), (never,))
+    assert "Quick validation" in markdown(run_validation((theme,), quick=True))
+    with pytest.raises(AssertionError):
+        run_validation((theme,))
+
+
+def test_a_refusal_becomes_a_failed_row():
+    def no_grid():
+        raise GridError("no elements", code="E-GRID-EMPTY")
+
+    result = run_validation((Theme("sample", "Sample", "", (no_grid, lambda: (GOOD,))),))
+    assert [row.verdict for row in result.rows] == ["FAILS", "passes"]
+    assert "no grid could not be computed" in summary(result)
+    assert "E-GRID-EMPTY" in markdown(result)
+
+
+def test_progress_counts_the_parts():
+    seen = []
+    theme = Theme("sample", "Sample", "", (lambda: (GOOD,), lambda: (BAD,)))
+    run_validation((theme,), progress=lambda *step: seen.append(step))
+    assert seen == [("sample", 0, 2), ("sample", 1, 2), ("sample", 2, 2)]
+
+
+@pytest.mark.parametrize(("row", "code"), [(GOOD, 0), (BAD, 3)])
+def test_exit_code_and_page_of_the_command(tmp_path, monkeypatch, capsys, row, code):
+    monkeypatch.setattr(validation_themes, "THEMES", (Theme("sample", "Sample", "", (lambda: (row,),)),))
+    page = tmp_path / "new" / "validation.md"
+    assert main(["-o", str(page)]) == code
+    assert row.quantity in page.read_text(encoding="utf-8")
+    out = capsys.readouterr().out
+    assert ("FAILS A2: width [m]" in out) == (code == 3)
+    assert "1 rows" in out
+
+
+def test_one_theme_prints_its_rows_and_writes_no_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    themes = tuple(
+        Theme(name, name, "", (lambda row=row: (row,),)) for name, row in (("a", GOOD), ("b", BAD))
+    )
+    monkeypatch.setattr(validation_themes, "THEMES", themes)
+    assert main(["--theme", "a"]) == 0
+    out = capsys.readouterr().out
+    assert f"passes {GOOD.case}: {GOOD.quantity}" in out and BAD.quantity not in out
+    assert main(["--theme", "b"]) == 3
+    assert capsys.readouterr().out.count(f"FAILS {BAD.case}: {BAD.quantity}") == 1
+    assert main(["--theme", "c"]) == 2
+    assert "allowed: a, b" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_options_the_page_of_the_repository_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written = []
+    monkeypatch.setattr(
+        "validation.validate",
+        lambda output, *, theme, quick, progress: written.append((output, theme, quick)),
+    )
+    main([])
+    main(["--quick"])
+    page = Path(__file__).parents[2] / "docs" / "validation.md"
+    assert written == [(page, None, False), (page, None, True)]
+
+
+def test_quick_leaves_slow_parts_out_on_the_command_line(tmp_path, monkeypatch, capsys):
+    theme = Theme("sample", "Sample", "", (lambda: (GOOD,),), (lambda: (BAD,),))
+    monkeypatch.setattr(validation_themes, "THEMES", (theme,))
+    assert main(["--quick", "-o", str(tmp_path / "quick.md")]) == 0
+    assert main(["-o", str(tmp_path / "whole.md")]) == 3
+    assert "Quick validation" in (tmp_path / "quick.md").read_text(encoding="utf-8")
+
+
+def test_the_command_runs_from_any_folder(tmp_path):
+    folder = Path(__file__).parents[1] / "validation"
+    done = subprocess.run(
+        [sys.executable, str(folder), "--theme", "none"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2 and "E-THEME" in done.stderr and "geometry" in done.stderr
+
+
+def test_an_interruption_is_no_traceback(monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(validation_themes, "THEMES", (Theme("a", "a", "", (interrupted,)),))
+    assert main(["--theme", "a"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("old")
+    with pytest.raises(StorageError):
+        write_page(validation(GOOD), blocked / "validation.md")
+    monkeypatch.setattr(validation_themes, "THEMES", (Theme("a", "a", "", (lambda: (GOOD,),)),))
+    assert main(["-o", str(blocked / "validation.md")]) == 4
+    assert blocked.read_text() == "old"
+
+
+def test_the_head_of_the_page_is_that_of_the_command():
+    page = Path(__file__).parents[2] / "docs" / "validation.md"
+    head = markdown(validation(GOOD)).split("1 rows: ")[0]
+    assert page.read_text(encoding="utf-8").startswith(head)
+
+
+PARTS = [(theme, part) for theme in validation_themes.THEMES for part in theme.parts]
+SLOW = [(theme, part) for theme in validation_themes.THEMES for part in theme.slow_parts]
+
+
+def _name(value):
+    return getattr(value, "name", None) or value.__name__
+
+
+def _check(theme, part):
+    rows = run_validation((Theme(theme.name, theme.title, "", (part,)),)).rows
+    assert rows
+    assert [row for row in rows if row.verdict == "FAILS"] == []
+    assert all(row.source for row in rows)
+
+
+@pytest.mark.parametrize(("theme", "part"), PARTS, ids=_name)
+def test_rows_pass(theme, part):
+    _check(theme, part)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("theme", "part"), SLOW, ids=_name)
+def test_slow_rows_pass(theme, part):
+    _check(theme, part)
+
+
+def test_the_page_in_the_repository_belongs_to_these_themes():
+    page = Path(__file__).parents[2] / "docs" / "validation.md"
+    titles = re.findall(r"^## (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert titles == [theme.title for theme in validation_themes.THEMES]
