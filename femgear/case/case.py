@@ -69,14 +69,7 @@ def need_set(case: Any) -> None:
 def planetary_set(case: Case) -> PlanetarySet:
     """Gears of a case, closed on their centre distance and checked; of a helical one the transverse section.
 
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    PlanetarySet
-        With the profile shifts, or the centre distance, that the case leaves to be found.
+    Profile shifts, or the centre distance, that the case leaves out are found.
 
     Raises
     ------
@@ -192,14 +185,6 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
 
 def set_deviations(case: Case) -> SetDeviations:
     """Modifications and errors of a case, as separations of the loaded flanks.
-
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    SetDeviations
 
     Raises
     ------

@@ -69,15 +69,7 @@ def read_text(path: str | os.PathLike) -> str:
 def parse(text: str, name: str) -> dict:
     """Tables of a TOML text, of limited depth and with finite numbers only.
 
-    Parameters
-    ----------
-    text : str
-    name : str
-        File name for messages.
-
-    Returns
-    -------
-    dict
+    ``name`` is that of the file, for messages.
 
     Raises
     ------

@@ -108,10 +108,6 @@ def order_spectrum(signal, *, revolutions: int = 1) -> OrderSpectrum:
     revolutions : int
         Carrier revolutions in the record.
 
-    Returns
-    -------
-    OrderSpectrum
-
     Raises
     ------
     CaseError
@@ -144,14 +140,9 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
     Parameters
     ----------
     spectrum : OrderSpectrum
-        Values of shape (..., n_orders).
+        Values of shape (..., n_orders), in the result zero outside the band.
     low, high : float
         Carrier orders, both included.
-
-    Returns
-    -------
-    OrderSpectrum
-        Of the same shape, zero outside the band.
 
     Raises
     ------
@@ -297,10 +288,6 @@ def analyse_band(
         Orders on either side; default (z_ring - 1) // 2, so that bands do not overlap.
     count : int
         Largest number of lines listed.
-
-    Returns
-    -------
-    BandAnalysis
 
     Raises
     ------

@@ -196,10 +196,6 @@ def heaviside_linear_lines(
     first_point : float
         Carrier-frame angle of point 0 [rad].
 
-    Returns
-    -------
-    SensorLines
-
     Raises
     ------
     CaseError

@@ -210,10 +210,6 @@ def minimise(
     progress : callable, optional
         Called with (stage, done, total).
 
-    Returns
-    -------
-    Optimum
-
     Raises
     ------
     CaseError

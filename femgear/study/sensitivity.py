@@ -152,19 +152,10 @@ def linearise(
     Parameters
     ----------
     basis : DesignBasis
-        Gears, flank compliances, supports and deviations.
-    sun_torque : float
-        [N m], not zero; a negative one loads the other flanks.
-    positions, periods : int
-        Positions in a mesh period, and mesh periods in the record.
+    sun_torque, positions, periods, contact
+        As for `contact.cycle.walk_mesh_cycle`; the torque is not zero.
     only : sequence of int, optional
         Numbers of the positions wanted; all of the record when left out.
-    contact : {"profile", "line_of_action"}
-        As for `contact.cycle.walk_mesh_cycle`.
-
-    Returns
-    -------
-    LinearContact
 
     Raises
     ------
