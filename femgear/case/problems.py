@@ -219,11 +219,7 @@ def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
 def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
     """Let a refusal name the entries that the user gave, their values, and keys that exist.
 
-    Parameters
-    ----------
-    error : GeometryError
-        Its fields are changed, ``file`` (with the line) among them.
-    case : Case
+    The fields of the error are changed, ``file`` (with the line) among them.
     """
     if error.code == "E-BACKLASH":
         gear = (error.key or "").partition(".")[0]

@@ -263,13 +263,7 @@ def flank_load_columns(grid: Grid, stations: _FlankStations) -> np.ndarray:
 def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> np.ndarray:
     """Spread a unit inward normal force evenly over the active flank of the ring tooth, (2n, 1) nodal forces.
 
-    Parameters
-    ----------
-    grid : Grid
-        Sector of the ring.
-    planetary_set : PlanetarySet
-    side : float
-        +1 loads the left flank, -1 the right one.
+    ``grid`` is the sector of the ring; ``side`` +1 loads the left flank, -1 the right one.
     """
     stations = flank_stations(grid, planetary_set.ring)
     pair = mesh_pairs(planetary_set)[1]

@@ -138,16 +138,8 @@ def separation(pair: FlankPair, zeta, roll_1):
 def admissible_arcs(pair: FlankPair, zeta):
     """Find the range of arc length on flank 1 whose points and foot points both lie on the flanks.
 
-    Parameters
-    ----------
-    pair : FlankPair
-    zeta : array
-        Path coordinates [m].
-
-    Returns
-    -------
-    low, high : arrays of the shape of `zeta`
-        Arc lengths measured from the base circle along flank 1 [m].
+    At path coordinates ``zeta`` [m]; ``low`` and ``high``, of the same shape, are arc lengths from the base
+    circle along flank 1 [m].
     """
     zeta = np.asarray(zeta, float)
     rb1 = pair.base_radius_1

@@ -118,11 +118,6 @@ def forward(lower, columns):
 def solve_step(problem: Problem, active: np.ndarray) -> Step:
     """Solve the linear conditions of one active set and list the candidates that violate the others.
 
-    Parameters
-    ----------
-    problem : Problem
-    active : (n,) bool array
-
     Raises
     ------
     ContactError

@@ -134,11 +134,8 @@ class RootCycle:
     def history(self, start: int | None = None) -> _RootHistory:
         """Follow one tooth from slot to slot through the mesh.
 
-        Parameters
-        ----------
-        start : int, optional
-            Mesh period of the record in which the tooth enters the first slot, by default that of the tooth
-            with the largest stress in the root of its loaded flank; records of one period serve all teeth.
+        It enters the first slot in the mesh period ``start`` of the record; by default it is the tooth with
+        the largest stress in the root of its loaded flank. Records of one period serve all teeth.
         """
         slots, positions = self.path.shape
         if start is None:
@@ -234,14 +231,7 @@ def root_stress(
 
 
 def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:
-    """Compute the root stress influence of a whole gear from what was observed with its flank compliance.
-
-    Parameters
-    ----------
-    gear : Gear
-    root : ObservedRoot
-        Of one sector of that gear, see `bodies.flank_compliance`.
-    """
+    """Compute the root stress influence of a whole gear from what `bodies.flank_compliance` observed."""
     along, stations = root.along, root.stations
     order = slice(None, None, -1 if gear.internal else 1)
     m, n = len(along.arc), len(stations.roll)

@@ -146,20 +146,8 @@ def mesh_tangent_matrix(H, active, mesh_of_candidate, n_meshes) -> np.ndarray:
     ``g^T (H_AA)^-1 g`` with one indicator column of ``g`` a mesh: the increments of the mesh forces per
     unit approach of each mesh while the others hold theirs.
 
-    Parameters
-    ----------
-    H, active, mesh_of_candidate, n_meshes
-        As for `tangent_stiffness`.
-
-    Returns
-    -------
-    (n_meshes, n_meshes) array
-        [N/m], symmetric; rows and columns of meshes without load are zero.
-
-    Raises
-    ------
-    ContactError
-        As `tangent_stiffness`.
+    Arguments and errors are those of `tangent_stiffness`. The (n_meshes, n_meshes) array [N/m] is symmetric;
+    rows and columns of meshes without load are zero.
     """
     index = np.flatnonzero(active)
     if not len(index):

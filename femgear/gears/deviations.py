@@ -189,7 +189,6 @@ def profile_separation(
 
     Parameters
     ----------
-    deviations, planetary_set : SetDeviations, PlanetarySet
     kind : int
         0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
     roll_1, roll_2 : arrays that broadcast
@@ -208,7 +207,6 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
 
     Parameters
     ----------
-    deviations : SetDeviations
     mesh : int
         0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring.
     tooth_1, tooth_2 : integer arrays that broadcast

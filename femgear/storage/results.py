@@ -223,15 +223,7 @@ def folder_lock(folder: str | os.PathLike):
 def prepare_output(folder: str | os.PathLike) -> Path:
     """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
 
-    Parameters
-    ----------
-    folder : path-like
-        As of `run_folder`.
-
-    Returns
-    -------
-    Path
-        The folder, with a manifest that says that the run is not complete.
+    It then has a manifest that says that the run is not complete.
 
     Raises
     ------

@@ -373,11 +373,7 @@ NAMES = tuple(_WORDS)
 def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
     """Quantity of some words, one of `NAMES`.
 
-    Parameters
-    ----------
-    words : str
-    speeds : (str, str), optional
-        First and last speed of the input, for mesh forces and housing levels.
+    Mesh forces and housing levels need the first and the last speed of the input, with units.
 
     Raises
     ------

@@ -9,7 +9,6 @@ finds the least peak to peak at one torque and says whether it is a minimum. All
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -181,19 +180,6 @@ def with_tip_relief(
     new = {"sun": TipRelief(amount, sun, power=power), side: TipRelief(amount, planet, power=power)}
     forms = {n: FlankForm((*getattr(found, n).modifications, relief)) for n, relief in new.items()}
     return replace(found, **forms)
-
-
-def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: float, back: bool) -> str:
-    """Tables of a case file for the tip relief of `with_tip_relief`, to be pasted at its end."""
-    side = "ring side" if back else "sun side"
-    lines = []
-    for gear, start, flank in zip((gears.sun, gears.planet), relief_starts(gears, length=length), ("", side)):
-        lines += [f"[[{gear.name}.modifications]]", 'kind = "tip relief"']
-        lines += [f'flank = "{flank}"'] if flank else []
-        diameter = 2e3 * math.hypot(start, gear.base_radius)
-        lines += [f'amount = "{amount * 1e6:.3f} um"', f'start_diameter = "{diameter:.5f} mm"']
-        lines += [f"power = {power:g}", ""]
-    return "\n".join(lines)
 
 
 @dataclass(frozen=True, eq=False)
