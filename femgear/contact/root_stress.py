@@ -153,10 +153,8 @@ class RootRange:
 
     Parameters
     ----------
-    kind : str
-        ``"sun"``, ``"planet"`` or ``"ring"``.
-    mesh, gear : int
-        The flank is that which gear 1 (0) or gear 2 (1) has in the mesh.
+    kind, mesh, gear
+        As those of `RootCycle`: the flank is that which the gear has in the mesh.
     point : int
         Root point with the largest difference of the two stresses.
     maximum, minimum : float

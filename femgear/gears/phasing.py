@@ -132,10 +132,9 @@ def mesh_phasing(
 
     Parameters
     ----------
-    sun_teeth, ring_teeth : int
     planet_angles : (N,) sequence of float
         psi_n [rad], ascending within one turn.
-    rotation, flank, convention, lag
+    sun_teeth, ring_teeth, rotation, flank, convention, lag
         See `MeshPhasing`.
 
     Raises

@@ -312,19 +312,9 @@ def tolerances(
 ) -> tuple[tuple[Tolerance, ...], dict[str, float]]:
     """Every variable off by its tolerance, alone; and all of them at once, each to its worse side.
 
-    Parameters
-    ----------
-    evaluations : Evaluations
-    x : (n,) sequence
-        The optimum, in the units of the variables. Points may lie outside the bounds.
-    quantities : sequence of Quantity
-        The first says which side is the worse one.
-
-    Returns
-    -------
-    tuple of Tolerance
-    dict
-        Quantities by name, all variables off at once; NaN where that cannot be computed.
+    About the optimum ``x`` (n,) in the units of the variables; points may lie outside the bounds. The first
+    of the quantities says which side is the worse one. With all variables off at once quantities are given
+    by name, NaN where that cannot be computed.
     """
     x, found = np.array(x, float), []
     worse = x.copy()

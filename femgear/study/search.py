@@ -354,16 +354,8 @@ def polish(
     The simplex may collapse before it reaches a minimum (K. I. M. McKinnon, SIAM J. Optim. 9, 1998,
     148-158): it begins again, half as large, from where it ended.
 
-    Parameters
-    ----------
-    run : Evaluations
-    cost : callable
-    x0 : (n,) array
-    method : {"simplex", "powell"}
-    size : float
-        Of the first simplex, over the ranges.
-    rounds : int
-        Simplexes one after the other.
+    ``size`` is that of the first simplex over the ranges, ``rounds`` the number of simplexes one after the
+    other. The other method is Powell's.
     """
     low, high = run.problem.bounds.T
     width, n = high - low, len(low)

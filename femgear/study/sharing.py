@@ -180,11 +180,10 @@ def pin_samples(n_planets: int, *, samples: int, radial: float, tangential: floa
 
     Parameters
     ----------
-    n_planets, samples : int
+    n_planets, samples, seed : int
+        The same seed of NumPy's default generator gives the same samples.
     radial, tangential : float
         Standard deviations [m].
-    seed : int
-        Of NumPy's default generator; the same seed gives the same samples.
 
     Raises
     ------
