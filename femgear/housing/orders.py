@@ -53,19 +53,18 @@ class Lobes(ReadOnlyArrays):
         Places of the maxima as fractions of the revolution, ascending.
     height : (n_lobes,) array
         Envelope there.
-    prominence : (n_lobes,) array
-        How far each stands out from its surroundings, in the unit of the envelope.
     threshold : float
         Prominence from which a maximum was counted, as a share of the largest envelope value.
-    per_revolution : float
-        Number of lobes a carrier revolution.
     """
 
     position: np.ndarray
     height: np.ndarray
-    prominence: np.ndarray
     threshold: float
-    per_revolution: float
+
+    @property
+    def per_revolution(self) -> float:
+        """Number of lobes a carrier revolution."""
+        return float(len(self.position))
 
 
 @dataclass(frozen=True)
@@ -200,19 +199,13 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
         )
     largest = values.max()
     if largest == 0:
-        return Lobes(np.empty(0), np.empty(0), np.empty(0), threshold, 0.0)
+        return Lobes(np.empty(0), np.empty(0), threshold)
     start = int(values.argmin())
     turned = np.append(np.roll(values, -start), values[start])
-    peaks, properties = find_peaks(turned, prominence=threshold * largest)
+    peaks, _ = find_peaks(turned, prominence=threshold * largest)
     place = (peaks + start) % values.size
     by_place = np.argsort(place)
-    return Lobes(
-        place[by_place] / values.size,
-        turned[peaks][by_place],
-        properties["prominences"][by_place],
-        threshold,
-        float(peaks.size),
-    )
+    return Lobes(place[by_place] / values.size, turned[peaks][by_place], threshold)
 
 
 def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6) -> tuple[Line, ...]:

@@ -108,18 +108,12 @@ class HousingSignal(ReadOnlyArrays):
         Radial displacement [m], positive outwards.
     acceleration : (..., n_times) array
         Radial acceleration of the fixed point [m/s^2].
-    sensor_angle : float
-        Position of the sensor on the housing [rad].
-    method : str
-        Where the lines came from, as in `SensorLines`.
     """
 
     revolution: np.ndarray
     seconds: np.ndarray
     displacement: np.ndarray
     acceleration: np.ndarray
-    sensor_angle: float
-    method: str
 
 
 def fixed_sensor_lines(
@@ -212,8 +206,6 @@ def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
         2 * np.pi * revolution / lines.base_speed[..., None],
         _synthesised(lines.displacement, count),
         _synthesised(lines.acceleration, count),
-        lines.sensor_angle,
-        lines.method,
     )
 
 

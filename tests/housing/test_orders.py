@@ -87,7 +87,7 @@ def test_lobes_survive_the_weight_of_the_acceleration():
 def test_seam_of_the_revolution_is_no_edge(shift):
     lobes = count_lobes(np.roll(1 + 0.5 * np.cos(6 * THETA), shift))
     assert lobes.per_revolution == 6
-    assert lobes.prominence == pytest.approx(np.ones(6), rel=1e-4)
+    assert lobes.height == pytest.approx(np.full(6, 1.5), rel=1e-4)
     expected = np.sort((np.arange(6) / 6 + shift / 2048) % 1)
     assert np.allclose(lobes.position, expected, atol=1 / 2048)
 
