@@ -116,7 +116,7 @@ def _gear(
     cutter: PinionCutter | None = None,
 ) -> Gear:
     given, module, pressure_angle = section.rack or case.rack, case.sun.module, case.sun.pressure_angle
-    rack = BasicRack(addendum=given.addendum, dedendum=given.dedendum, root_radius=given.root_radius)
+    rack = BasicRack(**given.model_dump())
     if case.helix_angle is not None:
         module, pressure_angle = transverse_tool(module, pressure_angle, case.helix_angle)
         rack = transverse_rack(rack, case.helix_angle)

@@ -39,8 +39,7 @@ class ContactState:
     residual : float
         Largest violation, before the clean-up of rounding errors: separation at touching candidates and
         penetration relative to the largest elastic displacement (at least 1e-6 of the largest gap), pull
-        and imbalance relative to the
-        largest load.
+        and imbalance relative to the largest load.
     method : str
         ``"active set"``, ``"active set, single pivots"``, ``"daqp"`` or ``"no load"``.
     open_motions : (m,) bool array
@@ -109,17 +108,11 @@ def tangent_stiffness(H, state: ContactState, mesh, window, cell, n_meshes) -> n
 
     Parameters
     ----------
-    H : (n, n) array
-        Compliance between the candidates [m/N].
-    state : ContactState
-        Loads, gaps and active set.
-    mesh : (n,) integer array
-        Mesh, 0 to ``n_meshes - 1``, of every candidate.
-    window : (n,) integer array
-        Number of its contact window, ascending.
-    cell : (n,) integer array
-        Place in its window, ascending.
-    n_meshes : int
+    H, state : (n, n) array, ContactState
+        Compliance between the candidates [m/N], and their solution.
+    mesh, window, cell : (n,) integer arrays
+        Mesh, 0 to ``n_meshes - 1``, of every candidate, number of its contact window and place in it, both
+        ascending.
 
     Returns
     -------

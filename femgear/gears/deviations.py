@@ -166,7 +166,6 @@ def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarr
 
     Parameters
     ----------
-    gear : Gear
     cumulative : (z,) sequence, optional
         Cumulative pitch deviations on the reference circle [m].
     single : (z,) sequence, optional
@@ -228,7 +227,6 @@ def body_separation(
 
     Parameters
     ----------
-    deviations, planetary_set : SetDeviations, PlanetarySet
     position : (P,) array
         tau, as a fraction of mesh periods; may exceed 1.
     back : bool
@@ -297,7 +295,6 @@ def common_period(
 
     Parameters
     ----------
-    deviations, planetary_set : SetDeviations, PlanetarySet
     limit : int
         Most mesh periods wanted. Beyond it the record is one turn of the carrier against the ring, z_r mesh
         periods, or the limit when even that is too long; it then does not close.

@@ -112,10 +112,7 @@ class PlanetarySet:
 
     @property
     def path_planet_ring(self) -> tuple[float, float]:
-        """Path coordinates [m] of first (ring tip) and last (planet tip) contact, 0 at the pitch point.
-
-        Undercut shortens the path to what is left of the involute.
-        """
+        """As `path_sun_planet`, of first (ring tip) and last (planet tip) contact [m]."""
         tangent = math.tan(self.working_pressure_angle_planet_ring)
         planet, ring = self.planet.base_radius * tangent, self.ring.base_radius * tangent
         start = max(self.ring.tip_roll - ring, _undercut_roll(self.planet) - planet)
@@ -233,17 +230,8 @@ def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
     Rims keep their thickness beside the roots. The ring's profile shift is found, which takes up that the
     tooth numbers were rounded.
 
-    Parameters
-    ----------
-    gears : PlanetarySet
-        Of the transverse section.
-    helix_angle : float
-        [rad]
-
-    Raises
-    ------
-    GeometryError
-        Where virtual gears cannot be made.
+    ``gears`` are those of the transverse section, the helix angle is in rad. GeometryError where virtual
+    gears cannot be made.
     """
     sun, planet, ring = virtual_teeth(gears, helix_angle)
     return close_set(

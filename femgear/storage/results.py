@@ -211,10 +211,7 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
 def folder_lock(folder: str | os.PathLike):
     """Lock a results folder: in this context no other process writes into it (readers need no lock).
 
-    Raises
-    ------
-    StorageError
-        ``E-LOCKED`` while another run holds the folder; ``E-RESULTS-MISSING``: no such folder.
+    Refuses a folder that another run holds (E-LOCKED), or that is not there (E-RESULTS-MISSING).
     """
     _refuse_missing(Path(folder))
     return exclusive_lock(Path(folder) / LOCK)
