@@ -152,17 +152,9 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
 
 
 def analytic_signal(spectrum: OrderSpectrum) -> np.ndarray:
-    """Compute the analytic signal sum_k value[k] exp(i order[k] theta); its modulus is the envelope.
+    """Compute the analytic signal sum_k value[k] exp(i order[k] theta), (..., 4 n_orders) complex samples.
 
-    Parameters
-    ----------
-    spectrum : OrderSpectrum
-        Values of shape (..., n_orders).
-
-    Returns
-    -------
-    (..., 4 n_orders) complex array
-        Samples over the record.
+    Its modulus is the envelope.
     """
     count = 4 * spectrum.value.shape[-1]
     return np.fft.ifft(spectrum.value, count, axis=-1) * count
@@ -211,19 +203,7 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
 def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6) -> tuple[Line, ...]:
     """List the strongest lines with orders low..high of one spectrum, strongest first, down to -60 dB.
 
-    Parameters
-    ----------
-    spectrum : OrderSpectrum
-        Of one signal: value of shape (n_orders,).
-    low, high : float
-        Carrier orders, both included.
-    count : int
-        Largest number of lines.
-
-    Returns
-    -------
-    tuple of Line
-        Empty where the band is silent.
+    There are ``count`` lines at most, none where the band is silent.
 
     Raises
     ------
@@ -262,10 +242,8 @@ def analyse_band(
     ----------
     spectrum : OrderSpectrum
         Of one signal.
-    z_ring : int
-        Teeth of the ring: the band is centred on order ``harmonic z_ring``.
-    harmonic : int
-        Mesh harmonic, 1 upwards.
+    z_ring, harmonic : int
+        The band is centred on order ``harmonic z_ring``.
     half_width : int, optional
         Orders on either side; default (z_ring - 1) // 2, so that bands do not overlap.
     count : int

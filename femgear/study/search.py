@@ -408,21 +408,9 @@ def has_derivatives(problem: Problem) -> bool:
 def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) -> tuple[bool, str]:
     """Minimum of a transmission error from a start, by successive linear programs.
 
-    Parameters
-    ----------
-    evaluations : Evaluations
-        Of a problem with `has_derivatives`.
-    start : (n,) sequence
-        In the units of the variables.
-    radius : float
-        Half the first box, over the ranges of the variables.
-
-    Returns
-    -------
-    bool
-        Whether no step within the smallest box lowers the linearised objective any more.
-    str
-        How the descent ended; its points are those of the evaluations.
+    The problem of the evaluations `has_derivatives`, ``start`` (n,) is in the units of the variables, and
+    ``radius`` half the first box over their ranges. Tells whether no step within the smallest box lowers the
+    linearised objective any more, and how the descent ended; its points are those of the evaluations.
     """
     problem = evaluations.problem
     low, high = problem.bounds.T

@@ -306,15 +306,9 @@ def sensitivity(
         Of the set with the deviations ``variant(value)``.
     variant : callable
         Deviations (of the set as it is, not mirrored) for a value of the parameter.
-    value : float
     step : float
         The separations are differentiated centrally over twice this; exact where they are linear in the
         parameter (amounts, pitch and pin errors).
-
-    Returns
-    -------
-    Sensitivity
-        Per unit of the parameter.
 
     Raises
     ------
