@@ -54,14 +54,10 @@ class Torques:
 
 
 def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations:
-    """Rotations of all bodies at a position, loaded flanks touching.
+    """Rotations of all bodies at a position tau, loaded flanks touching.
 
-    Parameters
-    ----------
-    planetary : PlanetarySet
-    position : float
-        tau, fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
-        ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``.
+    tau is a fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
+    ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``.
     """
     s = planetary
     psi, phase = s.planet_angles, s.mesh_phases.tolist()

@@ -178,13 +178,7 @@ def roll_at(
 
 
 def check_form(form: FlankForm, gear: Gear) -> None:
-    """Refuse laws that start or end outside the involute of the gear or run the wrong way.
-
-    Raises
-    ------
-    GeometryError
-        E-MODIFICATION
-    """
+    """Refuse (E-MODIFICATION) laws that start or end outside the involute or run the wrong way."""
     for number, modification in enumerate(form.modifications):
         problem = None if isinstance(modification, MeasuredProfile) else _problem(modification, gear)
         if problem is not None:
@@ -227,15 +221,8 @@ def _place(gear: Gear, roll: float) -> str:
 def check_flank(flank: str, form: FlankForm, gear: Gear) -> Iterator[GeometryWarning]:
     """Refuse modifications of a named flank that together are not plausible, and warn of short profiles.
 
-    Raises
-    ------
-    GeometryError
-        E-MODIFICATION: together they exceed `LARGEST_DEVIATION` modules.
-
-    Yields
-    ------
-    GeometryWarning
-        W-PROFILE: a measured profile covers less than `LEAST_COVERAGE` of its flank.
+    E-MODIFICATION: together they exceed `LARGEST_DEVIATION` modules; W-PROFILE: a measured profile covers
+    less than `LEAST_COVERAGE` of its flank.
     """
     _check_sum(flank, form, gear)
     low, high = sorted((gear.form_roll, gear.tip_roll))

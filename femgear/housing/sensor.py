@@ -212,6 +212,8 @@ def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
 def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max: int = 24) -> np.ndarray:
     """Compute the carrier-frame field of the Hanning-window model, for `fixed_sensor_lines`.
 
+    It has the shape (..., H + 1, 2 n_max + 1) and the unit of the harmonics.
+
     Parameters
     ----------
     harmonics : (..., N, H + 1) complex array
@@ -222,11 +224,6 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
         Angle over which a planet is heard [rad], 0 < width <= 2 pi; default 2 pi/N.
     n_max : int
         Circumferential orders kept; c_n falls like 1/n^3 (width = 2 pi: nothing beyond n = 1).
-
-    Returns
-    -------
-    (..., H + 1, 2 n_max + 1) complex array
-        In the unit of the harmonics.
 
     Raises
     ------

@@ -124,13 +124,7 @@ class Variable:
         return split(self.low, self.name)[0], self.number(self.high)
 
     def number(self, value: object) -> float:
-        """A value as the case file holds it, as a number in `unit`.
-
-        Raises
-        ------
-        CaseError
-            E-UNIT: a unit of another dimension, or none.
-        """
+        """A value as the case file holds it, as a number in `unit`; E-UNIT for another dimension, or none."""
         number, unit = split(value, self.name)
         if unit == self.unit:
             return number
@@ -342,13 +336,7 @@ def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
 
 
 def parse_variable(text: str) -> Variable:
-    """Variable of ``KEY=LOW..HIGH`` or ``KEY=LOW..HIGH +- TOLERANCE``.
-
-    Raises
-    ------
-    CaseError
-        E-VARIABLE, E-UNIT.
-    """
+    """Variable of ``KEY=LOW..HIGH`` or ``KEY=LOW..HIGH +- TOLERANCE``; others: E-VARIABLE, E-UNIT."""
     match = re.fullmatch(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*(?:\+-\s*(.+?)\s*)?", text, re.DOTALL)
     if not match:
         raise CaseError(

@@ -64,10 +64,7 @@ class DesignBasis:
     def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
         """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,).
 
-        Raises
-        ------
-        CaseError
-            E-TORQUE: no torque; E-SUPPORT: bearings with clearance.
+        Refuses no torque (E-TORQUE) and bearings with clearance (E-SUPPORT).
         """
         if not (np.isfinite(sun_torque) and sun_torque):
             raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
@@ -96,13 +93,7 @@ def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
 
 
 def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
-    """Torque on the sun [N m] under a torque on the input of the case, by default that of the case.
-
-    Raises
-    ------
-    CaseError
-        E-TORQUE: without torque there is nothing to design for.
-    """
+    """Torque on the sun [N m] under one on the input, by default the case's; refuses none (E-TORQUE)."""
     value = case.operation.torque if torque is None else torque
     if value == 0:
         raise CaseError("without torque no tooth bends", code="E-TORQUE", key="operation.torque")
@@ -112,16 +103,8 @@ def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> 
 def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
     """Roll lengths on sun and planet where a tip relief of their mesh starts [m].
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    length : float
-        Along the path of contact, in lengths ``(epsilon - 1) p_b`` of two-pair contact at either end: 1
-        starts at the ends of single-pair contact.
-
-    Returns
-    -------
-    sun, planet : float
+    Its length is along the path of contact, in lengths ``(epsilon - 1) p_b`` of two-pair contact at either
+    end: 1 starts at the ends of single-pair contact.
 
     Raises
     ------
@@ -162,11 +145,8 @@ def with_tip_relief(
     ----------
     deviations : SetDeviations, optional
         None for ideal gears.
-    planetary_set : PlanetarySet
-    amount : float
-        At the tips of sun and planet [m].
-    length : float
-        See `relief_starts`.
+    amount, length : float
+        At the tips of sun and planet [m]; see `relief_starts`.
     power : float
         1 linear, 2 parabolic.
     back : bool

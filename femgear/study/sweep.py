@@ -173,13 +173,7 @@ def _warn_of_time(left: int, seconds: float) -> None:
 
 
 def parse_over(text: str) -> tuple[str, Sequence[object]]:
-    """Key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``.
-
-    Raises
-    ------
-    CaseError
-        E-VARIABLE: no key, no values, or a range of less than two.
-    """
+    """Key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``; others are refused (E-VARIABLE)."""
     key, equals, values = (part.strip() for part in text.partition("="))
     if not (key and equals and values):
         raise _not_over(text)
@@ -234,29 +228,19 @@ def sweep_into(
 
     Parameters
     ----------
-    case : Case
-    folder : path
-        Created where it does not exist.
-    over : sequence of str
-        As `parse_over` takes them.
-    of : sequence of str
-        Quantities, see `objectives.NAMES`.
+    case, folder : Case, path
+        The folder is created where it does not exist; the names of the files come with the sweep.
+    over, of : sequences of str
+        As `parse_over` takes them; quantities, see `objectives.NAMES`.
     speeds : (str, str), optional
         First and last speed of the input, for mesh forces and housing levels.
     cache, progress
         As for `search.minimise`.
 
-    Returns
-    -------
-    Sweep
-    list of str
-        Names of the files.
-
     Raises
     ------
     CaseError
         E-VARIABLE, E-OBJECTIVE: what cannot be computed; nothing is written then.
-    StorageError
     """
     values = dict(parse_over(text) for text in over)
     if len(values) < len(over):
