@@ -12,7 +12,7 @@ import numpy as np
 from scipy.fft import irfftn, next_fast_len, rfftn
 
 from femgear.errors import CaseError
-from femgear.system.elements import Element, GearMeshes, PolynomialSprings, coefficients_of
+from femgear.system.elements import Element, coefficients_of
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import NonlinearSystem
 
@@ -141,7 +141,7 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
     top = np.abs(orders).max(axis=0)
     counts = np.ones(orders.shape[1], int)
     for element in problem.elements:
-        degree = _degree(element)
+        degree = getattr(element, "degree", None)
         content = _series_content(element, orders.shape[1])
         if degree is None or content is None:
             times, least = _CONTACT_SAMPLES[min(orders.shape[1], 2) - 1]
@@ -214,15 +214,6 @@ def _pick(coefficients: np.ndarray, places: tuple[np.ndarray, np.ndarray]) -> np
     out = coefficients[:, index]
     np.conjugate(out, out=out, where=mirrored)
     return out
-
-
-def _degree(element: Element) -> int | None:
-    """Degree of the law in the deflections; none where it has corners."""
-    if isinstance(element, PolynomialSprings):
-        return element.coefficients.shape[1]
-    if isinstance(element, GearMeshes) and not element.separates:
-        return 1
-    return getattr(element, "degree", None)
 
 
 def _series_content(element: Element, bases: int) -> np.ndarray | None:
