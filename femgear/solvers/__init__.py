@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from femgear.solvers.periodic.spectral import solve_spectral
     from femgear.solvers.stability.floquet import floquet_verdict
     from femgear.solvers.stability.lyapunov import lyapunov_exponents
-    from femgear.solvers.stability.parametric import stability_boundary, stability_chart
+    from femgear.solvers.stability.parametric import stability_chart
     from femgear.solvers.time.stroboscopic import (
         sweep_response,
         sweep_up_and_down,
@@ -58,7 +58,6 @@ __all__ = [
     "solve_shooting",
     "solve_spectral",
     "solve_transient",
-    "stability_boundary",
     "stability_chart",
     "sweep_response",
     "sweep_up_and_down",

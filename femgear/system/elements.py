@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol, TypeGuard
+from dataclasses import dataclass, is_dataclass, replace
+from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
@@ -388,6 +388,12 @@ def coefficients_of(element: Element) -> dict[str, Series]:
         for name, series in vars(element).items()
         if hasattr(series, "at") and hasattr(series, "orders")
     }
+
+
+def with_coefficients(element: Element, change: Callable[[Series], Any]) -> Element:
+    """The element with its periodic coefficients as ``change`` makes them."""
+    changed = {name: change(series) for name, series in coefficients_of(element).items()}
+    return replace(element, **changed) if changed and is_dataclass(element) else element
 
 
 def tangent_jumps(tangents: Callable[..., np.ndarray], states: np.ndarray) -> list[np.ndarray]:

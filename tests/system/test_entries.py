@@ -6,6 +6,7 @@ from small_trains import gear_pair
 from validation.reference.cornered_springs import PiecewiseSprings
 from validation.reference.free_vibration import solve_free_vibration
 from validation.reference.sections import bifurcation_diagram, stroboscopic_section
+from validation.reference.stability_boundary import stability_boundary
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
@@ -17,7 +18,7 @@ from femgear.solvers.periodic.harmonic_balance import (
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.solvers.stability.lyapunov import lyapunov_exponents
-from femgear.solvers.stability.parametric import stability_boundary, stability_chart
+from femgear.solvers.stability.parametric import stability_chart
 from femgear.solvers.time.stroboscopic import (
     sweep_response,
     sweep_up_and_down,

@@ -6,13 +6,13 @@ phases (Kim and Choi, J. Vib. Acoust. 119 (1997) 107).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfftn, next_fast_len, rfftn
 
 from femgear.errors import CaseError
-from femgear.system.elements import Element, coefficients_of
+from femgear.system.elements import Element, coefficients_of, with_coefficients
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import NonlinearSystem
 
@@ -156,11 +156,9 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
 
 def on_grid(element: Element, theta: np.ndarray) -> Element:
     """The element with its periodic coefficients evaluated once at the phases ``theta`` (N, n_bases)."""
-    fixed = {
-        name: _GridSeries(np.ascontiguousarray(value.at(theta)), value.mean, value.orders)
-        for name, value in coefficients_of(element).items()
-    }
-    return replace(element, **fixed) if fixed and is_dataclass(element) else element
+    return with_coefficients(
+        element, lambda one: _GridSeries(np.ascontiguousarray(one.at(theta)), one.mean, one.orders)
+    )
 
 
 def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:

@@ -12,7 +12,7 @@ where it is open, whatever the sign of u: smooth across the change.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import integrate, linalg
@@ -20,7 +20,7 @@ from scipy.optimize import root_scalar
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error
-from femgear.system.elements import Element, coefficients_of, has_corners
+from femgear.system.elements import Element, coefficients_of, has_corners, with_coefficients
 from femgear.system.fourier import StepSeries, constant, phase_of
 from femgear.system.system import NonlinearSystem
 
@@ -429,12 +429,8 @@ def _next_break(steps, time: float) -> float:
 
 def held(problem: NonlinearSystem, theta) -> NonlinearSystem:
     """The problem with its step series at their values at the phases ``theta``, constant."""
-    elements = []
-    for element in problem.elements:
-        changed = {
-            name: constant(series.at(theta))
-            for name, series in coefficients_of(element).items()
-            if isinstance(series, StepSeries)
-        }
-        elements.append(replace(element, **changed) if changed and is_dataclass(element) else element)
-    return replace(problem, elements=tuple(elements))
+
+    def at_theta(series):
+        return constant(series.at(theta)) if isinstance(series, StepSeries) else series
+
+    return replace(problem, elements=tuple(with_coefficients(one, at_theta) for one in problem.elements))
