@@ -362,7 +362,7 @@ def _complex_modes(modal, modes: Modes, common) -> Reduction:
     elastic, rigid = np.flatnonzero(natural > 0.0), np.flatnonzero(natural == 0.0)
     m, order = len(elastic), np.concatenate([elastic, rigid])
     scale = np.exp(np.mean(np.log(natural[elastic])))
-    state = state_matrix(natural[elastic] ** 2, modal[np.ix_(order, order)], scale)
+    state = state_matrix(np.diag(natural[elastic] ** 2), modal[np.ix_(order, order)], scale)
     rows = modes.mesh_deflection
     drive = np.zeros((len(state), len(rows)))
     drive[m:] = rows[:, order].T / scale

@@ -19,7 +19,7 @@ from scipy import integrate, linalg
 from scipy.optimize import root_scalar
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import mass_error
+from femgear.solvers.linear.modal import mass_error, state_matrix
 from femgear.system.elements import Element, coefficients_of, has_corners, with_coefficients
 from femgear.system.fourier import StepSeries, constant, phase_of
 from femgear.system.system import NonlinearSystem
@@ -137,10 +137,8 @@ def flow(problem: NonlinearSystem, frequency, *, variational=False) -> Flow:
         raise mass_error() from error
     rate = float(np.sqrt(np.abs(np.trace(linalg.cho_solve(factor, problem.stiffness))) / n))
     rate = rate or float(np.abs(frequency).max(initial=0.0)) or 1.0
-    matrix = np.zeros((2 * n, 2 * n))
-    matrix[:n, n:] = rate * np.eye(n)
-    matrix[n:, :n] = -linalg.cho_solve(factor, system.K) / rate
-    matrix[n:, n:] = -linalg.cho_solve(factor, problem.damping)
+    stiffness, damping = linalg.cho_solve(factor, system.K), linalg.cho_solve(factor, problem.damping)
+    matrix = state_matrix(stiffness, damping, rate)
     return Flow(
         problem, frequency, rate, matrix, linalg.cho_solve(factor, system.W) / rate,
         linalg.cho_solve(factor, loads.T).T / rate,
