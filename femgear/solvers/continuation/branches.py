@@ -47,8 +47,6 @@ class Branch:
 
     Parameters
     ----------
-    parameter : (p,) array
-        Frequency [rad/s] or whatever was varied, in order along the curve.
     solutions : tuple of PeriodicSolution
     curve : Curve
         The unknowns, limit points and branch points.
@@ -58,12 +56,12 @@ class Branch:
         Whether verdicts were asked for.
     """
 
-    parameter: np.ndarray
     solutions: tuple[PeriodicSolution, ...]
     curve: Curve
     equations: ContinuationProblem = field(repr=False)
     stability: bool = True
 
+    parameter = _of_curve("parameter", "Frequency [rad/s] or whatever was varied, (p,), along the curve.")
     folds = _of_curve("folds", "Indices of the limit points.")
     branch_points = _of_curve("branch_points", "Indices of the points where another branch crosses.")
     closed = _of_curve("closed", "The last solution is the first one again.")
@@ -375,7 +373,7 @@ def _branch(equations: ContinuationProblem, curve: Curve, stability: bool, toler
     )
     if stability:
         solutions = equations.judged(curve.parameter, solutions, tolerance)
-    return Branch(curve.parameter, solutions, curve, equations, stability)
+    return Branch(solutions, curve, equations, stability)
 
 
 def _ends(value, key: str, unit: str) -> tuple[float, float]:

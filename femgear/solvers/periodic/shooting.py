@@ -17,7 +17,6 @@ from scipy import linalg
 
 from femgear.errors import CaseError, checked_count, checked_tolerance
 from femgear.solvers.periodic.solution import (
-    FloquetVerdict,
     PeriodicSolution,
     of_solution,
     open_verdict,
@@ -183,22 +182,6 @@ def solve_shooting(
     return _judged(moving, found, chosen)
 
 
-def _verdict(
-    problem: NonlinearSystem, found: ShootingSolution, *, error: float, trivial: int
-) -> FloquetVerdict:
-    """Verdict of the monodromy matrix, of relative error ``error``, without ``trivial`` multipliers one.
-
-    Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
-    rounding splits; they are left out (as `floquet.floquet_verdicts` does). Of those that damping feels the
-    position has the multiplier one and is left out, the velocity counts.
-    """
-    matrix, positions = _without_free_motions(problem, found.monodromy)
-    return verdict_of(
-        np.linalg.eigvals(matrix), found.period, "shooting", error, np.inf, positions=trivial + positions,
-        velocities=positions,
-    )  # fmt: skip
-
-
 def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> tuple[np.ndarray, int]:
     """The monodromy matrix on the motions that are orthogonal in mass to those that nothing feels.
 
@@ -307,8 +290,17 @@ def _result(
 def _judged(
     moving: Flow, found: ShootingSolution, chosen: ShootingOptions, *, trivial: int = 0
 ) -> ShootingSolution:
-    """The motion with its verdict, without ``trivial`` multipliers."""
+    """The motion with the verdict of its monodromy matrix, without ``trivial`` multipliers one.
+
+    Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
+    rounding splits; they are left out (as `floquet.floquet_verdicts` does). Of those that damping feels the
+    position has the multiplier one and is left out, the velocity counts.
+    """
     verdict = open_verdict("not covered: the solution did not converge")
     if found.solution.converged:
-        verdict = _verdict(moving.problem, found, error=chosen.integration, trivial=trivial)
+        matrix, positions = _without_free_motions(moving.problem, found.monodromy)
+        verdict = verdict_of(
+            np.linalg.eigvals(matrix), found.period, "shooting", chosen.integration, np.inf,
+            positions=trivial + positions, velocities=positions,
+        )  # fmt: skip
     return replace(found, solution=replace(found.solution, verdict=verdict))
