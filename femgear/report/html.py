@@ -201,7 +201,7 @@ def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
     """Find place in the order, section and caption of a picture from its file name."""
-    figures = train.figures()
+    figures = train.figures
     captions = [
         (stage.title, *one)
         for stage in train.stages

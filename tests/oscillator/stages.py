@@ -93,7 +93,5 @@ OSCILLATOR = Train(
     ),
     describe=lambda case: (Block(case.title), Block("Oscillator"), Block("Warnings", notes=("none",))),
     warnings=lambda case: (),
-    figures=lambda: {
-        "receptance": Figures({"receptance": "Displacement of the mass for a unit force."}, draw)
-    },
+    figures={"receptance": Figures({"receptance": "Displacement of the mass for a unit force."}, draw)},
 )

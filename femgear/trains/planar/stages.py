@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ from femgear.trains.planar.checks import (
     end_of_branch,
     excited_spans,
 )
+from femgear.trains.planar.figures import FIGURES
 from femgear.trains.planar.model import (
     carrier_sense,
     judged_branch,
@@ -47,7 +48,7 @@ from femgear.trains.planar.results import (
     published_modes,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     member_speeds,
     modes_verdict,
@@ -212,12 +213,6 @@ def _lacks(section: str) -> Callable[[PlanarCase], str]:
     return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.planar.figures import FIGURES
-
-    return FIGURES
-
-
 def _result_warnings(results: Results) -> Iterator[Finding]:
     branch, response = (
         results.stage(name) if name in results.stages else None for name in ("branch", "response")
@@ -271,7 +266,7 @@ PLANAR = Train(
     ),
     warnings=set_warnings,
     result_warnings=_result_warnings,
-    figures=_figures,
+    figures=FIGURES,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
     cross_check=check_planar,
     notices=planar_notices,
