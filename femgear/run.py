@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from femgear.report.draw import write_pictures
-from femgear.report.html import write_report
+from femgear.report.page import write_pictures, write_report
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, folder_lock, record
 from femgear.trains.protocol import Context, Drawn, Progress, Stage, one_blas_thread

@@ -6,7 +6,7 @@ import numpy as np
 from oscillator.section import OscillatorCase
 
 from femgear.report.tables import Block
-from femgear.storage.dataset import dataset
+from femgear.storage.results import dataset
 from femgear.trains.protocol import Figures, OwnFile, Stage, Train
 
 

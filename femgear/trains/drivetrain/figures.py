@@ -14,7 +14,7 @@ import numpy as np
 
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure
-from femgear.storage.dataset import RPM
+from femgear.storage.results import RPM
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.checks import case_model
 from femgear.trains.drivetrain.data import numbered

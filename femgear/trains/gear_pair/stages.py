@@ -18,15 +18,18 @@ from femgear.solvers.continuation.branches import Branch, parameter_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.stability.lyapunov import LyapunovExponents, lyapunov_exponents
 from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
-from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
-from femgear.system.contact_states import (
+from femgear.storage.results import FOURIER, RPM, complex_entries, dataset
+from femgear.trains.gear_pair.figures import FIGURES
+from femgear.trains.gear_pair.model import (
+    BACK,
+    DRIVE,
     STATE_NAMES,
+    impact_borders,
     range_states,
+    separation_ratios,
     solution_states,
     state_regions,
 )
-from femgear.trains.gear_pair.figures import FIGURES
-from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
 from femgear.trains.gear_pair.section import GearPairCase, cross_check, pair_of, scales_of
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 

@@ -23,7 +23,6 @@ from femgear.system.assembler import free_motions, gear_set_system, mesh_directi
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation
-from femgear.trains.gear_set import gear_set_modes
 from femgear.trains.helical.figures import FIGURES
 from femgear.trains.helical.model import (
     SectionStiffness,
@@ -45,6 +44,7 @@ from femgear.trains.helical.section import HelicalCase, check_helical, helical_n
 from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     driving_torque,
+    gear_set_modes,
     member_speeds,
     modes_verdict,
     needed,
