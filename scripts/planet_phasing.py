@@ -68,7 +68,7 @@ def main(
     )
     from femgear.gears.planetary import equal_planet_angles, feasible_angles
     from femgear.report.style import save_figure
-    from femgear.trains.static.charts import phase_diagram
+    from femgear.trains.helical.figures import phase_diagram
 
     if points < 2 or not 1 <= harmonics <= MOST_HARMONICS:
         raise CaseError(
