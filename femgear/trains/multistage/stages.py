@@ -146,7 +146,7 @@ def error_response(
         Of the input [rad/s], not zero, of one sign.
     errors : mapping of int to (2N, H) complex array
         Of the stages named (from 1), harmonics 1 to H of every mesh [m], as of
-        `femgear.system.transmission_errors.tooth_lines` with the phases of the stage: ``e_j(tau) = e(tau +
+        `femgear.system.fourier.tooth_lines` with the phases of the stage: ``e_j(tau) = e(tau +
         phi_j)`` (Parker and Lin, J. Mech. Des. 126, 2004).
     damping_ratio : float
         Of all modes; ignored where modes are given.
