@@ -19,7 +19,7 @@ def inputs():
 
     from femgear.gears.phasing import MeshPhasing, phase_factors
     from femgear.system.assembler import gear_set_system
-    from femgear.trains.gear_set import gear_set_modes
+    from femgear.trains.rigid import gear_set_modes
 
     data = kahraman_set()
     cases = [
@@ -81,7 +81,7 @@ def test_direct(benchmark, medians):
 def test_modes(benchmark):
     from published.planetary_sets import kahraman_set
 
-    from femgear.trains.gear_set import gear_set_modes
+    from femgear.trains.rigid import gear_set_modes
 
     data = kahraman_set()
     found = benchmark.pedantic(gear_set_modes, args=(data,), rounds=9, warmup_rounds=1)

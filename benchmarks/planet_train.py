@@ -23,7 +23,7 @@ def mesh_stiffness():
     """k(t) of the six meshes in sequential phase."""
     from published.planetary_sets import lin_parker_set
 
-    from femgear.trains.gear_set import phased_series
+    from femgear.trains.rigid import phased_series
 
     return phased_series(FLUCTUATION, FLUCTUATION, PHASES, mean=lin_parker_set(3).mesh_stiffness)
 
@@ -34,7 +34,7 @@ def planet_train(damping: float) -> NonlinearSystem:
 
     from femgear.system.assembler import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
-    from femgear.trains.gear_set import gear_set_problem
+    from femgear.trains.rigid import gear_set_problem
 
     data = lin_parker_set(3)
     meshes = mesh_elements(data, stiffness=mesh_stiffness(), backlash=20e-6)
@@ -47,7 +47,7 @@ def two_base_train(damping: float) -> NonlinearSystem:
 
     from femgear.system.assembler import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
-    from femgear.trains.gear_set import Gravity, gear_set_problem
+    from femgear.trains.rigid import Gravity, gear_set_problem
 
     data, stiffness = lin_parker_set(3), replace(mesh_stiffness(), orders=(0, 1))
     meshes = mesh_elements(data, stiffness=stiffness, backlash=20e-6)

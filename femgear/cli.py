@@ -57,7 +57,7 @@ class _Progress:
 
 
 def _print(blocks) -> None:
-    """Print blocks of `femgear.report.summary` as tables on standard output."""
+    """Print blocks of `femgear.report.page` as tables on standard output."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -166,7 +166,7 @@ def run(
     force
         Replace the results that the folder holds, once the new ones are complete.
     """
-    from femgear.report.summary import case_warnings, describe_results, result_warnings
+    from femgear.report.page import case_warnings, describe_results, result_warnings
     from femgear.run import run_case
     from femgear.storage.results import run_folder
     from femgear.trains.reading import open_results, read_case
@@ -232,8 +232,8 @@ def export(
     output
         Folder of the files. Default: exported, inside the other.
     """
-    from femgear.storage.dataset import write_csv_tables
     from femgear.storage.files import storage_errors
+    from femgear.storage.results import write_csv_tables
     from femgear.trains.reading import open_results
 
     if not csv:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from femgear.report.html import write_report
+from femgear.report.page import write_pictures, write_report
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, folder_lock, record
 from femgear.trains.protocol import Context, Drawn, Progress, Stage, one_blas_thread
@@ -108,8 +108,6 @@ def run_case(
         convergence[name] = stage.verdict(result)
         record(folder, names, timings=timings, convergence=convergence)
     if pictures:
-        from femgear.report.draw import write_pictures
-
         start = time.perf_counter()
         drawn = Drawn(case, data, results, cache)
         names += write_pictures(folder, train_of(case), drawn, progress=progress)
@@ -128,8 +126,6 @@ def report_again(folder: Path) -> None:
     folder : path
         Results of a complete run.
     """
-    from femgear.report.draw import write_pictures
-
     with folder_lock(folder):
         results = open_results(folder, partial=False)
         manifest, train = results.manifest, train_of(results.case)

@@ -45,7 +45,7 @@ def main(
     from published.wind_turbine_figures import response_branches
     from published.wind_turbine_response import wedging_map
 
-    from femgear.case.units import LENGTH, to_si
+    from femgear.case.quantities import LENGTH, to_si
     from femgear.report.style import save_figure
 
     plays, play = [to_si(text, LENGTH) for text in clearance], to_si(backlash, LENGTH)

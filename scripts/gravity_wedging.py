@@ -57,7 +57,7 @@ def main(
     from published.wind_turbine import gravity_problem_b
     from published.wind_turbine_figures import response_branches
 
-    from femgear.case.units import LENGTH, to_si
+    from femgear.case.quantities import LENGTH, to_si
     from femgear.report.style import save_figure
 
     plays = [to_si(text, LENGTH) for text in backlash]

@@ -46,7 +46,7 @@ def main(
         Frequency with its unit; modes that are lower at rest are followed.
     """
     from femgear.case.case import planetary_set
-    from femgear.case.units import FREQUENCY, SPEED, to_si
+    from femgear.case.quantities import FREQUENCY, SPEED, to_si
     from femgear.report.style import save_figure
     from femgear.trains.elastic.checks import check_rim_speed
     from femgear.trains.elastic.stages import solve_modes

@@ -50,7 +50,7 @@ def main(
         Positions over one mesh period.
     """
     from femgear.case.case import need_set, planetary_set
-    from femgear.case.units import LENGTH, TORQUE, to_si
+    from femgear.case.quantities import LENGTH, TORQUE, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
     from femgear.study.relief import (

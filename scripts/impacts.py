@@ -136,8 +136,8 @@ def draw_curves(folder: Path, name: str, curves, title: str) -> list[str]:
 def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
     """Contact states by harmonic balance and by sweeps up and down."""
     from femgear.report.style import save_figure
-    from femgear.system.contact_states import STATE_NAMES, state_regions
     from femgear.trains.gear_pair.figures import contact_rows, state_bands
+    from femgear.trains.gear_pair.model import STATE_NAMES, state_regions
     from femgear.trains.gear_pair.stages import solve_response, solve_sweep
 
     count = max(3, ratios // 2)
@@ -196,7 +196,7 @@ def eccentric_set(eccentricity: float, floating: bool):
     from femgear.system.assembler import mesh_elements
     from femgear.system.fourier import tooth_lines
     from femgear.system.rigid_bodies import PlanarTorque
-    from femgear.trains.gear_set import gear_set_problem, phased_series
+    from femgear.trains.rigid import gear_set_problem, phased_series
 
     data = lin_parker_set(3)
     data = replace(data, sun=replace(data.sun, support=1e6 if floating else 1e9))

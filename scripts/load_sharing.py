@@ -42,7 +42,7 @@ def main(
         Number of the planet that has the gap, 1 upwards.
     """
     from femgear.case.case import planetary_set
-    from femgear.case.units import LENGTH, to_si
+    from femgear.case.quantities import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.study.relief import sun_torque
     from femgear.trains.reading import read_case

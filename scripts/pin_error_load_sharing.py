@@ -61,7 +61,7 @@ def main(
         In mesh periods, 0 to 1, rounded to a sixteenth.
     """
     from femgear.case.case import planetary_set
-    from femgear.case.units import LENGTH, to_si
+    from femgear.case.quantities import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
     from femgear.study.relief import design_basis, sun_torque

@@ -59,11 +59,16 @@ def main(
     points
         Frequencies of the mesh-force spectra, 2 or more.
     """
-    from femgear.gears.phasing import mesh_phasing, phasing_table, standard_lag
+    from femgear.gears.phasing import (
+        check_teeth,
+        mesh_phasing,
+        neighbouring_teeth,
+        phasing_table,
+        standard_lag,
+    )
     from femgear.gears.planetary import equal_planet_angles, feasible_angles
-    from femgear.gears.teeth_numbers import check_teeth, neighbouring_teeth
     from femgear.report.style import save_figure
-    from femgear.trains.static.charts import phase_diagram
+    from femgear.trains.helical.figures import phase_diagram
 
     if points < 2 or not 1 <= harmonics <= MOST_HARMONICS:
         raise CaseError(
@@ -174,7 +179,7 @@ def _spectra(points):
 
     from femgear.gears.phasing import phase_factors
     from femgear.solvers.linear.receptance import modal_error_response
-    from femgear.trains.gear_set import gear_set_modes
+    from femgear.trains.rigid import gear_set_modes
 
     modes, frequency = gear_set_modes(kahraman_set(), damping_ratio=0.05), np.linspace(100.0, 15e3, points)
     last, turning = TYPES["sequentially phased"], cases()

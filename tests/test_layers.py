@@ -115,6 +115,22 @@ def test_solvers_know_nothing_but_the_waist():
             assert outside <= {"femgear", "numpy", "scipy"}
 
 
+def test_small_modules_are_few():
+    """A module under 100 lines with one importer is part of another one, or has a reason to stand alone."""
+    importers = defaultdict(set)
+    for path in MODULES:
+        for name in imported(path, typed=True):
+            importers[name].add(place(path))
+    small = []
+    for path in MODULES:
+        name = place(path).removesuffix(".py").replace("/", ".")
+        lines = len(path.read_text(encoding="utf-8").splitlines())
+        if path.stem != "__init__" and lines < 100 and len(importers[name]) <= 1:
+            small.append(place(path))
+    # the worker is a process of its own: a signal or a crash of Gmsh ends it alone
+    assert small == ["fe/_gmsh_worker.py"]
+
+
 def heavy_after(code: str) -> set[str]:
     script = f"import sys\n{code}\nprint()\nprint('|'.join({HEAVY!r} & sys.modules.keys()))"
     run = subprocess.run(
@@ -135,3 +151,8 @@ def heavy_after(code: str) -> set[str]:
 )
 def test_heavy_libraries_are_imported_late(code):
     assert heavy_after(code) == set()
+
+
+def test_checking_a_case_loads_no_library_that_draws_or_solves():
+    case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
+    assert heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])") == {"pint"}

@@ -15,9 +15,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.checks import check_floating
-from femgear.case.deviations import CarrierErrors, GearErrors, RingErrors
 from femgear.case.problems import in_terms_of_the_case, rack_at
-from femgear.case.sections import Case, PlanetSection, RingSection, SunSection
+from femgear.case.sections import (
+    CarrierErrors,
+    Case,
+    GearErrors,
+    PlanetSection,
+    RingErrors,
+    RingSection,
+    SunSection,
+)
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.fe.elasticity import Material
 from femgear.fe.shaft import ShaftStep, shaft_support_stiffness, timoshenko_flexibility
@@ -46,8 +53,7 @@ from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack, PinionCutter, transverse_rack, transverse_tool
 
 if TYPE_CHECKING:
-    from femgear.case.deviations import ModificationSection
-    from femgear.case.sections import CarrierSection
+    from femgear.case.sections import CarrierSection, ModificationSection
 
 _ON_SHAFTS = ("sun", "carrier")
 """Members that may stand on a shaft."""

@@ -11,8 +11,14 @@ from collections.abc import Iterable
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
-from femgear.case.deviations import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors
-from femgear.case.sections import Case, check_published
+from femgear.case.sections import (
+    LARGEST_DEVIATION,
+    ROUNDING,
+    CarrierErrors,
+    Case,
+    GearErrors,
+    check_published,
+)
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.kinematics import unheld_members
 

@@ -16,10 +16,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from femgear.case import text as case_text
-from femgear.case.fields import described
+from femgear.case.quantities import ANGLE, LENGTH, described
 from femgear.case.sections import Case, RackSection
 from femgear.case.text import ReadCase
-from femgear.case.units import ANGLE, LENGTH
 from femgear.errors import CaseError, Finding, GeometryError, remark
 
 AnyCase = TypeVar("AnyCase", bound=ReadCase)

@@ -17,8 +17,8 @@ from itertools import pairwise
 from pathlib import PurePath
 
 from femgear.case import text
-from femgear.case.deviations import MOST_POINTS
-from femgear.case.units import ANGLE, LENGTH, Dimension, to_si
+from femgear.case.quantities import ANGLE, LENGTH, Dimension, to_si
+from femgear.case.sections import MOST_POINTS
 from femgear.errors import CaseError
 
 _HEADING = re.compile(r"\s*(?P<name>[A-Za-z_ ]+?)[\s_]*[\[(](?P<unit>[^\])]+)[\])]\s*")

@@ -1,4 +1,7 @@
-"""From an outline to a second-order grid: Gmsh in a killable process, results cached by content."""
+"""From the outline of a plane body, checked, to its second-order grid by Gmsh.
+
+Gmsh runs in a process that can be killed; results are cached by content.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +13,269 @@ import sys
 import tempfile
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from femgear.errors import GridError, StorageError
 from femgear.fe.grid import Grid, check_grid, read_grid, write_grid
-from femgear.fe.outline import Plan, check_outline, estimate_elements
+
+CLOSE = 1e-9  # points nearer than this share of the size of the outline count as the same
+MAX_SEGMENTS = 5_000
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Closed counter-clockwise boundary of a plane body, as named curves of exact points.
+
+    Parameters
+    ----------
+    curves : tuple of (name, (2k + 1, 2) array)
+        Points [m]: even rows are element corners, odd rows mid-side nodes. Each curve starts where the
+        one before ends.
+    interfaces : tuple of (name, (2k + 1, 2) array)
+        Inner curves that split the body; their ends are corners of other curves.
+    regions : tuple of (name, (x, y))
+        A point [m] inside each part that the interfaces make; may be empty for an undivided body,
+        which is then called ``"body"``.
+    """
+
+    curves: tuple[tuple[str, np.ndarray], ...]
+    interfaces: tuple[tuple[str, np.ndarray], ...] = ()
+    regions: tuple[tuple[str, tuple[float, float]], ...] = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A checked outline, ready for a mesh generator.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        Corners [m].
+    segments : (s, 2) int array
+        Their corner numbers, those of the boundary first and counter-clockwise.
+    mids : (s, 2) array
+        Their mid-side points [m].
+    names : (s,) tuple of str
+        Curve of each segment.
+    n_boundary : int
+        Segments of the boundary.
+    loops : tuple of int arrays
+        Segments of each part counter-clockwise, numbered from 1, negative when reversed.
+    faces : tuple of str
+        Names of the parts.
+    """
+
+    points: np.ndarray
+    segments: np.ndarray
+    mids: np.ndarray
+    names: tuple[str, ...]
+    n_boundary: int
+    loops: tuple[np.ndarray, ...]
+    faces: tuple[str, ...]
+
+    @property
+    def size(self) -> float:
+        """Larger side of the bounding box [m]."""
+        return float(np.ptp(self.points, axis=0).max())
+
+
+def check_outline(outline) -> Plan:
+    """Check an outline and find the parts into which its interfaces split it.
+
+    Parameters
+    ----------
+    outline : Outline
+        Or any object with the same fields.
+
+    Raises
+    ------
+    GridError
+        E-GRID: points that are not finite or coincide, curves that cross, no area, a clockwise boundary,
+        interfaces that do not divide the body, or too many segments.
+    """
+    curves = [(name, _curve(name, points)) for name, points in outline.curves]
+    inner = [(name, _curve(name, points)) for name, points in outline.interfaces]
+    every = np.vstack([points for _, points in curves])
+    size = np.ptp(every, axis=0).max()
+    if not size > 0:
+        raise GridError("all points of the outline coincide", code="E-GRID")
+    points, segments, mids, names = _join(curves, inner, size)
+    n_boundary = sum(len(p) // 2 for _, p in curves)
+    if len(segments) > MAX_SEGMENTS:
+        limit = f"at most {MAX_SEGMENTS}"
+        raise GridError(f"the outline has {len(segments)} segments", code="E-GRID", limit=limit)
+    _check_distinct(points, size)
+    _check_crossing(points, segments, names, size)
+    _check_area(points[segments[:n_boundary, 0]], size)
+    loops = _faces(segments, n_boundary, inner)
+    faces = _name_faces(points, segments, loops, tuple(outline.regions))
+    return Plan(points, segments, mids, names, n_boundary, loops, faces)
+
+
+def _curve(name, points):
+    """Points of a curve as an array, refused where one is not finite."""
+    points = np.asarray(points, dtype=float)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        x, y = points[bad[0]]
+        message = f"point {bad[0]} of the curve {name!r} is ({x}, {y})"
+        raise GridError(message, code="E-GRID", key=name, limit="finite coordinates")
+    return points
+
+
+def _join(curves, inner, size):
+    """Corners, segments, mid-side points and names of all curves; corners of interfaces join those there."""
+    points = np.vstack([points[0:-1:2] for _, points in curves])
+    number = np.arange(len(points))
+    segments = [np.stack([number, np.roll(number, -1)], axis=1)]
+    mids = [p[1::2] for _, p in curves + inner]
+    names = [name for name, p in curves + inner for _ in range(len(p) // 2)]
+    for _, curve in inner:
+        chain = []
+        for corner in curve[0::2]:
+            distance = np.abs(points - corner).max(axis=1)
+            nearest = int(distance.argmin())
+            if distance[nearest] > CLOSE * size:
+                nearest = len(points)
+                points = np.vstack([points, corner])
+            chain.append(nearest)
+        segments.append(np.stack([chain[:-1], chain[1:]], axis=1))
+    return points, np.vstack(segments), np.vstack(mids), tuple(names)
+
+
+def _check_distinct(points, size):
+    """Refuse corners that coincide."""
+    pairs = KDTree(points).query_pairs(CLOSE * size, output_type="ndarray")
+    if len(pairs):
+        a, b = points[pairs[0]]
+        raise GridError(
+            f"{len(pairs)} pairs of corners coincide, the first at ({a[0]:.9g}, {a[1]:.9g}) m, "
+            f"{np.hypot(*(a - b)):.3e} m apart",
+            code="E-GRID",
+        )
+
+
+def _check_crossing(points, segments, names, size):
+    """Every pair of segments, by the signs of the triangles their ends make; touching counts too."""
+    a, b = points[segments[:, 0]], points[segments[:, 1]]
+    low, high = np.minimum(a, b) - CLOSE * size, np.maximum(a, b) + CLOSE * size
+    for first in range(0, len(segments), 256):
+        rows = np.arange(first, min(first + 256, len(segments)))
+        near = (low[rows, None] <= high[None]).all(axis=2) & (low[None] <= high[rows, None]).all(axis=2)
+        i, j = np.nonzero(near)
+        i = rows[i]
+        i, j = i[i < j], j[i < j]
+        shared = (segments[i][:, :, None] == segments[j][:, None, :]).any(axis=(1, 2))
+        sides = [_side(a[i], b[i], a[j], size), _side(a[i], b[i], b[j], size)]
+        sides += [_side(a[j], b[j], a[i], size), _side(a[j], b[j], b[i], size)]
+        crossing = (sides[0] * sides[1] <= 0) & (sides[2] * sides[3] <= 0)
+        # neighbours always touch at their common corner: they overlap only when all is in line
+        along = ((b[i] - a[i]) * (b[j] - a[j])).sum(axis=1)
+        same_end = (segments[i, 0] == segments[j, 0]) | (segments[i, 1] == segments[j, 1])
+        flat = (np.abs(sides).sum(axis=0) == 0) & (np.where(same_end, along, -along) > 0)
+        hit = np.flatnonzero(np.where(shared, flat, crossing))
+        if len(hit):
+            p, q = i[hit[0]], j[hit[0]]
+            x, y = 0.25 * (a[p] + b[p] + a[q] + b[q])
+            raise GridError(
+                f"the outline crosses or touches itself: {names[p]!r} and {names[q]!r} near "
+                f"({x:.9g}, {y:.9g}) m",
+                code="E-GRID",
+            )
+
+
+def _side(a, b, c, size):
+    """+1, 0, -1: the point c lies left of, on (within tolerance) or right of the line through a and b."""
+    d = b - a
+    cross = d[:, 0] * (c[:, 1] - a[:, 1]) - d[:, 1] * (c[:, 0] - a[:, 0])
+    return np.where(np.abs(cross) <= CLOSE * size * np.hypot(d[:, 0], d[:, 1]), 0, np.sign(cross))
+
+
+def _check_area(polygon, size):
+    """Refuse a boundary without area, or one that runs clockwise."""
+    x, y = (polygon - polygon.mean(axis=0)).T
+    area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    if abs(area) < 1e-6 * size**2:
+        message = f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit"
+        raise GridError(message, code="E-GRID")
+    if area < 0:
+        limit = "counter-clockwise, the body on the left"
+        raise GridError("the outline runs clockwise", code="E-GRID", limit=limit)
+
+
+def _faces(segments, n_boundary, inner):
+    """Parts of the body as segments counter-clockwise, numbered from 1 and negative when reversed."""
+    loops, used = [np.arange(1, n_boundary + 1)], n_boundary
+    for name, curve in inner:
+        chain = used + 1 + np.arange(len(curve) // 2)
+        used = chain[-1]
+        ends = segments[chain[0] - 1, 0], segments[chain[-1] - 1, 1]
+        for number, loop in enumerate(loops):
+            starts = np.where(loop > 0, segments[np.abs(loop) - 1, 0], segments[np.abs(loop) - 1, 1])
+            if not np.isin(ends, starts).all():
+                continue
+            first, last = (int(np.flatnonzero(starts == end)[0]) for end in ends)
+            if first > last:
+                first, last, chain = last, first, -chain[::-1]
+            loops[number] = np.concatenate([loop[:first], chain, loop[last:]])
+            loops.append(np.concatenate([loop[first:last], -chain[::-1]]))
+            break
+        else:
+            message = f"the interface {name!r} does not end at two corners of one part of the body"
+            raise GridError(message, code="E-GRID", key=name)
+    return tuple(loops)
+
+
+def _name_faces(points, segments, loops, regions):
+    """Names of the parts, each by the one region whose point lies in it."""
+    if not regions and len(loops) == 1:
+        return ("body",)
+    faces = []
+    for loop in loops:
+        own = segments[np.abs(loop) - 1]
+        names = [name for name, point in regions if _contains(points, own, np.array([point]))[0]]
+        if len(names) != 1:
+            message = f"a part of the outline holds the points of the regions {names}"
+            raise GridError(message, code="E-GRID", limit="one region for each part")
+        faces += names
+    return tuple(faces)
+
+
+def _contains(points, segments, samples):
+    """Which of the samples (m, 2) lie inside the closed polygon of segments: even-odd rule."""
+    a, b = points[segments[:, 0]], points[segments[:, 1]]
+    x, y = samples[:, 0, None], samples[:, 1, None]
+    spans = (a[:, 1] > y) != (b[:, 1] > y)
+    rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
+    beyond = a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / rise > x
+    return np.count_nonzero(spans & beyond, axis=1) % 2 == 1
+
+
+def estimate_elements(plan: Plan) -> float:
+    """Rough number of triangles of a checked outline, before it is meshed.
+
+    The area divided by that of an equilateral triangle of the local size, which is the mean length of
+    the segments weighted with their length over their squared distance.
+    """
+    a, b = plan.points[plan.segments[:, 0]], plan.points[plan.segments[:, 1]]
+    middle, length = 0.5 * (a + b), np.hypot(*(b - a).T)
+    low, high = plan.points.min(axis=0), plan.points.max(axis=0)
+    step = (high - low) / 48
+    axes = [lo + h * (np.arange(48) + 0.5) for lo, h in zip(low, step)]
+    samples = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    count = 0.0
+    for block in np.array_split(samples, 1 + len(samples) * len(length) // 2_000_000):
+        block = block[_contains(plan.points, plan.segments[: plan.n_boundary], block)]
+        weight = length / (((block[:, None] - middle) ** 2).sum(axis=2) + 0.25 * length**2)
+        size = (weight * length).sum(axis=1) / weight.sum(axis=1)
+        count += float(np.sum(np.prod(step) / (0.25 * np.sqrt(3) * size**2)))
+    return count + len(length)
+
 
 FORMAT = "1"  # raise when the way grids are made changes, so that cached ones are not reused
 WORKER = Path(__file__).with_name("_gmsh_worker.py")

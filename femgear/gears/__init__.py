@@ -22,7 +22,10 @@ from femgear.gears.modifications import (
 from femgear.gears.phasing import (
     MeshPhasing,
     PhasingTable,
+    ToothChoices,
+    check_teeth,
     mesh_phasing,
+    neighbouring_teeth,
     phase_factors,
     phasing_of_set,
     phasing_table,
@@ -30,7 +33,6 @@ from femgear.gears.phasing import (
 )
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, feasible_angles
 from femgear.gears.profile import BasicRack, PinionCutter
-from femgear.gears.teeth_numbers import ToothChoices, check_teeth, neighbouring_teeth
 from femgear.gears.tooth import HalfSector, half_sector
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Results on disk: one folder a run, one NetCDF file a stage, and a manifest of what the run wrote.
+"""Results as xarray datasets with units, and on disk: one folder a run, one NetCDF file a stage, a manifest.
 
 The manifest holds the checksum of every file and whether the run came to its end.
 """
@@ -21,6 +21,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from femgear import __version__
 from femgear.errors import StorageError
 from femgear.storage.files import (
@@ -34,7 +36,111 @@ from femgear.storage.files import (
 )
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray as xr
+
+RPM = np.pi / 30.0
+FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
+MEMBERS = ("carrier", "ring", "sun")
+
+
+def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
+    """Make a dataset of entries ``(dims, values, units, long_name)``; dims as names or one text."""
+    import xarray as xr
+
+    def made(entries):
+        return {
+            name: (
+                dims.split() if isinstance(dims, str) else dims,
+                np.asarray(values),
+                {"units": units, "long_name": words},
+            )
+            for name, (dims, values, units, words) in entries.items()
+        }
+
+    return xr.Dataset(made(variables), coords=made(coords), attrs=attrs)
+
+
+def declared(texts: Mapping[str, tuple[str, str, str]], values: Mapping[str, Any]) -> dict[str, tuple]:
+    """Join declarations ``(dims, units, long_name)`` with values by name; what has no value is left out."""
+    return {
+        name: (dims, values[name], units, words)
+        for name, (dims, units, words) in texts.items()
+        if name in values
+    }
+
+
+def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
+    """Write the variables of a stage as CSV files, one for each set of dimensions; headers carry the units.
+
+    ``modes_dof_mode.csv`` holds the variables over degrees of freedom and modes, a line for each pair;
+    ``modes.csv`` holds single numbers and the attributes of the file, a line for each.
+
+    Returns
+    -------
+    list of str
+        File names.
+    """
+    import pandas as pd
+
+    flat, tables = data.reset_coords(), {}
+    single = [
+        *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
+        *((str(name), str(value), "") for name, value in data.attrs.items()),
+    ]
+    if single:
+        tables[()] = pd.DataFrame(single, columns=["name", "value", "unit"])
+    for dims in dict.fromkeys(one.dims for one in flat.values() if one.dims):
+        chosen = [name for name, one in flat.items() if one.dims == dims]
+        frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
+        tables[dims] = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
+    names = []
+    for dims, frame in tables.items():
+        names.append("_".join((stage, *dims)) + ".csv")
+        write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])
+    return names
+
+
+def _unit(one: xr.DataArray) -> str:
+    """Tell the unit of a number, nothing for text."""
+    return "" if one.dtype.kind in "OUSb" else str(one.attrs.get("units", "1"))
+
+
+def _header(data: xr.Dataset, name: str) -> str:
+    """Write a name with its unit; dimensions without values of their own are numbers."""
+    unit = _unit(data[name]) if name in data.variables else "1"
+    return f"{name} [{unit}]" if unit else name
+
+
+def complex_entries(entries) -> dict[str, tuple]:
+    """Split entries into real and imaginary parts, from ``(name, dims, values, units, long_name)``."""
+    found = {}
+    for name, dims, values, units, words in entries:
+        found[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
+        found[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
+    return found
+
+
+def response_entries(result: Any) -> dict[str, tuple]:
+    """List what is known of the periodic response at every speed: frequency, convergence, stability.
+
+    Of any result with a response, its stability and the speeds of the members.
+    """
+    response, stability, speed = result.response, result.stability, ("speed",)
+    return {
+        "mesh_frequency": (speed, response.mesh_frequency, "Hz", "mesh frequency"),
+        "carrier_speed": (speed, [s.carrier for s in result.speeds], "rad/s", "speed of the carrier"),
+        "converged": (speed, response.converged, "1", "whether the solution satisfies its tolerance"),
+        "iterations": (speed, response.iterations, "1", "iterations of the fixed point"),
+        "residual": (speed, response.residual, "1", "relative residual of the harmonic equations"),
+        "spectral_radius": (speed, response.spectral_radius, "1", "spectral radius of the fixed point"),
+        "tail": (speed, response.tail, "1", "share of the amplitude in the upper half of the harmonics"),
+        "method": (speed, list(response.method), "1", "method of solution"),
+        "floquet_multiplier": (speed, np.abs(stability.multiplier), "1", "largest Floquet multiplier"),
+        "stable": (speed, stability.stable, "1", "whether no perturbation grows"),
+    }
+
 
 FORMAT = 1
 MANIFEST = "manifest.json"

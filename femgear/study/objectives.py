@@ -16,8 +16,8 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import Steps, static_entries
+from femgear.case.quantities import ACCELERATION, SPEED, TORQUE, Dimension, to_si
 from femgear.case.sections import Case
-from femgear.case.units import ACCELERATION, SPEED, TORQUE, Dimension, to_si
 from femgear.contact.root_stress import LOADED
 from femgear.errors import CaseError
 from femgear.gears.gear import tooth_thickness

@@ -17,8 +17,8 @@ import numpy as np
 
 from femgear.case import text as case_text
 from femgear.case.case import planetary_set
+from femgear.case.quantities import Dimension, to_si
 from femgear.case.sections import Case
-from femgear.case.units import Dimension, to_si
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.study.objectives import NUMBER, Quantity, Speeds, named_quantity

@@ -20,6 +20,7 @@ import numpy as np
 
 from femgear.case.sections import Case
 from femgear.errors import CaseError, Finding
+from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
 from femgear.storage.files import storage_errors, write_text
 from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
@@ -285,8 +286,6 @@ def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:
 
     Of at most twelve combinations; a case that cannot be computed leaves a gap.
     """
-    from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
-
     last, count = counts[-1], len(found.quantities)
     scale = np.array([quantity.dimension.scale for quantity in found.quantities])
     curves = (found.values / scale).reshape(-1, last, count)

@@ -234,7 +234,7 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
     sun_planet, planet_ring : (H,) complex arrays
         Harmonics 1 to H at phase zero [m].
     phases : (2N,) array
-        Fractions of the mesh period, see `femgear.trains.planar.model.phased_series`.
+        Fractions of the mesh period, see `femgear.trains.rigid.phased_series`.
 
     Raises
     ------

@@ -160,9 +160,8 @@ class Train:
         ``(case) -> findings``: what is allowed but deserves a look.
     result_warnings : callable
         ``(Results) -> findings``: what the solvers say against their own results.
-    figures : callable
-        ``() -> {stage: Figures}``; called when something is drawn, so that drawing libraries are loaded late.
-        ``""`` are those of the case, whatever is computed of it.
+    figures : mapping of str to Figures
+        By stage; ``""`` are those of the case, whatever is computed of it.
     remarks : callable
         ``(Results, name of a picture) -> sentences`` that this case adds to a caption.
     section : str
@@ -182,7 +181,7 @@ class Train:
     describe: Callable[[Any], tuple[Block, ...]]
     warnings: Callable[[Any], Iterable[Finding]]
     result_warnings: Callable[[Results], Iterable[Finding]] = lambda results: ()
-    figures: Callable[[], Mapping[str, Figures]] = dict
+    figures: Mapping[str, Figures] = field(default_factory=dict)
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
     section: str = ""
     own_file: OwnFile | None = None

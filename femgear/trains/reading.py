@@ -19,8 +19,8 @@ from pydantic import create_model
 from femgear.case import text as case_text
 from femgear.case.case import with_shafts
 from femgear.case.checks import cross_check
-from femgear.case.fields import described
 from femgear.case.problems import added_material, checked_case, combine, notices
+from femgear.case.quantities import described
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.tables import embed_profiles
 from femgear.case.text import text_with_points

@@ -1,6 +1,9 @@
-"""What cases of planetary sets of rigid bodies have in common, in their plane or in space.
+"""Planetary sets of rigid bodies, in their plane or in space: what their cases and their models share.
 
-Refusals, notices, supports of the members, speeds and mesh stiffness.
+Of cases: refusals, notices, supports of the members, speeds and mesh stiffness. Of models: `gear_set_modes`
+gives the modes at standstill with their kinds. `gear_set_problem` joins a set with its elements and forces
+for harmonic balance and time integration: mesh stiffness, play, bearings with clearance, weight, pin errors.
+Both take any `RigidSet`: the number of directions of a body is that of the set.
 """
 
 from __future__ import annotations
@@ -8,6 +11,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -17,9 +21,24 @@ from femgear.case.sections import Case, MeshStiffnessSection, RigidCase, output_
 from femgear.errors import CaseError
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
-from femgear.system.rigid_bodies import PlanarTorque
+from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
+from femgear.storage.results import dataset
+from femgear.system.assembler import (
+    check_mesh_columns,
+    free_motions,
+    gear_set_system,
+    mesh_directions,
+    mesh_elements,
+)
+from femgear.system.elements import GearMeshes, RadialBearings
+from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of, tooth_lines
+from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis
+from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, RigidSet, flank_sign
+from femgear.system.system import HarmonicForce, MechanicalSystem, Modes, NonlinearSystem
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from femgear.gears.planetary import PlanetarySet
 
 Entry = TypeVar("Entry")
@@ -171,3 +190,454 @@ def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:
 def modes_verdict(result: Any) -> dict:
     """Numbers of modes and of coordinates for the manifest."""
     return {"modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape)}
+
+
+_AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
+# natural frequencies closer than this, relative to the frequency, count as one
+_SAME = 1e-3
+# the same, of what rounding alone tells apart
+_ONE_FREQUENCY = 1e-9
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Weight of all bodies, which turns backwards in the carrier frame.
+
+    Parameters
+    ----------
+    acceleration : float
+        [m/s^2]
+    direction : float
+        Angle of the weight from the x axis when the carrier's phase is zero [rad]; downwards along -y.
+    orders : tuple of int, optional
+        Multiples of the base frequencies that make the carrier's phase; None for a carrier that stands.
+        With a counter-clockwise carrier ``(0, 1)`` says that it turns with the second base frequency.
+    """
+
+    acceleration: float = 9.80665
+    direction: float = -0.5 * math.pi
+    orders: tuple[int, ...] | None = (0, 1)
+
+
+@dataclass(frozen=True)
+class MemberBearing:
+    """A radial bearing between two central members, or between one and the housing.
+
+    Parameters
+    ----------
+    stiffness : float
+        [N/m]
+    clearance : float or None
+        Radial, from the centred position [m]; None leaves the columns without a bearing.
+    inner, outer : str
+        ``"carrier"``, ``"ring"`` or ``"sun"``; ``outer`` also ``"housing"``.
+    """
+
+    stiffness: float
+    clearance: float | None = 0.0
+    inner: str = "carrier"
+    outer: str = "housing"
+
+
+@dataclass(frozen=True)
+class Bearings:
+    """Bearings that act on columns of their own, as elements; their stiffness is not in ``K``.
+
+    Parameters
+    ----------
+    planet_clearance : float or (N,) array, optional
+        Radial clearance of the planet bearings, from the centred position [m]; None leaves them linear.
+    members : tuple of MemberBearing
+        Beside the supports of the members; on the last columns, x and y of the inner less the outer member.
+    """
+
+    planet_clearance: float | np.ndarray | None = None
+    members: tuple[MemberBearing, ...] = ()
+
+    def columns(self, data: RigidSet, *, back_flanks: bool) -> dict[str, np.ndarray]:
+        """Places of the columns of ``W``, of meshes and back flanks (n,), of planets and members (g, 2)."""
+        meshes, planets = len(data.column_stiffness), self.planet_clearance is not None
+        counts = [meshes, meshes * back_flanks, 2 * data.n_planets * planets, 2 * len(self.members)]
+        drive, back, pins, members = np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
+        return {
+            "meshes": drive,
+            "back flanks": back,
+            "planets": pins.reshape(-1, 2),
+            "members": members.reshape(-1, 2),
+        }
+
+    def join(self, data: RigidSet, system: MechanicalSystem) -> MechanicalSystem:
+        """The system of a set with the columns of the members."""
+        T, columns = free_motions(data), [system.W]
+        for one in self.members:
+            first, *other = (
+                T[len(data.axes) * CENTRAL.index(name) :][:2].T
+                for name in (one.inner, one.outer)
+                if name in CENTRAL
+            )
+            columns.append(first - sum(other))
+        return replace(system, W=np.hstack(columns))
+
+    def elements(self, data: RigidSet, groups: dict[str, np.ndarray]) -> tuple[RadialBearings, ...]:
+        """The bearings on their `columns`."""
+        found = []
+        if self.planet_clearance is not None:
+            stiffness = data.pin_stiffness[:, 0]
+            found.append(RadialBearings(groups["planets"], stiffness, self.planet_clearance))
+        for place, one in zip(groups["members"], self.members):
+            if one.clearance is not None:
+                found.append(RadialBearings(place[None], one.stiffness, one.clearance))
+        return tuple(found)
+
+
+def gear_set_modes(
+    data: RigidSet,
+    *,
+    system: MechanicalSystem | None = None,
+    mesh_stiffness=None,
+    damping_ratio: float = 0.0,
+    max_frequency: float | None = None,
+) -> Modes:
+    """Solve for the modes of a set at standstill, with their kinds.
+
+    Parameters
+    ----------
+    data : RigidSet
+    system : MechanicalSystem, optional
+        `gear_set_system` of the set, with the flanks that a torque loads; without torque when not given.
+    mesh_stiffness : (n_columns,) array, optional
+        Of the columns of ``W`` [N/m]; that of the set when not given.
+    damping_ratio : float
+        Of all modes.
+    max_frequency : float, optional
+        Keep the modes up to this frequency [Hz]; all when not given.
+
+    Returns
+    -------
+    Modes
+        ``kind`` from `gear_set_kinds`; of bodies in space modes of one frequency have one phasing each.
+    """
+    system = gear_set_system(data) if system is None else system
+    stiffness = data.column_stiffness if mesh_stiffness is None else mesh_stiffness
+    modes = solve_modes(system, stiffness, damping_ratio=damping_ratio, max_frequency=max_frequency)
+    if len(data.axes) > 3:
+        # tilts of the planets that no mesh feels have one frequency in several classes
+        Q = phase_basis(gear_set_motions(data, modes.shape), modes.frequency, tolerance=_ONE_FREQUENCY)
+        modes = replace(
+            modes,
+            shape=modes.shape @ Q,
+            mesh_deflection=modes.mesh_deflection @ Q,
+            modal_load=None if modes.modal_load is None else Q.T @ modes.modal_load,
+        )
+    return replace(modes, kind=gear_set_kinds(data, modes.shape, frequency=modes.frequency))
+
+
+def gear_set_problem(
+    data: RigidSet,
+    *,
+    meshes: GearMeshes | None = None,
+    back_flanks: bool = False,
+    torque: PlanarTorque | None = None,
+    bearings: Bearings | None = None,
+    gravity: Gravity | None = None,
+    pin_errors=None,
+    carrier_speed: float = 0.0,
+    damping: float | Sequence[float] | np.ndarray | None = None,
+) -> NonlinearSystem:
+    """Assemble a lumped set with its elements and forces.
+
+    Parameters
+    ----------
+    data : RigidSet
+    meshes : GearMeshes, optional
+        From `mesh_elements`; constant stiffnesses without back side when not given.
+    back_flanks : bool
+        The back flanks act on their own lines of action, with the stiffness of the drive side, so that teeth
+        can wedge; otherwise they act on the line of the drive flanks.
+    torque : PlanarTorque, optional
+    bearings : Bearings, optional
+    gravity : Gravity, optional
+    pin_errors : (N, 2) array, optional
+        Radial (outwards) and tangential (counter-clockwise) displacement of the pins [m], from which the
+        coordinates of the planets then count. Not to be given again when the static record holds them.
+    carrier_speed : float
+        [rad/s], see `gear_set_system`.
+    damping : float, sequence of float or (n, n) array, optional
+        Damping ratio of all modes at standstill, or one a natural frequency as of `mode_ratios`, with the
+        stiffnesses of `working_springs`; or the matrix ``C`` [N s/m].
+
+    Raises
+    ------
+    CaseError
+        A load that accelerates the set (E-LOAD-BALANCE), back flanks without backlash (E-BACKLASH), arrays
+        that do not fit (E-SHAPE).
+    """
+    bearings = bearings or Bearings()
+    pins = np.zeros((data.n_planets, 2)) if pin_errors is None else _pins(data, pin_errors)
+    groups = bearings.columns(data, back_flanks=back_flanks)
+    meshes = mesh_elements(data) if meshes is None else meshes
+    check_mesh_columns(data, meshes)
+    elements = _mesh_elements(data, meshes, pins, flank_sign(data, torque), groups)
+    elements += bearings.elements(data, groups)
+    options = {
+        "torque": torque,
+        "back_flanks": back_flanks,
+        "planet_bearings": bearings.planet_clearance is not None,
+    }
+    still = bearings.join(data, gear_set_system(data, **options))
+    springs = working_springs(NonlinearSystem(still, elements), bearings.members)
+    # refuses a load that nothing takes up before a solver drifts away with it
+    modes = solve_modes(still, springs)
+    if damping is None or np.ndim(damping) > 1:
+        C = viscous_damping(still, springs, damping)
+    else:
+        C = modal_damping(still, springs, mode_ratios(modes.frequency, damping))
+    system = bearings.join(data, gear_set_system(data, carrier_speed=carrier_speed, **options))
+    steady, forces = _weight(data, gravity)
+    load = system.load + steady + _pin_inertia(data, pins, carrier_speed)
+    return NonlinearSystem(replace(system, load=load, C=C), elements, forces, speed=carrier_speed)
+
+
+def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] = ()) -> np.ndarray:
+    """Choose springs (n_columns,) [N/m] near which a set works: bearings closed, back flanks open.
+
+    The elements' own reference counts back flanks on their own lines as closed, far from where the set works.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+        Of `gear_set_problem`.
+    members : sequence of MemberBearing
+        On the last columns; closed whatever their clearance.
+    """
+    springs = problem.reference
+    for element in problem.elements[1:]:
+        if isinstance(element, GearMeshes):
+            springs[element.columns] = 0.0
+    for number, one in enumerate(members, -len(members)):
+        springs[[2 * number, 2 * number + 1]] = one.stiffness
+    return springs
+
+
+def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float] | np.ndarray) -> np.ndarray:
+    """Assign a damping ratio (m,) to every mode from one a natural frequency.
+
+    Parameters
+    ----------
+    frequency : (m,) array
+        Of the modes, ascending [Hz].
+    ratios : float or sequence of float
+        Of all modes; a sequence gives one a natural frequency (a pair of modes has one), ascending, the last
+        one for the rest. Motions at frequency zero have none and do not count.
+    """
+    given = np.atleast_1d(np.asarray(ratios, float))
+    moving = frequency > 0.0
+    steps = np.diff(frequency[moving], prepend=0.0) > _SAME * frequency[moving]
+    number = np.clip(np.cumsum(steps) - 1, 0, len(given) - 1)
+    out = np.zeros(len(frequency))
+    out[moving] = given[number]
+    return out
+
+
+def pin_deflections(data: RigidSet, pin_errors, *, flank: int = 1) -> np.ndarray:
+    """Compute the approach of the flanks (n_columns,) [m] by displaced pins, all bodies at rest in bearings.
+
+    Parameters
+    ----------
+    data : RigidSet
+    pin_errors : (N, 2) array
+        See `gear_set_problem` [m].
+    flank : {1, -1}
+        See `mesh_directions`.
+    """
+    shifted = np.zeros((data.n_planets + 3, len(data.axes)))
+    shifted[3:, :2] = _pins(data, pin_errors)
+    return mesh_directions(data, flank).T @ shifted.ravel()
+
+
+def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, ...] = (1,)) -> FourierSeries:
+    """Make the stiffness of the 2N meshes from one wave of each kind, shifted by the mesh phases.
+
+    Parameters
+    ----------
+    sun_planet, planet_ring : (H,) complex arrays
+        Harmonics 1 to H of the stiffness over its mean, at phase zero; the shorter one is filled with zeros.
+    phases : (2N,) array
+        phi_j as fractions of the mesh period, ``k_j(tau) = k(tau + phi_j)``: `PlanetarySet.mesh_phases`
+        (Parker and Lin, J. Mech. Des. 126, 2004).
+    mean : (2N,) array
+        [N/m], such as `RigidSet.mesh_stiffness`.
+    orders : tuple of int
+        Multiples of the base frequencies that make the mesh frequency.
+    """
+    lines, mean = tooth_lines(sun_planet, planet_ring, phases), np.asarray(mean, float)
+    if mean.shape != (len(lines),):
+        raise CaseError(
+            f"{mean.size} mean stiffnesses for {len(lines)} phases", code="E-SHAPE", limit="2N of each"
+        )
+    return FourierSeries(mean[:, None] * np.column_stack([np.ones(len(lines)), lines]), orders)
+
+
+def _mesh_elements(data: RigidSet, meshes: GearMeshes, pins, flank: int, groups) -> tuple:
+    """The meshes with the approach by the pins, and the back flanks on their own lines."""
+    drive = replace(meshes, deflection=_raised(meshes.state[0], -pin_deflections(data, pins, flank=flank)))
+    if not len(groups["back flanks"]):
+        return (drive,)
+    if not np.all(np.isfinite(meshes.backlash)) or not meshes.separates:
+        raise CaseError(
+            "back flanks need the backlash of every mesh, and meshes that separate", code="E-BACKLASH",
+            key="backlash", remedy="give a finite backlash, or leave the back flanks out",
+        )  # fmt: skip
+    behind = meshes.backlash - pin_deflections(data, pins, flank=-flank)
+    start = _raised(_unloaded(meshes), behind, sign=-1.0)
+    back = replace(meshes, columns=groups["back flanks"], deflection=start, force=None, backlash=np.inf)
+    return replace(drive, backlash=np.inf), back
+
+
+def _unloaded(meshes: GearMeshes) -> Series:
+    """Deflection at which the mesh line carries nothing, ``deflection - force / k``."""
+    deflection, force = meshes.state
+    if isinstance(force, FourierSeries) and not np.any(force.amplitudes):
+        return deflection
+    series = [one for one in (meshes.stiffness, deflection, force) if isinstance(one, FourierSeries)]
+    if len(series) < 3:
+        raise CaseError(
+            "back flanks cannot follow a stepwise record that holds mesh forces", code="E-BACKLASH",
+            remedy="give Fourier series, or the unloaded deflection with no force",
+        )  # fmt: skip
+    # the quotient of two series has no last harmonic: sample finely, keep what the samples resolve
+    count = max(one.amplitudes.shape[1] for one in series)
+    phase = 2.0 * np.pi * np.arange(16 * count)[:, None] / (16 * count)
+    k, deflection, force = (replace(one, orders=(1,)).at(phase) for one in series)
+    return series_of((deflection - force / k).T, 4 * count, orders=series[0].orders)
+
+
+def _raised(series: Series, offset, *, sign: float = 1.0) -> Series:
+    """The series times a sign, with a constant (n_columns,) added."""
+    if isinstance(series, StepSeries):
+        return replace(series, values=sign * series.values + offset[:, None])
+    if isinstance(series, SummedSeries):
+        offsets = [offset] + [np.zeros_like(offset)] * (len(series.parts) - 1)
+        parts = (_raised(one, part, sign=sign) for one, part in zip(series.parts, offsets))
+        return SummedSeries(tuple(one for one in parts if isinstance(one, FourierSeries)))
+    amplitudes = sign * series.amplitudes
+    amplitudes[:, 0] += offset
+    return replace(series, amplitudes=amplitudes)
+
+
+def _weight(data: RigidSet, gravity: Gravity | None) -> tuple[np.ndarray, tuple[HarmonicForce, ...]]:
+    """Steady load (n,) and harmonic forces of the weight.
+
+    In the carrier frame the weight stands at ``direction - theta_c``. On x and y of a member it is the real
+    part of ``m g (1, -i) exp(i (direction - theta_c))``, which is order -1 of the carrier; its conjugate
+    with order +1 is the same force.
+    """
+    T = free_motions(data)
+    if gravity is None:
+        return np.zeros(T.shape[1]), ()
+    force = np.zeros((data.n_planets + 3, len(data.axes)), complex)
+    masses = [getattr(data, name).mass for name in CENTRAL] + [data.planet.mass] * data.n_planets
+    axis = np.concatenate([np.zeros(3), data.planet_angles])
+    force[:, 0] = np.array(masses) * gravity.acceleration * np.exp(1j * (gravity.direction - axis))
+    force[:, 1] = -1j * force[:, 0]
+    reduced = T.T @ force.ravel()
+    if gravity.orders is None:
+        return np.real(reduced), ()
+    return np.zeros(T.shape[1]), (HarmonicForce(reduced.conj(), gravity.orders),)
+
+
+def _pins(data: RigidSet, pin_errors) -> np.ndarray:
+    pins = np.asarray(pin_errors, float)
+    if pins.shape != (data.n_planets, 2) or not np.all(np.isfinite(pins)):
+        raise CaseError(
+            f"pin errors of shape {pins.shape}", code="E-SHAPE", key="pin_errors",
+            limit=f"({data.n_planets}, 2) finite numbers, radial and tangential",
+        )  # fmt: skip
+    return pins
+
+
+def _pin_inertia(data: RigidSet, pins: np.ndarray, carrier_speed: float) -> np.ndarray:
+    """Centrifugal force (n,) of the planets by the displacement of their pins."""
+    force = np.zeros((data.n_planets + 3, len(data.axes)))
+    force[3:, :2] = carrier_speed**2 * data.planet.mass * pins
+    return free_motions(data).T @ force.ravel()
+
+
+def modes_dataset(
+    data: RigidSet,
+    gears: PlanetarySet,
+    modes: Modes,
+    *,
+    attrs: dict,
+    phasing: tuple[str, ...] = (),
+    along: str = "",
+) -> xr.Dataset:
+    """Collect modes.nc: frequencies, kinds and shapes of all bodies, mesh deflections, no elastic ring.
+
+    Parameters
+    ----------
+    data : RigidSet
+    gears : PlanetarySet
+    modes : Modes
+    attrs : dict
+        Of the file; the number of unknowns is added behind its title.
+    phasing : (m,) tuple of str, optional
+        Of every mode.
+    along : str
+        What is added to the descriptions of stiffness and deflection of the meshes.
+    """
+    shape, dofs = in_space(data, modes.shape)
+    count, slices, mode = 2 * data.n_planets, len(data.contact_lines.heights), ("mode",)
+    stiffness = modes.mesh_stiffness[: count * slices].reshape(count, slices).sum(axis=1)
+    deflection = modes.mesh_deflection[: count * slices].reshape(count, slices, -1).mean(axis=1)
+    variables = {
+        "frequency": (mode, modes.frequency, "Hz", "undamped natural frequency"),
+        "damping_ratio": (mode, modes.damping_ratio, "1", "fraction of critical damping"),
+        "kind": (mode, list(modes.kind), "1", "kind of mode"),
+    }
+    if phasing:
+        variables["phasing"] = (mode, list(phasing), "1", "phasing of the planets in the mode")
+    variables |= {
+        "nodal_diameter": (mode, modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
+        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
+        "mesh_stiffness": (("mesh",), stiffness, "N/m", f"mean mesh stiffness{along}"),
+        "mesh_deflection": (
+            ("mesh", "mode"), deflection, "kg^-1/2", f"mesh deflection of the mode{along}",
+        ),
+    }  # fmt: skip
+    coords = {
+        "mode": (mode, np.arange(len(modes.frequency)), "1", "mode"),
+        "dof": (("dof",), dofs, "1", "degree of freedom"),
+        "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+    }
+    named = {"title": attrs["title"], "unknowns": len(modes.shape)}
+    return dataset(variables, coords=coords, attrs=named | attrs)
+
+
+def in_space(data: RigidSet, shape: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Compute motions of all bodies along and about the axes of the set, held ones included.
+
+    Parameters
+    ----------
+    data : RigidSet
+    shape : (n, m) array
+        In the coordinates of `gear_set_system`.
+
+    Returns
+    -------
+    motions : (n_all, m) array
+        [m] and [rad] per unit of the shapes.
+    names : list of str
+        Body and motion, as in "planet 2: tilt x".
+    """
+    N, axes = data.n_planets, len(data.axes)
+    full = (free_motions(data) @ shape).reshape(N + 3, axes, -1)
+    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
+    for first in range(0, axes, 3):
+        radial, tangential = full[3:, first].copy(), full[3:, first + 1].copy()
+        full[3:, first] = radial * cosine - tangential * sine
+        full[3:, first + 1] = radial * sine + tangential * cosine
+    full[:, -(axes // 2) :] /= data.radii[:, None, None]
+    bodies = [*CENTRAL, *(f"planet {n + 1}" for n in range(N))]
+    names = [f"{body}: {_AXES[axis]}" for body in bodies for axis in data.axes]
+    return full.reshape(len(names), -1), names

@@ -19,7 +19,7 @@ from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.system.assembler import mesh_elements
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque
 from femgear.system.system import NonlinearSystem
-from femgear.trains.gear_set import (
+from femgear.trains.rigid import (
     Bearings,
     Gravity,
     MemberBearing,

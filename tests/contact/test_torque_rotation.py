@@ -11,7 +11,7 @@ from validation.torque_rotation import SUN_PLANET, by_compliance, depth_complian
 
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material
-from femgear.fe.outline import check_outline
+from femgear.fe.meshing import check_outline
 from femgear.gears.tooth import half_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)

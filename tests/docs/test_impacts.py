@@ -10,7 +10,7 @@ from femgear.solvers.stability.lyapunov import LyapunovExponents
 
 PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (
-    "published.transmission_errors", "femgear.system.fourier", "femgear.system.contact_states",
+    "published.transmission_errors", "femgear.system.fourier", "femgear.trains.gear_pair.model",
     "femgear.trains.gear_pair.model",
     "femgear.trains.gear_pair.section",
     "femgear.trains.gear_pair.figures", "femgear.solvers.linear.modal", "femgear.solvers.stability.lyapunov",

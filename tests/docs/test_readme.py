@@ -75,6 +75,12 @@ def test_pages_name_modules_and_files_that_exist(page):
     assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
 
 
+def test_docstrings_name_what_exists():
+    for path in (ROOT / "femgear").rglob("*.py"):
+        for name in set(re.findall(r"`(femgear(?:\.\w+)+)`", path.read_text(encoding="utf-8"))):
+            resolve_name(name)
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_pages_name_commands_that_exist(page):
     from femgear.cli import app

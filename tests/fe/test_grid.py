@@ -16,8 +16,7 @@ from femgear.fe.grid import (
     rotated_copies,
     write_grid,
 )
-from femgear.fe.meshing import mesh_outline
-from femgear.fe.outline import Outline
+from femgear.fe.meshing import Outline, mesh_outline
 
 COUNT = 9
 ANGLE = np.pi / COUNT

@@ -13,8 +13,7 @@ from validation.reference.plane_elasticity import quality
 from femgear.errors import GridError
 from femgear.fe import grid as fe_grid
 from femgear.fe import meshing
-from femgear.fe.meshing import mesh_outline, mesh_outlines
-from femgear.fe.outline import Outline, check_outline, estimate_elements
+from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_outline, mesh_outlines
 
 
 def polygon(corners, *, name="edge", divide=1):

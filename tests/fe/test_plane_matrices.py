@@ -15,8 +15,7 @@ from validation.reference.plane_elasticity import (
 from femgear.errors import FemgearError, GridError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import Grid
-from femgear.fe.meshing import mesh_outline
-from femgear.fe.outline import Outline
+from femgear.fe.meshing import Outline, mesh_outline
 
 STEEL = Material(206e9, 0.3, 7850.0)
 

@@ -6,8 +6,7 @@ from validation.mapped import mapped_grid
 from validation.reference.plane_elasticity import checked_solve, edge_load
 
 from femgear.fe.elasticity import Material, plane_modulus, stiffness, tangential_stress
-from femgear.fe.meshing import mesh_outline
-from femgear.fe.outline import Outline
+from femgear.fe.meshing import Outline, mesh_outline
 
 STEEL = Material(206e9, 0.3, 7850.0)
 

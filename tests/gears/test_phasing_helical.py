@@ -8,8 +8,8 @@ from femgear.gears.phasing import MEMBERS, mesh_phasing, phasing_table
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
 from femgear.system.assembler import gear_set_system, mesh_directions, pin_directions
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
-from femgear.trains.gear_set import gear_set_modes
 from femgear.trains.helical.model import HelicalSet
+from femgear.trains.rigid import gear_set_modes
 
 HARMONICS = np.arange(1, 7)
 KIND = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}

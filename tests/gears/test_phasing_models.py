@@ -20,7 +20,7 @@ from femgear.system.mode_kinds import (
     phase_shares,
 )
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 
 ALPHA = np.radians(21.0), np.radians(20.0)
 HARMONICS = np.arange(1, 8)

@@ -7,9 +7,15 @@ import pytest
 from validation.reference.gear_limits import neighbour_limit
 
 from femgear.errors import GeometryError
-from femgear.gears.phasing import KINDS, MeshPhasing, mesh_phasing, phasing_table
+from femgear.gears.phasing import (
+    KINDS,
+    MeshPhasing,
+    check_teeth,
+    mesh_phasing,
+    neighbouring_teeth,
+    phasing_table,
+)
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
-from femgear.gears.teeth_numbers import check_teeth, neighbouring_teeth
 
 
 @pytest.mark.parametrize(("wanted", "planets"), [((30, 20, 70), 4), ((27, 40, 108), 3), ((29, 16, 61), 5)])

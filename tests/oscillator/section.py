@@ -4,9 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from femgear.case.fields import Number, Quantity, Title
+from femgear.case.quantities import MASS, STIFFNESS, Number, Quantity, Title
 from femgear.case.text import ReadCase
-from femgear.case.units import MASS, STIFFNESS
 
 
 class OscillatorSection(BaseModel):

@@ -6,7 +6,7 @@ import numpy as np
 from oscillator.section import OscillatorCase
 
 from femgear.report.tables import Block
-from femgear.storage.dataset import dataset
+from femgear.storage.results import dataset
 from femgear.trains.protocol import Figures, OwnFile, Stage, Train
 
 
@@ -93,7 +93,5 @@ OSCILLATOR = Train(
     ),
     describe=lambda case: (Block(case.title), Block("Oscillator"), Block("Warnings", notes=("none",))),
     warnings=lambda case: (),
-    figures=lambda: {
-        "receptance": Figures({"receptance": "Displacement of the mass for a unit force."}, draw)
-    },
+    figures={"receptance": Figures({"receptance": "Displacement of the mass for a unit force."}, draw)},
 )

@@ -10,7 +10,7 @@ import pytest
 
 from femgear.errors import StorageError
 from femgear.report import style
-from femgear.report.html import write_report
+from femgear.report.page import write_report
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, prepare_output
 from femgear.trains.elastic.stages import ELASTIC

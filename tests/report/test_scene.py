@@ -12,7 +12,7 @@ from validation.planetary import reference_set
 
 from femgear.errors import CaseError, FemgearError, StorageError
 from femgear.gears.gear import half_thickness_angle
-from femgear.report import animation, scene
+from femgear.report import scene
 
 _HERE = Path(__file__).parents[1]
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -110,7 +110,7 @@ def test_missing_opengl_library_is_named(monkeypatch):
 
 @pytest.mark.parametrize(("teeth", "wished"), [(108, 48), (108, 36), (60, 30), (31, 31), (97, 24)])
 def test_stroboscope_shows_the_mesh_in_slow_motion(teeth, wished):
-    count = animation.strobe_frames(teeth, wished)
+    count = scene.strobe_frames(teeth, wished)
     assert 0.7 * wished <= count <= 1.3 * wished
     apparent = teeth % count
     assert apparent > 0, "the meshes would stand still"
@@ -120,7 +120,7 @@ def test_stroboscope_shows_the_mesh_in_slow_motion(teeth, wished):
 def field_of(h, n, value, *, turn=1.0):
     radial = np.zeros((7, 9), complex)
     radial[h, 4 + n] = value
-    return animation._Field(radial, 0 * radial, turn, 108)
+    return scene._Field(radial, 0 * radial, turn, 108)
 
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])
@@ -140,7 +140,7 @@ def test_a_fixed_point_hears_order_h_z_minus_n(h, n, turn):
 def test_field_is_the_double_sum():
     rng = np.random.default_rng(4)
     radial, tangential = rng.normal(size=(2, 4, 7)) + 1j * rng.normal(size=(2, 4, 7))
-    field = animation._Field(radial, tangential, 1.0, 36)
+    field = scene._Field(radial, tangential, 1.0, 36)
     phi_world, carrier = 1.1, 0.7
     for component, got in zip((radial, tangential), field.at(np.array([phi_world]), carrier)):
         expected = sum(
@@ -159,7 +159,7 @@ def gears():
 def test_drawn_teeth_are_the_exact_ones(gears):
     """Tip and root circles, and between them involute flanks of the right thickness."""
     for gear in (gears.sun, gears.planet, gears.ring):
-        outline = animation.gear_outline(gear)
+        outline = scene.gear_outline(gear)
         radius, angle = np.abs(outline), np.angle(outline)
         ends = sorted((gear.tip_radius, gear.root_radius))
         assert [radius.min(), radius.max()] == pytest.approx(ends, rel=1e-9)
@@ -175,20 +175,20 @@ def test_drawn_teeth_are_the_exact_ones(gears):
 
 @pytest.mark.parametrize("carrier", [0.0, 0.123, 2.9])
 def test_drawn_teeth_mesh_and_do_not_cross(gears, carrier):
-    (sun, sun_turn), *planets = animation._places(gears, carrier)
-    ring = animation._ring_corners(gears)[:, 0]
+    (sun, sun_turn), *planets = scene._places(gears, carrier)
+    ring = scene._ring_corners(gears)[:, 0]
 
     def inside(points, polygon):
         return Polygon(np.column_stack([polygon.real, polygon.imag])).contains_points(
             np.column_stack([points.real, points.imag]), radius=0.0
         )
 
-    sun = sun + animation.gear_outline(gears.sun) * np.exp(1j * sun_turn)
+    sun = sun + scene.gear_outline(gears.sun) * np.exp(1j * sun_turn)
     assert len(planets) == 3
     for n, (centre, turn) in enumerate(planets):
         at = gears.planet_angles[n] + carrier
         assert centre == pytest.approx(gears.centre_distance * np.exp(1j * at), rel=1e-12)
-        planet = centre + animation.gear_outline(gears.planet) * np.exp(1j * turn)
+        planet = centre + scene.gear_outline(gears.planet) * np.exp(1j * turn)
         # smaller by 10 um, less than a hundredth of a module: chords between points cut into round flanks
         shrunk = centre + (planet - centre) * (1.0 - 10e-6 / gears.planet.tip_radius)
         smaller = sun * (1.0 - 10e-6 / gears.sun.tip_radius)
@@ -201,7 +201,7 @@ def test_drawn_teeth_mesh_and_do_not_cross(gears, carrier):
 def test_animation_is_a_small_gif(gears, tmp_path):
     field = synthetic.ring_field()[1]
     path = tmp_path / "turning.gif"
-    count = animation.animate_operating_deflection(
+    count = scene.animate_operating_deflection(
         path, gears, radial=field, tangential=0.3j * field, frames=12, size=240, title="x"
     )
     images = iio.imread(path)
@@ -214,7 +214,7 @@ def test_animation_is_a_small_gif(gears, tmp_path):
 def test_animation_of_nothing_stands_still(gears, tmp_path):
     """Zero displacement is drawn as such, not divided by."""
     path = tmp_path / "rest.gif"
-    animation.animate_operating_deflection(
+    scene.animate_operating_deflection(
         path, gears, radial=np.zeros((3, 5)), tangential=np.zeros((3, 5)), frames=4, size=120
     )
     assert path.stat().st_size > 0

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from femgear import cli
-from femgear.report.summary import case_warnings, result_warnings
+from femgear.report.page import case_warnings, result_warnings
 from femgear.trains.drivetrain.results import describe_transient, transient_warnings
 from femgear.trains.reading import open_results, read_case, with_value
 from femgear.trains.registry import train_of

@@ -7,7 +7,7 @@ import pytest
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import Steps, compliance_entries, fingerprint, ring_entries
-from femgear.case.units import SPEED
+from femgear.case.quantities import SPEED
 from femgear.errors import CaseError
 from femgear.study.objectives import (
     Variant,

@@ -13,8 +13,7 @@ import pytest
 
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError, ConvergenceError, StorageError
-from femgear.storage.journal import Journal
-from femgear.study.designs import Designs, Failure, evaluations, open_designs
+from femgear.study.designs import Designs, Failure, Journal, evaluations, open_designs
 from femgear.study.front import non_dominated, pareto_front
 from femgear.study.objectives import NUMBER, Quantity, contact_ratio, tip_thickness, transmission_error
 from femgear.study.problem import Limit, Problem, Variable

@@ -15,7 +15,7 @@ from femgear.system.mode_kinds import (
     phasing,
     set_motions,
 )
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 
 
 def rigid_ring_set(planets, *, spread=0.0):

@@ -21,7 +21,7 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import gear_set_system, mesh_elements
 from femgear.system.fourier import tooth_lines
 from femgear.system.rigid_bodies import PlanarTorque
-from femgear.trains.gear_set import gear_set_problem
+from femgear.trains.rigid import gear_set_problem
 
 DATA = lin_parker_set(3)
 TEETH = {"sun": 28, "planet": 36, "ring": 101}

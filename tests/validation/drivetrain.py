@@ -16,9 +16,9 @@ from published.wind_turbine_drivetrain import (
     wind_turbine_drivetrain,
 )
 
+from femgear.fe.shaft import ShaftSection
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.assembler import gear_set_system
-from femgear.system.shaft import ShaftSection
 from femgear.trains.drivetrain.data import (
     BearingSection,
     BodySection,

@@ -13,8 +13,8 @@ from femgear.gears.phasing import phase_factors
 from femgear.solvers.linear.receptance import modal_error_response
 from femgear.system.assembler import gear_set_system, mesh_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
-from femgear.trains.gear_set import gear_set_modes
 from femgear.trains.helical.model import HelicalSet
+from femgear.trains.rigid import gear_set_modes
 from validation import independent
 from validation.reference.frequency_response import mesh_error_response
 from validation.rows import Row, at_most, counted, information, within

@@ -11,10 +11,16 @@ from femgear.solvers.continuation.branches import parameter_curve
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.stability.lyapunov import lyapunov_exponents
 from femgear.solvers.time.stroboscopic import sweep_response
-from femgear.system.contact_states import range_states
 from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
-from femgear.trains.gear_pair.model import BACK, DRIVE, ImpactPair, impact_borders, separation_ratios
+from femgear.trains.gear_pair.model import (
+    BACK,
+    DRIVE,
+    ImpactPair,
+    impact_borders,
+    range_states,
+    separation_ratios,
+)
 from validation.nonlinear import oscillator
 from validation.reference.adaptive_lyapunov import adaptive_exponents
 from validation.rows import Row, at_most, counted, information, within

@@ -16,7 +16,6 @@ from published.multistage_example import (
 )
 from published.planetary_sets import lin_parker_set, torsional_set
 
-from femgear.trains.gear_set import gear_set_modes
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
@@ -30,6 +29,7 @@ from femgear.trains.multistage.model import (
     train_torques,
 )
 from femgear.trains.multistage.stages import error_response, loaded_errors, multistage_modes
+from femgear.trains.rigid import gear_set_modes
 from validation.reference.frequency_response import mesh_error_response
 from validation.rows import Row, at_most, counted, information, within
 

@@ -34,7 +34,7 @@ from femgear.errors import ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import side_bands
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 from validation import independent, independent_weight
 from validation.rows import Row, at_most, information, within
 

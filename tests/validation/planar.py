@@ -18,7 +18,7 @@ from femgear.system.rigid_bodies import (
     planar_from_set,
 )
 from femgear.system.system import NonlinearSystem, element_forces
-from femgear.trains.gear_set import gear_set_modes, gear_set_problem
+from femgear.trains.rigid import gear_set_modes, gear_set_problem
 from validation import independent
 from validation.planetary import nrel_set
 from validation.rows import Row, at_most, counted, information, printed, within

@@ -48,8 +48,7 @@ def _lowest(grid, stiffness_matrix, mass_matrix, count, load) -> np.ndarray:
 def _annulus_sector(inner: float, outer: float, count: int):
     """Grid of one of `count` equal sectors of an annulus, meshed from half of it."""
     from femgear.fe.grid import mirror
-    from femgear.fe.meshing import mesh_outline
-    from femgear.fe.outline import Outline
+    from femgear.fe.meshing import Outline, mesh_outline
 
     half = math.pi / count
 

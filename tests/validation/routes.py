@@ -22,7 +22,7 @@ from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries, harmonics_of
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.system.system import NonlinearSystem
-from femgear.trains.gear_set import gear_set_problem, phased_series
+from femgear.trains.rigid import gear_set_problem, phased_series
 from validation.nonlinear import duffing, one_harmonic, oscillator, shooting_motion
 from validation.rows import Row, at_most, counted, information
 

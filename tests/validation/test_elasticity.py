@@ -5,8 +5,7 @@ import pytest
 
 from femgear.fe.elasticity import Material, basis, mass, node_of_dof, stiffness
 from femgear.fe.grid import Grid
-from femgear.fe.meshing import mesh_outline
-from femgear.fe.outline import Outline
+from femgear.fe.meshing import Outline, mesh_outline
 from validation.reference.plane_elasticity import checked_solve, edge_load, stress
 
 

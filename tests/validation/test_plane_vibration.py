@@ -6,8 +6,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from femgear.fe.elasticity import Material, mass, stiffness
 from femgear.fe.grid import mirror, rotated_copies
-from femgear.fe.meshing import mesh_outline
-from femgear.fe.outline import Outline
+from femgear.fe.meshing import Outline, mesh_outline
 from validation.reference.annulus import annulus_frequencies
 
 NAFEMS = Material(200e9, 0.3, 8000.0)

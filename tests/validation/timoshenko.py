@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.shaft import AXES, ShaftSection, beam_element, disc_matrices
+from femgear.fe.shaft import AXES, ShaftSection, beam_element, disc_matrices
 from femgear.system.system import MechanicalSystem
 
 

@@ -19,8 +19,7 @@ from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.solve import solve_contact
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror
-from femgear.fe.meshing import mesh_outlines
-from femgear.fe.outline import Outline
+from femgear.fe.meshing import Outline, mesh_outlines
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 from femgear.gears.tooth import half_sector
 from validation.mortar import boundary_dofs, make_surface, mortar_contact

@@ -37,8 +37,7 @@ def whole_grid(gear: Gear, *, refine: int = 1) -> Grid:
     refine : int
         Multiplies the edges along every curve.
     """
-    from femgear.fe.meshing import _mesh_plan
-    from femgear.fe.outline import Plan
+    from femgear.fe.meshing import Plan, _mesh_plan
 
     points, segments, mids, names, loops = [], [], [], [], []
 

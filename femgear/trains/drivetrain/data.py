@@ -18,10 +18,25 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, ValidationInfo
 
-from femgear.case.fields import Count, Number, Quantity, Section, StiffnessOrRigid, described, refuse
-from femgear.case.units import ANGLE, DENSITY, INERTIA, LENGTH, MASS, MODULUS, STIFFNESS, TORSION
+from femgear.case.quantities import (
+    ANGLE,
+    DENSITY,
+    INERTIA,
+    LENGTH,
+    MASS,
+    MODULUS,
+    STIFFNESS,
+    TORSION,
+    Count,
+    Number,
+    Quantity,
+    Section,
+    StiffnessOrRigid,
+    described,
+    refuse,
+)
+from femgear.fe import shaft as shafts
 from femgear.gears.planetary import equal_planet_angles
-from femgear.system import shaft as shafts
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
 

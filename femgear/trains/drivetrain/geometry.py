@@ -17,9 +17,9 @@ import numpy as np
 from scipy import linalg
 
 from femgear.errors import CaseError
+from femgear.fe.shaft import AXES, joint_deflections, joint_springs
 from femgear.system.assembler import mesh_directions, pin_directions
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.system.shaft import AXES, joint_deflections, joint_springs
 from femgear.trains.drivetrain.data import (
     Drivetrain,
     ParallelSection,

@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.fe.shaft import beam_element, disc_matrices
 from femgear.solvers.linear.modal import modal_damping
 from femgear.system.elements import positive_part
 from femgear.system.fourier import FourierSeries, phase_of
-from femgear.system.shaft import beam_element, disc_matrices
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.data import BearingSection, Drivetrain, MeshSection, numbered
 from femgear.trains.drivetrain.geometry import (

@@ -16,7 +16,7 @@ import numpy as np
 
 from femgear.errors import Finding
 from femgear.report.tables import Block
-from femgear.storage.dataset import RPM, dataset
+from femgear.storage.results import RPM, dataset
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
 from femgear.trains.drivetrain.data import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel

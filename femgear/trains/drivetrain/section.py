@@ -18,11 +18,22 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, StrictBool
 
-from femgear.case.fields import Count, Number, Quantity, Section, Title
 from femgear.case.problems import checked_case, combine
+from femgear.case.quantities import (
+    ACCELERATION,
+    FREQUENCY,
+    LENGTH,
+    SPEED,
+    TIME,
+    TORQUE,
+    Count,
+    Number,
+    Quantity,
+    Section,
+    Title,
+)
 from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase, text_with_points
-from femgear.case.units import ACCELERATION, FREQUENCY, LENGTH, SPEED, TIME, TORQUE
 from femgear.errors import CaseError, Finding
 from femgear.trains.drivetrain.data import (
     BearingSection,

@@ -21,7 +21,8 @@ from scipy.signal import firwin, kaiserord, savgol_coeffs, upfirdn
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.trains.drivetrain.data import TorqueHistory
-from femgear.trains.drivetrain.model import DrivetrainModel, FlankContacts, contact_model
+from femgear.trains.drivetrain.geometry import FlankContacts
+from femgear.trains.drivetrain.model import DrivetrainModel, contact_model
 from femgear.trains.drivetrain.scheme import (
     Block,
     MeshBlock,

@@ -26,7 +26,6 @@ from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
 from femgear.housing.orders import BandAnalysis, analyse_band
 from femgear.housing.orders import order_spectrum as _spectrum
-from femgear.report.animation import animate_operating_deflection
 from femgear.report.response import (
     MODE_CAPTIONS,
     RESPONSE_CAPTIONS,
@@ -42,6 +41,7 @@ from femgear.report.response import (
     some_speeds,
 )
 from femgear.report.scene import (
+    animate_operating_deflection,
     deformed_picture,
     ring_modes_grid,
     write_vtu,

@@ -23,7 +23,7 @@ from femgear.housing.sensor import (
     hanning_model,
 )
 from femgear.report.tables import Block, chosen
-from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset, response_entries
+from femgear.storage.results import FOURIER, RPM, complex_entries, dataset, response_entries
 from femgear.system.assembler import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field

@@ -3,12 +3,18 @@
 Each stage takes the case and what came before, and returns a frozen result whose ``dataset()`` is what goes
 to disk. `ELASTIC` at the end is the train: the table of its stages, with what the report says and draws of
 each.
+
+Mesh stiffness jumps where tooth pairs begin and cease to carry: its harmonics fall like one over their order,
+while the acceleration of the housing grows towards the modes in which meshes are the springs. A fixed number
+of mesh harmonics ends below those modes at low speed. The excitation therefore ends at a frequency, the same
+at all speeds, and the level of the housing is computed again with twice that frequency.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,35 +35,44 @@ from femgear.errors import Finding, remark
 from femgear.fe.elasticity import mass
 from femgear.gears.kinematics import Speeds
 from femgear.gears.planetary import PlanetarySet
-from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, heaviside_linear_lines
+from femgear.housing.orders import order_level
+from femgear.housing.sensor import (
+    SensorLines,
+    fixed_sensor_lines,
+    fixed_sensor_signal,
+    heaviside_linear_lines,
+)
 from femgear.report.tables import describe_modes, describe_response
+from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
+from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
 from femgear.system.system import Response
 from femgear.trains.elastic.checks import (
+    HIGHEST_RESPONSE,
+    NOTICEABLE,
     case_warnings,
     check_dynamic_case,
     check_reach,
     check_rim_speed,
+    checked_speeds,
     dynamics_warnings,
     fastest_mesh_frequency,
     max_nodal_diameter,
 )
+from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
+    RADIAL,
+    TANGENTIAL,
     RingModel,
     body_flexibility,
     elastic_set,
     highest_mesh_mode,
     mesh_excitation,
+    ring_field,
     ring_mesh_compliance,
     ring_model,
-)
-from femgear.trains.elastic.response import (
-    checked_response,
-    highest_excitation,
-    mesh_and_ring_outputs,
-    periodic_response,
 )
 from femgear.trains.elastic.results import (
     DynamicsResult,
@@ -66,7 +81,7 @@ from femgear.trains.elastic.results import (
     describe_housing,
     mesh_bands,
 )
-from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import member_speeds, modes_verdict
 from femgear.trains.static.description import describe_case
 from femgear.trains.static.results import StaticResult
@@ -78,6 +93,193 @@ from femgear.trains.static.stages import (
     response_verdict,
     ring_foundation,
 )
+
+_LOWEST = 20e3
+"""The excitation reaches the end of hearing at least [Hz]."""
+_ABOVE_MESHES = 1.4
+"""And this many times the highest natural frequency of the rigid gears on their meshes."""
+_STEP = 2500.0
+"""In whole steps, so that variants of one set are excited alike [Hz]."""
+HARMONICS = 512
+"""The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide. Slower
+speeds are excited less far, and `_level_share` tells what they lose."""
+MEMORY = 1.5e9
+"""Largest size of the lines and signals of a run [bytes]."""
+
+
+@dataclass(frozen=True)
+class _FrequencyLimit:
+    """Harmonics of excitation and response, int, and highest excitation frequency [Hz], all (n_speeds,)."""
+
+    excitation: np.ndarray
+    response: np.ndarray
+    frequency: np.ndarray
+
+
+def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
+    """Frequency to which the excitation reaches unless the case says less [Hz].
+
+    Parameters
+    ----------
+    case : Case
+    mesh_mode : float
+        Highest natural frequency of the rigid gears on their meshes [Hz].
+    mesh_frequency : float
+        Of the fastest speed [Hz].
+    """
+    lowest = _STEP * math.ceil(max(_LOWEST, _ABOVE_MESHES * mesh_mode, 3 * mesh_frequency) / _STEP)
+    given = max((case.dynamics.mesh_harmonics or 0) * mesh_frequency, case.dynamics.up_to or 0.0)
+    return max(min(lowest, 0.5 * HIGHEST_RESPONSE), given)
+
+
+def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = None) -> _FrequencyLimit:
+    """Harmonics up to a frequency, or a given number of them.
+
+    Parameters
+    ----------
+    case : Case
+    mesh_frequency : (n_speeds,) array
+        [Hz]
+    up_to : float
+        [Hz]; less at the lowest of so many speeds that their lines would fill the memory.
+    given : int, optional
+        Mesh harmonics of the excitation at all speeds.
+    """
+    frequency = np.asarray(mesh_frequency, float)
+    if given is None:
+        # lines of the sensor with their signal, modes, ring field and meshes, a harmonic of all speeds
+        size = len(frequency) * (144 * case.ring.teeth + 8000 + 96 * planetary_set(case).n_planets)
+        most = min(HARMONICS, max(int(MEMORY / size), 18))
+        excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, most).astype(int)
+    else:
+        excitation = np.full(len(frequency), given)
+    # products with the low harmonics of the stiffness reach beyond the excitation
+    beyond = excitation + 2 * np.minimum(excitation, 6)
+    response = np.maximum(case.dynamics.response_harmonics or beyond, excitation)
+    return _FrequencyLimit(excitation, response, excitation * frequency)
+
+
+def periodic_response(
+    case: Case, modes: ModesResult, mesh_frequency, up_to: float, *, given: int | None
+) -> tuple[_FrequencyLimit, Response]:
+    """Periodic response to excitation up to a frequency, or of a given number of mesh harmonics.
+
+    Parameters
+    ----------
+    case : Case
+    modes : ModesResult
+    mesh_frequency, up_to, given
+        As for `limited`.
+    """
+    limit = limited(case, mesh_frequency, up_to, given=given)
+    response = solve_spectral(
+        modes.modes,
+        modes.excitation,
+        mesh_frequency,
+        excitation_harmonics=limit.excitation,
+        response_harmonics=limit.response,
+        tolerance=case.dynamics.tolerance,
+    )
+    return limit, response
+
+
+def _checked_response(
+    case: Case, modes: ModesResult, all_speeds: tuple[Speeds, ...]
+) -> tuple[_FrequencyLimit, Response, np.ndarray, float]:
+    """Response, its frequency limit, what the level changes beyond it [dB], and the limit compared with [Hz].
+
+    Where the case sets no limit it is doubled once where that changes the level by 1 dB or more. The changes
+    (n_speeds,) are nan at speeds that were not looked at.
+    """
+    frequency = np.array([s.mesh_frequency for s in all_speeds])
+    carrier = np.array([s.carrier for s in all_speeds])
+    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
+    automatic = given is None and case.dynamics.up_to is None
+    some = checked_speeds(len(frequency))
+    limit, response = periodic_response(case, modes, frequency, up_to, given=given)
+    while True:
+        beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
+        further, wider = periodic_response(case, modes, frequency[some], beyond, given=None)
+        parts = {name: getattr(response, name)[some] for name in ("deflection", "force", "modal")}
+        lines = (
+            _sensor_lines(case, modes, one, carrier[some]) for one in (replace(response, **parts), wider)
+        )
+        level, wider_level = (order_level(one) for one in lines)
+        change = np.full(len(frequency), np.nan)
+        change[some] = 20.0 * np.log10(wider_level / level)
+        reached = further.frequency > beyond - frequency[some]
+        doubted = np.abs(change[some][reached]).max(initial=0.0) >= NOTICEABLE
+        if not (automatic and doubted) or up_to > modes.reach:
+            break
+        up_to = beyond
+        if len(some) == len(frequency):
+            limit, response = further, wider
+        else:
+            limit, response = periodic_response(case, modes, frequency, up_to, given=None)
+    slow = frequency * HARMONICS < beyond - frequency
+    if slow.any():
+        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
+        change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
+    return limit, response, change, beyond
+
+
+def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
+    """Level up to frequencies (n,) over that up to another one, of the slowest speed that reaches it [Hz].
+
+    Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
+    weaker and closer by the same factor: the share of the level below a frequency depends little on the
+    speed (within 1 dB from 250 to 60 rpm of the reference set).
+    """
+    fast = np.array([beyond / HARMONICS * (1.0 + 1e-9)])
+    _, response = periodic_response(case, modes, fast, beyond, given=None)
+    lines = _sensor_lines(case, modes, response, sense * 2.0 * np.pi * fast / case.ring.teeth)
+    power = np.cumsum(np.abs(lines.acceleration[0]) ** 2)
+    place = np.searchsorted(lines.frequency[0], frequency, side="right") - 1
+    return np.sqrt(power[place] / power[-1])
+
+
+def _sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np.ndarray) -> SensorLines:
+    """Lines of the fixed sensor at speeds of the carrier [rad/s]."""
+    field = mesh_and_ring_outputs(modes, response)[1][0]
+    return fixed_sensor_lines(field, case.ring.teeth, carrier, case.housing.sensor_angle)
+
+
+def mesh_and_ring_outputs(
+    result: ModesResult, response: Response
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Dynamic transmission error of every mesh, and radial and tangential field of the ring.
+
+    Parameters
+    ----------
+    result : ModesResult
+    response : Response
+        At S speeds, H harmonics.
+
+    Returns
+    -------
+    (S, 2N, H + 1) complex array
+        [m]
+    two (S, H + 1, 2 n_max + 1) complex arrays
+        Of the outer surface, see `femgear.trains.elastic.model.ring_field` [m].
+    """
+    model, basis = result.model, result.modes
+    ring_rows = np.eye(len(model.system.M))[model.ring_slice]
+    outputs = np.vstack([model.rigid_directions.T, ring_rows])
+    values = output_response(
+        basis,
+        response,
+        outputs @ basis.shape,
+        residual=residual_output(model.system, basis, outputs),
+        load=output_load(model.system, basis, outputs),
+    )
+    n_meshes = model.rigid_directions.shape[1]
+    coordinates = np.swapaxes(values[:, n_meshes:], 1, 2)
+    radial, tangential = (
+        ring_field(model, result.ring.modes, coordinates, output, result.max_diameter)
+        for output in (RADIAL, TANGENTIAL)
+    )
+    return values[:, :n_meshes], (radial, tangential)
+
 
 RECORD = 2**13
 """Positions of the excitation in one mesh period at least."""
@@ -250,7 +452,7 @@ def solve_dynamics(
     all_speeds = _turning_speeds(case, gears)
     check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
     check_rim_speed(modes.ring.modes, [s.carrier for s in all_speeds])
-    limit, response, change, compared_to = checked_response(case, modes, all_speeds)
+    limit, response, change, compared_to = _checked_response(case, modes, all_speeds)
     if progress is not None:
         progress("dynamics", 1, 2)
     verdict = stability(
@@ -336,12 +538,6 @@ def _notices(data: dict) -> Iterator[Finding]:
         )
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.elastic.figures import FIGURES
-
-    return FIGURES
-
-
 ELASTIC = Train(
     name="elastic",
     words="a case with an elastic ring",
@@ -385,6 +581,6 @@ ELASTIC = Train(
     result_warnings=lambda results: (
         dynamics_warnings(results.dynamics) if "dynamics" in results.stages else ()
     ),
-    figures=_figures,
+    figures=FIGURES,
     notices=_notices,
 )  # fmt: skip

@@ -20,7 +20,7 @@ from femgear.report.style import (
     legend_below,
     new_figure,
 )
-from femgear.system.contact_states import STATE_NAMES
+from femgear.trains.gear_pair.model import STATE_NAMES
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:

@@ -10,10 +10,20 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from femgear.case.fields import PAIR, Count, Number, Quantity, Section, Title
+from femgear.case.quantities import (
+    ANGLE,
+    LENGTH,
+    PAIR,
+    STIFFNESS,
+    TORQUE,
+    Count,
+    Number,
+    Quantity,
+    Section,
+    Title,
+)
 from femgear.case.sections import FORMAT, Inertia, Mass, Radius, Stiffness
 from femgear.case.text import ReadCase
-from femgear.case.units import ANGLE, LENGTH, STIFFNESS, TORQUE
 from femgear.errors import CaseError
 from femgear.trains.gear_pair.model import ImpactPair, PairBearings
 

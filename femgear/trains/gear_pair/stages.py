@@ -6,7 +6,7 @@ The stages know nothing of one another. Lengths count in half backlashes and tim
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,16 +18,20 @@ from femgear.solvers.continuation.branches import Branch, parameter_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.stability.lyapunov import LyapunovExponents, lyapunov_exponents
 from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
-from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
-from femgear.system.contact_states import (
+from femgear.storage.results import FOURIER, RPM, complex_entries, dataset
+from femgear.trains.gear_pair.figures import FIGURES
+from femgear.trains.gear_pair.model import (
+    BACK,
+    DRIVE,
     STATE_NAMES,
+    impact_borders,
     range_states,
+    separation_ratios,
     solution_states,
     state_regions,
 )
-from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
 from femgear.trains.gear_pair.section import GearPairCase, cross_check, pair_of, scales_of
-from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -330,12 +334,6 @@ def _no_response(case: GearPairCase) -> str:
     return "the shafts of eccentric gears add base frequencies; take sweep" if eccentric else ""
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.gear_pair.figures import FIGURES
-
-    return FIGURES
-
-
 GEAR_PAIR = Train(
     name="gear_pair",
     words="a gear pair",
@@ -371,5 +369,5 @@ GEAR_PAIR = Train(
     describe=_describe_case,
     warnings=_case_warnings,
     result_warnings=_result_warnings,
-    figures=_figures,
+    figures=FIGURES,
 )

@@ -1,10 +1,12 @@
 """Figures of a helical case: modes from the front and from the side, stiffness of the meshes, mesh forces.
 
-They read modes.nc and dynamics.nc. `FIGURES` at the end ties the pictures of the report to their captions.
+They read modes.nc and dynamics.nc; `phase_diagram` shows the phases of the meshes and what they cancel.
+`FIGURES` at the end ties the pictures of the report to their captions.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -12,7 +14,7 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError
-from femgear.gears.phasing import phasing_of_set
+from femgear.gears.phasing import MeshPhasing, PhasingTable, phase_factors, phasing_of_set, phasing_table
 from femgear.report.response import (
     RESPONSE_CAPTIONS,
     draw_static,
@@ -29,6 +31,8 @@ from femgear.report.style import (
     COLOURS,
     DASHES,
     GREEN,
+    GREY,
+    ORANGE,
     SIZE,
     VERMILION,
     distinct_lines,
@@ -38,10 +42,10 @@ from femgear.report.style import (
     new_figure,
     periodic,
     rpm,
+    xy,
 )
 from femgear.system.rigid_bodies import CENTRAL, gear_geometry
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.charts import phase_diagram
 from femgear.trains.static.figures import FIGURES as STATIC
 
 if TYPE_CHECKING:
@@ -51,6 +55,8 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 _CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
+# of the carrier and of the dials of a phase diagram
+_DIAL = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
 _BODIES = {"carrier": GREEN, "ring": BLACK, "sun": VERMILION, "planets": BLUE}
 # modes that are shown and that stand in a row, harmonics of mesh forces
 _SHOWN, _COLUMNS, _HARMONICS = 12, 4, 4
@@ -113,8 +119,8 @@ def _draw_front(ax, data, moved: np.ndarray) -> None:
             (centre, 0.0, {"color": "0.82", "linewidth": 1.0, "label": "at rest"}),
             (centre + x + 1j * y, u / base, {"color": colour, "linewidth": 1.5, "label": name} | style),
         ):
-            ax.plot(*_xy(at + radius * _CIRCLE), **look)
-            ax.plot(*_xy(np.array([at, at + spoke * np.exp(1j * turn)])), **look)
+            ax.plot(*xy(at + radius * _CIRCLE), **look)
+            ax.plot(*xy(np.array([at, at + spoke * np.exp(1j * turn)])), **look)
     _limits(ax, data, _FRONT)
 
 
@@ -133,10 +139,6 @@ def _limits(ax, data, high: float) -> None:
     ring = _pitch_radii(data)[0]
     ax.set_xlim(-1.25 * ring, 1.25 * ring)
     ax.set_ylim(-high * ring, high * ring)
-
-
-def _xy(points):
-    return points.real, points.imag
 
 
 def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float = 0.16) -> Figure:
@@ -276,6 +278,53 @@ def _mark(ax, modes: xr.Dataset, top: float) -> None:
                 markerfacecolor="none", label=f"modes {name}", linestyle="none",
                 transform=ax.get_xaxis_transform(),
             )  # fmt: skip
+
+
+def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 4)) -> Figure:
+    """Draw the phases of sun and ring meshes as hands of a dial at every planet, one picture a harmonic.
+
+    Parameters
+    ----------
+    phasing : MeshPhasing
+    harmonics : sequence of int
+        A hand upwards has phase zero; phase grows counter-clockwise.
+    """
+    table, factors = phasing_table(phasing, list(harmonics)), phase_factors(phasing, list(harmonics))
+    columns = min(4, len(harmonics))
+    rows = -(-len(harmonics) // columns)
+    figure, axes = new_figure(rows=rows, columns=columns, width=2.9 * columns, height=3.4 * rows + 0.5)
+    centres = np.exp(1j * phasing.planet_angles)
+    nearest = np.abs(np.diff([*centres, centres[0]])).min() if phasing.n_planets > 1 else 1.0
+    dial = min(0.44 * nearest, 0.42)
+    for ax in axes:
+        ax.set_axis_off()
+        ax.set_aspect("equal")
+    for h, (ax, row) in enumerate(zip(axes, factors)):
+        ax.plot(*xy(_DIAL), color="0.85", linewidth=1.0)
+        for n, centre in enumerate(centres):
+            ax.plot(*xy(centre + dial * _DIAL), color=GREY, linewidth=1.0)
+            number = centre * (1.0 + 1.35 * dial)
+            ax.text(*xy(number), str(n + 1), ha="center", va="center", fontsize=SIZE - 2)
+            ends = centre + 0.9j * dial * row[[n, phasing.n_planets + n]]
+            ax.plot(*xy(np.array([centre, ends[0]])), color=BLUE, linewidth=3.6, label="sun mesh")
+            ax.plot(*xy(np.array([centre, ends[1]])), color=ORANGE, linewidth=1.6, label="ring mesh")
+        ax.text(0.0, 0.0, _what_is_left(table, h), ha="center", va="center", fontsize=SIZE - 2)
+        ax.set_title(f"harmonic {table.harmonics[h]}: {table.kind[h]}", fontsize=SIZE - 1)
+        ax.set_xlim(-1.05 - 1.6 * dial, 1.05 + 1.6 * dial)
+        ax.set_ylim(-1.05 - 1.6 * dial, 1.05 + 1.6 * dial)
+    legend_below(figure, columns=2)
+    return figure
+
+
+def _what_is_left(table: PhasingTable, row: int) -> str:
+    """Tell what is left of the mesh forces on sun and ring."""
+    torque, lateral = table.members[row, :2, :2].max(axis=0)
+    left = [
+        f"{name} {100 * size:.0f} %"
+        for name, size in (("torque", torque), ("lateral", lateral))
+        if size > 1e-9
+    ]
+    return "\n".join(left) or "nothing on\nsun and ring"
 
 
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:

@@ -4,7 +4,7 @@ Carrier, ring, sun and N planets have three translations and three rotations eac
 A. Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
 springs along the tooth normals, supports and planet pins in all directions, without terms of the carrier's
 speed. The matrices are those of `femgear.system.assembler.gear_set_system`; with the meshes as elements,
-`femgear.trains.gear_set.gear_set_problem`, they have a stiffness that changes, play and contact loss.
+`femgear.trains.rigid.gear_set_problem`, they have a stiffness that changes, play and contact loss.
 
 The mesh stiffness follows from that of spur teeth. Teeth are solved as spur gears of the transverse section;
 those of the normal section, the virtual gears, tell by how much their stiffness differs. A helical gear is

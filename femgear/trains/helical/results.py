@@ -16,7 +16,7 @@ import numpy as np
 from femgear.gears import profile
 from femgear.gears.planetary import virtual_teeth
 from femgear.report.tables import Block
-from femgear.storage.dataset import (
+from femgear.storage.results import (
     FOURIER,
     MEMBERS,
     RPM,
@@ -25,9 +25,8 @@ from femgear.storage.dataset import (
     response_entries,
 )
 from femgear.system.system import MeshExcitation
-from femgear.trains.gear_set import modes_dataset
 from femgear.trains.helical.model import HelicalSet, SectionStiffness, contact_ratios
-from femgear.trains.rigid import stiffness_text, torsion_text
+from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
 from femgear.trains.static.description import static_warnings
 
 if TYPE_CHECKING:

@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from femgear.case.fields import Count, Quantity, Section
+from femgear.case.quantities import ANGLE, INERTIA, MASS, STIFFNESS, TORSION, Count, Quantity, Section
 from femgear.case.sections import MeshStiffnessSection, RigidCase
-from femgear.case.units import ANGLE, INERTIA, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     entries_without_effect,

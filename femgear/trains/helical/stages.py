@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,7 @@ from femgear.system.assembler import free_motions, gear_set_system, mesh_directi
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.helical.figures import FIGURES
 from femgear.trains.helical.model import (
     SectionStiffness,
     check_helical_case,
@@ -41,9 +41,10 @@ from femgear.trains.helical.results import (
     describe_helical_static,
 )
 from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
-from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     driving_torque,
+    gear_set_modes,
     member_speeds,
     modes_verdict,
     needed,
@@ -201,12 +202,6 @@ def _remarks(results: Results, stem: str) -> Iterator[str]:
         yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.helical.figures import FIGURES
-
-    return FIGURES
-
-
 def _check_gears(case: HelicalCase) -> None:
     planetary_set(case)
 
@@ -272,7 +267,7 @@ HELICAL = Train(
     result_warnings=lambda results: (
         response_warnings(results.dynamics) if "dynamics" in results.stages else ()
     ),
-    figures=_figures,
+    figures=FIGURES,
     remarks=_remarks,
     cross_check=check_helical,
     notices=helical_notices,

@@ -13,7 +13,7 @@ import numpy as np
 
 from femgear.errors import Finding
 from femgear.report.tables import Block
-from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
+from femgear.storage.results import FOURIER, RPM, complex_entries, dataset
 from femgear.system.assembler import mesh_names
 from femgear.trains.multistage.model import (
     MultistageSet,

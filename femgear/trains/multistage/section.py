@@ -13,8 +13,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from femgear.case.fields import (
+from femgear.case.quantities import (
+    ANGLE,
+    LENGTH,
     PAIR,
+    SPEED,
+    STIFFNESS,
+    TORQUE,
+    TORSION,
     TRIPLE,
     Count,
     Number,
@@ -27,15 +33,14 @@ from femgear.case.fields import (
 )
 from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
 from femgear.case.text import ReadCase
-from femgear.case.units import ANGLE, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
 from femgear.errors import CaseError, FemgearError
+from femgear.fe.shaft import ShaftSection, joint_springs
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, planar_from_set
-from femgear.system.shaft import ShaftSection, joint_springs
 from femgear.trains.multistage.model import (
     STIFFEST,
     Member,

@@ -21,6 +21,7 @@ from femgear.system.elements import GearMeshes, TurningSprings, turning_wave
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample, tooth_lines
 from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
+from femgear.trains.multistage.figures import FIGURES
 from femgear.trains.multistage.model import (
     MultistageSet,
     joined_motions,
@@ -50,7 +51,7 @@ from femgear.trains.multistage.section import (
     multistage_of,
     stage_gears,
 )
-from femgear.trains.protocol import Figures, OwnFile, Progress, Train, one_blas_thread
+from femgear.trains.protocol import OwnFile, Progress, Train, one_blas_thread
 from femgear.trains.protocol import Stage as RunStage
 
 # relative distance of frequencies that count as one
@@ -145,7 +146,7 @@ def error_response(
         Of the input [rad/s], not zero, of one sign.
     errors : mapping of int to (2N, H) complex array
         Of the stages named (from 1), harmonics 1 to H of every mesh [m], as of
-        `femgear.system.transmission_errors.tooth_lines` with the phases of the stage: ``e_j(tau) = e(tau +
+        `femgear.system.fourier.tooth_lines` with the phases of the stage: ``e_j(tau) = e(tau +
         phi_j)`` (Parker and Lin, J. Mech. Des. 126, 2004).
     damping_ratio : float
         Of all modes; ignored where modes are given.
@@ -380,12 +381,6 @@ def _no_balance(case: MultistageCase) -> str:
     return _no_response(case) or ("" if _asked(case)[1].balance_points else "response.balance_points is 0")
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.multistage.figures import FIGURES
-
-    return FIGURES
-
-
 MULTISTAGE = Train(
     name="multistage",
     words="a multistage case",
@@ -421,5 +416,5 @@ MULTISTAGE = Train(
     describe=describe_multistage,
     warnings=multistage_warnings,
     result_warnings=lambda results: balance_warnings(results.balance) if "balance" in results.stages else (),
-    figures=_figures,
+    figures=FIGURES,
 )

@@ -33,14 +33,18 @@ from femgear.system.rigid_bodies import (
     planar_from_set,
 )
 from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
-from femgear.trains.gear_set import Bearings, Gravity, MemberBearing, gear_set_problem, working_springs
 from femgear.trains.rigid import (
+    Bearings,
+    Gravity,
+    MemberBearing,
     driving_torque,
+    gear_set_problem,
     member_speeds,
     mesh_stiffnesses,
     needed,
     rotation_sense,
     torsional_support,
+    working_springs,
 )
 from femgear.trains.static.results import StaticResult
 

@@ -18,8 +18,7 @@ from femgear.case.sections import output_member
 from femgear.errors import Finding, remark
 from femgear.gears.kinematics import torques
 from femgear.report.tables import MANY, Block, chosen
-from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset
-from femgear.trains.gear_set import modes_dataset
+from femgear.storage.results import MEMBERS, RPM, complex_entries, dataset
 from femgear.trains.planar.model import (
     TAIL_LIMIT,
     MotionLines,
@@ -28,7 +27,7 @@ from femgear.trains.planar.model import (
     merged_folds,
     shown_points,
 )
-from femgear.trains.rigid import stiffness_text, torsion_text
+from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,9 +14,24 @@ from pydantic import (
     model_validator,
 )
 
-from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
+from femgear.case.quantities import (
+    ACCELERATION,
+    ANGLE,
+    FREQUENCY,
+    INERTIA,
+    LENGTH,
+    MASS,
+    STIFFNESS,
+    TORSION,
+    Count,
+    Number,
+    Quantity,
+    Section,
+    Title,
+    described,
+    refuse,
+)
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
-from femgear.case.units import ACCELERATION, ANGLE, FREQUENCY, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     entries_without_effect,

@@ -1,31 +1,26 @@
 """The pipeline of a planar case: static (where no mesh stiffness is given) -> modes -> branch, response.
 
-`PLANAR` at the end is the train: the table of its stages, with what the report says and draws of each.
+What the case asks for is refused before anything is computed where the model cannot represent it, and what
+was found is checked. `PLANAR` at the end is the train: the table of its stages, with what the report says and
+draws of each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.case import planetary_set
-from femgear.errors import Finding
+from femgear.errors import CaseError, ConvergenceError, Finding
 from femgear.report.tables import describe_modes
+from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.storage.results import RPM
 from femgear.system.fourier import side_bands
-from femgear.trains.gear_set import gear_set_modes, mode_ratios
-from femgear.trains.planar.checks import (
-    bounded_branch,
-    check_damping,
-    check_planar_case,
-    check_response_motions,
-    check_smoothing,
-    end_of_branch,
-    excited_spans,
-)
+from femgear.trains.planar.figures import FIGURES
 from femgear.trains.planar.model import (
     carrier_sense,
     judged_branch,
@@ -47,9 +42,12 @@ from femgear.trains.planar.results import (
     published_modes,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
+    check_one_period,
+    gear_set_modes,
     member_speeds,
+    mode_ratios,
     modes_verdict,
     needed,
 )
@@ -59,7 +57,206 @@ from femgear.trains.static.stages import STATIC, STRESS
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
+    from femgear.solvers.continuation.branches import Branch
+    from femgear.solvers.periodic.solution import PeriodicSolution
     from femgear.storage.results import Results
+    from femgear.trains.planar.model import MotionLines, PlanarModel
+    from femgear.trains.planar.section import BranchSection
+
+# largest motion of a member and largest deflection of a mesh [modules], as in the static stage
+_MODULES = {"motion": 2.0, "approach": 0.5}
+# distance of a line from an undamped natural frequency, relative to it, at which the response has no bound
+_ON_RESONANCE = 1e-3
+# what a curve holds of every point
+_ALONG = ("points", "parameter", "tangent", "iterations", "error")
+
+
+def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
+    """Refuse what the planar model cannot represent, before anything is computed.
+
+    Raises
+    ------
+    CaseError
+        E-BACKLASH: back flanks without play. E-PERIODS: a static record of several mesh periods.
+    """
+    planar = case.planar
+    play = min(gears.backlash_sun_planet, gears.backlash_planet_ring)
+    # play of a rounding error is none
+    if planar.back_flanks and planar.line_backlash is None and play < 1e-9:
+        raise CaseError(
+            f"back flanks need play, and the gears have {max(play, 0.0) * 1e6:.3g} um",
+            code="E-BACKLASH",
+            key="planar.back_flanks",
+            value="true",
+            limit="play above 0 in every mesh",
+            remedy="give planar.line_backlash or set.backlash, or write planar.back_flanks = false",
+            file=case.location("planar.back_flanks"),
+        )
+    if planar.mesh_stiffness is None:
+        check_one_period(case, gears, "the planar model takes")
+
+
+def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -> None:
+    """Refuse contact that sets in over a length which is none of contact.
+
+    The smoothed law carries ``k s^2 / 4 b`` through a gap b, and its force at a compression d is wrong by
+    ``(s / 2 d)^2`` of it.
+
+    Raises
+    ------
+    CaseError
+        E-RANGE: a smoothing length above half the play or above the mean compression.
+    """
+    smoothing, limits = case.planar.smoothing, {}
+    play = case.planar.line_backlash
+    play = min(gears.backlash_sun_planet, gears.backlash_planet_ring) if play is None else play
+    # play of a rounding error is none
+    if play > 1e-9:
+        limits["half the play"] = 0.5 * play
+    if (compression := mean_compression(model)) > 0.0:
+        limits["the mean compression of a mesh, force / stiffness"] = compression
+    for words, limit in limits.items():
+        if smoothing > limit:
+            raise CaseError(
+                f"contact sets in over {smoothing * 1e6:.4g} um, more than {words}: teeth would carry across "
+                "their play",
+                code="E-RANGE",
+                key="planar.smoothing",
+                value=f"{smoothing * 1e6:.6g} um",
+                limit=f"{limit * 1e6:.4g} um or less",
+                remedy="leave it out: 0.3 um",
+                file=case.location("planar.smoothing"),
+            )
+
+
+def mean_compression(model: PlanarModel) -> float:
+    """Compute the least compression [m] of a mesh under the mean load, force / stiffness, flanks closed."""
+    system, count = model.problem.system, 2 * model.data.n_planets
+    K = system.K + (system.W * model.springs) @ system.W.T
+    # free turning of the whole set has no stiffness, and the load none of it
+    moved = np.linalg.lstsq(K, system.load, rcond=1e-14)[0]
+    return float(np.abs(system.W[:, :count].T @ moved).min())
+
+
+def _check_damping(case: PlanarCase, model: PlanarModel, spans: Iterable[tuple[float, float, str]]) -> None:
+    """Refuse natural frequencies without damping in spans (lowest [Hz], highest [Hz], what excites them)."""
+    ratios = planar_ratios(case)
+    if np.min(ratios) > 0.0:
+        return
+    system = model.problem.system
+    plain = replace(system, C=np.zeros_like(system.C), gyroscopic=None)
+    hertz = solve_modes(plain, model.springs).frequency
+    bare = hertz[(hertz > 0.0) & (mode_ratios(hertz, ratios) == 0.0)]
+    key = "planar.damping_ratios" if case.planar.damping_ratios else "dynamics.damping_ratio"
+    for lowest, highest, words in spans:
+        met = bare[(bare >= lowest) & (bare <= highest)]
+        if len(met):
+            raise CaseError(
+                f"the natural frequency {met[0]:.6g} Hz has no damping and {words}: "
+                "the response has no bound there",
+                code="E-RESONANCE",
+                key=key,
+                value="0",
+                limit="above 0 at a resonance",
+                remedy="give the mode some damping, or move the range or the speed",
+                file=case.location(key),
+            )
+
+
+def _excited_spans(frequency: np.ndarray, orders: np.ndarray) -> Iterator[tuple[float, float, str]]:
+    """Make the spans of `_check_damping` around lines of weight and mesh, from frequencies (2,) [rad/s]."""
+    pure = (orders[:, 0] == 0) | ((np.abs(orders[:, 0]) == 1) & (orders[:, 1] == 0))
+    for line in np.abs(orders[pure] @ frequency) / (2.0 * np.pi):
+        words = f"the line at {line:.6g} Hz is on it"
+        yield line / (1.0 + _ON_RESONANCE), line / (1.0 - _ON_RESONANCE), words
+
+
+def _bounded_branch(
+    branch: Branch, lines: Iterable[MotionLines], gears: PlanetarySet
+) -> tuple[Branch, tuple[MotionLines, ...]]:
+    """Cut a branch at the last point that converged with small displacements, and compute its motions."""
+    good: list[MotionLines] = []
+    for solution, one in zip(branch.solutions, lines):
+        hertz = f"{solution.frequency[0] / (2.0 * np.pi):.6g} Hz"
+        words = _too_far(one, gears) if solution.converged else f"no solution: {solution.message}"
+        if words:
+            if len(good) < 2:
+                raise _moved_too_far(f"at {hertz} of the weight", words, solution.converged)
+            ending = f"stopped before {hertz}, where {words}" if solution.converged else f"{words} at {hertz}"
+            return _cut(branch, len(good), ending), tuple(good)
+        good.append(one)
+    return branch, tuple(good)
+
+
+def _cut(branch: Branch, count: int, message: str) -> Branch:
+    """The first points of a branch, which then did not reach an end of its range."""
+    known = branch.curve
+    curve = replace(
+        known,
+        **{name: getattr(known, name)[:count] for name in _ALONG},
+        **{name: getattr(known, name)[getattr(known, name) < count] for name in ("folds", "branch_points")},
+        closed=False,
+        complete=False,
+        message=message,
+    )
+    return replace(branch, solutions=branch.solutions[:count], curve=curve)
+
+
+def _check_response_motions(
+    speeds: Sequence[float],
+    solutions: Sequence[PeriodicSolution],
+    lines: Sequence[MotionLines],
+    gears: PlanetarySet,
+) -> None:
+    """Refuse speeds without a solution, and displacements that are not small."""
+    lost = [i for i, one in enumerate(solutions) if not one.converged]
+    if lost:
+        listed = ", ".join(f"{speeds[i] / RPM:.6g}" for i in lost[:8]) + (", ..." if len(lost) > 8 else "")
+        raise ConvergenceError(
+            f"no response at {len(lost)} of {len(speeds)} speeds: {listed} rpm; {solutions[lost[0]].message}",
+            code="E-CONVERGENCE",
+            key="operation.speeds",
+            value=f"relative residual {solutions[lost[0]].residual:.2e}",
+            remedy="leave these speeds out, change planar.response.carrier_harmonics, or raise the damping",
+        )
+    for speed, one in zip(speeds, lines):
+        if words := _too_far(one, gears):
+            raise _moved_too_far(f"at {speed / RPM:.6g} rpm", words, True)
+
+
+def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
+    """Why displacements are not small; empty where they are."""
+    module = gears.sun.module
+    for name, words in (("motion", "a member moves"), ("approach", "the flanks of a mesh approach")):
+        value, limit = getattr(one, name), _MODULES[name] * module
+        if not value <= limit:
+            allowed = f"{limit * 1e3:.4g} mm ({_MODULES[name]:g} modules)"
+            return f"{words} by {value * 1e3:.4g} mm, more than {allowed}"
+    return ""
+
+
+def _moved_too_far(where: str, words: str, converged: bool) -> ConvergenceError:
+    if not converged:
+        return ConvergenceError(f"{where}: {words}", code="E-CONVERGENCE", key="planar.branch.from")
+    return ConvergenceError(
+        f"{where} {words}: the model is one of small displacements",
+        code="E-MOTION",
+        remedy="raise the damping, stiffen the supports, or leave the resonance out",
+    )
+
+
+def _end_of_branch(branch: Branch, wanted: BranchSection) -> str:
+    """Tell how a branch ended, in frequencies [Hz] and entries of the case file."""
+    hertz, count = branch.parameter[-1] / (2.0 * np.pi), len(branch.parameter)
+    if branch.complete:
+        side = "start" if abs(hertz - wanted.start) < abs(hertz - wanted.to) else "end"
+        return f"it came to the {side} of its range, {hertz:.6g} Hz"
+    if count >= wanted.points:
+        return (
+            f"NOT COMPLETE: it ended at {hertz:.6g} Hz after {count} points, before {wanted.to:.6g} Hz: "
+            "raise planar.branch.points"
+        )
+    return f"NOT COMPLETE: it ended at {hertz:.6g} Hz, before {wanted.to:.6g} Hz: {branch.message}"
 
 
 @one_blas_thread()
@@ -107,7 +304,7 @@ def solve_branch(
     check_planar_case(case, gears)
     model = planar_model(case, gears, static)
     check_smoothing(case, gears, model)
-    check_damping(case, model, [(wanted.start, wanted.to, "planar.branch crosses it")])
+    _check_damping(case, model, [(wanted.start, wanted.to, "planar.branch crosses it")])
     branch = weight_curve(
         model.problem,
         (wanted.start, wanted.to),
@@ -116,13 +313,13 @@ def solve_branch(
         radius=True,
         max_points=wanted.points,
     )
-    branch, lines = bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
+    branch, lines = _bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
     if wanted.stability:
         tell = progress or (lambda stage, done, total: None)
         branch = judged_branch(
             model.problem, branch, lambda done, total: tell("branch", 0.3 * total + 0.7 * done, total)
         )
-    ending = end_of_branch(branch, wanted)
+    ending = _end_of_branch(branch, wanted)
     return BranchResult(gears, model, branch, lines, carrier_sense(case, gears), ending)
 
 
@@ -150,7 +347,7 @@ def solve_planar_response(
             model = planar_model(case, gears, static, mesh_frequency=True, carrier_speed=carrier)
             check_smoothing(case, gears, model)
         frequency = np.array([abs(speed.carrier), 2.0 * np.pi * speed.mesh_frequency])
-        check_damping(case, model, excited_spans(frequency, orders))
+        _check_damping(case, model, _excited_spans(frequency, orders))
         found = None
         options = {"orders": orders, "reduction": model.reduction, "radius": len(orders) < 60}
         if solutions and solutions[-1].converged:
@@ -161,7 +358,7 @@ def solve_planar_response(
         lines.append(motion_lines(model, found))
         if progress is not None:
             progress("response", number + 1, len(turning))
-    check_response_motions(operation.speeds, solutions, lines, gears)
+    _check_response_motions(operation.speeds, solutions, lines, gears)
     return PlanarResponseResult(gears, np.array(operation.speeds), turning, tuple(solutions), tuple(lines))
 
 
@@ -210,12 +407,6 @@ def _needs_static(case: PlanarCase) -> tuple[str, ...]:
 
 def _lacks(section: str) -> Callable[[PlanarCase], str]:
     return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
-
-
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.planar.figures import FIGURES
-
-    return FIGURES
 
 
 def _result_warnings(results: Results) -> Iterator[Finding]:
@@ -271,7 +462,7 @@ PLANAR = Train(
     ),
     warnings=set_warnings,
     result_warnings=_result_warnings,
-    figures=_figures,
+    figures=FIGURES,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
     cross_check=check_planar,
     notices=planar_notices,

@@ -20,10 +20,9 @@ from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import tooth_thickness
 from femgear.gears.kinematics import speeds, torques
-from femgear.gears.phasing import KINDS, ZERO, phasing_of_set, phasing_table
-from femgear.gears.teeth_numbers import neighbouring_teeth
+from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_set, phasing_table
 from femgear.report.tables import Block, chosen, tabulate
-from femgear.storage.dataset import RPM
+from femgear.storage.results import RPM
 
 if TYPE_CHECKING:
     import xarray as xr

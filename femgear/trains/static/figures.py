@@ -1,15 +1,17 @@
 """Figures of static.nc and stress.nc: errors, stiffnesses, loads, the deformed set, stresses of one tooth.
 
 What the gears do over one mesh period, and one tooth on its way through the mesh, with the stresses along its
-roots, contact pressures and load spectra. `FIGURES` at the end ties the pictures of the report, charts of
-deviations among them, to their captions.
+roots, contact pressures and load spectra; deviations as measuring machines draw them, profiles over the roll
+angle and pitches over the teeth. `FIGURES` at the end ties the pictures of the report to their captions.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +21,10 @@ from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.flank_pairs import mirrored_set
 from femgear.contact.tooth_loads import deformed_set
 from femgear.fe.grid import copy_nodes, rotated_copies
+from femgear.gears.deviations import SetDeviations
+from femgear.gears.gear import Gear
+from femgear.gears.modifications import FlankForm, form_deviation
+from femgear.gears.planetary import PlanetarySet
 from femgear.report.scene import Body, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.style import (
     BLACK,
@@ -36,7 +42,6 @@ from femgear.report.style import (
     periodic,
 )
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.charts import four_panels, has_pitches, has_profiles, pitch_chart, profile_chart
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -210,7 +215,7 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
             label(ax, "path from the pitch point [base pitches]")
         return f"{title}: {tension.max() * 1e-6:.3g} and {compression.min() * 1e-6:.3g} MPa"
 
-    return four_panels(draw, "stress [MPa]", columns=2, sharex=True)
+    return _four_panels(draw, "stress [MPa]", columns=2, sharex=True)
 
 
 def root_stress_profile(stress: xr.Dataset) -> Figure:
@@ -238,7 +243,7 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
         label(ax, "arc from the end of the flank [mm]")
         return title
 
-    return four_panels(draw, "stress [MPa]", columns=3)
+    return _four_panels(draw, "stress [MPa]", columns=3)
 
 
 def contact_pressure(stress: xr.Dataset) -> Figure:
@@ -394,6 +399,125 @@ def _crossing(slope, arc, angle) -> float | None:
         return None
     i = above[0]
     return float(arc[i] + (arc[i + 1] - arc[i]) * (angle - slope[i]) / (slope[i + 1] - slope[i]))
+
+
+def _four_panels(draw: Callable[[int, Any], str], y: str, *, columns: int, sharex: bool = False) -> Figure:
+    """Draw sun, planets (either side) and ring in panels of one scale; `draw(panel, axes)` gives titles."""
+    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharex=sharex, sharey=True)
+    for number, ax in enumerate(axes):
+        label(ax, title=draw(number, ax))
+    for ax in axes[::2]:
+        label(ax, y=y)
+    legend_below(figure, columns=columns)
+    return figure
+
+
+def has_profiles(deviations: SetDeviations, planetary_set: PlanetarySet) -> bool:
+    """Tell whether any loaded flank differs from its involute, so that `profile_chart` shows something."""
+    flanks = _flanks(deviations, planetary_set)
+    return any(form_deviation(form, gear, _stations(form, gear)).any() for _, form, gear in flanks)
+
+
+def has_pitches(deviations: SetDeviations) -> bool:
+    """Tell whether any tooth stands off its place, so that `pitch_chart` shows something."""
+    d = deviations
+    return any(p.any() for p in (d.sun_pitch, d.planet_pitch, d.planet_ring_side_pitch, d.ring_pitch))
+
+
+def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
+    """Draw the profiles of the loaded flanks over the roll angle, positive with more material.
+
+    The involute is the zero line; the part that meets the mate is marked.
+    """
+    active, flanks = active_rolls(planetary_set), _flanks(deviations, planetary_set)
+
+    def draw(number: int, ax) -> str:
+        name, form, gear = flanks[number]
+        roll = _stations(form, gear)
+        ax.plot(_degrees(gear, roll), -1e6 * form_deviation(form, gear, roll), color=BLUE, label="profile")
+        ax.axhline(0.0, color=BLACK, linewidth=0.8, label="involute")
+        ax.axvspan(*_degrees(gear, np.array(active[number])), color="0.93", label="meets the mate")
+        for place, end, dash in (("form circle", gear.form_roll, ":"), ("tip circle", gear.tip_roll, "--")):
+            ax.axvline(float(_degrees(gear, end)), color=GREY, linestyle=dash, label=place)
+        label(ax, "roll angle [deg]")
+        return name
+
+    return _deviation_panels(draw)
+
+
+def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
+    """Draw the cumulative pitch deviations of the loaded flanks over the teeth, positive with more material.
+
+    Along the line of action; a line for each planet and flank that has any.
+    """
+    d, N = deviations, planetary_set.n_planets
+    rows = (
+        ("sun", [("sun", d.sun_pitch)]),
+        ("planets, sun side", [(f"planet {n + 1}", d.planet_pitch[n]) for n in range(N)]),
+        ("planets, ring side", [(f"planet {n + 1}", d.planet_ring_side_pitch[n]) for n in range(N)]),
+        ("ring", [("ring", d.ring_pitch)]),
+    )
+
+    def draw(number: int, ax) -> str:
+        title, lines = rows[number]
+        for i, (name, values) in enumerate(lines):
+            # sun, ring and planets differ in the common legend
+            style = line_style(i if len(lines) > 1 else N + (title == "ring"))
+            ax.step(np.arange(len(values)), -1e6 * values, where="mid", label=name, **style)
+        label(ax, "tooth number [1]")
+        return title
+
+    return _deviation_panels(draw)
+
+
+def _deviation_panels(draw: Callable[[int, Any], str]) -> Figure:
+    """Draw deviations of the four kinds of flanks on a scale of at least one micrometre up and down."""
+    figure = _four_panels(draw, "deviation [µm], material positive", columns=5)
+    low, high = figure.axes[0].get_ylim()
+    figure.axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
+    return figure
+
+
+def _flanks(d: SetDeviations, s: PlanetarySet) -> tuple[tuple[str, FlankForm, Gear], ...]:
+    """Name the four kinds of loaded flanks, with their forms and gears."""
+    return (
+        ("sun", d.sun, s.sun),
+        ("planet, sun side", d.planet_sun_side, s.planet),
+        ("planet, ring side", d.planet_ring_side, s.planet),
+        ("ring", d.ring, s.ring),
+    )
+
+
+def active_rolls(planetary_set: PlanetarySet) -> tuple[tuple[float, float], ...]:
+    """Find the roll lengths [m] of the parts of the flanks that rigid gears use: sun, planet twice, ring.
+
+    From the path of contact: ``r_b tan(alpha_w)`` and the path coordinate, which runs down the flank of a
+    driven external gear.
+    """
+    s = planetary_set
+    sun_side = math.tan(s.working_pressure_angle_sun_planet)
+    ring_side = math.tan(s.working_pressure_angle_planet_ring)
+    (a, b), (c, e) = s.path_sun_planet, s.path_planet_ring
+    planet = s.planet.base_radius
+    return (
+        (s.sun.base_radius * sun_side + a, s.sun.base_radius * sun_side + b),
+        (planet * sun_side - b, planet * sun_side - a),
+        (planet * ring_side + c, planet * ring_side + e),
+        (s.ring.base_radius * ring_side + c, s.ring.base_radius * ring_side + e),
+    )
+
+
+def _stations(form, gear: Gear) -> np.ndarray:
+    """Choose roll lengths [m] for curves, the corners of all laws and the measured points among them."""
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    corners = [getattr(m, "roll", None) or (m.start, m.end) for m in form.modifications]
+    extra = [roll for pair in corners for roll in pair if roll is not None and low < roll < high]
+    return np.unique(np.concatenate([np.linspace(low, high, 301), extra]))
+
+
+def _degrees(gear: Gear, roll):
+    """Convert roll lengths [m] to roll angles [deg]."""
+    return np.degrees(np.asarray(roll) / gear.base_radius)
 
 
 def _static_figures(drawn: Drawn) -> dict[str, Figure]:

@@ -15,7 +15,7 @@ from femgear.case.dependencies import Entries
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
 from femgear.errors import Finding
 from femgear.report.tables import Block, tabulate
-from femgear.storage.dataset import dataset, declared
+from femgear.storage.results import dataset, declared
 from femgear.trains.static.description import static_warnings
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from femgear.solvers.linear.modal import complex_modes, solve_modes
 from femgear.solvers.linear.receptance import modal_response
 from femgear.system.assembler import gear_set_system
 from femgear.system.system import MechanicalSystem
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 
 NO_MESH = np.zeros(0)
 

@@ -23,7 +23,7 @@ from femgear.solvers.linear.tracking import campbell_data, oscillating, track_mo
 from femgear.system.assembler import gear_set_system
 from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.system import MechanicalSystem
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 
 # two masses 1 on springs 1 + p and 2 - p, joined by kc: eigenvalues 1.5 + kc -+ sqrt((p - 1/2)^2 + kc^2)
 SPLIT = np.diag([1.0, -1.0])

@@ -21,7 +21,7 @@ from femgear.system.system import (
     element_forces,
     external_force,
 )
-from femgear.trains.gear_set import Bearings, MemberBearing, gear_set_problem
+from femgear.trains.rigid import Bearings, MemberBearing, gear_set_problem
 
 
 def state_of(problem, solution):

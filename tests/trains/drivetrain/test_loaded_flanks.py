@@ -11,14 +11,7 @@ from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivet
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.trains.drivetrain.checks import (
-    BENDING,
-    TORSIONAL,
-    case_model,
-    mean_torque,
-    speed_ratios,
-    with_drivers,
-)
+from femgear.trains.drivetrain.checks import BENDING, TORSIONAL, case_model, mean_torque, with_drivers
 from femgear.trains.drivetrain.data import (
     BearingSection,
     BodySection,
@@ -28,6 +21,7 @@ from femgear.trains.drivetrain.data import (
     TorqueHistory,
     constant_torques,
 )
+from femgear.trains.drivetrain.geometry import speed_ratios
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,

@@ -10,14 +10,17 @@ from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_lines
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.checks import missing_level
-from femgear.trains.elastic.response import (
+from femgear.trains.elastic.stages import (
     HARMONICS,
     MEMORY,
     highest_excitation,
     limited,
     mesh_and_ring_outputs,
+    solve_dynamics,
+    solve_housing,
+    solve_modes,
+    solve_response,
 )
-from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_response
 from femgear.trains.reading import read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
 

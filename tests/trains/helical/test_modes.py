@@ -11,7 +11,7 @@ from femgear.errors import CaseError
 from femgear.system.assembler import gear_set_system
 from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis, phasing
 from femgear.system.rigid_bodies import HelicalSupport
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 
 
 def equal(planets, **changes):

@@ -18,8 +18,8 @@ from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.assembler import mesh_elements
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque
 from femgear.system.system import MeshExcitation, element_forces
-from femgear.trains.gear_set import gear_set_modes, gear_set_problem, phased_series
 from femgear.trains.helical.model import HelicalSet, helical_excitation
+from femgear.trains.rigid import gear_set_modes, gear_set_problem, phased_series
 
 TORQUE = PlanarTorque(300.0)
 PHASES = -np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])

@@ -13,7 +13,7 @@ from femgear.solvers.linear.receptance import modal_error_response
 from femgear.system.assembler import free_motions, gear_set_system
 from femgear.system.mode_kinds import gear_set_motions
 from femgear.system.rigid_bodies import body_masses
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 
 HERTZ = np.linspace(60.0, 15e3, 150)
 AMPLITUDES = np.array([1.0, 0.5j, -0.25, 0.1 + 0.1j]) * 1e-6

@@ -8,7 +8,7 @@ from published.multistage_example import CASES, four_stage_case, published_case
 
 from femgear import cli
 from femgear.errors import CaseError
-from femgear.system.shaft import ShaftSection, joint_springs
+from femgear.fe.shaft import ShaftSection, joint_springs
 from femgear.trains import registry
 from femgear.trains.multistage.model import Member, in_series, train_speeds
 from femgear.trains.multistage.section import multistage_of, stage_gears

@@ -15,7 +15,6 @@ from small_trains import closed_set, published_table, stage, two_stages
 from femgear.errors import CaseError
 from femgear.system.assembler import gear_set_system
 from femgear.system.rigid_bodies import CENTRAL
-from femgear.trains.gear_set import gear_set_modes
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
@@ -32,6 +31,7 @@ from femgear.trains.multistage.model import (
     train_torques,
 )
 from femgear.trains.multistage.stages import multistage_modes, multistage_problem
+from femgear.trains.rigid import gear_set_modes
 
 # --- speeds and torques -------------------------------------------------------------------------------
 

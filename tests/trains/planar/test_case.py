@@ -11,9 +11,8 @@ from femgear.case.case import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.checks import check_set
 from femgear.system.rigid_bodies import PlanarSet
-from femgear.trains.planar.checks import check_planar_case, check_smoothing, mean_compression
 from femgear.trains.planar.model import planar_data, planar_model
-from femgear.trains.planar.stages import PLANAR
+from femgear.trains.planar.stages import PLANAR, check_planar_case, check_smoothing, mean_compression
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 
 CASES = Path(__file__).parents[3] / "cases"

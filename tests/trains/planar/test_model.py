@@ -21,7 +21,7 @@ from femgear.system.assembler import (
     pin_directions,
 )
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarTorque, planar_from_set, torque_shares
-from femgear.trains.gear_set import Bearings
+from femgear.trains.rigid import Bearings
 
 
 def uneven(**changes):

@@ -10,7 +10,7 @@ from validation.planar import by_kind, torsional
 
 from femgear.errors import CaseError
 from femgear.system.mode_kinds import class_shares, gear_set_kinds
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 
 # the matrices of Lin and Parker (1999) set up elsewhere and solved in double precision [Hz]
 PLANET = (1808.18088204, 5963.76002161, 6981.70516704)

@@ -19,7 +19,7 @@ from femgear.system.assembler import (
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, torque_shares
 from femgear.system.system import MeshExcitation, element_forces, external_force
-from femgear.trains.gear_set import (
+from femgear.trains.rigid import (
     Bearings,
     Gravity,
     MemberBearing,

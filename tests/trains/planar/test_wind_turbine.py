@@ -26,7 +26,7 @@ from validation import nrel
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.stroboscopic import sweep_response
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.rigid import gear_set_modes
 
 
 def solved(problem, hertz, harmonics=9, **options):

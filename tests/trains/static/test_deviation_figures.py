@@ -14,7 +14,7 @@ from femgear.gears.planetary import close_set, equal_planet_angles
 from femgear.report.style import png_bytes
 from femgear.trains.protocol import Drawn
 from femgear.trains.static import figures as static_figures
-from femgear.trains.static.charts import active_rolls, has_pitches, has_profiles, pitch_chart, profile_chart
+from femgear.trains.static.figures import active_rolls, has_pitches, has_profiles, pitch_chart, profile_chart
 
 ALPHA = math.radians(20.0)
 UM = 1e-6

@@ -7,7 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from femgear.contact.root_stress import RootCycle
 from femgear.report.style import png_bytes
-from femgear.storage.dataset import dataset, declared
+from femgear.storage.results import dataset, declared
 from femgear.trains.static.figures import (
     contact_pressure,
     load_spectrum,

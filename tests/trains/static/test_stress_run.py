@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from femgear.report.draw import write_figures
-from femgear.report.html import page
-from femgear.report.summary import describe_results
+from femgear.report.page import describe_results, page, write_figures
 from femgear.run import run_case
 from femgear.storage.results import run_folder
 from femgear.trains.elastic.stages import ELASTIC
@@ -151,7 +149,7 @@ def test_report_has_the_section_with_its_figures(tmp_path, case, library, result
         f"{name}.png"
         for name in ("root_stress", "root_profile", "contact_pressure", "load_spectrum", "planet_bending")
     }
-    from femgear.report.html import caption_of
+    from femgear.report.page import caption_of
 
     assert {caption_of(ELASTIC, name.removesuffix(".png"))[1] for name in figures} == {"Stresses"}
     text = page(ELASTIC, results)

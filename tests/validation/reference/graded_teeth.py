@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from femgear.fe.outline import Outline
+from femgear.fe.meshing import Outline
 from femgear.gears.gear import flank_points
 from femgear.gears.tooth import half_sector
 

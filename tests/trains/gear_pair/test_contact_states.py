@@ -6,7 +6,9 @@ from small_trains import example_pair, level_crossings
 
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.system.contact_states import (
+from femgear.system.elements import GearMeshes
+from femgear.system.fourier import FourierSeries, constant
+from femgear.trains.gear_pair.model import (
     STATE_NAMES,
     UNKNOWN,
     contact_states,
@@ -14,8 +16,6 @@ from femgear.system.contact_states import (
     solution_states,
     state_regions,
 )
-from femgear.system.elements import GearMeshes
-from femgear.system.fourier import FourierSeries, constant
 
 MESHES = GearMeshes([2, 0, 1], constant([2.0, 2.0, 2.0]), deflection=constant([1.0, 1.0, 1.0]), backlash=2.0)
 

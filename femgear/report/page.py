@@ -1,4 +1,7 @@
-"""One self-contained HTML page of a run: tables, figures, warnings, provenance."""
+"""What a run shows: its numbers and warnings in tables, its pictures, and the page that holds everything.
+
+Figures are PNG, grids VTU, the turning carrier is a GIF; the page is one HTML file that loads nothing else.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,91 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from femgear.report.summary import case_warnings, describe_results, result_warnings
+from femgear.report.style import save_figure
 from femgear.report.tables import Block
 from femgear.storage.files import checksum, storage_errors, write_text
 from femgear.storage.results import Results
 
 if TYPE_CHECKING:
-    from femgear.trains.protocol import Train
+    from femgear.errors import Finding
+    from femgear.storage.results import Results
+    from femgear.trains.protocol import Drawn, Figures, Progress, Train
+
+
+def describe_results(train: Train, results: Results) -> tuple[Block, ...]:
+    """Tabulate the numbers of a run, one block a stage, and the time that each took.
+
+    Parameters
+    ----------
+    train : Train
+        Of the case.
+    results : Results
+
+    """
+    blocks = [stage.describe(results) for stage in train.stages if stage.name in results.stages]
+    timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
+    return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
+
+
+def case_warnings(train: Train, case) -> tuple[Finding, ...]:
+    """What a case is allowed to be but deserves a look, each once.
+
+    Raises
+    ------
+    FemgearError
+        What cannot be computed at all.
+    """
+    return tuple(dict.fromkeys(train.warnings(case)))
+
+
+def result_warnings(train: Train, results: Results) -> tuple[Finding, ...]:
+    """What the solvers say against their own results, each once."""
+    return tuple(dict.fromkeys(train.result_warnings(results)))
+
+
+def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
+    """Write the figures of the stages whose data are there, and of the case; returns the file names."""
+    figures = {}
+    for stage in _drawn(train, drawn):
+        figures |= stage.draw(drawn)
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return [f"{name}.png" for name in figures]
+
+
+def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
+    """List the figures of the stages whose data are there, in their order, and of the case."""
+    figures, names = train.figures, [*(s.name for s in train.stages if s.name in drawn.data), ""]
+    return [figures[name] for name in names if name in figures]
+
+
+def write_pictures(
+    folder: Path, train: Train, drawn: Drawn, *, progress: Progress | None = None
+) -> list[str]:
+    """Write everything that a run shows; returns the names of the files.
+
+    Parameters
+    ----------
+    folder : path
+    train : Train
+        Of the case.
+    drawn : Drawn
+    progress : callable, optional
+        Called with (stage, done, total).
+    """
+    written = [w for stage in _drawn(train, drawn) for w in stage.write]
+    steps = [
+        lambda: write_figures(folder, train, drawn), *(lambda w=w: w(drawn, folder) for w in written),
+    ]  # fmt: skip
+    names = []
+    for done, step in enumerate(steps):
+        if progress is not None:
+            progress("pictures", done, len(steps))
+        names += step()
+    if progress is not None:
+        progress("pictures", len(steps), len(steps))
+    return names
+
 
 _LARGEST_PICTURE = 8_000_000
 """Bytes of a picture on the page."""
@@ -201,7 +282,7 @@ def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
     """Find place in the order, section and caption of a picture from its file name."""
-    figures = train.figures()
+    figures = train.figures
     captions = [
         (stage.title, *one)
         for stage in train.stages

@@ -8,7 +8,7 @@ from scipy.linalg import eigh, eigvals
 from validation.timoshenko import Disc, Support, free_bending, shaft_system
 
 from femgear.errors import CaseError
-from femgear.system.shaft import ShaftSection, beam_element, joint_deflections, joint_springs
+from femgear.fe.shaft import ShaftSection, beam_element, joint_deflections, joint_springs
 
 SECTION = ShaftSection(0.1, 0.02)
 LENGTH, COUNT = 1.0, 24

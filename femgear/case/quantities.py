@@ -1,8 +1,13 @@
-"""Building blocks of the sections of a case file: quantities, numbers and counts within plausible windows."""
+"""Quantities of a case file: text with units to SI numbers, and fields with plausible windows for sections.
+
+No other module talks to pint.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -11,8 +16,135 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
 from femgear.case.text import found, shown
-from femgear.case.units import ANGLE, Dimension, to_si
 from femgear.errors import CaseError
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
+# A product of named units with one- or two-digit exponents: pint would also evaluate "mm**9**9**9".
+_FACTOR = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)[ ]?-?\d{1,2}|[²³])?"
+_UNIT = re.compile(rf"(?:1[ ]?/[ ]?)?{_FACTOR}(?:(?:[ ]?[*/·⋅.][ ]?|[ ]){_FACTOR}){{0,7}}")
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A physical dimension as the case file knows it.
+
+    Parameters
+    ----------
+    name : str
+        With its article, as messages use it: ``"a length"``.
+    si : str
+        SI unit, with radians counted: a torsional stiffness is not a torque.
+    shown : str
+        Unit of messages and tables.
+    scale : float
+        SI value of one ``shown`` unit.
+    """
+
+    name: str
+    si: str
+    shown: str
+    scale: float
+
+    def show(self, value: float) -> str:
+        """Text of an SI value in the unit ``shown``."""
+        return f"{value / self.scale:.6g} {self.shown}"
+
+
+LENGTH = Dimension("a length", "m", "mm", 1e-3)
+ANGLE = Dimension("an angle", "rad", "deg", math.pi / 180)
+SPEED = Dimension("a speed of rotation", "rad/s", "rpm", math.pi / 30)
+TORQUE = Dimension("a torque", "N m", "N m", 1.0)
+MASS = Dimension("a mass", "kg", "kg", 1.0)
+INERTIA = Dimension("a moment of inertia", "kg m^2", "kg m^2", 1.0)
+DENSITY = Dimension("a density", "kg/m^3", "kg/m^3", 1.0)
+MODULUS = Dimension("a modulus of elasticity", "Pa", "GPa", 1e9)
+STIFFNESS = Dimension("a stiffness", "N/m", "N/m", 1.0)
+TORSION = Dimension("a torsional stiffness", "N m/rad", "N m/rad", 1.0)
+FREQUENCY = Dimension("a frequency", "Hz", "Hz", 1.0)
+TIME = Dimension("a time", "s", "s", 1.0)
+ACCELERATION = Dimension("an acceleration", "m/s^2", "m/s^2", 1.0)
+FOUNDATION = Dimension("a foundation stiffness per area", "N/m^3", "N/m^3", 1.0)
+
+
+def to_si(text: str, dimension: Dimension) -> float:
+    """SI value of a quantity such as ``"1.5 mm"``, ``"20 deg"`` or ``"1e-4 kg m^2"``.
+
+    Parameters
+    ----------
+    text : str
+        A number and a product of units; radians and degrees count as a dimension, so that neither
+        ``"5 Hz"`` passes as a speed of rotation nor ``"20 %"`` as an angle.
+    dimension : Dimension
+
+    Raises
+    ------
+    CaseError
+        ``E-UNIT``: no number, no unit, an unknown unit or another dimension. ``E-FINITE``: overflow.
+    """
+    example = f'write it as in "{dimension.show(dimension.scale)}"'
+    match = _NUMBER.fullmatch(text)
+    if re.match(r"\s*[+-]?\d+,\d", text):
+        message = f"{dimension.name} has a comma in its number"
+        raise CaseError(message, code="E-UNIT", value=text, remedy="use a decimal point")
+    if not match:
+        message = f"{dimension.name} must start with a number"
+        raise CaseError(message, code="E-UNIT", value=text, remedy=example)
+    number, unit = float(match[1]), " ".join(match[2].split())
+    if not unit:
+        raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=text, remedy=example)
+    factor = _factor(unit, dimension, text, example)
+    inverse = round(1 / factor)
+    # 51/1000 is 0.051 to the last digit, 51*0.001 is not.
+    value = number / inverse if abs(inverse * factor - 1) < 1e-12 else number * factor
+    if not math.isfinite(value):
+        raise CaseError("the number is not finite", code="E-FINITE", value=text, limit="finite numbers")
+    return value
+
+
+def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
+    """SI value of one ``unit``, refused unless it has the dimension."""
+    if len(unit) > 60 or not _UNIT.fullmatch(unit):
+        raise CaseError(
+            f"{unit[:60]!a} is not a product of units",
+            code="E-UNIT",
+            value=text,
+            limit="unit names with * / ^ or blanks, without brackets",
+            remedy=example,
+        )
+    found, expected = _root(unit), _root(dimension.si)
+    if found is None or expected is None:
+        raise CaseError(f"unknown unit {unit!a}", code="E-UNIT", value=text, remedy=example)
+    if found[1] != expected[1]:
+        raise CaseError(
+            f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}",
+            code="E-UNIT",
+            value=text,
+            limit=f"units convertible to {dimension.si}",
+            remedy=example,
+        )
+    return found[0] / expected[0]
+
+
+@functools.lru_cache(maxsize=256)
+def _root(unit: str) -> tuple[float, dict[str, float]] | None:
+    """Factor to and exponents of the registry's root units (radian among them); None if unknown."""
+    import pint
+
+    registry = _registry()
+    try:
+        quantity = registry.Quantity(1.0, registry.parse_units(unit)).to_root_units()
+    except (pint.errors.PintError, ValueError):
+        return None
+    exponents: Any = quantity._units
+    return float(quantity.magnitude), {str(name): float(power) for name, power in exponents.items()}
+
+
+@functools.cache
+def _registry():
+    """Pint's units, loaded when the first quantity is read."""
+    import pint
+
+    return pint.UnitRegistry()
 
 
 class Section(BaseModel):

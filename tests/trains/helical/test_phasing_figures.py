@@ -5,7 +5,7 @@ import pytest
 from planet_phasing import mesh_force_spectra, resultant_chart
 
 from femgear.gears.phasing import MeshPhasing, phasing_table
-from femgear.trains.static.charts import phase_diagram
+from femgear.trains.helical.figures import phase_diagram
 
 
 def test_hands_of_the_dials_are_the_phases():
