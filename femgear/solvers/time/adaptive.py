@@ -167,7 +167,7 @@ def trajectory(
     ConvergenceError
         The integrator gives up, contact chatters, too many steps.
     """
-    steps = stepped(motion.problem, motion.frequency) if events else []
+    steps = _stepped(motion.problem, motion.frequency) if events else []
     y, t, taken = np.asarray(start, float), begin, 0
     q, v, x = motion.split(y)
     scale = scale or motion_scale(motion, (q, v)) or 1.0
@@ -183,9 +183,9 @@ def trajectory(
             t = stop
             continue
         middle = 0.5 * (t + stop) * motion.frequency
-        piece = replace(motion, problem=held(motion.problem, middle)) if steps else motion
+        piece = replace(motion, problem=_held(motion.problem, middle)) if steps else motion
         q, v, x = motion.split(y)
-        law = contacts(piece.problem, x, t * motion.frequency, motion.rows @ v, events=events)
+        law = _contacts(piece.problem, x, t * motion.frequency, motion.rows @ v, events=events)
         for t0, t1, dense in _smooth_pieces(piece, law, y, t, stop, small, method, tolerance, atol):
             taken += 1
             if taken > max_steps:
@@ -386,7 +386,7 @@ class Contacts:
         return replace(self, closed=tuple(parts))
 
 
-def contacts(problem: NonlinearSystem, x, theta, rate, *, events: bool) -> Contacts:
+def _contacts(problem: NonlinearSystem, x, theta, rate, *, events: bool) -> Contacts:
     """Contact state at deflections x (n_c,) and phases theta (n_bases,), tending as the rate of x.
 
     A switch at zero within rounding is closed when its deflection rate opens the next instant so.
@@ -400,7 +400,7 @@ def contacts(problem: NonlinearSystem, x, theta, rate, *, events: bool) -> Conta
     return Contacts(elements, columns, closed)
 
 
-def stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float]]:
+def _stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float]]:
     """Breaks (fractions) and repetition rate [1/s] of every step series of the elements."""
     found = []
     for element in problem.elements:
@@ -425,7 +425,7 @@ def _next_break(steps, time: float) -> float:
     return best
 
 
-def held(problem: NonlinearSystem, theta) -> NonlinearSystem:
+def _held(problem: NonlinearSystem, theta) -> NonlinearSystem:
     """The problem with its step series at their values at the phases ``theta``, constant."""
 
     def at_theta(series):

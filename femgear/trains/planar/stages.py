@@ -199,9 +199,7 @@ def _cut(branch: Branch, count: int, message: str) -> Branch:
         complete=False,
         message=message,
     )
-    return replace(
-        branch, parameter=branch.parameter[:count], solutions=branch.solutions[:count], curve=curve
-    )
+    return replace(branch, solutions=branch.solutions[:count], curve=curve)
 
 
 def _check_response_motions(
