@@ -283,6 +283,12 @@ def open_designs(
         Entries of the case file that every value of a point sets.
     journal, cache, progress
         As for `search.minimise`; only grids of the case itself are kept.
+
+    Raises
+    ------
+    StorageError
+        E-JOURNAL: written for another case, other variables or by another version, or not a journal;
+        E-LOCKED: in use.
     """
     fingerprint = hashlib.sha256(to_toml(case).encode()).hexdigest()
     names = tuple(" = ".join(entries) for entries in keys)
