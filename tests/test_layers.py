@@ -104,7 +104,7 @@ def test_no_two_modules_of_a_folder_share_their_first_word():
         assert len(set(words)) == len(words), folder
 
 
-def test_solvers_know_nothing_but_the_waist():
+def test_solvers_know_nothing_but_systems():
     for path in (PACKAGE / "solvers").rglob("*.py"):
         assert {name.split(".")[0] for name in imported(path)} <= {"errors", "system", "solvers"}
         for node in nodes(path, typed=False):

@@ -1,4 +1,4 @@
-"""The contact waist: one complementarity problem for all meshes at one position.
+"""The contact problem: one complementarity problem for all meshes at one position.
 
 Find contact loads ``p`` (n candidates) and motions ``q`` (m bodies) with
 

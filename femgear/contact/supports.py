@@ -201,7 +201,7 @@ def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
     """Compute the force of every pin on its planet [N], shape (N, 2, P), in the frame of the carrier.
 
     What balances the mesh forces on the planet, whatever holds it: ``-(n_sp F_sp - n_pr F_pr)`` with the
-    normals of `femgear.gears.deviations.mesh_normals` on either side of the teeth.
+    normals of `femgear.gears.kinematics.mesh_normals` on either side of the teeth.
 
     ``force`` and ``back_force`` (2N, P) [N] are those on drive and back flanks.
     """

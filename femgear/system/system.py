@@ -1,4 +1,4 @@
-"""The dynamic waist: every model ends in these types, every solver starts from them.
+"""The mechanical system: every model ends in these types, every solver starts from them.
 
 `MechanicalSystem` holds the matrices, `NonlinearSystem` joins them with the laws of their elements and with
 harmonic forces for harmonic balance and time integration. What of the element forces depends on time alone is

@@ -1,4 +1,4 @@
-"""The contact waist against a general quadratic program, springs by hand, and its own conditions."""
+"""The contact problem against a general quadratic program, springs by hand, and its own conditions."""
 
 from dataclasses import replace
 
