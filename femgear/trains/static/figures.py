@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.case import material_of, planetary_set, set_deviations
+from femgear.case.sections import Case
 from femgear.contact.bodies import make_sectors
-from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.flank_pairs import mirrored_set
+from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
+from femgear.contact.flank_pairs import loaded_image
 from femgear.contact.tooth_loads import deformed_set
 from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.gears.deviations import SetDeviations
@@ -42,6 +43,8 @@ from femgear.report.style import (
     periodic,
 )
 from femgear.trains.protocol import Drawn, Figures
+from femgear.trains.static.results import StaticResult
+from femgear.trains.static.stages import static_supports
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -563,12 +566,7 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     if static is None or not static.cycle.force.any():
         return []
 
-    gears, cycle, side = static.planetary_set, static.cycle, 1.0
-    if static.sun_torque < 0:
-        gears, side = mirrored_set(gears)[0], -1.0
-        cycle = walk_mesh_cycle(
-            gears, static.bodies, sun_torque=-static.sun_torque, positions=1, contact=case.static.contact
-        )
+    gears, cycle = _left_flanks_loaded(static, case)
     sectors = make_sectors(
         gears,
         material_of(case),
@@ -583,13 +581,31 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
         moved = whole_field(np.asarray(body.displacement), numbers)
         bodies.append(placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=moved))
-    if side < 0:
+    if static.sun_torque < 0:
         bodies = [_reflected(body) for body in bodies]
     grid = assemble_set(bodies)
     write_vtu(grid, folder / "deformed_set.vtu")
     title = "static deflection, position 0"
     deformed_picture(grid, folder / "deformed_set.png", title=title)
     return ["deformed_set.vtu", "deformed_set.png"]
+
+
+def _left_flanks_loaded(static: StaticResult, case: Case) -> tuple[PlanetarySet, MeshCycle]:
+    """The set and its static state at position zero; of a negative torque those of the mirror image."""
+    if static.sun_torque >= 0:
+        return static.planetary_set, static.cycle
+    gears, _, deviations = loaded_image(static.planetary_set, static.sun_torque, set_deviations(case))
+    cycle = walk_mesh_cycle(
+        gears,
+        static.bodies,
+        sun_torque=-static.sun_torque,
+        positions=1,
+        contact=case.static.contact,
+        deviations=deviations,
+        supports=static_supports(case),
+        options=CycleOptions(both_flanks=case.static.back_flanks),
+    )
+    return gears, cycle
 
 
 def _reflected(body: Body) -> Body:

@@ -1,0 +1,35 @@
+"""The deformed set of a negative torque is the state that static.nc holds, seen from behind."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.contact.flank_pairs import mirrored_set
+from femgear.trains.reading import read_case, with_values
+from femgear.trains.static.figures import _left_flanks_loaded
+from femgear.trains.static.stages import solve_static
+
+CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
+
+
+@pytest.mark.parametrize("members", ["fixed", "elastic"])
+def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members):
+    changes = {
+        "operation.torque": "-60 N m",
+        "set.pin_errors": [{"planet": 2, "tangential": "5 um"}],
+        "static.members": members,
+        "static.positions": 8,
+        "static.flank_elements": 6,
+    }
+    case = with_values(read_case(CASE), changes)
+    static = solve_static(case)
+    gears, cycle = _left_flanks_loaded(static, case)
+    order = mirrored_set(static.planetary_set)[1]
+    start = int(np.argmin(np.abs(static.cycle.position)))
+    force = static.cycle.force[:, start]
+    assert np.ptp(force[:3]) > 0.05 * force[:3].mean()
+    seen = np.concatenate([force[order], force[3 + order]])
+    # the cells of a walk fit the largest load of all its positions
+    np.testing.assert_allclose(cycle.force[:, 0], seen, rtol=1e-3)
+    assert gears.planet_angles == mirrored_set(static.planetary_set)[0].planet_angles
