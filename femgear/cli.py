@@ -127,11 +127,12 @@ def check(case: Path, /) -> int:
     case
         TOML case file.
     """
+    from femgear.report.summary import describe_case
     from femgear.trains.reading import read_case
     from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
-    _print(train_of(data).describe(data))
+    _print(describe_case(train_of(data), data))
     try:
         check_case(data)
     except FemgearError as error:

@@ -23,8 +23,8 @@ def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
 
 def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
     """List the figures of the stages whose data are there, in their order, and of the case."""
-    figures, names = train.figures(), [*(s.name for s in train.stages if s.name in drawn.data), ""]
-    return [figures[name] for name in names if name in figures]
+    names = [*(stage.name for stage in train.stages if stage.name in drawn.data), ""]
+    return [train.figures[name] for name in names if name in train.figures]
 
 
 def write_pictures(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import io
 import os
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from femgear.storage.files import replace_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 # Okabe and Ito, "Color Universal Design" (2008): told apart with every kind of colour vision
 BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
@@ -41,6 +43,8 @@ def new_figure(
     Figure
     list of Axes
     """
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots(
         rows,
@@ -50,7 +54,7 @@ def new_figure(
         sharey=sharey,
         subplot_kw={"projection": "polar"} if polar else None,
     )
-    cast(ConstrainedLayoutEngine, figure.get_layout_engine()).set(w_pad=0.08, h_pad=0.1)
+    cast("ConstrainedLayoutEngine", figure.get_layout_engine()).set(w_pad=0.08, h_pad=0.1)
     flat = list(axes.ravel())
     for ax in flat:
         ax.tick_params(labelsize=SIZE - 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from femgear.report.tables import Block
@@ -10,6 +11,12 @@ if TYPE_CHECKING:
     from femgear.errors import Finding
     from femgear.storage.results import Results
     from femgear.trains.protocol import Train
+
+
+def describe_case(train: Train, case) -> tuple[Block, ...]:
+    """Tabulate a case: its title, what its train says about it, and its warnings."""
+    warnings = tuple(map(str, train.warnings(case)))
+    return Block(case.title), *train.describe(case), Block("Warnings", notes=warnings or ("none",))
 
 
 def describe_results(train: Train, results: Results) -> tuple[Block, ...]:
@@ -40,4 +47,5 @@ def case_warnings(train: Train, case) -> tuple[Finding, ...]:
 
 def result_warnings(train: Train, results: Results) -> tuple[Finding, ...]:
     """What the solvers say against their own results, each once."""
-    return tuple(dict.fromkeys(train.result_warnings(results)))
+    found = (stage.warnings(results[stage.name]) for stage in train.stages if stage.name in results.stages)
+    return tuple(dict.fromkeys(chain.from_iterable(found)))

@@ -110,6 +110,8 @@ class Stage:
         ``(case)``: refuses, before a run, what the stage cannot represent.
     tables : callable
         ``(Results) -> blocks`` that the page shows beside the numbers.
+    warnings : callable
+        ``(Dataset) -> findings``: what the solver says against the contents of the stage's file.
     """
 
     name: str
@@ -123,6 +125,7 @@ class Stage:
     asked: Callable[[Any], Any] = lambda case: case
     check: Callable[[Any], object] | None = None
     tables: Callable[[Results], Iterable[Block]] = lambda results: ()
+    warnings: Callable[[xr.Dataset], Iterable[Finding]] = lambda data: ()
 
 
 @dataclass(frozen=True)
@@ -155,14 +158,11 @@ class Train:
     stages : tuple of Stage
         In order.
     describe : callable
-        ``(case) -> blocks``: its title first, its warnings last.
+        ``(case) -> blocks`` between its title and its warnings.
     warnings : callable
         ``(case) -> findings``: what is allowed but deserves a look.
-    result_warnings : callable
-        ``(Results) -> findings``: what the solvers say against their own results.
-    figures : callable
-        ``() -> {stage: Figures}``; called when something is drawn, so that drawing libraries are loaded late.
-        ``""`` are those of the case, whatever is computed of it.
+    figures : mapping of str to Figures
+        By stage; ``""`` are those of the case, whatever is computed of it.
     remarks : callable
         ``(Results, name of a picture) -> sentences`` that this case adds to a caption.
     section : str
@@ -181,8 +181,7 @@ class Train:
     stages: tuple[Stage, ...]
     describe: Callable[[Any], tuple[Block, ...]]
     warnings: Callable[[Any], Iterable[Finding]]
-    result_warnings: Callable[[Results], Iterable[Finding]] = lambda results: ()
-    figures: Callable[[], Mapping[str, Figures]] = dict
+    figures: Mapping[str, Figures] = field(default_factory=dict)
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
     section: str = ""
     own_file: OwnFile | None = None

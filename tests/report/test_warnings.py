@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from femgear import cli
-from femgear.report.summary import case_warnings, result_warnings
+from femgear.report.summary import case_warnings, describe_case, result_warnings
 from femgear.trains.drivetrain.results import describe_transient, transient_warnings
 from femgear.trains.reading import open_results, read_case, with_value
 from femgear.trains.registry import train_of
@@ -34,7 +34,7 @@ def test_warnings_are_those_of_check(name, key, value, words):
     case = with_value(read_case(CASES / f"{name}.toml"), key, value)
     found = [str(one) for one in case_warnings(train_of(case), case)]
     assert any(text.startswith(words) for text in found) and len(set(found)) == len(found)
-    assert set(found) == set(train_of(case).describe(case)[-1].notes)
+    assert set(found) == set(describe_case(train_of(case), case)[-1].notes)
 
 
 @pytest.mark.parametrize("name", ["nrel_pga", "wind_turbine_drivetrain"])

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure
@@ -27,6 +26,7 @@ from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 # Columns of pixels of a panel, and instants a column from which a band is drawn.
 _PIXELS, _POINTS = 900, 4

@@ -17,7 +17,7 @@ import numpy as np
 from femgear.errors import Finding
 from femgear.report.tables import Block
 from femgear.storage.dataset import RPM, dataset
-from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
+from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
 from femgear.trains.drivetrain.data import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
@@ -376,7 +376,7 @@ def _shown_factor(power: float) -> str:
 
 
 def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
-    """Bodies, shafts, gear stages, operation and warnings of a drivetrain case.
+    """Tabulate bodies, shafts, gear stages and operation of a drivetrain case.
 
     Raises
     ------
@@ -385,12 +385,10 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
     """
     model = check_drivetrain(case)
     return (
-        Block(case.title),
         _bodies(case, model),
         _shafts(model),
         _stages(case, model),
         _operation(case, model),
-        Block("Warnings", notes=tuple(map(str, drivetrain_warnings(case, model))) or ("none",)),
     )
 
 

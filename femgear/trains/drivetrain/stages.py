@@ -11,7 +11,7 @@ and the case file of its own.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -33,6 +33,7 @@ from femgear.trains.drivetrain.checks import (
     record_every,
     record_rate,
 )
+from femgear.trains.drivetrain.figures import FIGURES
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.results import (
     AveragedSpectrum,
@@ -54,7 +55,7 @@ from femgear.trains.drivetrain.section import (
     torque_histories,
 )
 from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
-from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -319,12 +320,6 @@ def _transient_verdict(result: TransientResult) -> dict:
     }
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.drivetrain.figures import FIGURES
-
-    return FIGURES
-
-
 def remarks(results: Results, stem: str) -> Iterator[str]:
     """What a force without its usual sign means, for the caption of its picture."""
     if stem == "transient_forces":
@@ -357,6 +352,7 @@ DRIVETRAIN = Train(
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
             check=check_drivetrain,
+            warnings=transient_warnings,
         ),
         Stage(
             name="spectrum",
@@ -374,9 +370,6 @@ DRIVETRAIN = Train(
     ),
     describe=describe_drivetrain,
     warnings=drivetrain_warnings,
-    result_warnings=lambda results: (
-        transient_warnings(results.transient) if "transient" in results.stages else ()
-    ),
-    figures=_figures,
+    figures=FIGURES,
     remarks=remarks,
 )  # fmt: skip

@@ -7,7 +7,7 @@ each.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -44,6 +44,7 @@ from femgear.trains.elastic.checks import (
     fastest_mesh_frequency,
     max_nodal_diameter,
 )
+from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
     RingModel,
     body_flexibility,
@@ -66,9 +67,9 @@ from femgear.trains.elastic.results import (
     describe_housing,
     mesh_bands,
 )
-from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import member_speeds, modes_verdict
-from femgear.trains.static.description import describe_case
+from femgear.trains.static.description import describe_set
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import (
     STATIC,
@@ -336,12 +337,6 @@ def _notices(data: dict) -> Iterator[Finding]:
         )
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.elastic.figures import FIGURES
-
-    return FIGURES
-
-
 ELASTIC = Train(
     name="elastic",
     words="a case with an elastic ring",
@@ -369,6 +364,7 @@ ELASTIC = Train(
             verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             needs=lambda case: ("modes",),
+            warnings=dynamics_warnings,
         ),
         Stage(
             name="housing",
@@ -380,11 +376,8 @@ ELASTIC = Train(
             tables=lambda results: (mesh_bands(results),),
         ),
     ),
-    describe=lambda case: describe_case(case, warnings=case_warnings(case)),
+    describe=describe_set,
     warnings=case_warnings,
-    result_warnings=lambda results: (
-        dynamics_warnings(results.dynamics) if "dynamics" in results.stages else ()
-    ),
-    figures=_figures,
+    figures=FIGURES,
     notices=_notices,
 )  # fmt: skip

@@ -6,7 +6,7 @@ The stages know nothing of one another. Lengths count in half backlashes and tim
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,9 +25,10 @@ from femgear.system.contact_states import (
     solution_states,
     state_regions,
 )
+from femgear.trains.gear_pair.figures import FIGURES
 from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
 from femgear.trains.gear_pair.section import GearPairCase, cross_check, pair_of, scales_of
-from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -248,7 +249,7 @@ def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> Chao
 
 
 def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
-    """Title, units, numbers of the pair, and warnings of a case."""
+    """Tabulate units and numbers of the pair of a case."""
     scales, pair = scales_of(case), pair_of(case)
     numbers = {
         "natural frequency [Hz]": scales.frequency / (2.0 * np.pi),
@@ -269,8 +270,7 @@ def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
         )
         ends = " and ".join(f"{ratio:.4f}" for ratio in parting) or "no ratio"
         notes = (f"with constant stiffness drive flanks begin to part at {ends} of the natural frequency",)
-    warnings = tuple(map(str, _case_warnings(case))) or ("none",)
-    return Block(case.title), Block("Gear pair", (), tuple(rows), notes), Block("Warnings", notes=warnings)
+    return (Block("Gear pair", (), tuple(rows), notes),)
 
 
 def _case_warnings(case: GearPairCase) -> Iterator[Finding]:
@@ -282,11 +282,13 @@ def _case_warnings(case: GearPairCase) -> Iterator[Finding]:
         yield Finding("W-EXCITATION", "mesh", text)
 
 
-def _result_warnings(results) -> Iterator[Finding]:
-    """What the solvers say against their own results."""
-    if "response" in results.stages and not results.response.attrs["complete"]:
-        yield Finding("W-BRANCH", "response", str(results.response.attrs["message"]))
-    if "sweep" in results.stages and (lost := int((~results.sweep["settled"].values.astype(bool)).sum())):
+def _response_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    if not data.attrs["complete"]:
+        yield Finding("W-BRANCH", "response", str(data.attrs["message"]))
+
+
+def _sweep_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    if lost := int((~data["settled"].values.astype(bool)).sum()):
         yield Finding("W-SETTLED", "sweep", f"{lost} motions do not repeat within sweep.most_periods")
 
 
@@ -330,12 +332,6 @@ def _no_response(case: GearPairCase) -> str:
     return "the shafts of eccentric gears add base frequencies; take sweep" if eccentric else ""
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.gear_pair.figures import FIGURES
-
-    return FIGURES
-
-
 GEAR_PAIR = Train(
     name="gear_pair",
     words="a gear pair",
@@ -350,6 +346,7 @@ GEAR_PAIR = Train(
             verdict=lambda result: {"points": len(result.lowest), "message": result.branch.message},
             describe=lambda results: _describe_response(results.response),
             unavailable=_no_response,
+            warnings=_response_warnings,
         ),
         Stage(
             name="sweep",
@@ -358,6 +355,7 @@ GEAR_PAIR = Train(
             verdict=lambda result: {"settled": int(result.up.settled.sum() + result.down.settled.sum())},
             describe=lambda results: _describe_sweep(results.sweep),
             unavailable=lambda case: "" if case.sweep else "the case has no section sweep",
+            warnings=_sweep_warnings,
         ),
         Stage(
             name="chaos",
@@ -370,6 +368,5 @@ GEAR_PAIR = Train(
     ),
     describe=_describe_case,
     warnings=_case_warnings,
-    result_warnings=_result_warnings,
-    figures=_figures,
+    figures=FIGURES,
 )

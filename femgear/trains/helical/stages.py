@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,7 @@ from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation
 from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.helical.figures import FIGURES
 from femgear.trains.helical.model import (
     SectionStiffness,
     check_helical_case,
@@ -41,7 +42,7 @@ from femgear.trains.helical.results import (
     describe_helical_static,
 )
 from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
-from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     driving_torque,
     member_speeds,
@@ -50,7 +51,7 @@ from femgear.trains.rigid import (
     rotation_sense,
 )
 from femgear.trains.static import stages as static_stages
-from femgear.trains.static.description import describe_case, set_warnings
+from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
 
 if TYPE_CHECKING:
@@ -201,12 +202,6 @@ def _remarks(results: Results, stem: str) -> Iterator[str]:
         yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.helical.figures import FIGURES
-
-    return FIGURES
-
-
 def _check_gears(case: HelicalCase) -> None:
     planetary_set(case)
 
@@ -263,16 +258,12 @@ HELICAL = Train(
                 _NOTHING_EXCITES if _given(case) else ""
             ),
             needs=lambda case: ("modes",),
+            warnings=response_warnings,
         ),
     ),
-    describe=lambda case: describe_case(
-        case, model=tuple(describe_helical(case, planetary_set(case))), warnings=set_warnings(case)
-    ),
+    describe=lambda case: (*describe_set(case), *describe_helical(case, planetary_set(case))),
     warnings=set_warnings,
-    result_warnings=lambda results: (
-        response_warnings(results.dynamics) if "dynamics" in results.stages else ()
-    ),
-    figures=_figures,
+    figures=FIGURES,
     remarks=_remarks,
     cross_check=check_helical,
     notices=helical_notices,

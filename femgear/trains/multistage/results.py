@@ -192,7 +192,7 @@ def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
 
 
 def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
-    """Title, stages with speeds and torques, couplings, and warnings of a case."""
+    """Tabulate stages with speeds and torques, and couplings of a case."""
     train = multistage_of(case)
     header = ["stage", "teeth", "planets", "fixed", "sun-planet [N/m]", "planet-ring [N/m]"]
     rows = []
@@ -218,10 +218,8 @@ def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
         for one in train.couplings
     ]
     return (
-        Block(case.title),
         Block("Stages", tuple(header), tuple(map(tuple, rows)), notes),
         Block("Couplings", ("from", "to", "torsional [N m/rad]", "lateral [N/m]"), tuple(couplings)),
-        Block("Warnings", notes=tuple(map(str, multistage_warnings(case))) or ("none",)),
     )
 
 

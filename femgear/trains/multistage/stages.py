@@ -21,6 +21,7 @@ from femgear.system.elements import GearMeshes, TurningSprings, turning_wave
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample, tooth_lines
 from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
+from femgear.trains.multistage.figures import FIGURES
 from femgear.trains.multistage.model import (
     MultistageSet,
     joined_motions,
@@ -50,7 +51,7 @@ from femgear.trains.multistage.section import (
     multistage_of,
     stage_gears,
 )
-from femgear.trains.protocol import Figures, OwnFile, Progress, Train, one_blas_thread
+from femgear.trains.protocol import OwnFile, Progress, Train, one_blas_thread
 from femgear.trains.protocol import Stage as RunStage
 
 # relative distance of frequencies that count as one
@@ -380,12 +381,6 @@ def _no_balance(case: MultistageCase) -> str:
     return _no_response(case) or ("" if _asked(case)[1].balance_points else "response.balance_points is 0")
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.multistage.figures import FIGURES
-
-    return FIGURES
-
-
 MULTISTAGE = Train(
     name="multistage",
     words="a multistage case",
@@ -416,10 +411,10 @@ MULTISTAGE = Train(
             verdict=lambda result: {"speeds": len(result.speed), "converged": int(result.converged.sum())},
             describe=lambda results: describe_forces(results.balance, "Harmonic balance"),
             unavailable=_no_balance,
+            warnings=balance_warnings,
         ),
     ),
     describe=describe_multistage,
     warnings=multistage_warnings,
-    result_warnings=lambda results: balance_warnings(results.balance) if "balance" in results.stages else (),
-    figures=_figures,
+    figures=FIGURES,
 )

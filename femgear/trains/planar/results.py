@@ -2,7 +2,7 @@
 
 Lines of motions and forces belong to the real signals ``x(t) = Re sum_l x_l exp(i (order_l . theta(t)))``;
 every variable of a file carries its units. The tables say what the case is and what was found;
-`tail_warnings` and `planar_verdicts` say what speaks against it.
+`branch_warnings` and `response_warnings` say what speaks against it.
 """
 
 from __future__ import annotations
@@ -411,14 +411,16 @@ def _where(data: xr.Dataset, bad: np.ndarray) -> str:
     return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {listed} rpm"
 
 
-def planar_verdicts(branch: xr.Dataset | None, response: xr.Dataset | None) -> Iterator[Finding]:
-    """What speaks against results of a planar case, for the head of the report."""
-    if branch is not None:
-        if not bool(branch.attrs["complete"]):
-            yield remark(f"the branch of the response to the weight: {branch.attrs['message']!s}")
-        yield from tail_warnings(branch, "planar.branch.harmonics")
-    if response is not None:
-        yield from tail_warnings(response, _response_key(response))
+def branch_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """What speaks against branch.nc: an early end, and truncation of its lines."""
+    if not bool(data.attrs["complete"]):
+        yield remark(f"the branch of the response to the weight: {data.attrs['message']!s}")
+    yield from tail_warnings(data, "planar.branch.harmonics")
+
+
+def response_warnings(data: xr.Dataset) -> tuple[Finding, ...]:
+    """What truncation of the lines does to response.nc."""
+    return tail_warnings(data, _response_key(data))
 
 
 def _response_key(data: xr.Dataset) -> str:
@@ -486,7 +488,7 @@ def describe_response(data: xr.Dataset) -> Block:
             "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
             "weight to the mesh frequency; r.m.s. values count such lines apart"
         )
-    notes += map(str, tail_warnings(data, _response_key(data)))
+    notes += map(str, response_warnings(data))
     return Block("Weight and mesh frequency", header, tuple(rows), tuple(notes))
 
 

@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.case import planetary_set
-from femgear.errors import Finding
 from femgear.report.tables import describe_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.fourier import side_bands
@@ -26,6 +25,7 @@ from femgear.trains.planar.checks import (
     end_of_branch,
     excited_spans,
 )
+from femgear.trains.planar.figures import FIGURES
 from femgear.trains.planar.model import (
     carrier_sense,
     judged_branch,
@@ -38,28 +38,28 @@ from femgear.trains.planar.results import (
     BranchResult,
     PlanarModesResult,
     PlanarResponseResult,
+    branch_warnings,
     comparisons,
     describe_branch,
     describe_planar,
     describe_response,
     doubts,
-    planar_verdicts,
     published_modes,
+    response_warnings,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     member_speeds,
     modes_verdict,
     needed,
 )
-from femgear.trains.static.description import describe_case, set_warnings
+from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
-    from femgear.storage.results import Results
 
 
 @one_blas_thread()
@@ -212,19 +212,6 @@ def _lacks(section: str) -> Callable[[PlanarCase], str]:
     return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
 
 
-def _figures() -> Mapping[str, Figures]:
-    from femgear.trains.planar.figures import FIGURES
-
-    return FIGURES
-
-
-def _result_warnings(results: Results) -> Iterator[Finding]:
-    branch, response = (
-        results.stage(name) if name in results.stages else None for name in ("branch", "response")
-    )
-    return planar_verdicts(branch, response)
-
-
 PLANAR = Train(
     name="planar",
     words="a planar case",
@@ -253,6 +240,7 @@ PLANAR = Train(
             describe=lambda results: describe_branch(results.branch),
             unavailable=_lacks("branch"),
             needs=lambda case: ("modes",),
+            warnings=branch_warnings,
         ),
         Stage(
             name="response",
@@ -264,14 +252,12 @@ PLANAR = Train(
             describe=lambda results: describe_response(results.response),
             unavailable=_lacks("response"),
             needs=lambda case: ("modes",),
+            warnings=response_warnings,
         ),
     ),
-    describe=lambda case: describe_case(
-        case, model=(describe_planar(case, planetary_set(case)),), warnings=set_warnings(case)
-    ),
+    describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),
     warnings=set_warnings,
-    result_warnings=_result_warnings,
-    figures=_figures,
+    figures=FIGURES,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
     cross_check=check_planar,
     notices=planar_notices,
