@@ -57,17 +57,40 @@ def tabulate(
     return Block(title, tuple(columns), rows, tuple(notes))
 
 
-def describe_modes(data: xr.Dataset) -> Block:
-    """Tabulate natural frequencies, kinds and nodal diameters of the first modes of modes.nc."""
+def describe_modes(
+    data: xr.Dataset,
+    more: Mapping[str, Callable[[xr.Dataset], str]] | None = None,
+    *,
+    digits: int = 2,
+    note: str = "",
+) -> Block:
+    """Tabulate natural frequencies and kinds of the first modes of modes.nc.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    more : mapping of str to callable, optional
+        Further columns, the text of a mode from its part of the file; nodal diameters when not given.
+    digits : int
+        Of the frequencies [Hz] behind the point.
+    note : str
+        Behind the number of modes.
+    """
     count, shown = data.sizes["mode"], min(data.sizes["mode"], _MODES)
     columns = {
         "mode": lambda i: str(i + 1),
-        "frequency [Hz]": lambda i: f"{float(data.frequency[i]):.2f}",
+        "frequency [Hz]": lambda i: f"{float(data.frequency[i]):.{digits}f}",
         "kind": lambda i: str(data.kind.values[i]),
-        "nodal diameters": lambda i: "-" if data.nodal_diameter[i] < 0 else str(int(data.nodal_diameter[i])),
     }
-    note = f"{count} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown"
-    return tabulate("Modes", range(shown), columns, (note,))
+    for name, text in (more or {"nodal diameters": _nodal_diameters}).items():
+        columns[name] = lambda i, text=text: text(data.isel(mode=i))
+    found = f"{count} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown"
+    return tabulate("Modes", range(shown), columns, (found + note,))
+
+
+def _nodal_diameters(mode: xr.Dataset) -> str:
+    """Write the nodal diameters of the ring in a mode, a dash where it is rigid."""
+    return "-" if mode.nodal_diameter < 0 else str(int(mode.nodal_diameter))
 
 
 def describe_response(data: xr.Dataset) -> Block:

@@ -20,6 +20,7 @@ from femgear.report.response import (
     fine_positions,
     harmonics_of,
     name_kinds,
+    panels,
     response_figures,
     some_speeds,
 )
@@ -38,6 +39,7 @@ from femgear.report.style import (
     new_figure,
     periodic,
     rpm,
+    xy,
 )
 from femgear.system.rigid_bodies import CENTRAL, gear_geometry
 from femgear.trains.protocol import Drawn, Figures
@@ -113,8 +115,8 @@ def _draw_front(ax, data, moved: np.ndarray) -> None:
             (centre, 0.0, {"color": "0.82", "linewidth": 1.0, "label": "at rest"}),
             (centre + x + 1j * y, u / base, {"color": colour, "linewidth": 1.5, "label": name} | style),
         ):
-            ax.plot(*_xy(at + radius * _CIRCLE), **look)
-            ax.plot(*_xy(np.array([at, at + spoke * np.exp(1j * turn)])), **look)
+            ax.plot(*xy(at + radius * _CIRCLE), **look)
+            ax.plot(*xy(np.array([at, at + spoke * np.exp(1j * turn)])), **look)
     _limits(ax, data, _FRONT)
 
 
@@ -133,10 +135,6 @@ def _limits(ax, data, high: float) -> None:
     ring = _pitch_radii(data)[0]
     ax.set_xlim(-1.25 * ring, 1.25 * ring)
     ax.set_ylim(-high * ring, high * ring)
-
-
-def _xy(points):
-    return points.real, points.imag
 
 
 def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float = 0.16) -> Figure:
@@ -210,12 +208,7 @@ def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
         Contents of dynamics.nc, of which at most four speeds are drawn, and of modes.nc.
     """
     speeds = some_speeds(dynamics.sizes["speed"])
-    rows, columns = -(-len(speeds) // 2), min(len(speeds), 2)
-    figure, axes = new_figure(
-        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=1.2 + 3.6 * rows, sharey=True
-    )
-    for ax in axes[len(speeds) :]:
-        figure.delaxes(ax)
+    figure, axes = panels(len(speeds), above=1.2)
     h = dynamics["harmonic"].values
     position = fine_positions(int(h.max()))
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
@@ -233,7 +226,7 @@ def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
         frequency = float(dynamics["mesh_frequency"].values[s])
         title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
         label(ax, "position in the mesh period [1]", title=title)
-    for ax in axes[: len(speeds) : 2]:
+    for ax in axes[::2]:
         label(ax, y="transmission error less its mean [µm]")
     name_kinds(axes[0], dynamics)
     legend_below(figure, columns=3)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -202,10 +203,6 @@ def _remarks(results: Results, stem: str) -> Iterator[str]:
         yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
 
 
-def _check_gears(case: HelicalCase) -> None:
-    planetary_set(case)
-
-
 def _given(case: HelicalCase) -> bool:
     return case.helical.mesh_stiffness is not None
 
@@ -216,13 +213,11 @@ HELICAL = Train(
     model=HelicalCase,
     section="helical",
     stages=(
-        Stage(
-            name="static",
-            title="Static",
+        replace(
+            static_stages.STATIC,
             solve=lambda case, _, context: solve_helical_static(
                 case, cache=context.cache, progress=context.progress
             ),
-            verdict=static_stages.static_verdict,
             describe=lambda results: describe_helical_static(
                 results.static,
                 results.modes if "modes" in results.stages else None,
@@ -233,7 +228,6 @@ HELICAL = Train(
                 if _given(case)
                 else ""
             ),
-            check=_check_gears,
         ),
         Stage(
             name="modes",
