@@ -62,7 +62,7 @@ class Progress:
 
 
 def _print(blocks) -> None:
-    """Print blocks of `femgear.report.summary` as tables on standard output."""
+    """Print blocks as tables on standard output."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -125,12 +125,11 @@ def check(case: Path, /) -> int:
     case
         TOML case file.
     """
-    from femgear.report.summary import describe_case
     from femgear.trains.reading import read_case
     from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
-    _print(describe_case(train_of(data), data))
+    _print(train_of(data).describe_case(data))
     try:
         check_case(data)
     except FemgearError as error:
@@ -165,7 +164,6 @@ def run(
     force
         Replace the results that the folder holds, once the new ones are complete.
     """
-    from femgear.report.summary import case_warnings, describe_results, result_warnings
     from femgear.run import run_case
     from femgear.storage.results import run_folder
     from femgear.trains.reading import open_results, read_case
@@ -184,12 +182,12 @@ def run(
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
     train = train_of(data)
-    _warn(case_warnings(train, data))
+    _warn(train.case_warnings(data))
     with run_folder(output, force=force) as folder, Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(output)
-    _print(describe_results(train, results))
-    _warn(result_warnings(train, results))
+    _print(train.describe_results(results))
+    _warn(train.result_warnings(results))
     print(f"results: {output}")
     if "report.html" in results.manifest.files:
         print(f"report:  {output / 'report.html'}")

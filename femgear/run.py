@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from femgear.report.html import write_report
+from femgear.report.style import save_figure
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, folder_lock, record
-from femgear.trains.protocol import Context, Drawn, Progress, Stage, one_blas_thread
+from femgear.trains.protocol import Context, Drawn, Figures, Progress, Stage, Train, one_blas_thread
 from femgear.trains.reading import open_results
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -108,8 +109,6 @@ def run_case(
         convergence[name] = stage.verdict(result)
         record(folder, names, timings=timings, convergence=convergence)
     if pictures:
-        from femgear.report.draw import write_pictures
-
         start = time.perf_counter()
         drawn = Drawn(case, data, results, cache)
         names += write_pictures(folder, train_of(case), drawn, progress=progress)
@@ -128,8 +127,6 @@ def report_again(folder: Path) -> None:
     folder : path
         Results of a complete run.
     """
-    from femgear.report.draw import write_pictures
-
     with folder_lock(folder):
         results = open_results(folder, partial=False)
         manifest, train = results.manifest, train_of(results.case)
@@ -140,3 +137,47 @@ def report_again(folder: Path) -> None:
             finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
         write_report(train, open_results(folder))
         finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)
+
+
+def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
+    """Write the figures of the stages whose data are there, and of the case; returns the file names."""
+    figures = {}
+    for stage in _drawn(train, drawn):
+        figures |= stage.draw(drawn)
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return [f"{name}.png" for name in figures]
+
+
+def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
+    """List the figures of the stages whose data are there, in their order, and of the case."""
+    names = [*(stage.name for stage in train.stages if stage.name in drawn.data), ""]
+    return [train.figures[name] for name in names if name in train.figures]
+
+
+def write_pictures(
+    folder: Path, train: Train, drawn: Drawn, *, progress: Progress | None = None
+) -> list[str]:
+    """Write everything that a run shows; returns the names of the files.
+
+    Parameters
+    ----------
+    folder : path
+    train : Train
+        Of the case.
+    drawn : Drawn
+    progress : callable, optional
+        Called with (stage, done, total).
+    """
+    written = [w for stage in _drawn(train, drawn) for w in stage.write]
+    steps = [
+        lambda: write_figures(folder, train, drawn), *(lambda w=w: w(drawn, folder) for w in written),
+    ]  # fmt: skip
+    names = []
+    for done, step in enumerate(steps):
+        if progress is not None:
+            progress("pictures", done, len(steps))
+        names += step()
+    if progress is not None:
+        progress("pictures", len(steps), len(steps))
+    return names

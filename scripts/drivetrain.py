@@ -88,7 +88,7 @@ def main(
 
 def _computed(data, folder: Path, *, gears: bool):
     """Datasets of all stages, and the names of the pictures of a run."""
-    from femgear.report.draw import write_pictures
+    from femgear.run import write_pictures
     from femgear.trains.drivetrain.stages import (
         DRIVETRAIN,
         solve_drivetrain_modes,

@@ -9,7 +9,6 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from femgear.report.summary import case_warnings, describe_results, result_warnings
 from femgear.report.tables import Block
 from femgear.storage.files import checksum, storage_errors, write_text
 from femgear.storage.results import Results
@@ -86,8 +85,8 @@ def page(train: Train, results: Results) -> str:
     """Make the page as text; see `write_report`."""
     case = results.case
     pictures, skipped = _pictures(train, results)
-    warnings = [*case_warnings(train, case), *result_warnings(train, results), *skipped]
-    numbers = {block.title: block for block in describe_results(train, results)}
+    warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
+    numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
     head = "".join(
         (

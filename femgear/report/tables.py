@@ -14,11 +14,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MANY = 8
-"""Rows of a table that shows the speeds."""
+"""Rows of a table that shows the speeds, and speeds that a warning names."""
 _MODES = 16
 """Rows of the table of modes."""
-_NAMED = 8
-"""Speeds that a warning names."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +138,10 @@ def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         (~data["stable"].values.astype(bool), "the periodic solution is unstable at"),
     ):
         if bad.any():
-            shown = ", ".join(f"{value:.6g}" for value in speed[bad][:_NAMED])
-            rest = np.count_nonzero(bad) - _NAMED
-            yield remark(f"{text} {shown} rpm{f' and {rest} more speeds' if rest > 0 else ''}")
+            rest = np.count_nonzero(bad) - MANY
+            yield remark(f"{text} {first_speeds(speed[bad])}{f' and {rest} more speeds' if rest > 0 else ''}")
+
+
+def first_speeds(speeds: np.ndarray) -> str:
+    """Write the first of some speeds (p,) [rpm], as many as a warning names."""
+    return ", ".join(f"{value:.6g}" for value in speeds[:MANY]) + " rpm"

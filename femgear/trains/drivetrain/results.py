@@ -62,7 +62,8 @@ class DrivetrainModesResult:
         members, energy, rotation = _energies(model, modes.shape)
         bases = np.unique(model.mesh_base)
         orders = model.base_ratio[bases]
-        critical = found.critical
+        critical, over_speed = found.critical, "natural frequency over the speed"
+        at = [one.speed / RPM for one in critical]
         line = orders * self.speed / (2 * np.pi)
         variables = {
             "frequency": ("mode", modes.frequency, "Hz", "undamped natural frequency"),
@@ -76,18 +77,8 @@ class DrivetrainModesResult:
             "ratio": ("body", list(model.ratio.values()), "1", "speed over that of the first body"),
             "base_order": ("base", orders, "1", "mesh frequency over the first body's turn"),
             "mesh_frequency": ("base", line, "Hz", "mesh frequency at the speed of the operation"),
-            "campbell_frequency": (
-                "campbell_speed branch",
-                found.frequency,
-                "Hz",
-                "natural frequency over the speed",
-            ),
-            "critical_speed": (
-                "crossing",
-                [c.speed / RPM for c in critical],
-                "rpm",
-                "speed of a mesh line on a branch",
-            ),
+            "campbell_frequency": ("campbell_speed branch", found.frequency, "Hz", over_speed),
+            "critical_speed": ("crossing", at, "rpm", "speed of a mesh line on a branch"),
             "critical_frequency": ("crossing", [c.frequency for c in critical], "Hz", "frequency there"),
         }
         coords = {

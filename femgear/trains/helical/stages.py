@@ -115,7 +115,7 @@ def solve_helical_modes(
         sense, cycle, beta = rotation_sense(case, gears), static.cycle, case.helical.helix_angle
         overlap = contact_ratios(gears, helix_angle=beta, face_width=case.set.face_width)[0, 1]
         base = profile.base_helix_angle(case.sun.pressure_angle, beta)
-        backlash = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], gears.n_planets)
+        backlash = static_stages.mesh_backlash(gears)
         spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, backlash)
         record = normal_record(spur, factor, base, reversed_time=sense < 0)
         hand = sense * (1 if case.helical.hand == "right" else -1)

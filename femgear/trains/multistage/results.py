@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import Finding
-from femgear.report.tables import Block, describe_modes, tabulate
+from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
 from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
 from femgear.system.assembler import mesh_names
 from femgear.trains.multistage.model import (
@@ -258,6 +258,5 @@ def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """What harmonic balance says against balance.nc."""
     lost = data["speed"].values[~data["converged"].values.astype(bool)]
     if len(lost):
-        shown = ", ".join(f"{value:.6g}" for value in lost[:8])
-        text = f"harmonic balance did not converge at {len(lost)} speeds: {shown} rpm"
+        text = f"harmonic balance did not converge at {len(lost)} speeds: {first_speeds(lost)}"
         yield Finding("W-BALANCE", "", text)

@@ -17,7 +17,7 @@ import numpy as np
 from femgear.case.sections import output_member
 from femgear.errors import Finding, remark
 from femgear.gears.kinematics import torques
-from femgear.report.tables import MANY, Block, chosen, tabulate
+from femgear.report.tables import Block, chosen, first_speeds, tabulate
 from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset
 from femgear.trains.gear_set import modes_dataset
 from femgear.trains.planar.model import (
@@ -400,8 +400,7 @@ def _where(data: xr.Dataset, bad: np.ndarray) -> str:
     if "weight_frequency" in data:
         hertz = data["weight_frequency"].values[bad]
         return f"{len(hertz)} of {len(bad)} points, {hertz.min():.4g} to {hertz.max():.4g} Hz"
-    listed = ", ".join(f"{value:.6g}" for value in data["speed"].values[bad][:MANY])
-    return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {listed} rpm"
+    return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {first_speeds(data['speed'].values[bad])}"
 
 
 def branch_warnings(data: xr.Dataset) -> Iterator[Finding]:

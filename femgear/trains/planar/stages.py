@@ -49,11 +49,7 @@ from femgear.trains.planar.results import (
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
 from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
-from femgear.trains.rigid import (
-    member_speeds,
-    modes_verdict,
-    needed,
-)
+from femgear.trains.rigid import member_speeds, modes_verdict, needed
 from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS
