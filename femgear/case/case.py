@@ -69,14 +69,7 @@ def need_set(case: Any) -> None:
 def planetary_set(case: Case) -> PlanetarySet:
     """Gears of a case, closed on their centre distance and checked; of a helical one the transverse section.
 
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    PlanetarySet
-        With the profile shifts, or the centre distance, that the case leaves to be found.
+    Profile shifts, or the centre distance, that the case leaves out are found.
 
     Raises
     ------
@@ -123,7 +116,7 @@ def _gear(
     cutter: PinionCutter | None = None,
 ) -> Gear:
     given, module, pressure_angle = section.rack or case.rack, case.sun.module, case.sun.pressure_angle
-    rack = BasicRack(addendum=given.addendum, dedendum=given.dedendum, root_radius=given.root_radius)
+    rack = BasicRack(**given.model_dump())
     if case.helix_angle is not None:
         module, pressure_angle = transverse_tool(module, pressure_angle, case.helix_angle)
         rack = transverse_rack(rack, case.helix_angle)
@@ -192,14 +185,6 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
 
 def set_deviations(case: Case) -> SetDeviations:
     """Modifications and errors of a case, as separations of the loaded flanks.
-
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    SetDeviations
 
     Raises
     ------

@@ -269,12 +269,7 @@ def _largest(value: float | tuple[float, ...] | None) -> float:
 def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False) -> None:
     """Refuse members that float though the planets cannot hold them.
 
-    Parameters
-    ----------
-    case : Case
-    planetary : PlanetarySet
-    dynamic : bool
-        For modes and dynamics, where members move whatever static.members says.
+    ``dynamic`` is for modes and dynamics, where members move whatever static.members says.
 
     Raises
     ------

@@ -98,10 +98,8 @@ def check_entries(result: Any, kind: type, case_entries: Entries, words: str) ->
 
     Parameters
     ----------
-    result : kind
-        With the ``entries`` of the case that it belongs to.
-    kind : type
-        Of the result.
+    result, kind : object, type
+        With the ``entries`` of the case that it belongs to; the kind that is needed.
     case_entries : mapping
         The same entries of the case at hand.
     words : str
@@ -143,16 +141,7 @@ class Steps:
         self._found: dict[str, OrderedDict[str, Any]] = {}
 
     def take(self, step: str, entries: Entries, compute: Callable[[], Result]) -> Result:
-        """Result of a step for these entries, computed now where it is not kept.
-
-        Parameters
-        ----------
-        step : str
-            Name of what is computed.
-        entries : mapping
-            All that decides it.
-        compute : callable
-        """
+        """Result of a named step for the entries that decide it, computed now where it is not kept."""
         key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
         if key not in found:
             found[key] = compute()

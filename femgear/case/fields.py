@@ -35,19 +35,12 @@ class _Reader:
         return dict(self.schema)
 
 
-def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = False) -> _Reader:
+def Quantity(dimension: Dimension, low: float, high: float) -> _Reader:
     """_Reader of a quantity given with its unit, an SI float in the model.
 
-    Parameters
-    ----------
-    dimension : Dimension
-    low, high : float
-        Plausible window, in SI units.
-    open_low : bool
-        The low end itself is refused too.
+    ``low`` and ``high`` are the ends of the plausible window in SI units.
     """
-    ends = dimension.show(low), dimension.show(high)
-    limit = f"above {ends[0]} up to {ends[1]}" if open_low else f"{ends[0]} to {ends[1]}"
+    limit = f"{dimension.show(low)} to {dimension.show(high)}"
 
     def convert(value: object) -> float:
         if isinstance(value, int | float) and not isinstance(value, bool):
@@ -65,7 +58,7 @@ def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = 
             raise refuse(
                 error.message, code=error.code, value=value, limit=error.limit, remedy=error.remedy
             ) from None
-        if not (low < number <= high if open_low else low <= number <= high):
+        if not low <= number <= high:
             message = f"{dimension.name} of {dimension.show(number)} is not plausible"
             hint = _factor_hint(number, low, high, dimension, value)
             raise refuse(message, code="E-RANGE", value=value, limit=limit, remedy=hint)

@@ -42,13 +42,7 @@ _WANTED |= {"bool_type": "true or false", "string_type": "a text"}
 def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") -> list[CaseError]:
     """One `CaseError` for each mistake that pydantic found.
 
-    Parameters
-    ----------
-    error : ValidationError
-    model : type
-        Whose field names are the valid keys.
-    prefix : str
-        Dotted key of the table that was validated.
+    The field names of ``model`` are the valid keys, ``prefix`` is the key of the table that was validated.
     """
     problems = []
     details: Any = error.errors(include_url=False)
@@ -164,10 +158,8 @@ def checked_case(
     Parameters
     ----------
     model : type
-    data : dict
-        Tables of the file.
-    text, name : str
-        As for `combine`.
+    data, text, name : dict, str, str
+        Tables of the file; as for `combine`.
     keys : callable, optional
         ``() -> model`` whose field names are the valid keys; those of `model` when left out.
     check : callable
@@ -192,16 +184,9 @@ def checked_case(
 
 
 def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
-    """One error that lists all; its ``problems`` holds them one by one.
+    """One error that lists all (at least one); its ``problems`` holds them one by one.
 
-    Parameters
-    ----------
-    problems : list of CaseError
-        At least one.
-    text : str
-        The file, for line numbers; empty where the text is not the user's.
-    name : str
-        Its name.
+    ``text`` is the file, for line numbers (empty where the text is not the user's), ``name`` its name.
     """
     for problem in problems:
         line = case_text.line_of(text, problem.key) if problem.key and name else None
@@ -219,11 +204,7 @@ def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
 def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
     """Let a refusal name the entries that the user gave, their values, and keys that exist.
 
-    Parameters
-    ----------
-    error : GeometryError
-        Its fields are changed, ``file`` (with the line) among them.
-    case : Case
+    The fields of the error are changed, ``file`` (with the line) among them.
     """
     if error.code == "E-BACKLASH":
         gear = (error.key or "").partition(".")[0]

@@ -373,19 +373,9 @@ def _speeds(case: Case) -> str:
 
 
 def without_uncomputed(data: dict, error: CaseError) -> Finding | None:
-    """Take those published lines out of the tables of a case to which alone an error objects.
+    """Take those published lines out of the tables of a case to which alone the error of its check objects.
 
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file; modified.
-    error : CaseError
-        Of the check of the case.
-
-    Returns
-    -------
-    Finding or None
-        What was left out; None where the error is about other things too.
+    Says what was left out; None where the error is about other things too.
     """
     problems = getattr(error, "problems", ())
     if not problems or any(problem.code != CODE for problem in problems):

@@ -192,12 +192,10 @@ def embed_points(
 
     Parameters
     ----------
-    data : dict
-        Tables of a case file; modified.
+    data, name : dict, str
+        Tables of a case file, modified, and its name: files lie in its folder or below.
     entry : str
         Dotted key of the list, such as ``"sun.modifications"``.
-    name : str
-        Of the case file: files lie in its folder or below.
     read : callable
         ``(path) -> SI values by entry``.
     units : mapping of str to str
@@ -257,25 +255,15 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
 
 
 def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:
-    """Columns of a measured profile in SI units.
+    """Columns of a measured profile in SI units; for the file and refusals see `read_columns`.
 
-    Parameters
-    ----------
-    path : path-like
-        Text in two columns, divided by comma, semicolon or tab (with semicolon or tab the numbers may have
-        decimal commas); the first line names them with their units, such as ``roll angle [deg]`` or
-        ``diameter [mm]`` and ``deviation [um]``. Empty lines and those that begin with ``#`` are skipped.
-        Deviations are positive where there is more material.
+    Its heading is ``roll angle [deg]`` or ``diameter [mm]``, and ``deviation [um]``, or in other units.
+    Deviations are positive where there is more material.
 
     Returns
     -------
     dict
         ``"roll_angles"`` [rad] or ``"diameters"`` [m], ascending or descending, and ``"deviations"`` [m].
-
-    Raises
-    ------
-    CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-FILE`` with the number of the line.
     """
     found = read_columns(path, _PROFILE_DIMENSIONS, least=2, most=MOST_POINTS, remedy=_PROFILE_HEADING)
     if "deviation" not in found.values:

@@ -69,15 +69,7 @@ def read_text(path: str | os.PathLike) -> str:
 def parse(text: str, name: str) -> dict:
     """Tables of a TOML text, of limited depth and with finite numbers only.
 
-    Parameters
-    ----------
-    text : str
-    name : str
-        File name for messages.
-
-    Returns
-    -------
-    dict
+    ``name`` is that of the file, for messages.
 
     Raises
     ------
@@ -225,10 +217,7 @@ def _clean(key: str) -> str:
 def write(data: dict) -> str:
     """TOML text of nested tables of strings, booleans, integers, floats and lists of these.
 
-    Returns
-    -------
-    str
-        Text for which ``parse(write(data), "")`` equals ``data``.
+    ``parse(write(data), "")`` equals ``data``.
     """
     lines: list[str] = []
     _write_table(data, (), lines)
@@ -307,19 +296,7 @@ class ReadCase(BaseModel):
     _profile_files: dict[str, str] = PrivateAttr(default_factory=dict)
 
     def read_from(self, text: str, lines: str, name: str, *, notices=(), profile_files=None) -> None:
-        """Remember where the values were read.
-
-        Parameters
-        ----------
-        text : str
-            TOML text that gives this case.
-        lines : str
-            Text of the user, for line numbers; empty where he wrote none.
-        name : str
-            Of the file.
-        notices : sequence of Finding
-        profile_files : dict of str to str, optional
-        """
+        """Remember the text that gives this case, that of the user (or none), and the name of the file."""
         self._source, self._lines, self._name = text, lines, name
         self._notices, self._profile_files = tuple(notices), dict(profile_files or {})
 

@@ -68,11 +68,6 @@ def to_si(text: str, dimension: Dimension) -> float:
         ``"5 Hz"`` passes as a speed of rotation nor ``"20 %"`` as an angle.
     dimension : Dimension
 
-    Returns
-    -------
-    float
-        Value in ``dimension.si``.
-
     Raises
     ------
     CaseError

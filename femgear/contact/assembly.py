@@ -125,11 +125,7 @@ class MeshWindows(Windows):
     def missed(self, position: int, deflection) -> float:
         """Separation from the nearest pair within which no omitted pair penetrates [m]; zero if none does.
 
-        Parameters
-        ----------
-        position : int
-        deflection : (2N,) array
-            Approach of the drive flanks of every mesh [m].
+        ``deflection`` (2N,) is the approach of the drive flanks of every mesh [m].
         """
         gap = self.smallest_gap[:, position]
         # a back flank approaches when its drive flank parts

@@ -134,15 +134,8 @@ def make_sectors(
 ) -> Sectors:
     """Mesh one sector of each gear and assemble its stiffness matrix.
 
-    Parameters
-    ----------
-    planetary_set, material : PlanetarySet, Material
-    flank_elements : int
-        Element edges along a flank.
-    refine : float
-        Divides all element sizes.
-    cache : path, optional
-        Folder of generated grids.
+    ``flank_elements`` are the element edges along a flank, ``refine`` divides all element sizes, ``cache`` is
+    the folder of generated grids.
     """
     gears = (planetary_set.sun, planetary_set.planet, planetary_set.ring)
     halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in gears]
@@ -263,13 +256,7 @@ def flank_load_columns(grid: Grid, stations: _FlankStations) -> np.ndarray:
 def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> np.ndarray:
     """Spread a unit inward normal force evenly over the active flank of the ring tooth, (2n, 1) nodal forces.
 
-    Parameters
-    ----------
-    grid : Grid
-        Sector of the ring.
-    planetary_set : PlanetarySet
-    side : float
-        +1 loads the left flank, -1 the right one.
+    ``grid`` is the sector of the ring; ``side`` +1 loads the left flank, -1 the right one.
     """
     stations = flank_stations(grid, planetary_set.ring)
     pair = mesh_pairs(planetary_set)[1]
@@ -296,18 +283,9 @@ def with_cut(schur: SectorSchur, grid: Grid, held: str | None, along: BoundarySt
 
 
 def station_weights(roll, stations):
-    """Compute cubic Lagrange weights on equidistant stations.
+    """Compute indices and cubic Lagrange weights (..., 4) on equidistant stations (n,) [m].
 
-    Parameters
-    ----------
-    roll : (...) array
-        Roll lengths [m]; values outside the stations are extrapolated by at most half a spacing.
-    stations : (n,) array
-        Roll lengths [m].
-
-    Returns
-    -------
-    index, weight : (..., 4) arrays
+    At roll lengths (...) [m]; values outside the stations are extrapolated by at most half a spacing.
     """
     step = (stations[-1] - stations[0]) / (len(stations) - 1)
     position = np.clip((np.asarray(roll) - stations[0]) / step, -0.5, len(stations) - 0.5)

@@ -298,13 +298,8 @@ def cycle_without_load(
 ) -> MeshCycle:
     """Make the defined result without load: nothing touches, nothing is stiff, no pressure has a place.
 
-    Parameters
-    ----------
-    n_planets : int
-    position, periods, contact
-        As in `MeshCycle`.
-    options : CycleOptions, optional
-        Whether there are pressures, and in how many cells.
+    ``position``, ``periods`` and ``contact`` are those of `MeshCycle`; the options say whether there are
+    pressures, and in how many cells.
     """
     options, N, P = options or CycleOptions(), n_planets, len(position)
     size = {"g": 2, "m": 2 * N, "n": N, "s": 1, "c": options.cells, "t": P}

@@ -108,18 +108,8 @@ def flank_pair(gear_1: Gear, gear_2: Gear, centre_distance: float, pressure_angl
 def separation(pair: FlankPair, zeta, roll_1):
     """Compute the separation of flank 1 from flank 2 and the roll length of the foot point on flank 2.
 
-    Parameters
-    ----------
-    pair : FlankPair
-    zeta : array
-        Path coordinate of the tooth pair [m].
-    roll_1 : array, broadcast with `zeta`
-        Roll length of the point on flank 1 [m].
-
-    Returns
-    -------
-    gap, roll_2 : arrays
-        Separation along the normal of flank 2 [m] and roll length of the foot point [m].
+    From arrays that broadcast: path coordinates of the tooth pair and roll lengths on flank 1, all in m. The
+    separation is along the normal of flank 2.
     """
     rb1, rb2, sign = pair.base_radius_1, pair.base_radius_2, pair.sign
     # polar angle of an involute point: origin angle less the involute function of its pressure angle
@@ -138,16 +128,8 @@ def separation(pair: FlankPair, zeta, roll_1):
 def admissible_arcs(pair: FlankPair, zeta):
     """Find the range of arc length on flank 1 whose points and foot points both lie on the flanks.
 
-    Parameters
-    ----------
-    pair : FlankPair
-    zeta : array
-        Path coordinates [m].
-
-    Returns
-    -------
-    low, high : arrays of the shape of `zeta`
-        Arc lengths measured from the base circle along flank 1 [m].
+    At path coordinates ``zeta`` [m]; ``low`` and ``high``, of the same shape, are arc lengths from the base
+    circle along flank 1 [m].
     """
     zeta = np.asarray(zeta, float)
     rb1 = pair.base_radius_1
@@ -265,20 +247,8 @@ def loaded_image(
 
     The mirror image turns the other way: position ``tau`` of the set is position ``-tau`` of the image.
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    sun_torque : float
-        [N m]; a negative one loads the right flanks of the sun.
-    deviations : SetDeviations, optional
-
-    Returns
-    -------
-    PlanetarySet
-    order : (N,) int array
-        See `mirrored_set`.
-    deviations : SetDeviations or None
-        As the returned set has them.
+    A negative torque [N m] loads the right flanks of the sun. With the set come its ``order`` (N,), see
+    `mirrored_set`, and the deviations as it has them.
     """
     if sun_torque >= 0:
         return planetary_set, np.arange(planetary_set.n_planets), deviations
@@ -309,14 +279,10 @@ def pair_separations(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-    deviations : SetDeviations, optional
     tooth : (2, 2N, pairs) int array
         Tooth numbers during the first mesh period.
-    turns : (P,) int array
-        Mesh periods passed.
-    tau : (P,) array
-        Positions [mesh periods].
+    turns, tau : (P,) int array, (P,) array
+        Mesh periods passed, and positions [mesh periods].
     back : bool
         Whether it is the back side.
     """

@@ -114,21 +114,12 @@ def loaded_period(
 
     Parameters
     ----------
-    planetary_set, bodies, contact, deviations, supports
+    planetary_set, bodies, sun_torque, contact, deviations, supports
         As for `walk_mesh_cycle`.
-    held_bodies : Bodies
+    held_bodies, progress
         See `CycleOptions`.
-    sun_torque : float
-        Of either sign [N m].
     positions : int
         Positions over the period at least; more come where the stiffness jumps or is steep.
-    progress : callable, optional
-        Called with (positions done, positions).
-
-    Raises
-    ------
-    ContactError
-        As `walk_mesh_cycle`.
     """
     symmetry = planet_symmetry(planetary_set, deviations)
     parts = symmetry // gcd(symmetry, planetary_set.sun.teeth)

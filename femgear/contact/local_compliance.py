@@ -74,14 +74,8 @@ def depth_displacement(x, depth, shear_modulus, poisson_ratio):
 def hertz_half_width(line_load: float, radius: float, modulus: float) -> float:
     """Compute the half width [m] of Hertz's line contact, ``sqrt(4 P R / (pi E*))`` (Johnson, eq. 4.43).
 
-    Parameters
-    ----------
-    line_load : float
-        ``P`` [N/m].
-    radius : float
-        Relative radius of curvature ``R`` [m].
-    modulus : float
-        Contact modulus ``E*``, ``1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2`` [Pa].
+    Line load ``P`` [N/m], relative radius of curvature ``R`` [m], contact modulus ``E*`` [Pa],
+    ``1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2``.
     """
     return float(np.sqrt(4 * line_load * radius / (np.pi * modulus)))
 

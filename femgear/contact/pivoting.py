@@ -118,11 +118,6 @@ def forward(lower, columns):
 def solve_step(problem: Problem, active: np.ndarray) -> Step:
     """Solve the linear conditions of one active set and list the candidates that violate the others.
 
-    Parameters
-    ----------
-    problem : Problem
-    active : (n,) bool array
-
     Raises
     ------
     ContactError
@@ -200,14 +195,8 @@ def _residual(problem: Problem, active, loads, gaps) -> float:
 def _settle(problem: Problem, null, gaps, active):
     """Motions that no touching candidate restrains: their shift, who cannot be judged, who must touch.
 
-    Returns
-    -------
-    shift : (k,) array
-        Amounts along the columns of `null`.
-    blocked : integer array
-        Candidates whose gaps mean nothing because no shift settles these motions.
-    forced : integer array
-        Candidates that must touch.
+    Amounts (k,) along the columns of `null`, numbers of the candidates whose gaps mean nothing because no
+    shift settles these motions, and of those that must touch.
     """
     arms = problem.G @ null
     moved = np.flatnonzero(~active & (np.abs(arms).max(axis=1) > 1e-9))
@@ -253,20 +242,8 @@ def _least_motion(arms, gaps):
 def pivot(problem: Problem, active, *, max_steps, single) -> tuple[Step, int]:
     """Flip all violations while their number falls; then, if `single`, one at a time until it falls again.
 
-    Parameters
-    ----------
-    problem : Problem
-    active : (n,) bool array
-        First active set.
-    max_steps : int
-    single : bool
-        Whether to go on with single pivots when blocks of pivots make no progress.
-
-    Returns
-    -------
-    step : Step
-        The last one; solved when its `flips` are empty.
-    iterations : int
+    From the first active set (n,); gives the last step, solved when its `flips` are empty, and the number of
+    steps.
     """
     fewest, patience = np.inf, PATIENCE
     for iteration in range(1, max_steps + 1):

@@ -134,11 +134,8 @@ class RootCycle:
     def history(self, start: int | None = None) -> _RootHistory:
         """Follow one tooth from slot to slot through the mesh.
 
-        Parameters
-        ----------
-        start : int, optional
-            Mesh period of the record in which the tooth enters the first slot, by default that of the tooth
-            with the largest stress in the root of its loaded flank; records of one period serve all teeth.
+        It enters the first slot in the mesh period ``start`` of the record; by default it is the tooth with
+        the largest stress in the root of its loaded flank. Records of one period serve all teeth.
         """
         slots, positions = self.path.shape
         if start is None:
@@ -156,10 +153,8 @@ class RootRange:
 
     Parameters
     ----------
-    kind : str
-        ``"sun"``, ``"planet"`` or ``"ring"``.
-    mesh, gear : int
-        The flank is that which gear 1 (0) or gear 2 (1) has in the mesh.
+    kind, mesh, gear
+        As those of `RootCycle`: the flank is that which the gear has in the mesh.
     point : int
         Root point with the largest difference of the two stresses.
     maximum, minimum : float
@@ -234,14 +229,7 @@ def root_stress(
 
 
 def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:
-    """Compute the root stress influence of a whole gear from what was observed with its flank compliance.
-
-    Parameters
-    ----------
-    gear : Gear
-    root : ObservedRoot
-        Of one sector of that gear, see `bodies.flank_compliance`.
-    """
+    """Compute the root stress influence of a whole gear from what `bodies.flank_compliance` observed."""
     along, stations = root.along, root.stations
     order = slice(None, None, -1 if gear.internal else 1)
     m, n = len(along.arc), len(stations.roll)
@@ -264,20 +252,10 @@ def root_stress_cycle(
 ) -> tuple[RootCycle, ...]:
     """Compute the root stress of both gears of every mesh at every position of the cycle.
 
-    Parameters
-    ----------
-    planetary_set, roots : PlanetarySet, RootStresses
-    cycle : MeshCycle
-        Of that set. The load of a tooth pair acts at its point on the line of action.
-    reverse : bool
-        Whether the cycle is that of a negative torque on the sun; the stress field is then the mirror image
-        of that on the other flanks.
-
-    Returns
-    -------
-    tuple of RootCycle
-        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on. Loads on back flanks press on the other flank
-        of the same teeth and add to both roots.
+    Of gear 1 and gear 2 of mesh 0, then of mesh 1, and so on. The load of a tooth pair acts at its point on
+    the line of action; loads on back flanks press on the other flank of the same teeth and add to both roots.
+    With ``reverse`` the cycle is that of a negative torque on the sun: the stress field is then the mirror
+    image of that on the other flanks.
     """
     N = planetary_set.n_planets
     teeth = loaded_teeth(cycle, reverse=reverse)
@@ -298,17 +276,9 @@ def root_ranges(
 ) -> tuple[RootRange, ...]:
     """Find the stress range in the root of every loaded flank, from the field of whole bodies.
 
-    Parameters
-    ----------
-    planetary_set, roots, teeth : PlanetarySet, RootStresses, LoadedTeeth
-    closes : bool
-        Whether the record repeats after its end: every tooth then meets every state that tooth numbers and
-        periods without a common divisor allow. Otherwise each tooth has what the record shows of it.
-
-    Returns
-    -------
-    tuple of RootRange
-        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on.
+    Of gear 1 and gear 2 of mesh 0, then of mesh 1, and so on. Where the record ``closes``, that is, repeats
+    after its end, every tooth meets every state that tooth numbers and periods without a common divisor
+    allow; otherwise each tooth has what the record shows of it.
     """
     N = planetary_set.n_planets
     found = {}
@@ -321,23 +291,14 @@ def root_ranges(
 def body_stress(
     planetary_set: PlanetarySet, root: _RootStress, acting, teeth: LoadedTeeth, samples, numbers
 ) -> np.ndarray:
-    """Superpose the root stress of some teeth of one body at some positions.
+    """Superpose the root stress (t, 2 m, p) [Pa] of some teeth of a body at some positions, left root first.
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
     root, acting
         Of the body, see `RootStresses.of_bodies`.
-    teeth : LoadedTeeth
-    samples : (p,) int array
-        Positions of the record.
-    numbers : (t,) int array
-        Teeth, by their numbers in the first mesh period.
-
-    Returns
-    -------
-    (t, 2 m, p) array
-        [Pa]; left root first.
+    samples, numbers : (p,), (t,) int arrays
+        Positions of the record, and teeth by their numbers in the first mesh period.
     """
     z, n = len(root.influence), len(root.roll)
     total = np.zeros((len(numbers), root.influence.shape[1], len(samples)))

@@ -39,8 +39,7 @@ class ContactState:
     residual : float
         Largest violation, before the clean-up of rounding errors: separation at touching candidates and
         penetration relative to the largest elastic displacement (at least 1e-6 of the largest gap), pull
-        and imbalance relative to the
-        largest load.
+        and imbalance relative to the largest load.
     method : str
         ``"active set"``, ``"active set, single pivots"``, ``"daqp"`` or ``"no load"``.
     open_motions : (m,) bool array
@@ -109,17 +108,11 @@ def tangent_stiffness(H, state: ContactState, mesh, window, cell, n_meshes) -> n
 
     Parameters
     ----------
-    H : (n, n) array
-        Compliance between the candidates [m/N].
-    state : ContactState
-        Loads, gaps and active set.
-    mesh : (n,) integer array
-        Mesh, 0 to ``n_meshes - 1``, of every candidate.
-    window : (n,) integer array
-        Number of its contact window, ascending.
-    cell : (n,) integer array
-        Place in its window, ascending.
-    n_meshes : int
+    H, state : (n, n) array, ContactState
+        Compliance between the candidates [m/N], and their solution.
+    mesh, window, cell : (n,) integer arrays
+        Mesh, 0 to ``n_meshes - 1``, of every candidate, number of its contact window and place in it, both
+        ascending.
 
     Returns
     -------
@@ -146,20 +139,8 @@ def mesh_tangent_matrix(H, active, mesh_of_candidate, n_meshes) -> np.ndarray:
     ``g^T (H_AA)^-1 g`` with one indicator column of ``g`` a mesh: the increments of the mesh forces per
     unit approach of each mesh while the others hold theirs.
 
-    Parameters
-    ----------
-    H, active, mesh_of_candidate, n_meshes
-        As for `tangent_stiffness`.
-
-    Returns
-    -------
-    (n_meshes, n_meshes) array
-        [N/m], symmetric; rows and columns of meshes without load are zero.
-
-    Raises
-    ------
-    ContactError
-        As `tangent_stiffness`.
+    Arguments and errors are those of `tangent_stiffness`. The (n_meshes, n_meshes) array [N/m] is symmetric;
+    rows and columns of meshes without load are zero.
     """
     index = np.flatnonzero(active)
     if not len(index):

@@ -203,11 +203,7 @@ def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
     What balances the mesh forces on the planet, whatever holds it: ``-(n_sp F_sp - n_pr F_pr)`` with the
     normals of `femgear.gears.deviations.mesh_normals` on either side of the teeth.
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    force, back_force : (2N, P) arrays
-        On drive and back flanks [N].
+    ``force`` and ``back_force`` (2N, P) [N] are those on drive and back flanks.
     """
     N = planetary_set.n_planets
     result = np.zeros((N, 2, np.shape(force)[1]))

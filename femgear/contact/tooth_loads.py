@@ -38,12 +38,8 @@ class LoadedTeeth:
 
     Parameters
     ----------
-    load, path : (2N, T, P) arrays
-        Of the drive flanks [N], [m]; positions in the order of the cycle.
-    tooth : (2, 2N, T) int array
-        See `MeshCycle`.
-    back_load, back_path, back_tooth : arrays
-        The same of the back flanks.
+    load, path, tooth, back_load, back_path, back_tooth : arrays
+        As ``tooth_load``, ``path`` ... of `MeshCycle`; positions in the order of the cycle.
     turn : (P,) int array
         Whole mesh periods passed at every position.
     periods : int
@@ -172,17 +168,8 @@ def deformed_set(
     """Compute the elastic displacement of sun, planets and ring, each held as in the static problem.
 
     The load of each tooth pair acts at its point on the line of action; the half-plane indentation, a few
-    tenths of a micrometre deep, is not part of the field.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-        With the torque on the left flanks of the sun (mirror the set otherwise).
-    sectors : Sectors
-    cycle : MeshCycle
-        Of that set.
-    position : int
-        Index into ``cycle.position``.
+    tenths of a micrometre deep, is not part of the field. The torque is on the left flanks of the sun (mirror
+    the set otherwise); ``position`` is an index into ``cycle.position``.
     """
     s = planetary_set
     at = orientations(s, float(cycle.position[position]))

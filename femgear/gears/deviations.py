@@ -166,7 +166,6 @@ def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarr
 
     Parameters
     ----------
-    gear : Gear
     cumulative : (z,) sequence, optional
         Cumulative pitch deviations on the reference circle [m].
     single : (z,) sequence, optional
@@ -189,7 +188,6 @@ def profile_separation(
 
     Parameters
     ----------
-    deviations, planetary_set : SetDeviations, PlanetarySet
     kind : int
         0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
     roll_1, roll_2 : arrays that broadcast
@@ -208,7 +206,6 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
 
     Parameters
     ----------
-    deviations : SetDeviations
     mesh : int
         0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring.
     tooth_1, tooth_2 : integer arrays that broadcast
@@ -230,7 +227,6 @@ def body_separation(
 
     Parameters
     ----------
-    deviations, planetary_set : SetDeviations, PlanetarySet
     position : (P,) array
         tau, as a fraction of mesh periods; may exceed 1.
     back : bool
@@ -299,7 +295,6 @@ def common_period(
 
     Parameters
     ----------
-    deviations, planetary_set : SetDeviations, PlanetarySet
     limit : int
         Most mesh periods wanted. Beyond it the record is one turn of the carrier against the ring, z_r mesh
         periods, or the limit when even that is too long; it then does not close.

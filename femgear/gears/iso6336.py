@@ -136,10 +136,8 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
     Parameters
     ----------
     gear : Gear
-    contact_ratio : float
-        Transverse contact ratio with its mate, 1 to 2.5.
-    tangential_force : float
-        F_t at the reference circle [N], not negative.
+    contact_ratio, tangential_force : float
+        As for `nominal_contact_stress`, with its mate.
 
     Raises
     ------

@@ -116,11 +116,7 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
 def planet_motion(sun: Any, carrier: Any, sun_teeth: Any, planet_teeth: Any) -> tuple[Any, Any]:
     """Speed of the planets about their own axes [rad/s] and mesh frequency [Hz].
 
-    Parameters
-    ----------
-    sun, carrier : float or (S,) array
-        Speeds [rad/s], of one set or of several.
-    sun_teeth, planet_teeth : int or (S,) array
+    From the speeds of sun and carrier [rad/s] and the teeth, all numbers or arrays (S,) of several sets.
     """
     relative = sun - carrier
     return carrier - relative * sun_teeth / planet_teeth, abs(relative) * sun_teeth / (2.0 * math.pi)

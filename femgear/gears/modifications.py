@@ -115,18 +115,10 @@ class FlankForm:
 
 
 def form_deviation(form: FlankForm, gear: Gear, roll):
-    """Compute the material removed from a flank at roll lengths.
+    """Compute the material removed from a flank at roll lengths (array of any shape) [m].
 
-    Parameters
-    ----------
-    form, gear : FlankForm, Gear
-    roll : array, any shape
-        Roll lengths [m]; beyond the ends of the involute flank the value of that end holds.
-
-    Returns
-    -------
-    array of the shape of `roll`
-        Separation along the flank normal [m], positive where material is missing.
+    It is the separation along the flank normal [m], positive where material is missing; beyond the ends of
+    the involute flank the value of that end holds.
     """
     low, high = sorted((gear.form_roll, gear.tip_roll))
     roll = np.clip(np.asarray(roll, float), low, high)

@@ -132,10 +132,9 @@ def mesh_phasing(
 
     Parameters
     ----------
-    sun_teeth, ring_teeth : int
     planet_angles : (N,) sequence of float
         psi_n [rad], ascending within one turn.
-    rotation, flank, convention, lag
+    sun_teeth, ring_teeth, rotation, flank, convention, lag
         See `MeshPhasing`.
 
     Raises
@@ -156,11 +155,7 @@ def phasing_of_set(
 ) -> MeshPhasing:
     """Find the phases of a geared set, the lag of its planets from the real thickness of their teeth.
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    rotation, flank, convention
-        See `MeshPhasing`.
+    ``rotation``, ``flank`` and ``convention`` are those of `MeshPhasing`.
     """
     s, phases = planetary_set, planetary_set.mesh_phases
     options = {"rotation": rotation, "flank": flank, "convention": convention}
@@ -303,11 +298,6 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
     meshes, so that its resultant is sure to vanish where those of sun and ring both do. A. Kahraman (J. Mech.
     Des. 116, 1994, 713-720, Table 1) has the case of four equal planets, R. G. Parker (J. Sound Vib. 236,
     2000, 561-573) the sums for equal spacing.
-
-    Parameters
-    ----------
-    phasing : MeshPhasing
-    harmonics : (H,) sequence of int
 
     Raises
     ------

@@ -112,10 +112,7 @@ class PlanetarySet:
 
     @property
     def path_planet_ring(self) -> tuple[float, float]:
-        """Path coordinates [m] of first (ring tip) and last (planet tip) contact, 0 at the pitch point.
-
-        Undercut shortens the path to what is left of the involute.
-        """
+        """As `path_sun_planet`, of first (ring tip) and last (planet tip) contact [m]."""
         tangent = math.tan(self.working_pressure_angle_planet_ring)
         planet, ring = self.planet.base_radius * tangent, self.ring.base_radius * tangent
         start = max(self.ring.tip_roll - ring, _undercut_roll(self.planet) - planet)
@@ -200,30 +197,23 @@ def close_set(
     centre_distance : float, optional
         [m]; None takes the distance at which the given shifts run without play.
     find : tuple of str
-        Gears whose profile shift is found so that the mesh has no play before thickness allowances:
-        ("sun",), ("ring",), or with a centre distance any two of "sun", "planet", "ring". Without a distance
-        the mesh that is not to be found sets it.
+        Gears whose profile shift is found so that the mesh has no play before thickness allowances: "sun",
+        "ring", or with a centre distance both. Without a distance the other mesh sets it.
 
     Raises
     ------
     GeometryError
-        Meshes that ask for different centre distances (E-COAXIAL), shifts not determined (E-SHIFT), an
-        impossible centre distance (E-CENTRE-DISTANCE, E-GEOMETRY), or a gear that the shift found spoils.
+        Meshes that ask for different centre distances (E-COAXIAL), an impossible centre distance
+        (E-CENTRE-DISTANCE, E-GEOMETRY), or a gear that the shift found spoils.
     """
     sun, planet, ring = (replace(g, name=n) for g, n in ((sun, "sun"), (planet, "planet"), (ring, "ring")))
-    _check_find(find, centre_distance)
     if centre_distance is None:
         centre_distance = _free_distance(sun, planet, ring, find)
     total = zero_backlash_shift(sun, planet, centre_distance)  # x_sun + x_planet
     difference = zero_backlash_shift(planet, ring, centre_distance)  # x_ring - x_planet
-    x_sun, x_planet, x_ring = sun.profile_shift, planet.profile_shift, ring.profile_shift
-    if "planet" in find:
-        x_planet = x_ring - difference if "sun" in find else total - x_sun
-    x_sun = total - x_planet if "sun" in find else x_sun
-    x_ring = difference + x_planet if "ring" in find else x_ring
-    shifts = ((sun, x_sun), (planet, x_planet), (ring, x_ring))
-    gears = [gear if x == gear.profile_shift else replace(gear, profile_shift=x) for gear, x in shifts]
-    return PlanetarySet(gears[0], gears[1], gears[2], centre_distance, planet_angles)
+    found = {"sun": total - planet.profile_shift, "ring": difference + planet.profile_shift}
+    sun, ring = (replace(g, profile_shift=found[g.name]) if g.name in find else g for g in (sun, ring))
+    return PlanetarySet(sun, planet, ring, centre_distance, planet_angles)
 
 
 def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:
@@ -240,17 +230,8 @@ def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
     Rims keep their thickness beside the roots. The ring's profile shift is found, which takes up that the
     tooth numbers were rounded.
 
-    Parameters
-    ----------
-    gears : PlanetarySet
-        Of the transverse section.
-    helix_angle : float
-        [rad]
-
-    Raises
-    ------
-    GeometryError
-        Where virtual gears cannot be made.
+    ``gears`` are those of the transverse section, the helix angle is in rad. GeometryError where virtual
+    gears cannot be made.
     """
     sun, planet, ring = virtual_teeth(gears, helix_angle)
     return close_set(
@@ -480,19 +461,3 @@ def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -
             remedy="give centre_distance and let the profile shifts of sun or ring be found",
         )
     return first
-
-
-def _check_find(find: tuple[str, ...], centre_distance: float | None) -> None:
-    """Refuse shifts that the conditions of two meshes do not determine (E-SHIFT)."""
-    free = centre_distance is None
-    some = set(find) <= ({"sun", "ring"} if free else {"sun", "planet", "ring"}) and find != ("planet",)
-    if not some or len(set(find)) != len(find) or len(find) > (1 if free else 2):
-        raise GeometryError(
-            f"the profile shifts of {', '.join(find)} cannot be found {'without' if free else 'from'} a "
-            "centre distance: two meshes give two conditions",
-            code="E-SHIFT",
-            key="set.centre_distance",
-            value=find,
-            limit="sun, ring" + ("" if free else ", or two of sun, planet, ring"),
-            remedy="fix the other profile shifts",
-        )

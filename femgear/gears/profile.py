@@ -52,12 +52,7 @@ def _plain(value: np.ndarray) -> Any:
 
 
 def arcinv(value) -> Any:
-    """Pressure angle [rad] in [0, pi/2) whose involute is `value`, inverse of `inv` to double precision.
-
-    Parameters
-    ----------
-    value : float or array
-        ``inv(angle)`` [rad], >= 0.
+    """Pressure angle [rad] in [0, pi/2) whose involute is `value` [rad] (float or array), inverse of `inv`.
 
     Raises
     ------

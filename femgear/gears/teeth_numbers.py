@@ -133,17 +133,6 @@ def neighbouring_teeth(
 def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     """Refuse tooth numbers that make no set, and remark on those that shifts must help to one.
 
-    Parameters
-    ----------
-    phasing : MeshPhasing
-        Teeth of sun and ring, and places of the planets.
-    planet_teeth : int
-
-    Returns
-    -------
-    tuple of str
-        Remarks.
-
     Raises
     ------
     GeometryError

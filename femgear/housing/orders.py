@@ -20,16 +20,13 @@ class OrderSpectrum(ReadOnlyArrays):
     Parameters
     ----------
     order : (n_orders,) array
-        Carrier orders k / revolutions from 0 upwards.
+        Carrier orders from 0 upwards.
     value : (..., n_orders) complex array
         Complex amplitudes in the unit of the signal (peak values, not r.m.s.).
-    revolutions : int
-        Carrier revolutions that the spectrum resolves; 1 gives whole orders.
     """
 
     order: np.ndarray
     value: np.ndarray
-    revolutions: int = 1
 
     @property
     def amplitude(self) -> np.ndarray:
@@ -48,27 +45,26 @@ class Line:
 
 @dataclass(frozen=True)
 class Lobes(ReadOnlyArrays):
-    """Lobes of an envelope, one carrier revolution or several.
+    """Lobes of an envelope over one carrier revolution.
 
     Parameters
     ----------
     position : (n_lobes,) array
-        Places of the maxima as fractions of the record, ascending.
+        Places of the maxima as fractions of the revolution, ascending.
     height : (n_lobes,) array
         Envelope there.
-    prominence : (n_lobes,) array
-        How far each stands out from its surroundings, in the unit of the envelope.
     threshold : float
         Prominence from which a maximum was counted, as a share of the largest envelope value.
-    per_revolution : float
-        Number of lobes a carrier revolution.
     """
 
     position: np.ndarray
     height: np.ndarray
-    prominence: np.ndarray
     threshold: float
-    per_revolution: float
+
+    @property
+    def per_revolution(self) -> float:
+        """Number of lobes a carrier revolution."""
+        return float(len(self.position))
 
 
 @dataclass(frozen=True)
@@ -98,39 +94,29 @@ class BandAnalysis(ReadOnlyArrays):
     lobes: Lobes
 
 
-def order_spectrum(signal, *, revolutions: int = 1) -> OrderSpectrum:
-    """Compute the order spectrum of a signal that spans whole carrier revolutions (no window, no leakage).
+def order_spectrum(signal) -> OrderSpectrum:
+    """Compute the order spectrum of a signal that spans one carrier revolution (no window, no leakage).
 
     Parameters
     ----------
     signal : (..., n_samples) array
         Equidistant samples, end point excluded.
-    revolutions : int
-        Carrier revolutions in the record.
-
-    Returns
-    -------
-    OrderSpectrum
 
     Raises
     ------
     CaseError
-        ``E-SHAPE`` for samples that are not finite or less than two, or no whole number of revolutions.
+        ``E-SHAPE`` for samples that are not finite or less than two.
     """
     signal = np.asarray(signal, dtype=float)
     n = signal.shape[-1] if signal.ndim else 0
-    if n < 2 or not np.all(np.isfinite(signal)) or revolutions != int(revolutions) or revolutions < 1:
-        raise CaseError(
-            f"a signal of {n} samples over {revolutions} revolutions has no order spectrum",
-            code="E-SHAPE",
-            limit="two or more finite samples over a whole number of carrier revolutions",
-            remedy="cut the record to whole revolutions",
-        )
+    if n < 2 or not np.all(np.isfinite(signal)):
+        message = f"a signal of {n} samples has no order spectrum"
+        raise CaseError(message, code="E-SHAPE", limit="two or more finite samples over a carrier revolution")
     value = np.fft.rfft(signal, axis=-1) * (2 / n)
     value[..., 0] /= 2
     if n % 2 == 0:
         value[..., -1] /= 2
-    return OrderSpectrum(np.arange(value.shape[-1]) / revolutions, value, int(revolutions))
+    return OrderSpectrum(np.arange(float(value.shape[-1])), value)
 
 
 def order_level(lines: SensorLines) -> np.ndarray:
@@ -144,14 +130,9 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
     Parameters
     ----------
     spectrum : OrderSpectrum
-        Values of shape (..., n_orders).
+        Values of shape (..., n_orders), in the result zero outside the band.
     low, high : float
         Carrier orders, both included.
-
-    Returns
-    -------
-    OrderSpectrum
-        Of the same shape, zero outside the band.
 
     Raises
     ------
@@ -167,27 +148,19 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
             limit=f"0 < low <= high, low <= {spectrum.order[-1]}",
             remedy="choose a mesh harmonic that the response contains",
         )
-    return OrderSpectrum(spectrum.order, np.where(inside, spectrum.value, 0), spectrum.revolutions)
+    return OrderSpectrum(spectrum.order, np.where(inside, spectrum.value, 0))
 
 
 def analytic_signal(spectrum: OrderSpectrum) -> np.ndarray:
-    """Compute the analytic signal sum_k value[k] exp(i order[k] theta); its modulus is the envelope.
+    """Compute the analytic signal sum_k value[k] exp(i order[k] theta), (..., 4 n_orders) complex samples.
 
-    Parameters
-    ----------
-    spectrum : OrderSpectrum
-        Values of shape (..., n_orders).
-
-    Returns
-    -------
-    (..., 4 n_orders) complex array
-        Samples over the record.
+    Its modulus is the envelope.
     """
     count = 4 * spectrum.value.shape[-1]
     return np.fft.ifft(spectrum.value, count, axis=-1) * count
 
 
-def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int = 1) -> Lobes:
+def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
     """Count the maxima of a periodic envelope that stand out by at least `threshold` times its largest value.
 
     The record is turned until it begins and ends at its lowest value, so that its seam is no edge
@@ -196,11 +169,9 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int =
     Parameters
     ----------
     periodic_envelope : (n_samples,) array
-        Envelope over whole carrier revolutions, not negative.
+        Envelope over one carrier revolution, not negative.
     threshold : float
         Least prominence as a share of the largest envelope value, 0 < threshold < 1.
-    revolutions : int
-        Carrier revolutions in the record.
 
     Raises
     ------
@@ -220,37 +191,19 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int =
         )
     largest = values.max()
     if largest == 0:
-        return Lobes(np.empty(0), np.empty(0), np.empty(0), threshold, 0.0)
+        return Lobes(np.empty(0), np.empty(0), threshold)
     start = int(values.argmin())
     turned = np.append(np.roll(values, -start), values[start])
-    peaks, properties = find_peaks(turned, prominence=threshold * largest)
+    peaks, _ = find_peaks(turned, prominence=threshold * largest)
     place = (peaks + start) % values.size
     by_place = np.argsort(place)
-    return Lobes(
-        place[by_place] / values.size,
-        turned[peaks][by_place],
-        properties["prominences"][by_place],
-        threshold,
-        peaks.size / revolutions,
-    )
+    return Lobes(place[by_place] / values.size, turned[peaks][by_place], threshold)
 
 
 def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6) -> tuple[Line, ...]:
     """List the strongest lines with orders low..high of one spectrum, strongest first, down to -60 dB.
 
-    Parameters
-    ----------
-    spectrum : OrderSpectrum
-        Of one signal: value of shape (n_orders,).
-    low, high : float
-        Carrier orders, both included.
-    count : int
-        Largest number of lines.
-
-    Returns
-    -------
-    tuple of Line
-        Empty where the band is silent.
+    There are ``count`` lines at most, none where the band is silent.
 
     Raises
     ------
@@ -289,18 +242,12 @@ def analyse_band(
     ----------
     spectrum : OrderSpectrum
         Of one signal.
-    z_ring : int
-        Teeth of the ring: the band is centred on order ``harmonic z_ring``.
-    harmonic : int
-        Mesh harmonic, 1 upwards.
+    z_ring, harmonic : int
+        The band is centred on order ``harmonic z_ring``.
     half_width : int, optional
         Orders on either side; default (z_ring - 1) // 2, so that bands do not overlap.
     count : int
         Largest number of lines listed.
-
-    Returns
-    -------
-    BandAnalysis
 
     Raises
     ------
@@ -313,5 +260,5 @@ def analyse_band(
     lines = dominant_lines(spectrum, low=low, high=high, count=count)
     analytic = analytic_signal(band_pass(spectrum, low, high))
     envelope = np.abs(analytic)
-    lobes = count_lobes(envelope, revolutions=spectrum.revolutions)
+    lobes = count_lobes(envelope)
     return BandAnalysis(harmonic, low, high, lines, np.real(analytic), envelope, lobes)

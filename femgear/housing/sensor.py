@@ -12,8 +12,8 @@ iterative approach - Modulation effects induced by carrier rotation", Eqs. (13)-
 (`heaviside_linear_lines`). As printed there the arguments of the Heaviside functions are reversed and
 1/(t_{i+1} - t_i) is missing.
 
-Linear interpolation of exp(i n phi) between points first_point + 2 pi j / P is the sum over all
-integers q of sinc^2(m/P) exp(i m phi) exp(-i q P first_point) with m = n + q P and
+Linear interpolation of exp(i n phi) between points 2 pi j / P is the sum over all
+integers q of sinc^2(m/P) exp(i m phi) with m = n + q P and
 sinc(x) = sin(pi x)/(pi x): samples repeat a component with period P, the hat function weighs every
 copy with its transform. So n itself is attenuated by sinc^2(n/P) and has images at m weaker by (n/m)^2.
 The interpolated displacement has a kink whenever the sensor passes a point: its lines fall like
@@ -108,18 +108,12 @@ class HousingSignal(ReadOnlyArrays):
         Radial displacement [m], positive outwards.
     acceleration : (..., n_times) array
         Radial acceleration of the fixed point [m/s^2].
-    sensor_angle : float
-        Position of the sensor on the housing [rad].
-    method : str
-        Where the lines came from, as in `SensorLines`.
     """
 
     revolution: np.ndarray
     seconds: np.ndarray
     displacement: np.ndarray
     acceleration: np.ndarray
-    sensor_angle: float
-    method: str
 
 
 def fixed_sensor_lines(
@@ -127,15 +121,11 @@ def fixed_sensor_lines(
     z_ring: int,
     carrier_speed,
     sensor_angle: float,
-    *,
-    mesh_frequency=None,
-    max_order: int | None = None,
 ) -> SensorLines:
     """Compute the lines of a fixed sensor: component (h, n) at order ``h z_ring - sign(carrier_speed) n``.
 
     Components that fall on the same order add with their phases; negative orders are folded to
-    positive ones (the conjugate). Where the carrier stands still there is no modulation and every
-    component of harmonic h is heard at order ``h z_ring``.
+    positive ones (the conjugate). The mesh frequency is that of a fixed ring.
 
     Parameters
     ----------
@@ -147,22 +137,16 @@ def fixed_sensor_lines(
         Speed of the carrier [rad/s], counter-clockwise positive, one a speed; all of one direction.
     sensor_angle : float
         Angle of the sensor on the housing [rad], where the carrier frame is at time zero.
-    mesh_frequency : float or (...) array, optional
-        Mesh frequency [Hz]. Needed where the carrier stands still; otherwise it must be
-        ``z_ring |carrier_speed| / (2 pi)``, that is, the ring is fixed.
-    max_order : int, optional
-        Highest carrier order; default: the larger of (H + 1) z_ring and H z_ring + n_max, so that no
-        line is lost.
 
     Raises
     ------
     CaseError
-        ``E-SHAPE``, ``E-TEETH``, ``E-SPEED``, ``E-HARMONICS``: data of the wrong shape or not finite, speeds
-        of both directions, a ring that turns.
+        ``E-SHAPE``, ``E-TEETH``, ``E-SPEED``, ``E-RANGE``: data of the wrong shape or not finite, a carrier
+        that stands still, speeds of both directions.
     """
     field, n = _checked_field(field)
-    direction, base_speed = _motion(field, z_ring, carrier_speed, mesh_frequency)
-    top = _top_order(field, z_ring, max_order)
+    direction, base_speed = _motion(field, z_ring, carrier_speed)
+    top = _top_order(field, z_ring)
     heard = field * np.exp(1j * n * _checked_angle(sensor_angle))
     two_sided = _heard_orders(heard, z_ring, direction, top)
     return SensorLines(
@@ -177,45 +161,34 @@ def heaviside_linear_lines(
     sensor_angle: float,
     *,
     points: int = 54,
-    first_point: float = 0.0,
-    mesh_frequency=None,
     max_order: int | None = None,
 ) -> SensorLines:
     """Compute the lines of the Heaviside/linear form over P points of the ring (paper Eqs. (13)-(16)).
 
-    The acceleration has no natural end, see the head of this module: the order range is limited,
-    default (H + 1) z_ring. P should be a multiple of the number of planets (or the points break the
-    symmetry of the set) and more than twice the largest n that matters.
+    Point 0 is at angle 0 of the carrier frame. The acceleration has no natural end, see the head of this
+    module: the order range is limited. P should be a multiple of the number of planets (or the points break
+    the symmetry of the set) and more than twice the largest n that matters.
 
     Parameters
     ----------
-    field, z_ring, carrier_speed, sensor_angle, mesh_frequency, max_order
+    field, z_ring, carrier_speed, sensor_angle
         As in `fixed_sensor_lines`.
     points : int
         Number P of equidistant points on the ring.
-    first_point : float
-        Carrier-frame angle of point 0 [rad].
-
-    Returns
-    -------
-    SensorLines
+    max_order : int, optional
+        Highest carrier order, by default that of `fixed_sensor_lines`.
 
     Raises
     ------
     CaseError
-        As `fixed_sensor_lines`, and ``E-SYMMETRY`` for less than 3 points.
+        As `fixed_sensor_lines`, and ``E-SYMMETRY`` for less than 3 points, ``E-HARMONICS`` for no orders.
     """
     field, n = _checked_field(field)
     points = checked_count(points, "points", code="E-SYMMETRY", least=3)
-    direction, base_speed = _motion(field, z_ring, carrier_speed, mesh_frequency)
+    direction, base_speed = _motion(field, z_ring, carrier_speed)
     top = _top_order(field, z_ring, max_order)
-    away = _checked_angle(sensor_angle) - _checked_angle(first_point)
-    sampled = _sampled_components(field, n, points, first_point)
-    if direction == 0:
-        standing = _between_points(sampled, points, away)
-        two_sided = _heard_orders(standing[..., None], z_ring, 0, top)
-    else:
-        two_sided = _interpolated_orders(sampled, z_ring, direction, top, away)
+    sampled = _sampled_components(field, n, points)
+    two_sided = _interpolated_orders(sampled, z_ring, direction, top, _checked_angle(sensor_angle))
     method = f"linear, {points} points"
     lines = _folded(two_sided)
     return SensorLines(np.arange(top + 1), lines, base_speed, float(sensor_angle), int(z_ring), method)
@@ -233,8 +206,6 @@ def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
         2 * np.pi * revolution / lines.base_speed[..., None],
         _synthesised(lines.displacement, count),
         _synthesised(lines.acceleration, count),
-        lines.sensor_angle,
-        lines.method,
     )
 
 
@@ -285,44 +256,24 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
     return np.swapaxes(riding @ harmonics, -1, -2)
 
 
-def _motion(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> tuple[int, np.ndarray]:
-    """Find the direction +1, 0 or -1 of the carrier and the speed that orders count (...) [rad/s]."""
+def _motion(field: np.ndarray, z_ring: int, carrier_speed) -> tuple[int, np.ndarray]:
+    """Find the direction +1 or -1 of the carrier and the speed that orders count (...) [rad/s]."""
     checked_count(z_ring, "ring teeth", code="E-TEETH")
     speed = np.asarray(carrier_speed, dtype=float)
     direction = np.unique(np.sign(speed))
-    if speed.shape != field.shape[:-2] or not np.all(np.isfinite(speed)) or direction.size != 1:
+    usable = speed.shape == field.shape[:-2] and np.all(np.isfinite(speed))
+    if not usable or direction.size != 1 or direction[0] == 0:
         raise CaseError(
             f"carrier speeds of shape {speed.shape}, directions {direction.tolist()}, do not fit the field",
             code="E-SPEED",
             value=carrier_speed,
-            limit=f"finite speeds of shape {field.shape[:-2]}, all of one direction",
+            limit=f"finite speeds of shape {field.shape[:-2]}, all of one direction, none zero",
             remedy="one speed for every field; split a sweep where the carrier changes direction",
         )
-    expected = z_ring * np.abs(speed)
-    given = expected if mesh_frequency is None else 2 * np.pi * np.asarray(mesh_frequency, dtype=float)
-    standing = direction[0] == 0
-    if given.shape != speed.shape or not np.all(given > 0) or not np.all(np.isfinite(given)):
-        raise CaseError(
-            "the mesh frequency is missing or not positive"
-            if standing
-            else "the mesh frequency is not usable",
-            code="E-SPEED",
-            value=mesh_frequency,
-            limit=f"positive mesh frequencies [Hz] of shape {speed.shape}",
-            remedy="give mesh_frequency: a carrier that stands still does not tell it",
-        )
-    if not standing and not np.allclose(given, expected, rtol=1e-6, atol=0):
-        raise CaseError(
-            "the mesh frequency is not that of a fixed ring, and a housing sensor does not ride on another",
-            code="E-SPEED",
-            value=mesh_frequency,
-            limit="z_ring |carrier_speed| / (2 pi)",
-            remedy="use a set whose ring or carrier is fixed",
-        )
-    return int(direction[0]), given / z_ring
+    return int(direction[0]), z_ring * np.abs(speed) / z_ring
 
 
-def _top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
+def _top_order(field: np.ndarray, z_ring: int, max_order: int | None = None) -> int:
     """Choose the highest carrier order of the lines: as asked for, or that of the highest component."""
     if max_order is not None:
         return checked_count(max_order, "carrier orders", code="E-HARMONICS")
@@ -361,9 +312,6 @@ def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> n
     """Collect two-sided lines -top..top: every component added at order h z_ring - direction n."""
     n_max = heard.shape[-1] // 2
     two_sided = np.zeros((*heard.shape[:-2], 2 * top + 1), dtype=complex)
-    if direction == 0:
-        heard = heard.sum(axis=-1, keepdims=True)
-        n_max = 0
     ascending = heard[..., ::-1] if direction > 0 else heard
     for h in range(heard.shape[-2]):
         low, high = h * z_ring - n_max, h * z_ring + n_max
@@ -381,12 +329,11 @@ def _folded(two_sided: np.ndarray) -> np.ndarray:
     return lines
 
 
-def _sampled_components(field: np.ndarray, n: np.ndarray, points: int, first_point: float) -> np.ndarray:
+def _sampled_components(field: np.ndarray, n: np.ndarray, points: int) -> np.ndarray:
     """Find the components that P points tell apart: sums over one residue of n modulo P, phase at point 0."""
-    at_first = field * np.exp(1j * n * first_point)
     sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
     for residue in np.unique(n % points):
-        sampled[..., residue] = at_first[..., n % points == residue].sum(axis=-1)
+        sampled[..., residue] = field[..., n % points == residue].sum(axis=-1)
     return sampled
 
 
@@ -401,14 +348,6 @@ def _interpolated_orders(
         m = direction * (h * z_ring - order)
         two_sided += sampled[..., h, m % points] * (np.sinc(m / points) ** 2 * np.exp(1j * m * away))
     return two_sided
-
-
-def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray:
-    """Evaluate the linear interpolation at the angle `away` from point 0."""
-    at_points = np.fft.ifft(sampled, axis=-1) * points
-    place = away * points / (2 * np.pi)
-    i = int(np.floor(place))
-    return (1 - (place - i)) * at_points[..., i % points] + (place - i) * at_points[..., (i + 1) % points]
 
 
 def _synthesised(lines: np.ndarray, samples: int) -> np.ndarray:

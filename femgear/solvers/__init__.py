@@ -8,17 +8,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from femgear.solvers.continuation.branches import (
-        branch_maximum,
-        crossing_branches,
-        frequency_response_curve,
-        parameter_curve,
-    )
+    from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
     from femgear.solvers.linear.modal import complex_modes, solve_modes
-    from femgear.solvers.linear.receptance import direct_response, modal_response
+    from femgear.solvers.linear.receptance import modal_response
     from femgear.solvers.linear.tracking import campbell_data
     from femgear.solvers.periodic.harmonic_balance import (
-        adapt_harmonics,
         displacements,
         periodic_response,
         solve_harmonic_balance,
@@ -27,10 +21,8 @@ if TYPE_CHECKING:
     from femgear.solvers.periodic.spectral import solve_spectral
     from femgear.solvers.stability.floquet import floquet_verdict
     from femgear.solvers.stability.lyapunov import lyapunov_exponents
-    from femgear.solvers.stability.parametric import stability_boundary, stability_chart
+    from femgear.solvers.stability.parametric import stability_chart
     from femgear.solvers.time.stroboscopic import (
-        bifurcation_diagram,
-        stroboscopic_section,
         sweep_response,
         sweep_up_and_down,
     )
@@ -52,13 +44,8 @@ def lazy_names(
 
 
 __all__ = [
-    "adapt_harmonics",
-    "bifurcation_diagram",
-    "branch_maximum",
     "campbell_data",
     "complex_modes",
-    "crossing_branches",
-    "direct_response",
     "displacements",
     "floquet_verdict",
     "frequency_response_curve",
@@ -71,9 +58,7 @@ __all__ = [
     "solve_shooting",
     "solve_spectral",
     "solve_transient",
-    "stability_boundary",
     "stability_chart",
-    "stroboscopic_section",
     "sweep_response",
     "sweep_up_and_down",
 ]

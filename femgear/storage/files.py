@@ -103,13 +103,8 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
 def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
     """Write a file under a temporary name, force it to the disk, then give it its name.
 
-    Parameters
-    ----------
-    path : path-like
-    write : callable
-        Is given the temporary path, in the same folder and with the same suffix.
-    size : int
-        Bytes to come; refused beforehand where the disk has not that much left.
+    ``write`` is given the temporary path, in the same folder and with the same suffix; ``size`` bytes are
+    refused beforehand where the disk has not that much left.
 
     Raises
     ------
@@ -151,13 +146,7 @@ def checksum(path: str | os.PathLike) -> str:
 
 
 def checked_name(name: str) -> str:
-    """Refuse a name that some file system does not take as one plain file name.
-
-    Raises
-    ------
-    StorageError
-        ``E-CHOICE``.
-    """
+    """Refuse (E-CHOICE) a name that some file system does not take as one plain file name."""
     if not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.startswith(".") or name.endswith("."):
         raise StorageError(
             "not a safe file name",

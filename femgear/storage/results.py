@@ -211,10 +211,7 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
 def folder_lock(folder: str | os.PathLike):
     """Lock a results folder: in this context no other process writes into it (readers need no lock).
 
-    Raises
-    ------
-    StorageError
-        ``E-LOCKED`` while another run holds the folder; ``E-RESULTS-MISSING``: no such folder.
+    Refuses a folder that another run holds (E-LOCKED), or that is not there (E-RESULTS-MISSING).
     """
     _refuse_missing(Path(folder))
     return exclusive_lock(Path(folder) / LOCK)
@@ -223,15 +220,7 @@ def folder_lock(folder: str | os.PathLike):
 def prepare_output(folder: str | os.PathLike) -> Path:
     """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
 
-    Parameters
-    ----------
-    folder : path-like
-        As of `run_folder`.
-
-    Returns
-    -------
-    Path
-        The folder, with a manifest that says that the run is not complete.
+    It then has a manifest that says that the run is not complete.
 
     Raises
     ------

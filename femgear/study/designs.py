@@ -164,17 +164,8 @@ def open_designs(
     case : Case
     keys : sequence of tuple of str
         Entries of the case file that every value of a point sets.
-    journal : path-like, optional
-        File of the records; an interrupted search goes on from them.
-    cache : path, optional
-        Folder of generated grids; only those of the case itself are kept.
-    progress : callable, optional
-        Called with (stage, done, total).
-
-    Raises
-    ------
-    StorageError
-        See `femgear.storage.journal.open_journal`.
+    journal, cache, progress
+        As for `search.minimise`; only grids of the case itself are kept.
     """
     fingerprint = hashlib.sha256(to_toml(case).encode()).hexdigest()
     names = tuple(" = ".join(entries) for entries in keys)
@@ -283,17 +274,9 @@ class Evaluations:
 
 
 @contextmanager
-def evaluations(
-    problem: Problem,
-    *,
-    journal: str | Path | None = None,
-    cache: Path | None = None,
-    max_designs: int | None = None,
-    progress: Progress | None = None,
-) -> Iterator[Evaluations]:
-    """Evaluations of a problem; parameters as for `open_designs`."""
-    keys = [variable.keys for variable in problem.variables]
-    with open_designs(problem.case, keys, journal=journal, cache=cache, progress=progress) as designs:
+def evaluations(problem: Problem, *, max_designs: int | None = None, **options) -> Iterator[Evaluations]:
+    """Evaluations of a problem, of so many different designs at most; options as for `open_designs`."""
+    with open_designs(problem.case, [variable.keys for variable in problem.variables], **options) as designs:
         yield Evaluations(problem, designs, max_designs=max_designs)
 
 
@@ -329,19 +312,9 @@ def tolerances(
 ) -> tuple[tuple[Tolerance, ...], dict[str, float]]:
     """Every variable off by its tolerance, alone; and all of them at once, each to its worse side.
 
-    Parameters
-    ----------
-    evaluations : Evaluations
-    x : (n,) sequence
-        The optimum, in the units of the variables. Points may lie outside the bounds.
-    quantities : sequence of Quantity
-        The first says which side is the worse one.
-
-    Returns
-    -------
-    tuple of Tolerance
-    dict
-        Quantities by name, all variables off at once; NaN where that cannot be computed.
+    About the optimum ``x`` (n,) in the units of the variables; points may lie outside the bounds. The first
+    of the quantities says which side is the worse one. With all variables off at once quantities are given
+    by name, NaN where that cannot be computed.
     """
     x, found = np.array(x, float), []
     worse = x.copy()

@@ -98,10 +98,6 @@ def pareto_front(
         As for `minimise`; an optimum of the first objective is a good start. Of the options samples, seed and
         designs at most are taken.
 
-    Returns
-    -------
-    ParetoFront
-
     Raises
     ------
     CaseError

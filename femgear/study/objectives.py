@@ -232,10 +232,8 @@ def mesh_force(
 
     Parameters
     ----------
-    first, last : str
-        Input speeds with their unit.
-    speeds : int
-        Number of equidistant speeds.
+    first, last, speeds : str, str, int
+        Input speeds with their unit, and number of equidistant speeds.
     part : {"dynamic", "peak"}
         Largest deviation from the mean, or largest force.
     """
@@ -249,18 +247,10 @@ def mesh_force(
 
 
 def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
-    """Largest force, or largest deviation from its mean, of every speed and mesh [N].
+    """Largest force, or largest deviation from its mean, of every speed and mesh (speeds, meshes) [N].
 
-    Parameters
-    ----------
-    force : (speeds, meshes, H + 1) complex array
-        ``F(t) = Re sum_h F_h exp(i h omega t)``.
-    dynamic : bool
-
-    Returns
-    -------
-    (speeds, meshes) array
-        From sixteen samples a period of the highest harmonic: within 2 % of its amplitude.
+    Of the harmonics ``force`` (speeds, meshes, H + 1), ``F(t) = Re sum_h F_h exp(i h omega t)``, from sixteen
+    samples a period of the highest one: within 2 % of its amplitude.
     """
     harmonics = force.shape[-1]
     padded = np.zeros((*force.shape[:2], 8 * harmonics + 1), complex)
@@ -373,11 +363,7 @@ NAMES = tuple(_WORDS)
 def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
     """Quantity of some words, one of `NAMES`.
 
-    Parameters
-    ----------
-    words : str
-    speeds : (str, str), optional
-        First and last speed of the input, for mesh forces and housing levels.
+    Mesh forces and housing levels need the first and the last speed of the input, with units.
 
     Raises
     ------

@@ -18,7 +18,7 @@ import numpy as np
 from femgear.case import text as case_text
 from femgear.case.case import planetary_set
 from femgear.case.sections import Case
-from femgear.case.units import LENGTH, Dimension, to_si
+from femgear.case.units import Dimension, to_si
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.study.objectives import NUMBER, Quantity, Speeds, named_quantity
@@ -372,30 +372,15 @@ def _number(text: str) -> str | float:
         return text
 
 
-def tip_reliefs(case: Case, *, largest: str | None = None) -> tuple[Case, tuple[Variable, ...]]:
+def tip_reliefs(case: Case) -> tuple[Case, tuple[Variable, ...]]:
     """The case with one more linear tip relief on every loaded flank; amounts and starts are the variables.
 
     Sun and ring have one each, planets one for the flank that touches the sun and one for that which touches
-    the ring. The amounts are zero, so that the case computes as before. Starts lie between the pitch circle
-    and near the tip.
-
-    Parameters
-    ----------
-    case : Case
-        Its modifications stay; amounts get a tolerance of 1 um, diameters one of 0.1 mm.
-    largest : str, optional
-        Largest amount, with its unit; a hundredth of the module when left out.
-
-    Raises
-    ------
-    CaseError
-        E-RANGE: a largest amount that is not over 0 and at most 0.2 modules.
+    the ring. The amounts are zero, so that the case computes as before, and reach to a hundredth of the
+    module, with a tolerance of 1 um. Starts lie between the pitch circle and near the tip, with one of
+    0.1 mm. The modifications of the case stay.
     """
-    gears = planetary_set(case)
-    most = 0.01 * case.sun.module if largest is None else to_si(largest, LENGTH)
-    if not 0 < most <= 0.2 * case.sun.module:
-        limit = f"over 0 to 0.2 modules, {0.2e6 * case.sun.module:.6g} um"
-        raise CaseError("not a plausible relief", code="E-RANGE", key="largest", value=largest, limit=limit)
+    gears, most = planetary_set(case), 0.01 * case.sun.module
     back = torques(gears, member=case.operation.input, torque=case.operation.torque).sun < 0
     sides = ("ring side", "sun side") if back else ("sun side", "ring side")
     sun, planet, ring = gears.sun, gears.planet, gears.ring

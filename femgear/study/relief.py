@@ -9,7 +9,6 @@ finds the least peak to peak at one torque and says whether it is a minimum. All
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -89,15 +88,7 @@ class DesignBasis:
 def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
     """Gears, compliances, deviations, and supports as the static problem of a case has them.
 
-    Parameters
-    ----------
-    case : Case
-    cache : path, optional
-        Folder of generated grids.
-
-    Raises
-    ------
-    GeometryError, GridError
+    ``cache`` is the folder of generated grids.
     """
     gears, deviations = planetary_set(case), set_deviations(case)
     bodies = flank_compliances(case, gears, cache=cache)[1]
@@ -191,19 +182,6 @@ def with_tip_relief(
     return replace(found, **forms)
 
 
-def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: float, back: bool) -> str:
-    """Tables of a case file for the tip relief of `with_tip_relief`, to be pasted at its end."""
-    side = "ring side" if back else "sun side"
-    lines = []
-    for gear, start, flank in zip((gears.sun, gears.planet), relief_starts(gears, length=length), ("", side)):
-        lines += [f"[[{gear.name}.modifications]]", 'kind = "tip relief"']
-        lines += [f'flank = "{flank}"'] if flank else []
-        diameter = 2e3 * math.hypot(start, gear.base_radius)
-        lines += [f'amount = "{amount * 1e6:.3f} um"', f'start_diameter = "{diameter:.5f} mm"']
-        lines += [f"power = {power:g}", ""]
-    return "\n".join(lines)
-
-
 @dataclass(frozen=True, eq=False)
 class HarrisMap:
     """Transmission error over torque.
@@ -242,20 +220,14 @@ def harris_map(
     ----------
     basis : DesignBasis
         Its deviations are not looked at.
-    torques : sequence of float
+    torques : (T,) sequence of float
         On the sun [N m], not zero.
     deviations : sequence of SetDeviations or None
         One a curve; the record spans the common period of each.
-    positions : int
-        In one mesh period.
-    contact : {"profile", "line_of_action"}
-        See `contact.cycle.walk_mesh_cycle`.
+    positions, contact
+        As for `contact.cycle.walk_mesh_cycle`.
     progress : callable, optional
         Called with (mesh cycles done, mesh cycles).
-
-    Returns
-    -------
-    HarrisMap
 
     Raises
     ------
@@ -339,18 +311,10 @@ def relief_grid(
     ----------
     basis : DesignBasis
         The reliefs are added to its deviations.
-    amounts : (A,) sequence
-        [m]
-    lengths : (L,) sequence
-        In lengths of two-pair contact.
-    torques : (T,) sequence
-        On the sun [N m], of one sign.
+    amounts, lengths, torques : (A,), (L,), (T,) sequences
+        See `ReliefGrid`; torques are of one sign.
     power, positions, contact, progress
         As for `with_tip_relief` and `harris_map`.
-
-    Returns
-    -------
-    ReliefGrid
     """
     amounts, lengths, torques = (np.array(a, float) for a in (amounts, lengths, torques))
     back = loads_back(torques)
@@ -379,12 +343,8 @@ class ReliefOptimum:
 
     Parameters
     ----------
-    torque : float
-        On the sun [N m].
-    amount : float
-        [m]
-    length : float
-        In lengths of two-pair contact.
+    torque, amount, length : float
+        As those of `ReliefGrid`.
     peak_to_peak, unmodified : float
         With the relief and without it [m].
     evaluations : int
@@ -442,18 +402,12 @@ def optimise_relief(
 
     Parameters
     ----------
-    grid : ReliefGrid
-        Over the same set, with `torque` among its torques.
-    torque : float
-        On the sun [N m].
-    max_evaluations : int
-        Mesh cycles after which the search is not begun again.
     basis, power, positions, contact
         As for `relief_grid`.
-
-    Returns
-    -------
-    ReliefOptimum
+    grid : ReliefGrid
+        Over the same set, with `torque` (on the sun [N m]) among its torques.
+    max_evaluations : int
+        Mesh cycles after which the search is not begun again.
     """
     t = int(np.abs(grid.torques - torque).argmin())
     options = {"torques": [torque], "positions": positions, "contact": contact}

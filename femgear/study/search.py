@@ -210,10 +210,6 @@ def minimise(
     progress : callable, optional
         Called with (stage, done, total).
 
-    Returns
-    -------
-    Optimum
-
     Raises
     ------
     CaseError
@@ -358,16 +354,8 @@ def polish(
     The simplex may collapse before it reaches a minimum (K. I. M. McKinnon, SIAM J. Optim. 9, 1998,
     148-158): it begins again, half as large, from where it ended.
 
-    Parameters
-    ----------
-    run : Evaluations
-    cost : callable
-    x0 : (n,) array
-    method : {"simplex", "powell"}
-    size : float
-        Of the first simplex, over the ranges.
-    rounds : int
-        Simplexes one after the other.
+    ``size`` is that of the first simplex over the ranges, ``rounds`` the number of simplexes one after the
+    other. The other method is Powell's.
     """
     low, high = run.problem.bounds.T
     width, n = high - low, len(low)
@@ -420,21 +408,9 @@ def has_derivatives(problem: Problem) -> bool:
 def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) -> tuple[bool, str]:
     """Minimum of a transmission error from a start, by successive linear programs.
 
-    Parameters
-    ----------
-    evaluations : Evaluations
-        Of a problem with `has_derivatives`.
-    start : (n,) sequence
-        In the units of the variables.
-    radius : float
-        Half the first box, over the ranges of the variables.
-
-    Returns
-    -------
-    bool
-        Whether no step within the smallest box lowers the linearised objective any more.
-    str
-        How the descent ended; its points are those of the evaluations.
+    The problem of the evaluations `has_derivatives`, ``start`` (n,) is in the units of the variables, and
+    ``radius`` half the first box over their ranges. Tells whether no step within the smallest box lowers the
+    linearised objective any more, and how the descent ended; its points are those of the evaluations.
     """
     problem = evaluations.problem
     low, high = problem.bounds.T

@@ -152,19 +152,10 @@ def linearise(
     Parameters
     ----------
     basis : DesignBasis
-        Gears, flank compliances, supports and deviations.
-    sun_torque : float
-        [N m], not zero; a negative one loads the other flanks.
-    positions, periods : int
-        Positions in a mesh period, and mesh periods in the record.
+    sun_torque, positions, periods, contact
+        As for `contact.cycle.walk_mesh_cycle`; the torque is not zero.
     only : sequence of int, optional
         Numbers of the positions wanted; all of the record when left out.
-    contact : {"profile", "line_of_action"}
-        As for `contact.cycle.walk_mesh_cycle`.
-
-    Returns
-    -------
-    LinearContact
 
     Raises
     ------
@@ -315,15 +306,9 @@ def sensitivity(
         Of the set with the deviations ``variant(value)``.
     variant : callable
         Deviations (of the set as it is, not mirrored) for a value of the parameter.
-    value : float
     step : float
         The separations are differentiated centrally over twice this; exact where they are linear in the
         parameter (amounts, pitch and pin errors).
-
-    Returns
-    -------
-    Sensitivity
-        Per unit of the parameter.
 
     Raises
     ------

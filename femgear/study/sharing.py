@@ -85,13 +85,12 @@ def sharing_model(
     Parameters
     ----------
     basis : DesignBasis
-        Gears, flank compliances, supports, and deviations; samples add to the pin errors of these.
+        Samples add to the pin errors of its deviations.
     sun_torque : float
         [N m]; the curves reach to where one planet carries all of it.
     position, positions : int
         Number of the position among those of one mesh period.
     contact : {"profile", "line_of_action"}
-        As for `contact.cycle.walk_mesh_cycle`.
     loads : int
         Points of a curve.
 
@@ -181,11 +180,10 @@ def pin_samples(n_planets: int, *, samples: int, radial: float, tangential: floa
 
     Parameters
     ----------
-    n_planets, samples : int
+    n_planets, samples, seed : int
+        The same seed of NumPy's default generator gives the same samples.
     radial, tangential : float
         Standard deviations [m].
-    seed : int
-        Of NumPy's default generator; the same seed gives the same samples.
 
     Raises
     ------
@@ -249,10 +247,6 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
         Radial (outwards) and tangential (counter-clockwise) displacements of the planet axes [m].
     max_steps : int
         Of Newton's method.
-
-    Returns
-    -------
-    Sharing
 
     Raises
     ------
@@ -380,12 +374,7 @@ def walked_shares(
 ) -> np.ndarray:
     """Shares (S, N) of a few samples from the whole contact problem, to check `sharing_of_samples`.
 
-    Parameters
-    ----------
-    pins : (S, N, 2) array
-        See there.
-    basis, sun_torque, position, positions, contact
-        As for `sharing_model`.
+    Arguments as for `sharing_model`, with the pin errors ``pins`` (S, N, 2) [m].
     """
     base = no_deviations(basis.gears) if basis.deviations is None else basis.deviations
     shares = []

@@ -101,10 +101,6 @@ def sweep(
     cache, progress
         As for `search.minimise`.
 
-    Returns
-    -------
-    Sweep
-
     Raises
     ------
     CaseError

@@ -53,25 +53,24 @@ def contact_states(meshes: GearMeshes, x, theta) -> ContactStates:
     CaseError
         Meshes that do not separate, no instants, deflections or forces that are not finite (E-CONTACT).
     """
-    if not meshes.separates or meshes.force is None or meshes.deflection is None:
+    if not meshes.separates:
         raise CaseError(
             "meshes that do not separate have no impacts", code="E-CONTACT", limit="separates=True"
         )
     x = checked_numbers(x, "x", code="E-CONTACT", unit="m")
     theta = checked_numbers(theta, "theta", code="E-CONTACT", unit="rad")
-    columns = meshes.columns[:, 0]
-    if x.ndim < 2 or x.shape[-1] <= columns.max(initial=-1) or theta.ndim != 2 or not len(theta):
+    if x.ndim < 2 or x.shape[-1] <= meshes.columns.max(initial=-1) or theta.ndim != 2 or not len(theta):
         _refuse(f"deflections of shape {x.shape} at phases of shape {theta.shape}")
     if x.shape[-2] != len(theta):
         _refuse(f"{x.shape[-2]} deflections of every column at {len(theta)} instants")
-    k = meshes.stiffness.at(theta)
-    line = meshes.force.at(theta) + k * (x[..., columns] - meshes.deflection.at(theta))
+    _, line, behind, has_back = meshes.flank_forces(x[..., meshes.columns], theta)
     if not np.all(np.isfinite(line)):
         _refuse("deflections or forces that are not finite")
-    # flanks of infinite backlash have no back side
-    play = np.where(np.isfinite(meshes.backlash), meshes.backlash, 0.0)
-    drive, back = line > 0.0, np.isfinite(meshes.backlash) & (line + k * play < 0.0)
-    return _judged(drive, back, axis=-2)
+    drive, back = line > 0.0, has_back & (behind < 0.0)
+    both = drive.any(axis=-2) & back.any(axis=-2)
+    closed = drive.all(axis=-2) | back.all(axis=-2)
+    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
+    return ContactStates(state, drive.mean(axis=-2), (~drive & ~back).mean(axis=-2), back.mean(axis=-2))
 
 
 def solution_states(meshes: GearMeshes, solution, *, samples: int = 1024) -> ContactStates:
@@ -139,10 +138,3 @@ def _refuse(message: str):
     raise CaseError(
         message, code="E-CONTACT", limit="finite numbers, as many instants as phases, one or more"
     )
-
-
-def _judged(drive, back, axis: int) -> ContactStates:
-    both = drive.any(axis) & back.any(axis)
-    closed = drive.all(axis) | back.all(axis)
-    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
-    return ContactStates(state, drive.mean(axis), (~drive & ~back).mean(axis), back.mean(axis))

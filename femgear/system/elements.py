@@ -1,4 +1,4 @@
-"""Springs between motions: gear meshes with play, bearings with clearance, polynomial and piecewise laws.
+"""Springs between motions: gear meshes with play, bearings with clearance, polynomial laws.
 
 An element acts on groups of columns of ``W`` and gives, for their deflections ``x = W^T q``, the forces
 ``f(x, t)`` of ``M q'' + C q' + K q + W f = load`` and the tangents ``df/dx``, for all instants at once.
@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, is_dataclass, replace
+from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
@@ -37,6 +37,9 @@ class Element(Protocol):
     ``columns`` (g, d) int array: g independent groups of d columns of ``W``. ``reference`` (g, d): a linear
     stiffness [N/m] near which it works. ``evaluate(x, theta)``: from deflections x (..., g, d) [m] and phases
     theta (..., n_bases) [rad], forces (..., g, d) [N] and tangents (..., g, d, d) [N/m].
+
+    Optional: ``degree`` of the law in x, None where it has corners. ``steepest(theta)`` (g, d): largest
+    stiffness over phases (n, n_bases), where that is not the reference.
     """
 
     @property
@@ -46,6 +49,23 @@ class Element(Protocol):
     def reference(self) -> np.ndarray: ...
 
     def evaluate(self, x, theta) -> tuple[np.ndarray, np.ndarray]: ...
+
+
+class CorneredElement(Element, Protocol):
+    """An element whose law is a sum of positive parts ``max(u, 0)``.
+
+    ``switches(x, theta)``: the arguments u (..., m). ``frozen(x, theta, closed)``: forces (g, d) and tangents
+    (g, d, d) of one instant with the parts closed (m,) or open as given, whatever the sign of u.
+    """
+
+    def switches(self, x, theta) -> np.ndarray: ...
+
+    def frozen(self, x, theta, closed) -> tuple[np.ndarray, np.ndarray]: ...
+
+
+def has_corners(element: Element) -> TypeGuard[CorneredElement]:
+    """Whether an element can tell where its law has corners."""
+    return hasattr(element, "switches")
 
 
 def positive_part(x, smoothing: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -126,33 +146,63 @@ class GearMeshes:
         return deflection, force
 
     @property
+    def degree(self) -> int | None:
+        """Of the law in the deflections; None where flanks part."""
+        return None if self.separates else 1
+
+    @property
     def reference(self) -> np.ndarray:
         """Mean mesh stiffness, (g, 1) [N/m]."""
         return self.stiffness.mean[:, None]
 
-    def evaluate(self, x, theta):
-        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+    def steepest(self, theta) -> np.ndarray:
+        """Largest stiffness over the phases, (g, 1) [N/m]."""
+        return self.stiffness.at(theta).max(axis=0)[:, None]
+
+    def flank_forces(self, x, theta):
+        """Stiffness [N/m], forces of drive and of back flanks (..., g) [N], and which have a back side.
+
+        Drive flanks are closed where their force is positive, back flanks where theirs is negative.
+        """
         k = self.stiffness.at(theta)
         deflection, force = self.state
         line = force.at(theta) + k * (x[..., 0] - deflection.at(theta))
+        has_back = np.isfinite(self.backlash)
+        return k, line, line + k * np.where(has_back, self.backlash, 0.0), has_back
+
+    def switches(self, x, theta):
+        """Forces (..., m) of drive flanks, then of back flanks where there are some."""
+        if not self.separates or self.smoothing:
+            return np.zeros((*x.shape[:-2], 0))
+        _, line, behind, has_back = self.flank_forces(x, theta)
+        return np.concatenate([line, -behind[..., has_back]], axis=-1)
+
+    def frozen(self, x, theta, closed):
+        """Forces (g, 1) and tangents (g, 1, 1) with the flanks closed as given."""
+        k, line, behind, has_back = self.flank_forces(x, theta)
+        drive, back = closed[: len(k)].astype(float), np.zeros(len(k))
+        back[has_back] = closed[len(k) :]
+        return (line * drive + behind * back)[:, None], (k * (drive + back))[:, None, None]
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        k, line, behind, has_back = self.flank_forces(x, theta)
         if not self.separates:
             return line[..., None], np.broadcast_to(k, line.shape)[..., None, None]
         force, slope = positive_part(line, self.smoothing * k)
-        has_back = np.isfinite(self.backlash)
         if np.any(has_back):
-            play = k * np.where(has_back, self.backlash, 0.0)
-            back, back_slope = positive_part(-line - play, self.smoothing * k)
+            back, back_slope = positive_part(-behind, self.smoothing * k)
             force, slope = force - has_back * back, slope + has_back * back_slope
         return force[..., None], (k * slope)[..., None, None]
 
 
 @dataclass(frozen=True)
 class RadialBearings:
-    """Bearings with radial clearance: a ring of one-sided radial springs.
+    """Bearings with radial clearance: a ring of infinitely many one-sided radial springs.
 
-    With infinitely many springs ``F(r) = (2 k / pi) [r (p + sin p cos p) - 2 c sin p]``, ``cos p = c / r``,
+    ``F(r) = (2 k / pi) [r (p + sin p cos p) - 2 c sin p]``, ``cos p = c / r``,
     beyond the clearance c, zero within (integral of the springs over the loaded arc; for c = 0 it is
-    ``k r``). With n springs each has the stiffness ``4 k / n``.
+    ``k r``).
 
     Parameters
     ----------
@@ -162,18 +212,11 @@ class RadialBearings:
         ``k`` [N/m].
     clearance : (g,) array or float
         Radial, from the centred position [m].
-    springs : int, optional
-        Number of springs, the first on the x axis; the continuous limit when not given.
-    smoothing : float
-        Length over which a spring sets in [m]; only with a number of springs, the limit is smooth.
     """
 
     columns: np.ndarray
     stiffness: np.ndarray | float
     clearance: np.ndarray | float = 0.0
-    springs: int | None = None
-    smoothing: float = 0.0
-    directions: np.ndarray | None = field(init=False, default=None)
 
     def __post_init__(self):
         columns = _columns(self.columns, 2)
@@ -183,20 +226,6 @@ class RadialBearings:
             if not np.all(np.isfinite(value)) or np.any(value < 0.0):
                 raise CaseError(f"bearing {name} of {value.min():.4g}", code="E-BEARING", limit="0 or more")
             object.__setattr__(self, name, value)
-        _positive("smoothing length", self.smoothing)
-        if self.springs is None:
-            if self.smoothing:
-                raise CaseError(
-                    "a continuous bearing needs no smoothing", code="E-BEARING", key="smoothing",
-                    remedy="give a number of springs or no smoothing length",
-                )  # fmt: skip
-            return
-        if self.springs < 3:
-            raise CaseError(
-                f"a bearing of {self.springs} springs", code="E-BEARING", key="springs", limit="3 or more"
-            )
-        angle = 2.0 * np.pi * np.arange(self.springs) / self.springs
-        object.__setattr__(self, "directions", np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
     @property
     def reference(self) -> np.ndarray:
@@ -205,9 +234,6 @@ class RadialBearings:
 
     def evaluate(self, x, theta):
         """Forces (..., g, 2) and tangents (..., g, 2, 2)."""
-        return self._continuous(x) if self.directions is None else self._discrete(x, self.directions)
-
-    def _continuous(self, x):
         r = np.hypot(x[..., 0], x[..., 1])
         touching = (r > self.clearance) & (r > 0.0)
         safe = np.where(touching, r, 1.0)
@@ -223,14 +249,6 @@ class RadialBearings:
         unit = x / safe[..., None]
         tangent = (radial - secant)[..., None, None] * unit[..., :, None] * unit[..., None, :]
         return secant[..., None] * x, tangent + secant[..., None, None] * np.eye(2)
-
-    def _discrete(self, x, directions: np.ndarray):
-        each = 4.0 * np.asarray(self.stiffness)[:, None] / len(directions)
-        stretch = x @ directions.T - np.asarray(self.clearance)[:, None]
-        force, slope = positive_part(stretch, self.smoothing)
-        forces = (each * force) @ directions
-        tangents = np.einsum("...gs,si,sj->...gij", each * slope, directions, directions)
-        return forces, tangents
 
 
 @dataclass(frozen=True)
@@ -263,6 +281,11 @@ class PolynomialSprings:
         object.__setattr__(self, "coefficients", table)
 
     @property
+    def degree(self) -> int:
+        """Of the law in the deflections."""
+        return self.coefficients.shape[1]
+
+    @property
     def reference(self) -> np.ndarray:
         """Stiffness at rest, (g, 1) [N/m]."""
         return self.coefficients[:, :1]
@@ -276,58 +299,6 @@ class PolynomialSprings:
             slope = slope * x + force + coefficient
             force = (force + coefficient) * x
         return force[..., None], slope[..., None, None]
-
-
-@dataclass(frozen=True)
-class PiecewiseSprings:
-    """Continuous piecewise linear springs without force at ``x = 0``.
-
-    Parameters
-    ----------
-    columns : (g,) int array
-    breaks : (m,) array
-        Ascending deflections where the slope changes [m].
-    slopes : (m + 1,) array
-        Slopes below, between and above the breaks [N/m].
-    smoothing : float
-        Length over which a slope changes [m], see `positive_part`; the force at rest stays zero.
-    """
-
-    columns: np.ndarray
-    breaks: np.ndarray
-    slopes: np.ndarray
-    smoothing: float = 0.0
-
-    def __post_init__(self):
-        columns = _columns(self.columns, 1)
-        breaks, slopes = np.atleast_1d(_numbers(self.breaks, "breaks")), _numbers(self.slopes, "slopes")
-        if not (np.all(np.isfinite(breaks)) and np.all(np.isfinite(slopes))):
-            raise CaseError(
-                f"breaks {breaks.tolist()} with slopes {slopes.tolist()}", code="E-FINITE",
-                limit="finite numbers",
-            )  # fmt: skip
-        if len(slopes) != len(breaks) + 1 or np.any(np.diff(breaks) <= 0.0):
-            raise CaseError(
-                f"{len(slopes)} slopes with breaks {breaks.tolist()}", code="E-SHAPE",
-                limit="ascending breaks and one more slope than breaks",
-            )  # fmt: skip
-        _positive("smoothing length", self.smoothing)
-        for name, value in (("columns", columns), ("breaks", breaks), ("slopes", slopes)):
-            object.__setattr__(self, name, value)
-
-    @property
-    def reference(self) -> np.ndarray:
-        """Mean of the lowest and the highest slope, (g, 1) [N/m]."""
-        return np.full((len(self.columns), 1), 0.5 * (self.slopes.min() + self.slopes.max()))
-
-    def evaluate(self, x, theta):
-        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
-        x = x[..., 0]
-        change = np.diff(self.slopes)
-        part, slope = positive_part(x[..., None] - self.breaks, self.smoothing)
-        rest, _ = positive_part(-self.breaks, self.smoothing)
-        force = self.slopes[0] * x + (part - rest) @ change
-        return force[..., None], (self.slopes[0] + slope @ change)[..., None, None]
 
 
 @dataclass(frozen=True)
@@ -417,6 +388,12 @@ def coefficients_of(element: Element) -> dict[str, Series]:
         for name, series in vars(element).items()
         if hasattr(series, "at") and hasattr(series, "orders")
     }
+
+
+def with_coefficients(element: Element, change: Callable[[Series], Any]) -> Element:
+    """The element with its periodic coefficients as ``change`` makes them."""
+    changed = {name: change(series) for name, series in coefficients_of(element).items()}
+    return replace(element, **changed) if changed and is_dataclass(element) else element
 
 
 def tangent_jumps(tangents: Callable[..., np.ndarray], states: np.ndarray) -> list[np.ndarray]:

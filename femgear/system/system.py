@@ -306,7 +306,7 @@ class NonlinearSystem:
     speed: float = 0.0
 
     def __post_init__(self):
-        _check_system(self.system)
+        check_matrices(self.system)
         n, columns = self.system.W.shape
         for element in self.elements:
             if element.columns.max(initial=-1) >= columns:
@@ -479,31 +479,36 @@ def drift_note(problem: NonlinearSystem) -> str:
     )
 
 
-def _check_system(system: MechanicalSystem) -> None:
-    """Refuse matrices of wrong shapes, numbers that are not finite, wrong symmetries, W without columns."""
+def check_matrices(
+    system: MechanicalSystem, *, symmetric: tuple[str, ...] = ("M",), columns: int | None = None
+) -> None:
+    """Refuse matrices of wrong shapes (E-SHAPE), not finite (E-FINITE) or of wrong symmetries (E-SYMMETRY).
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    symmetric : tuple of str
+        Matrices that must be; circulatory forces make K unsymmetric, which time integration takes.
+    columns : int, optional
+        Of ``W``; one or more when not given.
+    """
     n = len(system.M)
-    shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "load": (n,), "gyroscopic": (n, n)}
+    shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "load": (n,), "gyroscopic": (n, n), "W": (n, columns)}
+    if columns is None:
+        shapes["W"] = (n, max(1, system.W.shape[-1]))
     for name, shape in shapes.items():
         array = getattr(system, name)
         if array is None:
             continue
         if array.shape != shape:
-            raise CaseError(f"{name} has shape {array.shape}", code="E-SHAPE", limit=f"{shape}, as M")
+            raise CaseError(f"{name} has shape {array.shape}", code="E-SHAPE", limit=f"{shape}")
         if not np.all(np.isfinite(array)):
             raise CaseError(f"{name} holds numbers that are not finite", code="E-FINITE")
+        sign = 1.0 if name in symmetric else -1.0 if name == "gyroscopic" else 0.0
         size = np.abs(array).max(initial=0.0)
-        # circulatory forces make K unsymmetric, which time integration and shooting take
-        sign = {"M": 1.0, "gyroscopic": -1.0}.get(name, 0.0)
         if sign and np.abs(array - sign * array.T).max(initial=0.0) > 1e-9 * size:
             kind = "symmetric" if sign > 0 else "skew-symmetric"
             raise CaseError(f"{name} is not {kind}", code="E-SYMMETRY", limit=f"{kind} to 1e-9")
-    if system.W.ndim != 2 or len(system.W) != n or not system.W.shape[1]:
-        raise CaseError(
-            f"W has shape {system.W.shape}", code="E-SHAPE", limit=f"({n}, 1 or more deflections)",
-            remedy="give one column for every deflection of an element",
-        )  # fmt: skip
-    if not np.all(np.isfinite(system.W)):
-        raise CaseError("W holds numbers that are not finite", code="E-FINITE")
 
 
 def _coupled_law(problem: NonlinearSystem, theta) -> Law:

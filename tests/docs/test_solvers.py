@@ -25,7 +25,6 @@ WORDS = {
     "largest_multiplier",
     "settled",
     "settle",
-    "segments",
     "orders",
     "tolerance",
     "fold",
@@ -97,6 +96,6 @@ def test_options_that_the_page_names_exist():
     ):
         assert hasattr(Branch, name)
     assert {"start", "start_at", "samples"} <= options(CurveOptions)
-    assert {"settle", "segments"} <= options(solve_shooting)
+    assert "settle" in options(solve_shooting)
     assert "events" in options(solve_transient) and {"modal", "DOP853"} <= set(METHODS)
     assert "method" in options(floquet_verdicts)

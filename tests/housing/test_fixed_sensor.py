@@ -122,39 +122,6 @@ def test_identical_planets_leave_only_orders_that_are_multiples_of_their_number(
     assert symmetry_leakage(OrderSpectrum(unequal.order, unequal.acceleration), planets) > 0.1
 
 
-def test_standing_carrier_has_no_modulation():
-    field = random_field()
-    lines = fixed_sensor_lines(field, Z_RING, 0.0, SENSOR, mesh_frequency=90.0)
-    heard = np.flatnonzero(np.abs(lines.displacement) > 1e-12)
-    assert heard.tolist() == [0, 108, 216, 324]
-    assert lines.frequency[heard] == pytest.approx([0, 90, 180, 270], rel=1e-14)
-    signal = fixed_sensor_signal(lines)
-    there = field_at(field, SENSOR, signal.seconds, 2 * np.pi * 90)
-    assert np.allclose(signal.displacement, there, atol=1e-11)
-
-
-def test_standing_carrier_between_two_points():
-    field = random_field()
-    lines = heaviside_linear_lines(
-        field, Z_RING, 0.0, SENSOR, points=20, first_point=0.1, mesh_frequency=90.0
-    )
-    signal = fixed_sensor_signal(lines)
-    before = 0.1 + 2 * np.pi / 20
-    share = (SENSOR - before) / (2 * np.pi / 20)
-    left = field_at(field, before, signal.seconds, 2 * np.pi * 90)
-    right = field_at(field, before + 2 * np.pi / 20, signal.seconds, 2 * np.pi * 90)
-    assert 0 < share < 1
-    assert np.allclose(signal.displacement, (1 - share) * left + share * right, atol=1e-11)
-
-
-def test_mesh_frequency_of_the_fixed_ring_is_accepted():
-    field = random_field()
-    # 250 rpm at the sun of 27/40/108: the carrier turns at 50 rpm, the mesh frequency is 90 Hz
-    carrier = 50 * 2 * np.pi / 60
-    lines = fixed_sensor_lines(field, Z_RING, carrier, SENSOR, mesh_frequency=90.0)
-    assert lines.frequency[108] == pytest.approx(90.0, rel=1e-12)
-
-
 def test_results_are_read_only():
     lines = fixed_sensor_lines(random_field(), Z_RING, SPEED, SENSOR)
     with pytest.raises(ValueError, match="read-only"):
@@ -176,10 +143,8 @@ BAD = {
         {"field": random_field(batch=(2,)), "carrier_speed": np.array([1.0, -1.0])},
         "E-SPEED",
     ),
-    "standing, frequency unknown": ({"carrier_speed": 0.0}, "E-SPEED"),
-    "turning ring": ({"mesh_frequency": 91.0}, "E-SPEED"),
+    "standing carrier": ({"carrier_speed": 0.0}, "E-SPEED"),
     "infinite angle": ({"sensor_angle": np.inf}, "E-RANGE"),
-    "no orders": ({"max_order": 0}, "E-HARMONICS"),
 }
 
 

@@ -45,13 +45,6 @@ def test_parseval_with_the_highest_line(samples):
     assert mean_square(spectrum) + last == pytest.approx(np.mean(signal**2), rel=1e-13)
 
 
-def test_several_revolutions_resolve_parts_of_orders():
-    theta = 2 * np.pi * 4 * np.arange(1024) / 1024
-    spectrum = order_spectrum(np.cos(10.25 * theta), revolutions=4)
-    assert spectrum.order[np.argmax(spectrum.amplitude)] == 10.25
-    assert count_lobes(1 + 0.5 * np.cos(3 * theta), revolutions=4).per_revolution == 3
-
-
 def test_band_pass_and_envelope_of_two_carriers():
     modulated = (1 + 0.6 * np.cos(3 * THETA)) * np.cos(108 * THETA) + 0.7 * np.cos(216 * THETA)
     band = band_pass(order_spectrum(modulated), 54, 162)
@@ -94,7 +87,7 @@ def test_lobes_survive_the_weight_of_the_acceleration():
 def test_seam_of_the_revolution_is_no_edge(shift):
     lobes = count_lobes(np.roll(1 + 0.5 * np.cos(6 * THETA), shift))
     assert lobes.per_revolution == 6
-    assert lobes.prominence == pytest.approx(np.ones(6), rel=1e-4)
+    assert lobes.height == pytest.approx(np.full(6, 1.5), rel=1e-4)
     expected = np.sort((np.arange(6) / 6 + shift / 2048) % 1)
     assert np.allclose(lobes.position, expected, atol=1 / 2048)
 
@@ -156,8 +149,6 @@ def test_unusable_requests_are_refused():
     refused = [
         (lambda: order_spectrum([1.0]), "E-SHAPE"),
         (lambda: order_spectrum([1.0, np.nan]), "E-SHAPE"),
-        (lambda: order_spectrum(np.ones(8), revolutions=0), "E-SHAPE"),
-        (lambda: order_spectrum(np.ones(8), revolutions=1.5), "E-SHAPE"),
         (lambda: band_pass(spectrum, 0, 10), "E-RANGE"),
         (lambda: band_pass(spectrum, 500, 600), "E-RANGE"),
         (lambda: analyse_band(spectrum, 108, 9), "E-RANGE"),

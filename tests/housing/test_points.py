@@ -14,7 +14,7 @@ def random_field(harmonics, n_max, seed=7):
     return rng.normal(size=shape) + 1j * rng.normal(size=shape)
 
 
-def fourier_by_quadrature(field, z_ring, points, first_point, sensor, direction, orders):
+def fourier_by_quadrature(field, z_ring, points, sensor, direction, orders):
     """Fourier coefficients of the interpolated displacement, Gauss quadrature segment by segment.
 
     Speaks of places, not of passing times: where the sensor is, which two points lie beside it.
@@ -24,7 +24,7 @@ def fourier_by_quadrature(field, z_ring, points, first_point, sensor, direction,
     nodes, weights = np.polynomial.legendre.leggauss(40)
     lines = np.zeros(len(orders), dtype=complex)
     for j in range(points):
-        edge = first_point + 2 * np.pi * j / points
+        edge = 2 * np.pi * j / points
         x = (nodes + 1) / 2
         phi = edge + 2 * np.pi / points * x
         turned = direction * (sensor - phi)  # angle of the carrier, phi = sensor - direction * turned
@@ -37,26 +37,21 @@ def fourier_by_quadrature(field, z_ring, points, first_point, sensor, direction,
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("first_point", [0.0, 0.23])
-def test_lines_are_the_fourier_series_of_the_interpolation(direction, first_point):
+def test_lines_are_the_fourier_series_of_the_interpolation(direction):
     field = random_field(2, 5)
-    lines = heaviside_linear_lines(
-        field, 12, direction * 3.0, 0.9, points=9, first_point=first_point, max_order=60
-    )
-    quadrature = fourier_by_quadrature(field, 12, 9, first_point, 0.9, direction, range(61))
+    lines = heaviside_linear_lines(field, 12, direction * 3.0, 0.9, points=9, max_order=60)
+    quadrature = fourier_by_quadrature(field, 12, 9, 0.9, direction, range(61))
     assert np.allclose(lines.displacement, quadrature, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_time_form_has_the_same_lines(direction):
     field, z_ring, points, samples = random_field(2, 4), 12, 9, 65536
-    signals = point_signals(field, z_ring, points=points, samples=samples, first_point=0.23)
-    passed = passages(points, 0.9, direction=direction, first_point=0.23)
+    signals = point_signals(field, z_ring, points=points, samples=samples)
+    passed = passages(points, 0.9, direction=direction)
     spectrum = np.fft.rfft(heaviside_linear(signals, passed))[:61] * 2 / samples
     spectrum[0] /= 2
-    lines = heaviside_linear_lines(
-        field, z_ring, direction * 3.0, 0.9, points=points, first_point=0.23, max_order=60
-    )
+    lines = heaviside_linear_lines(field, z_ring, direction * 3.0, 0.9, points=points, max_order=60)
     # lines of a signal with kinks fall like 1/order^2: so does what sampling folds back
     assert np.allclose(lines.displacement, spectrum, rtol=0, atol=1e-6)
 

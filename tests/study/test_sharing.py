@@ -16,7 +16,6 @@ from femgear.study.relief import (
     harris_map,
     optimise_relief,
     relief_grid,
-    relief_snippet,
     relief_starts,
     sun_torque,
     with_tip_relief,
@@ -239,10 +238,12 @@ def test_a_map_of_negative_torques_is_that_of_positive_ones(basis):
 
 
 def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
+    from tip_relief_design import relief_tables
+
     from femgear.case.case import set_deviations
 
     gears = basis.gears
-    text = relief_snippet(gears, amount=4e-6, length=0.9, power=2.0, back=False)
+    text = relief_tables(gears, amount=4e-6, length=0.9, power=2.0, back=False)
     path = tmp_path / "case.toml"
     path.write_text(CASE.read_text(encoding="utf-8") + "\n" + text, encoding="utf-8")
     case = read_case(path)

@@ -14,16 +14,18 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from femgear.solvers.continuation.arclength import continue_curve
-from femgear.solvers.continuation.branches import Branch, branch_maximum, frequency_response_curve
+from femgear.solvers.continuation.branches import Branch, frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.shooting import ShootingSolution, solve_shooting
 from femgear.solvers.stability.floquet import floquet_verdict
-from femgear.system.elements import PiecewiseSprings, PolynomialSprings
+from femgear.system.elements import PolynomialSprings
 from femgear.system.fourier import harmonics_of
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from validation.reference.branch_switching import branch_maximum
+from validation.reference.cornered_springs import PiecewiseSprings
 from validation.reference.free_vibration import solve_free_vibration
 from validation.rows import Row, at_most, counted, printed, within
 

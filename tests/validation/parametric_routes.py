@@ -10,12 +10,12 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdict
-from femgear.solvers.stability.parametric import stability_boundary
 from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries, StepSeries
 from femgear.system.system import NonlinearSystem
 from validation.nonlinear import oscillator
 from validation.parametric import EXACT, NATURAL, RATIO, SOFT
+from validation.reference.stability_boundary import stability_boundary
 from validation.rows import REPEATED, Row, at_most, counted, printed, within
 
 RECTANGLE = StepSeries([[1.0, SOFT]], [0.0, RATIO])

@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.system.fourier import harmonics_of
 from validation import nonlinear, routes
 from validation.routes import GATE, difference
@@ -132,14 +131,3 @@ def test_planetary_train_settles_from_rest_and_balance_is_thirty_times_faster():
     assert difference(reference, few.deflection) < 5e-6
     assert difference(reference, loose.lines) > difference(reference, few.deflection)
     assert integration_time > 30.0 * balance_time
-
-
-@pytest.mark.slow
-def test_shooting_in_segments_finds_the_train_too():
-    found = routes.train_motion()
-    several = solve_shooting(
-        found.problem, found.frequency, settle=60, segments=4, harmonics=16, samples=2048,
-        integration=1e-10, tolerance=1e-8,
-    )  # fmt: skip
-    assert several.solution.converged
-    assert difference(found.shooting.solution.deflection, several.solution.deflection) < 1e-7

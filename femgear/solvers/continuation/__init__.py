@@ -10,8 +10,6 @@ __all__, __getattr__ = lazy_names(
         "branches": [
             "Branch",
             "CurveOptions",
-            "branch_maximum",
-            "crossing_branches",
             "frequency_response_curve",
             "parameter_curve",
         ],

@@ -25,7 +25,6 @@ from femgear.solvers.continuation.corrector import (
     branch_point,
     check_step,
     correct,
-    crossing_tangent,
     describe_value,
     folds,
     step_effort,
@@ -130,7 +129,7 @@ def continue_curve(
     ConvergenceError
         No solution near the start.
     """
-    curve = scaled_curve(
+    curve = _scaled_curve(
         evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, describe=describe
     )
     if not limits[0] <= parameter <= limits[1]:
@@ -150,59 +149,7 @@ def continue_curve(
     return _collect(curve, first)
 
 
-def switch_branch(
-    evaluate: Callable,
-    known: Curve,
-    index: int,
-    *,
-    limits,
-    options: StepOptions | None = None,
-    describe: Callable[[float], str] = describe_value,
-) -> tuple[Curve, Curve]:
-    """Follow the curve that crosses a known one in a branch point, in both directions from there.
-
-    Parameters
-    ----------
-    evaluate : callable
-        As given to :func:`continue_curve`.
-    known : Curve
-    index : int
-        Of the branch point among the points of the known curve, one of ``known.branch_points``.
-    limits, options, describe
-        As for :func:`continue_curve`.
-
-    Raises
-    ------
-    CaseError
-        The point is no branch point.
-    ConvergenceError
-        The branch point is not simple, so that the other directions cannot be told apart.
-    """
-    if index not in known.branch_points:
-        raise CaseError(
-            f"point {index} is no branch point", code="E-CONVERGENCE",
-            limit=f"one of {known.branch_points.tolist()}",
-        )  # fmt: skip
-    start = known.points[index]
-    curve = scaled_curve(
-        evaluate, start, known.parameter[index], limits=limits, scale=known.scale, unit=known.unit,
-        options=options, describe=describe,
-    )  # fmt: skip
-    z = curve.scaled(start, known.parameter[index])
-    _, derivative = curve.equations(z)
-    point = CurvePoint(z, known.tangent[index], derivative, 0.0, 0, 0.0, float(known.error[index]))
-    try:
-        tangent = crossing_tangent(curve, point)
-    except LostError as error:
-        raise ConvergenceError(
-            f"no other curve found at {describe(float(known.parameter[index]))}: {error}",
-            code="E-CONVERGENCE", remedy="disturb the symmetry of the system a little",
-        ) from error  # fmt: skip
-    along, back = (_collect(curve, replace(point, tangent=sign * tangent)) for sign in (1.0, -1.0))
-    return along, back
-
-
-def scaled_curve(
+def _scaled_curve(
     evaluate: Callable,
     start,
     parameter: float,

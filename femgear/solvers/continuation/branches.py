@@ -11,11 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import OptimizeResult, minimize_scalar
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
-from femgear.solvers.continuation.arclength import Curve, continue_curve, scaled_curve, switch_branch
-from femgear.solvers.continuation.corrector import Segment, StepOptions, correct, describe_value
+from femgear.solvers.continuation.arclength import Curve, continue_curve
+from femgear.solvers.continuation.corrector import StepOptions, describe_value
 from femgear.solvers.linear.receptance import Reduction
 from femgear.solvers.periodic.equations import HarmonicBalance, harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -48,8 +47,6 @@ class Branch:
 
     Parameters
     ----------
-    parameter : (p,) array
-        Frequency [rad/s] or whatever was varied, in order along the curve.
     solutions : tuple of PeriodicSolution
     curve : Curve
         The unknowns, limit points and branch points.
@@ -59,12 +56,12 @@ class Branch:
         Whether verdicts were asked for.
     """
 
-    parameter: np.ndarray
     solutions: tuple[PeriodicSolution, ...]
     curve: Curve
     equations: ContinuationProblem = field(repr=False)
     stability: bool = True
 
+    parameter = _of_curve("parameter", "Frequency [rad/s] or whatever was varied, (p,), along the curve.")
     folds = _of_curve("folds", "Indices of the limit points.")
     branch_points = _of_curve("branch_points", "Indices of the points where another branch crosses.")
     closed = _of_curve("closed", "The last solution is the first one again.")
@@ -248,75 +245,6 @@ def parameter_curve(
     return _follow(equations, parameter, chosen)
 
 
-def crossing_branches(
-    branch: Branch, index: int, *, stability: bool = True, tolerance: float = 1e-7, options=None
-) -> tuple[Branch, Branch]:
-    """Follow the branch that crosses a known one in a branch point, in both directions from there.
-
-    Parameters
-    ----------
-    branch : Branch
-    index : int
-        One of ``branch.branch_points``.
-    stability, tolerance, options
-        Fields of `CurveOptions`.
-
-    Raises
-    ------
-    CaseError
-        The point is no branch point.
-    ConvergenceError
-        The branch point is not simple.
-    """
-    tolerance, equations = checked_tolerance(tolerance), branch.equations
-    along, back = switch_branch(
-        equations.evaluate, branch.curve, index, limits=equations.limits, options=options,
-        describe=equations.describe,
-    )  # fmt: skip
-    return _branch(equations, along, stability, tolerance), _branch(equations, back, stability, tolerance)
-
-
-def branch_maximum(
-    branch: Branch, measure: Callable[[np.ndarray], float], *, tolerance: float = 1e-7
-) -> tuple[float, float, PeriodicSolution]:
-    """Find the largest value along a branch, between its points too: parameter, value, solution.
-
-    Parameters
-    ----------
-    branch : Branch
-    measure : callable
-        Lines (n_columns, L) -> float.
-    tolerance : float
-        Of the verdict, which the solution has where the branch has them.
-    """
-    equations, known = branch.equations, branch.curve
-    values = np.array([measure(lines) for lines in branch.lines])
-    top = int(np.argmax(values))
-    parameter, value, solution = float(branch.parameter[top]), float(values[top]), branch.solutions[top]
-    z = np.column_stack([known.points / known.scale, branch.parameter / known.unit])
-    curve = scaled_curve(
-        equations.evaluate, known.points[top], known.parameter[top], limits=equations.limits,
-        scale=known.scale, unit=known.unit,
-    )  # fmt: skip
-    for i in {max(top - 1, 0), min(top, len(z) - 2)}:
-        first, last = (correct(curve, z[k], known.tangent[k]) for k in (i, i + 1))
-        segment = Segment(curve, first, last)
-
-        def lowered(h: float, segment=segment) -> float:
-            u, _ = curve.physical(segment.at(h).z)
-            return -measure(equations.balance.lines(u))
-
-        found: OptimizeResult = minimize_scalar(
-            lowered, bounds=(0.0, segment.length), method="bounded", options={"xatol": 1e-10}
-        )  # type: ignore[assignment]
-        if -found.fun > value:
-            u, parameter = curve.physical(segment.at(found.x).z)
-            value, solution = float(-found.fun), equations.solution(u, parameter, 0.0)
-    if branch.stability:
-        solution = equations.judged([parameter], [solution], tolerance)[0]
-    return parameter, value, solution
-
-
 @dataclass(frozen=True)
 class ContinuationProblem:
     """The harmonic equations along one parameter: a base frequency, or anything that changes the system.
@@ -445,7 +373,7 @@ def _branch(equations: ContinuationProblem, curve: Curve, stability: bool, toler
     )
     if stability:
         solutions = equations.judged(curve.parameter, solutions, tolerance)
-    return Branch(curve.parameter, solutions, curve, equations, stability)
+    return Branch(solutions, curve, equations, stability)
 
 
 def _ends(value, key: str, unit: str) -> tuple[float, float]:

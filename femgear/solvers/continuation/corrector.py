@@ -3,9 +3,8 @@
 Bordered systems, tangents and their orientation: Allgower and Georg, Introduction to Numerical Continuation
 Methods (SIAM 2003), chapters 2, 3 and 6. A step is judged by its angle, the contraction of Newton's method,
 the way back and the middle (chapter 6; Deuflhard, Newton Methods for Nonlinear Problems (Springer 2004),
-sections 2.1 and 5.1, for the contraction). Limit points and branch points between two points, and the curves
-that cross there: Allgower and Georg, chapters 8 and 9; Seydel, Practical Bifurcation and Stability Analysis
-(3rd ed. 2010), chapters 5 and 6.
+sections 2.1 and 5.1, for the contraction). Limit points and branch points between two points: Allgower and
+Georg, chapters 8 and 9; R. Seydel, Practical Bifurcation and Stability Analysis (2010), chapters 5 and 6.
 """
 
 from __future__ import annotations
@@ -37,8 +36,6 @@ _START = 1e-9
 _WINDOW = 1e-3
 # The same for the two points whose mean is the branch point.
 _BESIDE = 1e-5
-# Share of the largest second derivative below which the crossing curve has no curvature term.
-_FLAT = 1e-6
 
 
 class LostError(Exception):
@@ -508,40 +505,3 @@ def bracketed_root(function: Callable[[float], float], known: dict[float, float]
         return known[h]
 
     return root_scalar(value, bracket=tuple(known), method="brentq", xtol=xtol, rtol=1e-14).root
-
-
-def crossing_tangent(curve: ScaledCurve, point: CurvePoint) -> np.ndarray:
-    """Unit tangent (n + 1,) of the other curve through a simple branch point.
-
-    With t the known tangent, p the other direction of the null space and ``a_xy = psi^T F''[x, y]``, the
-    crossing curve goes along ``2 a_tp p - a_pp t`` (algebraic bifurcation equation, Seydel section 5.5.3).
-
-    Raises
-    ------
-    LostError
-        The point is no simple branch point.
-    """
-    left, singular, right = np.linalg.svd(point.derivative)
-    if len(singular) > 1 and singular[-2] < 1e3 * singular[-1]:
-        raise LostError(
-            f"no simple branch point: smallest singular values {singular[-2]:.1e}, {singular[-1]:.1e}"
-        )
-    psi, plane = left[:, -1], right[-2:]
-    known = plane @ point.tangent
-    other = np.array([-known[1], known[0]]) @ plane
-    other /= np.linalg.norm(other)
-    step = 1e-3
-
-    def second(direction: np.ndarray) -> float:
-        # the derivative along the null space itself changes: psi^T F'[z + h d] d
-        ahead = curve.equations(point.z + step * direction)[1] @ direction
-        back = curve.equations(point.z - step * direction)[1] @ direction
-        return float(psi @ (ahead - back)) / (2.0 * step)
-
-    app, att = second(other), second(point.tangent)
-    atp = 0.5 * (second((other + point.tangent) / np.sqrt(2.0)) * 2.0 - app - att)
-    direction = 2.0 * atp * other - app * point.tangent
-    size = np.linalg.norm(direction)
-    if size <= _FLAT * max(abs(app), abs(att), abs(atp), np.finfo(float).tiny):
-        raise LostError("the curves through the branch point have no distinct directions")
-    return direction / size

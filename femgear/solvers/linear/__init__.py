@@ -6,7 +6,7 @@ __all__, __getattr__ = lazy_names(
     __name__,
     {
         "modal": ["complex_modes", "modal_damping", "solve_modes"],
-        "receptance": ["direct_response", "modal_response", "reduce_problem"],
+        "receptance": ["modal_response", "reduce_problem"],
         "tracking": ["campbell_data", "track_modes"],
     },
 )

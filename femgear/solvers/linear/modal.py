@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.system.system import MechanicalSystem, Modes, Response, freeze
+from femgear.system.system import MechanicalSystem, Modes, Response, check_matrices, freeze
 
 # Eigenvalues of two modes closer than this (relative) are one multiple eigenvalue: never cut through it.
 _MULTIPLE = 1e-6
@@ -255,7 +255,7 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     m, elastic = int(np.count_nonzero(~rigid)), ~rigid
     order = np.concatenate([np.flatnonzero(elastic), np.flatnonzero(rigid)])
     scale = np.exp(0.5 * np.mean(np.log(np.abs(square[elastic])))) if m else 1.0
-    state = state_matrix(square[elastic], damping[np.ix_(order, order)], scale)
+    state = state_matrix(np.diag(square[elastic]), damping[np.ix_(order, order)], scale)
     pairs = linalg.eig(state)
     value, vector = np.asarray(pairs[0], np.complex128), np.asarray(pairs[1])
     inverse = _inverse(vector)
@@ -302,23 +302,24 @@ def whirl(shape, mass, planes) -> np.ndarray:
     return np.where(bound > 1e-12 * total, area / np.where(bound > 0.0, bound, 1.0), 0.0)
 
 
-def state_matrix(square: np.ndarray, damping: np.ndarray, scale: float) -> np.ndarray:
-    """First-order form of modes, elastic ones first; rigid ones by their velocity, without a double zero.
+def state_matrix(stiffness: np.ndarray, damping: np.ndarray, scale: float) -> np.ndarray:
+    """``A`` (..., 2 m + r, 2 m + r) of the first-order form ``y' = A y``, ``y = (q, q' / scale)``.
 
     Parameters
     ----------
-    square : (m,) array
-        ``omega^2`` of the elastic modes [1/s^2].
+    stiffness : (..., m, m) array
+        Over the masses [1/s^2].
     damping : (m + r, m + r) array
-        Modal damping, rigid modes last [1/s].
+        Over the masses [1/s]; the last r motions are rigid and enter by their velocity alone, without a
+        double zero.
     scale : float
-        Speeds are over it; a mean frequency [1/s] keeps the matrix balanced.
+        A mean frequency [1/s] keeps the matrix balanced.
     """
-    m = len(square)
-    state = np.zeros((m + len(damping),) * 2)
-    state[:m, m : 2 * m] = scale * np.eye(m)
-    state[m : 2 * m, :m] = -np.diag(square) / scale
-    state[m:, m:] = -damping
+    m = stiffness.shape[-1]
+    state = np.zeros((*stiffness.shape[:-2], m + len(damping), m + len(damping)))
+    state[..., :m, m : 2 * m] = scale * np.eye(m)
+    state[..., m : 2 * m, :m] = -stiffness / scale
+    state[..., m:, m:] = -damping
     return state
 
 
@@ -371,19 +372,8 @@ def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> 
 
 def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     """``K + W diag(mesh_stiffness) W^T`` (n, n) [N/m], with the flexibility between the meshes, checked."""
-    n, meshes = len(system.M), np.asarray(mesh_stiffness, dtype=float)
-    shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "W": (n, len(meshes)), "load": (n,)}
-    for name, shape in shapes.items():
-        array = getattr(system, name)
-        if array.shape != shape:
-            raise CaseError(f"{name} has shape {array.shape}, expected {shape}", code="E-SHAPE")
-        if not np.all(np.isfinite(array)):
-            raise CaseError(f"{name} holds numbers that are not finite", code="E-FINITE")
-    for name in ("M", "K"):
-        array = getattr(system, name)
-        error, size = np.abs(array - array.T).max(), np.abs(array).max()
-        if error > 1e-9 * size:
-            raise CaseError(f"{name} is not symmetric: {error:.3e} of {size:.3e}", code="E-SYMMETRY")
+    meshes = np.asarray(mesh_stiffness, dtype=float)
+    check_matrices(system, symmetric=("M", "K"), columns=len(meshes))
     if not np.all(np.isfinite(meshes)) or np.any(meshes < 0.0):
         raise CaseError(
             "mesh stiffnesses must be finite and not negative",

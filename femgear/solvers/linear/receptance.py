@@ -1,6 +1,6 @@
-"""Receptances: by direct solution, as sums over modes, and reduced to the deflections of the elements.
+"""Receptances: as sums over modes, and reduced to the deflections of the elements.
 
-Forces excite a linear system (`direct_response`, `modal_response`). Of a problem with nonlinear elements one
+Forces excite a linear system (`modal_response`). Of a problem with nonlinear elements one
 reduction to modes serves any number of frequencies (`reduce_problem`), ``T(omega) = W^T Z^-1 [W, loads]`` of
 ``Z = K' + i omega (C + speed G) - omega^2 M`` and ``K' = K + W diag(reference) W^T``, as a sum over poles.
 """
@@ -13,19 +13,14 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import (
-    damping_matrix,
-    modal_damping,
     pseudo_solve,
     residual_output,
     rigid_basis,
     solve_modes,
     state_matrix,
-    total_stiffness,
 )
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 
-# Bytes of dynamic stiffness that are solved in one batch.
-_BATCH = 2**26
 # Distance to an undamped pole, relative to it, below which the response is infinite.
 _RESONANT = 1e-12
 # Modal damping off the diagonal, relative to the largest entry, above which the modes are coupled.
@@ -57,33 +52,28 @@ class MeshErrorResponse:
     force: np.ndarray
 
 
-def direct_response(
-    system: MechanicalSystem,
-    frequency,
-    inputs,
-    outputs,
-    *,
-    mesh_stiffness,
-    speed: float = 0.0,
-    damping_ratio=None,
+def modal_response(
+    system: MechanicalSystem, modes: Modes, frequency, inputs, outputs, *, residual: bool = True
 ) -> np.ndarray:
-    """``L (K' + i omega D - omega^2 M)^-1 B`` by one dense solution a frequency, many in a batch.
+    """``L (K' + i omega C - omega^2 M)^-1 B`` as a sum over real modes and the static rest.
+
+    ``sum (L phi) (phi^T B) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega) + R``, R = ``L K^+ B`` less the
+    static part of the sum (D. J. Ewins, Modal Testing, 2nd ed., 2000, section 2.4; Geradin and Rixen,
+    Mechanical Vibrations, 3rd ed., 2.9). Exact with all modes; without some, good below their frequencies.
 
     Parameters
     ----------
     system : MechanicalSystem
+    modes : Modes
+        Of that system.
     frequency : (F,) array
         [Hz], positive or zero.
     inputs : (n, n_inputs) array
-        ``B``, one column a force; `unit_force` makes them from names.
+        ``B``, one column a force.
     outputs : (n_outputs, n) array
         ``L``.
-    mesh_stiffness : (n_meshes,) array
-        [N/m]
-    speed : float
-        That multiplies the gyroscopic matrix [rad/s].
-    damping_ratio : float or (n,) array, optional
-        Modal damping that is added to ``C``; see `modal.modal_damping`.
+    residual : bool
+        False leaves R out.
 
     Returns
     -------
@@ -95,62 +85,15 @@ def direct_response(
     CaseError
         Arrays that do not fit (E-SHAPE), frequencies that are none (E-RANGE).
     ConvergenceError
-        An undamped resonance, or rigid motions at frequency zero (E-RESONANCE).
-    """
-    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
-    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
-    damping = damping_matrix(system, speed)
-    if damping_ratio is not None:
-        bare = replace(system, gyroscopic=None, C=np.zeros_like(system.C))
-        damping = damping + modal_damping(bare, mesh_stiffness, damping_ratio)
-    result = np.empty((len(omega), len(outputs), inputs.shape[1]), complex)
-    step = max(1, _BATCH // (16 * len(stiffness) ** 2))
-    for start in range(0, len(omega), step):
-        w = omega[start : start + step, None, None]
-        dynamic = stiffness - w**2 * system.M + 1j * w * damping
-        try:
-            result[start : start + step] = outputs @ np.linalg.solve(dynamic, inputs.astype(complex))
-        except np.linalg.LinAlgError as error:
-            f = w.ravel() / (2.0 * np.pi)
-            raise _resonance(f"between {f[0]:.6g} and {f[-1]:.6g} Hz") from error
-    if not np.all(np.isfinite(result)):
-        bad = np.flatnonzero(~np.isfinite(result).all(axis=(1, 2)))[0]
-        raise _resonance(f"at {omega[bad] / (2.0 * np.pi):.6g} Hz")
-    return result
-
-
-def modal_response(
-    system: MechanicalSystem, modes: Modes, frequency, inputs, outputs, *, residual: bool = True
-) -> np.ndarray:
-    """The same as a sum over real modes, with the static flexibility of those left out.
-
-    ``sum (L phi) (phi^T B) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega) + R``, R = ``L K^+ B`` less the
-    static part of the sum (D. J. Ewins, Modal Testing, 2nd ed., 2000, section 2.4; Geradin and Rixen,
-    Mechanical Vibrations, 3rd ed., 2.9). Exact with all modes; without some, good below their frequencies.
-
-    Parameters
-    ----------
-    system : MechanicalSystem
-    modes : Modes
-        Of that system.
-    frequency, inputs, outputs
-        See `direct_response`.
-    residual : bool
-        False leaves R out.
-
-    Returns
-    -------
-    (F, n_outputs, n_inputs) complex array
+        An undamped resonance (E-RESONANCE).
     """
     omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
     natural = 2.0 * np.pi * modes.frequency
     w = omega[:, None]
     below = natural**2 - w**2 + 2j * modes.damping_ratio * natural * w
-    if np.any(bad := np.abs(below) <= _RESONANT * np.maximum(natural**2, w**2)):
-        mode = int(np.argwhere(bad)[0, 1]) % len(natural)
-        raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
+    gain = _gain(below, np.maximum(natural**2, w**2), modes)
     left, right = outputs @ modes.shape, modes.shape.T @ inputs
-    result = (1.0 / below @ _pairs(left, right)).reshape(len(below), len(left), -1)
+    result = (gain @ _pairs(left, right)).reshape(len(below), len(left), -1)
     if residual and len(natural) < len(system.M):
         elastic = natural > 0.0
         static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
@@ -419,7 +362,7 @@ def _complex_modes(modal, modes: Modes, common) -> Reduction:
     elastic, rigid = np.flatnonzero(natural > 0.0), np.flatnonzero(natural == 0.0)
     m, order = len(elastic), np.concatenate([elastic, rigid])
     scale = np.exp(np.mean(np.log(natural[elastic])))
-    state = state_matrix(natural[elastic] ** 2, modal[np.ix_(order, order)], scale)
+    state = state_matrix(np.diag(natural[elastic] ** 2), modal[np.ix_(order, order)], scale)
     rows = modes.mesh_deflection
     drive = np.zeros((len(state), len(rows)))
     drive[m:] = rows[:, order].T / scale
@@ -513,12 +456,6 @@ def _gain(
         mode = int(np.arange(len(modes.frequency))[kept][np.argwhere(bad)[0, 1]])
         raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
     return 1.0 / below
-
-
-def _superposed(gain: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """``sum_k left_ok gain_fk right_ki`` as one matrix product."""
-    pairs = left.T[:, :, None] * right[:, None, :]
-    return (gain @ pairs.reshape(len(right), -1)).reshape(len(gain), len(left), right.shape[1])
 
 
 def _resonance(

@@ -6,7 +6,6 @@ __all__, __getattr__ = lazy_names(
     __name__,
     {
         "harmonic_balance": [
-            "adapt_harmonics",
             "displacements",
             "periodic_response",
             "solve_harmonic_balance",

@@ -95,63 +95,6 @@ def solve_harmonic_balance(
     return judged(problem, [found])[0] if stability else found
 
 
-def adapt_harmonics(
-    problem: NonlinearSystem,
-    frequency,
-    *,
-    tail: float = 1e-6,
-    harmonics: int = 4,
-    max_harmonics: int = 64,
-    start=None,
-    stability: bool = True,
-    radius: bool | None = None,
-    **options,
-) -> PeriodicSolution:
-    """Double the harmonics, each time from the solution before, until the tail is below a given share.
-
-    Parameters
-    ----------
-    problem, frequency, start, options
-        As for `solve_harmonic_balance`.
-    tail : float
-        Wanted share of the amplitude in the upper half of the lines.
-    stability, radius : bool
-        Of the last solution only; see `solve_harmonic_balance`.
-    harmonics, max_harmonics : int
-        First and largest number, three or more: the upper half must hold odd and even harmonics.
-
-    Returns
-    -------
-    PeriodicSolution
-        The message says when the largest number did not suffice, and where it did not converge.
-    """
-    harmonics = checked_count(harmonics, "harmonics", code="E-HARMONICS")
-    max_harmonics = checked_count(max_harmonics, "max_harmonics", code="E-HARMONICS")
-    if not 0.0 < checked_numbers(tail, "tail", code="E-HARMONICS", unit="") < 1.0 or not (
-        3 <= harmonics <= max_harmonics
-    ):
-        raise CaseError(
-            f"tail {tail} with {harmonics} to {max_harmonics} harmonics", code="E-HARMONICS",
-            limit="a tail between 0 and 1, at least three harmonics",
-        )  # fmt: skip
-    if options.get("reduction") is None:
-        options["reduction"] = reduced(problem)
-    options["stability"] = False
-    while True:
-        found = solve_harmonic_balance(problem, frequency, harmonics=harmonics, start=start, **options)
-        if found.tail <= tail or harmonics == max_harmonics or not found.converged:
-            break
-        harmonics, start = min(2 * harmonics, max_harmonics), found
-    note = f" {harmonics} harmonics: the upper half of the lines holds {found.tail:.2g} of the amplitude."
-    if found.converged and found.tail > tail:
-        note += f" Wanted {tail:.2g}: allow more harmonics."
-    found = replace(found, message=found.message + note)
-    if stability if radius is None else radius:
-        known = {name: options.get(name) for name in ("samples", "reduction")}
-        found = with_radius(harmonic_balance(problem, orders=found.orders, **known), found)
-    return judged(problem, [found])[0] if stability else found
-
-
 def displacements(
     problem: NonlinearSystem,
     solution: PeriodicSolution,

@@ -6,13 +6,13 @@ phases (Kim and Choi, J. Vib. Acoust. 119 (1997) 107).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfftn, next_fast_len, rfftn
 
 from femgear.errors import CaseError
-from femgear.system.elements import Element, GearMeshes, PolynomialSprings, coefficients_of
+from femgear.system.elements import Element, coefficients_of, with_coefficients
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import NonlinearSystem
 
@@ -141,7 +141,7 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
     top = np.abs(orders).max(axis=0)
     counts = np.ones(orders.shape[1], int)
     for element in problem.elements:
-        degree = _degree(element)
+        degree = getattr(element, "degree", None)
         content = _series_content(element, orders.shape[1])
         if degree is None or content is None:
             times, least = _CONTACT_SAMPLES[min(orders.shape[1], 2) - 1]
@@ -156,11 +156,9 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
 
 def on_grid(element: Element, theta: np.ndarray) -> Element:
     """The element with its periodic coefficients evaluated once at the phases ``theta`` (N, n_bases)."""
-    fixed = {
-        name: _GridSeries(np.ascontiguousarray(value.at(theta)), value.mean, value.orders)
-        for name, value in coefficients_of(element).items()
-    }
-    return replace(element, **fixed) if fixed and is_dataclass(element) else element
+    return with_coefficients(
+        element, lambda one: _GridSeries(np.ascontiguousarray(one.at(theta)), one.mean, one.orders)
+    )
 
 
 def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:
@@ -214,15 +212,6 @@ def _pick(coefficients: np.ndarray, places: tuple[np.ndarray, np.ndarray]) -> np
     out = coefficients[:, index]
     np.conjugate(out, out=out, where=mirrored)
     return out
-
-
-def _degree(element: Element) -> int | None:
-    """Degree of the law in the deflections; none where it has corners."""
-    if isinstance(element, PolynomialSprings):
-        return element.coefficients.shape[1]
-    if isinstance(element, GearMeshes) and not element.separates:
-        return 1
-    return getattr(element, "degree", None)
 
 
 def _series_content(element: Element, bases: int) -> np.ndarray | None:

@@ -4,8 +4,7 @@ R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed., sections 7.1 t
 motion by its start are integrated with it; over one period they are the monodromy matrix, which gives the
 verdict. Contact forces are continuous, so the derivatives are too at every contact change: no jump has to be
 added (R. I. Leine and H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, section 7.2:
-the saltation matrix is the unit matrix). The fixed point of the harmonic equations has its radius at the
-lines of the motion.
+the saltation matrix is the unit matrix).
 """
 
 from __future__ import annotations
@@ -16,10 +15,8 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from femgear.errors import CaseError, FemgearError, checked_count, checked_tolerance
-from femgear.solvers.periodic.equations import harmonic_balance
+from femgear.errors import CaseError, checked_count, checked_tolerance
 from femgear.solvers.periodic.solution import (
-    FloquetVerdict,
     PeriodicSolution,
     of_solution,
     open_verdict,
@@ -35,17 +32,16 @@ from femgear.solvers.time.adaptive import (
 )
 from femgear.solvers.time.stroboscopic import common_period
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import Element
 from femgear.system.fourier import harmonics_of, line_tail
-from femgear.system.system import HarmonicForce, NonlinearSystem, checked_bases, element_forces
+from femgear.system.system import NonlinearSystem, checked_bases, element_forces
 
 # Stiffness and damping of a motion, relative to the largest, that count as none.
 _FREE = 1e-11
 # Directions that the map changes by less than this share of the strongest one are left as they are.
-_SINGULAR = 1e-11
+SINGULAR = 1e-11
 # So are those that it changes by less than this many tolerances of the integrator: rounding, not stiffness.
 _ROUNDING = 100.0
-# Steps of the integrator in one segment, more of which a motion of interest does not need.
+# Steps of the integrator in one period, more of which a motion of interest does not need.
 _MOST_STEPS = 50_000
 
 
@@ -56,9 +52,8 @@ class ShootingSolution:
     Parameters
     ----------
     solution : PeriodicSolution
-        Lines of the deflections and forces; ``residual`` is the relative distance of start and end, the
-        spectral radius of the fixed point is that of the lines. Where the system has no such fixed point
-        (nothing holds it at its reference stiffness) the radius is nan and the message says so.
+        Lines of the deflections and forces; ``residual`` is the relative distance of start and end. No fixed
+        point is iterated, so that there is no spectral radius.
     period : float
         [s].
     displacement, velocity : (n,) arrays
@@ -101,8 +96,6 @@ class ShootingOptions:
     tolerance : float
         Of the distance between start and end, relative to the size of the motion.
     max_iterations : int
-    radius : bool
-        Whether the spectral radius of the fixed point is computed; the verdict always is.
     """
 
     harmonics: int = 20
@@ -110,7 +103,6 @@ class ShootingOptions:
     integration: float = 1e-11
     tolerance: float = 1e-9
     max_iterations: int = 30
-    radius: bool = True
 
     def __post_init__(self):
         for name in ("tolerance", "integration"):
@@ -135,7 +127,6 @@ def solve_shooting(
     *,
     start=None,
     periods: int = 1,
-    segments: int = 1,
     settle: int = 20,
     **options,
 ) -> ShootingSolution:
@@ -150,8 +141,6 @@ def solve_shooting(
         First guess; without one the motion ``settle`` periods after rest.
     periods : int
         Periods of the first base frequency that make one period of the motion.
-    segments : int
-        Pieces of the period whose starts are all unknown: multiple shooting, for motions that grow fast.
     settle : int
     options
         Fields of `ShootingOptions`.
@@ -172,87 +161,25 @@ def solve_shooting(
     """
     frequency, chosen = checked_bases(problem, frequency), ShootingOptions(**options)
     period = common_period(frequency, periods)
-    segments = checked_count(segments, "segments", code="E-RANGE")
     start = checked_start(problem, _settled(problem, frequency, period, settle) if start is None else start)
     moving = flow(problem, frequency, variational=True)
-    unknowns = _guess(moving, start, period, segments, chosen.integration)
+    y = replace(moving, variational=False).state(*start)
     integrator = chosen.integrator(moving, start)
     history, stuck = [], False
     while True:
-        ends, maps = _shoot(moving, unknowns, period, integrator)
-        defect = ends - np.roll(unknowns, -1, axis=0)
-        size = max(_size(unknowns), np.finfo(float).tiny)
+        end, monodromy = shoot(moving, y, period, integrator)
+        defect = end - y
+        size = max(float(np.abs(y).max()), np.finfo(float).tiny)
         history.append(float(np.abs(defect).max() / size))
         if history[-1] <= chosen.tolerance or len(history) > chosen.max_iterations:
             break
-        update, out_of_reach = _update(maps, defect, _ROUNDING * chosen.integration)
+        update, out_of_reach = _update(monodromy, defect, _ROUNDING * chosen.integration)
         stuck = out_of_reach > 0.5 and bool(np.abs(update).max() <= chosen.tolerance * size)
         if stuck:
             break
-        unknowns = _improved(moving, unknowns, update, np.abs(defect).max(), period, integrator)
-    whole = np.linalg.multi_dot(maps[::-1]) if segments > 1 else maps[0]
-    found = _result(moving, unknowns[0], whole, period, chosen, integrator, history, stuck=stuck)
+        y = _improved(moving, y, update, np.abs(defect).max(), period, integrator)
+    found = _result(moving, y, monodromy, period, chosen, integrator, history, stuck=stuck)
     return _judged(moving, found, chosen)
-
-
-def _verdict(
-    problem: NonlinearSystem, found: ShootingSolution, *, error: float, trivial: int
-) -> FloquetVerdict:
-    """Verdict of the monodromy matrix, of relative error ``error``, without ``trivial`` multipliers one.
-
-    Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
-    rounding splits; they are left out (as `floquet.floquet_verdicts` does). Of those that damping feels the
-    position has the multiplier one and is left out, the velocity counts.
-    """
-    matrix, positions = _without_free_motions(problem, found.monodromy)
-    return verdict_of(
-        np.linalg.eigvals(matrix), found.period, "shooting", error, np.inf, positions=trivial + positions,
-        velocities=positions,
-    )  # fmt: skip
-
-
-def _radius(problem: NonlinearSystem, turns, omega: float, lines: np.ndarray) -> tuple[float, str]:
-    """Spectral radius of the fixed point at lines (n_columns, L) [m] of a motion of ``omega`` [rad/s]; nan
-    and the reason where there is none. Base frequencies are ``turns`` (n_bases,) times that of the motion.
-    """
-    try:
-        balance = harmonic_balance(_on_one_base(problem, turns), orders=np.arange(lines.shape[1])[:, None])
-        return balance.spectral_radius(balance.unknowns(lines), [omega]), ""
-    except FemgearError as error:
-        return np.nan, f"; no spectral radius of a fixed point: {error.message}"
-
-
-def _on_one_base(problem: NonlinearSystem, turns) -> NonlinearSystem:
-    """The problem over one base frequency of which the given ones are the multiples ``turns`` (n_bases,)."""
-    turns = tuple(int(turn) for turn in turns)
-    if turns == (1,):
-        return problem
-    forces = tuple(
-        HarmonicForce(force.force, (sum(o * turn for o, turn in zip(force.orders, turns)),))
-        for force in problem.forces
-    )
-    return replace(
-        problem, elements=tuple(_Turned(element, turns) for element in problem.elements), forces=forces
-    )
-
-
-@dataclass(frozen=True)
-class _Turned:
-    """An element whose base phases are multiples ``turns`` of a single one."""
-
-    element: Element
-    turns: tuple[int, ...]
-
-    @property
-    def columns(self) -> np.ndarray:
-        return self.element.columns
-
-    @property
-    def reference(self) -> np.ndarray:
-        return self.element.reference
-
-    def evaluate(self, x, theta):
-        return self.element.evaluate(x, np.asarray(theta, float) * np.array(self.turns, float))
 
 
 def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> tuple[np.ndarray, int]:
@@ -294,64 +221,34 @@ def _settled(problem, frequency, period, settle):
     return found.displacement[-1], found.velocity[-1]
 
 
-def _guess(moving: Flow, start, period, segments, integration) -> np.ndarray:
-    """States (segments, 2n) at the starts of the segments, along the motion from the first one."""
-    plain = replace(moving, variational=False)
-    y = plain.state(*start)
-    scale, out = motion_scale(plain, start), [y]
-    for k in range(segments - 1):
-        span = period * k / segments, period * (k + 1) / segments
-        steps = trajectory(plain, y, *span, tolerance=max(integration, 1e-8), events=True, scale=scale)
-        y = sampled(steps, np.array(span[1:]), y)[0][0]
-        out.append(y)
-    return np.array(out)
+def shoot(moving: Flow, y, period: float, options) -> tuple[np.ndarray, np.ndarray | None]:
+    """End (2n,) of a period from the state y (2n,), and its derivatives (2n, 2n) where they are followed."""
+    state = np.column_stack([y, np.eye(len(y))]).ravel() if moving.variational else y
+    times = np.array([period])
+    end = sampled(trajectory(moving, state, 0.0, period, **options), times, state)[0][0]
+    return end.reshape(len(y), -1)[:, 0], moving.tangents(end) if moving.variational else None
 
 
-def _shoot(moving: Flow, unknowns, period, options):
-    """Ends (segments, 2n) of the segments and their derivatives (segments, 2n, 2n)."""
-    count, size = unknowns.shape
-    ends, maps = [], []
-    for k, y in enumerate(unknowns):
-        state = np.column_stack([y, np.eye(size)]).ravel() if moving.variational else y
-        span = period * k / count, period * (k + 1) / count
-        end, _ = sampled(trajectory(moving, state, *span, **options), np.array(span[1:]), state)
-        end = end[0]
-        ends.append(end.reshape(size, -1)[:, 0])
-        maps.append(moving.tangents(end) if moving.variational else None)
-    return np.array(ends), maps
-
-
-def _update(maps, defect, rounding):
-    """Newton step (segments, 2n): ``maps[k] d_k - d_{k+1} = -defect_k``, cyclic; the share it leaves over."""
-    count, size = defect.shape
-    matrix = np.zeros((count * size, count * size))
-    for k, part in enumerate(maps):
-        rows, following = slice(k * size, (k + 1) * size), (k + 1) % count
-        matrix[rows, rows] += part
-        matrix[rows, following * size : (following + 1) * size] -= np.eye(size)
+def _update(monodromy, defect, rounding: float) -> tuple[np.ndarray, float]:
+    """Newton step (2n,), ``(monodromy - 1) step = -defect``, and the share of the defect left over."""
+    matrix = monodromy - np.eye(len(defect))
     left, value, right = np.linalg.svd(matrix)
     # lstsq has no absolute bound, and here the whole matrix may be rounding
-    kept = value > max(_SINGULAR * value[0], rounding)
-    step = -right[kept].T @ ((left[:, kept].T @ defect.ravel()) / value[kept])
+    kept = value > max(SINGULAR * value[0], rounding)
+    step = -right[kept].T @ ((left[:, kept].T @ defect) / value[kept])
     wanted = np.linalg.norm(defect)
-    over = np.linalg.norm(matrix @ step + defect.ravel()) / wanted if wanted else 0.0
-    return step.reshape(count, size), float(over)
+    return step, float(np.linalg.norm(matrix @ step + defect) / wanted) if wanted else 0.0
 
 
-def _improved(moving: Flow, unknowns, update, before, period, options):
+def _improved(moving: Flow, y, update, before, period, options):
     """The Newton step, halved until the defect gets smaller; integrated without derivatives."""
     plain, share = replace(moving, variational=False), 1.0
     for _ in range(8):
-        tried = unknowns + share * update
-        ends, _ = _shoot(plain, tried, period, options)
-        if np.abs(ends - np.roll(tried, -1, axis=0)).max() < before:
+        tried = y + share * update
+        if np.abs(shoot(plain, tried, period, options)[0] - tried).max() < before:
             return tried
         share *= 0.5
-    return unknowns + update
-
-
-def _size(state) -> float:
-    return float(np.abs(state).max())
+    return y + update
 
 
 def _result(
@@ -370,7 +267,7 @@ def _result(
     converged = history[-1] <= chosen.tolerance
     message = "the motion returns to its start" if converged else (
         f"after {len(history) - 1} iterations start and end differ by {history[-1]:.2g} of the motion: "
-        "give a better start, or more segments"
+        "give a better start"
     )  # fmt: skip
     if stuck and not converged:
         message = (
@@ -393,14 +290,17 @@ def _result(
 def _judged(
     moving: Flow, found: ShootingSolution, chosen: ShootingOptions, *, trivial: int = 0
 ) -> ShootingSolution:
-    """The motion with its verdict, without ``trivial`` multipliers, and the radius at its lines."""
-    solution, problem = found.solution, moving.problem
-    told: dict[str, Any] = {"verdict": open_verdict("not covered: the solution did not converge")}
-    if solution.converged:
-        told["verdict"] = _verdict(problem, found, error=chosen.integration, trivial=trivial)
-    if chosen.radius:
-        omega = float(solution.frequency[0])
-        turns = np.rint(moving.frequency / omega).astype(int)
-        value, note = _radius(problem, turns, omega, solution.deflection)
-        told |= {"spectral_radius": value, "message": solution.message + note}
-    return replace(found, solution=replace(solution, **told))
+    """The motion with the verdict of its monodromy matrix, without ``trivial`` multipliers one.
+
+    Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
+    rounding splits; they are left out (as `floquet.floquet_verdicts` does). Of those that damping feels the
+    position has the multiplier one and is left out, the velocity counts.
+    """
+    verdict = open_verdict("not covered: the solution did not converge")
+    if found.solution.converged:
+        matrix, positions = _without_free_motions(moving.problem, found.monodromy)
+        verdict = verdict_of(
+            np.linalg.eigvals(matrix), found.period, "shooting", chosen.integration, np.inf,
+            positions=trivial + positions, velocities=positions,
+        )  # fmt: skip
+    return replace(found, solution=replace(found.solution, verdict=verdict))

@@ -7,6 +7,6 @@ __all__, __getattr__ = lazy_names(
     {
         "floquet": ["floquet_verdict", "floquet_verdicts", "monodromy"],
         "lyapunov": ["LyapunovOptions", "lyapunov_exponents"],
-        "parametric": ["stability", "stability_boundary", "stability_chart"],
+        "parametric": ["stability", "stability_chart"],
     },
 )

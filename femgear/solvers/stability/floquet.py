@@ -18,6 +18,7 @@ from scipy import linalg
 from scipy.linalg import expm
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
+from femgear.solvers.linear.modal import state_matrix
 from femgear.solvers.periodic.solution import (
     FloquetVerdict,
     PeriodicSolution,
@@ -143,12 +144,7 @@ class Frame:
 
     def state_matrices(self, kappa: np.ndarray) -> np.ndarray:
         """``A`` (..., 2 n, 2 n) of ``(eta, eta')' = A (eta, eta')`` with kappa (..., n_c, n_c)."""
-        n = len(self.square)
-        out = np.zeros((*kappa.shape[:-2], 2 * n, 2 * n))
-        out[..., range(n), range(n, 2 * n)] = 1.0
-        out[..., n:, :n] = -np.diag(self.square) - self.rows.T @ kappa @ self.rows
-        out[..., n:, n:] = -self.damping
-        return out
+        return state_matrix(np.diag(self.square) + self.rows.T @ kappa @ self.rows, self.damping, 1.0)
 
     def exact_monodromy(self, tangents: np.ndarray, durations) -> np.ndarray:
         """Monodromy matrices of tangents (..., pieces, n_c, n_c) that are constant over durations [s]."""

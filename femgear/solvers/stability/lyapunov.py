@@ -14,18 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError, checked_count, checked_numbers, checked_tolerance
+from femgear.errors import CaseError, ConvergenceError, checked_count, checked_numbers
 from femgear.solvers.stability.floquet import Frame, frame_of
-from femgear.solvers.time.adaptive import checked_start, flow, motion_scale, trajectory
-from femgear.solvers.time.stroboscopic import PoincareSection, common_period, stroboscopic_map
+from femgear.solvers.time.adaptive import checked_start
+from femgear.solvers.time.stroboscopic import PoincareSection, stroboscopic_map
 from femgear.system.system import NonlinearSystem, element_forces
 
 # parts of the run that are compared for the error
-_PARTS = 4
+PARTS = 4
 # errors by which an exponent differs from zero to have a sign, and exponent times period that is rounding
 _CLEAR = 3.0
 _ROUNDING = 1e-9
@@ -39,8 +38,6 @@ _BEYOND = 1e100
 # relative change of a tangent that is rounding, and of the sum of all exponents that is refused
 _SAME = 1e-9
 _SUM = 0.02
-# factor of the tolerance, or of the step, in the run that stands beside for the error of the integration
-_COARSER = {"DOP853": 1e3, "average acceleration": 2}
 
 
 @dataclass(frozen=True)
@@ -54,8 +51,7 @@ class LyapunovExponents:
     scatter : (count,) array
         Standard error of the mean over finite time: four parts of the run and the first directions [1/s].
     step_error : (count,) array
-        Change against the same periods with half the steps; for DOP853 against a quarter of them with a
-        thousand times the tolerance [1/s].
+        Change against the same periods with half the steps [1/s].
     growth : (periods, directions, count) array
         Logarithm of the growth in every period.
     period : float
@@ -126,7 +122,7 @@ class LyapunovExponents:
         """Whether the motion is larger from part to part of the run, and no less so at its end."""
         both = (self.section.displacement, self.section.velocity)
         for states in both:
-            parts = np.array([np.abs(part).max() for part in np.array_split(states, _PARTS)])
+            parts = np.array([np.abs(part).max() for part in np.array_split(states, PARTS)])
             more = np.diff(parts)
             if np.all(more > 0.0) and more[-1] >= 0.5 * more[0] and parts[-1] > 1.1 * parts[0]:
                 return True
@@ -147,15 +143,10 @@ class LyapunovOptions:
     points, skip : int
         Periods that count, and periods before them.
     steps : int
-        Time steps in a period, of average acceleration; 8 or more.
+        Time steps in a period, of average acceleration, whose derivative (the trapezoidal rule) the small
+        motions follow; 8 or more.
     periods : int
         Periods of the first base frequency between two points.
-    method : str
-        "average acceleration": fixed steps; the small motions follow the derivative of these steps, the
-        trapezoidal rule. "DOP853": motion and small motions to ``tolerance``, with a stop at every contact
-        change; slower.
-    tolerance : float
-        Of DOP853.
     seed : int
         Of the first directions.
     """
@@ -166,23 +157,15 @@ class LyapunovOptions:
     skip: int = 100
     steps: int = 200
     periods: int = 1
-    method: str = "average acceleration"
-    tolerance: float = 1e-10
     seed: int = 0
 
     def __post_init__(self):
-        least = {"points": 2 * _PARTS, "skip": 0, "directions": 1, "count": 1, "seed": 0}
+        least = {
+            "points": 2 * PARTS, "skip": 0, "directions": 1, "count": 1, "seed": 0, "steps": 8, "periods": 1,
+        }  # fmt: skip
         for name, lowest in least.items():
             number = checked_count(getattr(self, name), name, code="E-RANGE", least=lowest)
             object.__setattr__(self, name, number)
-        if self.method not in _COARSER:
-            raise CaseError(
-                f"exponents by {self.method!r}", code="E-CHOICE", key="method",
-                limit="average acceleration or DOP853",
-            )  # fmt: skip
-        object.__setattr__(self, "steps", checked_count(self.steps, "steps", code="E-RANGE", least=8))
-        object.__setattr__(self, "periods", checked_count(self.periods, "periods", code="E-RANGE"))
-        object.__setattr__(self, "tolerance", checked_tolerance(self.tolerance))
 
 
 def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **options) -> LyapunovExponents:
@@ -201,22 +184,30 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
     Raises
     ------
     CaseError
-        Numbers out of range (E-RANGE), frequencies without the common period, an unknown
-        method.
+        Numbers out of range (E-RANGE), frequencies without the common period.
     ConvergenceError
         A step whose column equations do not converge, a motion beyond all bounds (E-DIVERGED), exponents
         whose sum is not the divergence (E-INTEGRATION).
 
     Notes
     -----
-    Fixed steps leave out free motions that no element and no damping feels (rotation of a free train), whose
-    exponents are zero; DOP853 has them among the exponents.
+    Free motions that no element and no damping feels (rotation of a free train), whose exponents are zero,
+    are left out.
     """
     chosen = LyapunovOptions(**options)
-    count, points = chosen.count, chosen.points
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     start = checked_start(problem, start)
-    finer, coarser = _both_runs(problem, frequency, chosen)
+    finer, coarser = (
+        _Stepped(problem, frequency, steps, chosen.periods) for steps in (chosen.steps, chosen.steps // 2)
+    )
+    return exponents_of(problem, finer, coarser, start, chosen, beside=chosen.points)
+
+
+def exponents_of(
+    problem: NonlinearSystem, finer, coarser, start, chosen: LyapunovOptions, *, beside: int
+) -> LyapunovExponents:
+    """Exponents of a run, its error told by a coarser one over the first ``beside`` of its points."""
+    count, points = chosen.count, chosen.points
     if count > finer.size:
         raise CaseError(
             f"{count} exponents", code="E-RANGE", key="count", limit=f"1 to {finer.size}, two a coordinate"
@@ -229,7 +220,6 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
     growth, rows, same = _followed(passages, frames, points, problem)
     q, v, x, low, high = (np.array(part) for part in zip(*rows))
     # the same attractor and the same directions, so that only the steps differ
-    beside = points if chosen.method != "DOP853" else max(2 * _PARTS, points // 4)
     other, _, _ = _followed(coarser.passages((q[0], v[0])), frames, beside, problem)
     exponents, scatter = _means(growth / finer.period)
     step_error = np.abs(_means((other - growth[:beside]) / finer.period)[0])
@@ -239,15 +229,6 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
         exponents, scatter, step_error, growth, finer.period, PoincareSection(time, q, v, x), low.min(axis=0),
         high.max(axis=0), finer.divergence, same,
     )  # fmt: skip
-
-
-def _both_runs(problem: NonlinearSystem, frequency: np.ndarray, chosen: LyapunovOptions):
-    """The run, and the coarser one beside it."""
-    steps, periods, coarser = chosen.steps, chosen.periods, _COARSER[chosen.method]
-    if chosen.method == "DOP853":
-        tolerances = chosen.tolerance, min(chosen.tolerance * coarser, 1e-2)
-        return tuple(_Adaptive(problem, frequency, steps, periods, one) for one in tolerances)
-    return tuple(_Stepped(problem, frequency, n, periods) for n in (steps, int(steps // coarser)))
 
 
 def _turned(frames, matrices):
@@ -286,7 +267,8 @@ def _check_sum(exponents, scatter, run) -> None:
         )  # fmt: skip
 
 
-def _bounded(q, v) -> None:
+def check_bounded(q, v) -> None:
+    """Refuse displacements q (n,) and velocities v (n,) beyond all bounds (E-DIVERGED)."""
     if not (np.abs(q).max(initial=0.0) < _BEYOND and np.abs(v).max(initial=0.0) < _BEYOND):
         raise ConvergenceError(
             "the motion grows beyond all bounds and has no attractor", code="E-DIVERGED",
@@ -295,8 +277,8 @@ def _bounded(q, v) -> None:
         )  # fmt: skip
 
 
-def _pieces(damping, period: float) -> int:
-    """Parts of a period after which small motions are made orthogonal."""
+def pieces(damping, period: float) -> int:
+    """Parts of a period [s] after which small motions are made orthogonal, by the damping (n, n)."""
     fading = float(np.linalg.norm(damping, 2)) if len(damping) else 0.0
     return int(min(max(_PIECES, np.ceil(fading * period / _FADED)), _MOST_PIECES))
 
@@ -304,8 +286,8 @@ def _pieces(damping, period: float) -> int:
 def _means(rate):
     """Weighted mean (count,) of rates (points, directions, count), and its standard error."""
     mean = _weighted(rate)
-    parts = np.array([_weighted(part).mean(axis=0) for part in np.array_split(rate, _PARTS)])
-    scatter = parts.std(axis=0, ddof=1) / np.sqrt(_PARTS)
+    parts = np.array([_weighted(part).mean(axis=0) for part in np.array_split(rate, PARTS)])
+    scatter = parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
     return mean.mean(axis=0), np.hypot(scatter, np.ptp(mean, axis=0))
 
 
@@ -326,7 +308,7 @@ class _Stepped:
         self.divergence = -float(np.trace(self._frame.damping))
         natural = self._frame.fastest or 2.0 * np.pi / self.period
         self._scale = np.repeat([1.0, natural], len(self._frame.square))
-        self._pieces = min(_pieces(self._frame.damping, self.period), steps)
+        self._pieces = min(pieces(self._frame.damping, self.period), steps)
 
     def passages(self, start):
         """Motion at the start of every period, deflections and phases in it, derivatives of its parts."""
@@ -336,7 +318,7 @@ class _Stepped:
             block = once.run(state, g)
             x = once.columns(block)
             q, v = once.motion(block, np.array([0]))
-            _bounded(q, v)
+            check_bounded(q, v)
             yield (q[0], v[0], x, once.theta), self._map(x)
             state, g = block.states[-1], block.excess[-1]
 
@@ -356,40 +338,3 @@ def _product(factors):
         rest = factors[len(factors) // 2 * 2 :]
         factors = np.concatenate([factors[1::2] @ factors[: len(factors) // 2 * 2 : 2], rest])
     return factors[0]
-
-
-class _Adaptive:
-    """Periods of the adaptive integrator with the derivatives of the state."""
-
-    def __init__(self, problem, frequency, samples, periods, tolerance):
-        self.period = common_period(frequency, periods)
-        self._flow = flow(problem, frequency, variational=True)
-        self._tolerance = tolerance
-        self.size = 2 * self._flow.size
-        damping = np.linalg.solve(problem.system.M, problem.damping)
-        self.divergence = -float(np.trace(damping))
-        self._times = self.period * np.linspace(0.0, 1.0, samples + 1)
-        self._ends = self.period * np.linspace(0.0, 1.0, _pieces(damping, self.period) + 1)
-
-    def passages(self, start):
-        """As for fixed steps, in displacements and scaled velocities."""
-        moving, (q, v) = self._flow, start
-        theta = self._times[:, None] * moving.frequency
-        while True:
-            _bounded(q, v)
-            options = {
-                "tolerance": self._tolerance,
-                "events": True,
-                "scale": motion_scale(moving, (q, v)) or 1.0,
-            }
-            first, x, matrices = (q, v), np.tile(moving.rows @ q, (len(theta), 1)), []
-            for begin, end in pairwise(self._ends):
-                y = moving.state(q, v)
-                for t0, t1, dense in trajectory(moving, y, begin, end, **options):
-                    inside = np.flatnonzero((self._times > t0) & (self._times <= t1))
-                    if len(inside):
-                        x[inside] = moving.split(dense(self._times[inside]))[2].T
-                    y = dense(t1)
-                matrices.append(moving.tangents(y))
-                q, v, _ = moving.split(y)
-            yield (*first, x, theta), matrices

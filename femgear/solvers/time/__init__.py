@@ -6,9 +6,7 @@ __all__, __getattr__ = lazy_names(
     __name__,
     {
         "stroboscopic": [
-            "bifurcation_diagram",
             "stroboscopic_map",
-            "stroboscopic_section",
             "sweep_response",
             "sweep_up_and_down",
         ],

@@ -11,23 +11,17 @@ where it is open, whatever the sign of u: smooth across the change.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, is_dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import integrate, linalg
 from scipy.optimize import root_scalar
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import mass_error
-from femgear.system.elements import (
-    Element,
-    GearMeshes,
-    PiecewiseSprings,
-    RadialBearings,
-    coefficients_of,
-)
-from femgear.system.fourier import FourierSeries, StepSeries, constant, phase_of
+from femgear.solvers.linear.modal import mass_error, state_matrix
+from femgear.system.elements import Element, coefficients_of, has_corners, with_coefficients
+from femgear.system.fourier import StepSeries, constant, phase_of
 from femgear.system.system import NonlinearSystem
 
 METHODS = ("DOP853", "Radau", "LSODA")
@@ -143,10 +137,8 @@ def flow(problem: NonlinearSystem, frequency, *, variational=False) -> Flow:
         raise mass_error() from error
     rate = float(np.sqrt(np.abs(np.trace(linalg.cho_solve(factor, problem.stiffness))) / n))
     rate = rate or float(np.abs(frequency).max(initial=0.0)) or 1.0
-    matrix = np.zeros((2 * n, 2 * n))
-    matrix[:n, n:] = rate * np.eye(n)
-    matrix[n:, :n] = -linalg.cho_solve(factor, system.K) / rate
-    matrix[n:, n:] = -linalg.cho_solve(factor, problem.damping)
+    stiffness, damping = linalg.cho_solve(factor, system.K), linalg.cho_solve(factor, problem.damping)
+    matrix = state_matrix(stiffness, damping, rate)
     return Flow(
         problem, frequency, rate, matrix, linalg.cho_solve(factor, system.W) / rate,
         linalg.cho_solve(factor, loads.T).T / rate,
@@ -343,87 +335,11 @@ def _gaps(motion: Flow, law: Contacts, dense, times):
     return law.gaps(motion.split(dense(times))[2].T, times[:, None] * motion.frequency)
 
 
-@dataclass(frozen=True)
-class _SharpMeshes:
-    """Separating gear meshes without smoothing; ``k``, deflection and force come from one series, (3, g)."""
-
-    columns: np.ndarray
-    coefficients: Callable[[np.ndarray], np.ndarray]
-    backlash: np.ndarray
-    has_back: np.ndarray
-
-    def _sides(self, x, theta):
-        k, deflection, force = self.coefficients(theta)
-        line = force + k * (x[..., 0] - deflection)
-        return k, line, line + k * self.backlash
-
-    def evaluate(self, x, theta):
-        """As `GearMeshes.evaluate`."""
-        k, line, behind = self._sides(x, theta)
-        back = (behind < 0.0) & self.has_back
-        force = np.maximum(line, 0.0) + np.where(back, behind, 0.0)
-        return force[..., None], (k * ((line > 0.0) | back))[..., None, None]
-
-    def switches(self, x, theta):
-        """Drive flanks (g), then back flanks where there are some."""
-        _, line, behind = self._sides(x, theta)
-        return np.concatenate([line, -behind[..., self.has_back]], axis=-1)
-
-    def frozen(self, x, theta, closed):
-        """Forces (g, 1) and tangents (g, 1, 1) with the flanks closed as given."""
-        k, line, behind = self._sides(x, theta)
-        drive, back = closed[: len(k)].astype(float), np.zeros(len(k))
-        back[self.has_back] = closed[len(k) :]
-        return (line * drive + behind * back)[:, None], (k * (drive + back))[:, None, None]
-
-
-Piece = Element | GearMeshes | _SharpMeshes
-
-
-def _sharp(element: Element) -> Piece:
-    """Gear meshes as `_SharpMeshes` where those say the same, else the element itself."""
-    if type(element) is not GearMeshes or not element.separates or element.smoothing:
-        return element
-    has_back = np.isfinite(element.backlash)
-    backlash = np.where(has_back, element.backlash, 0.0)
-    return _SharpMeshes(element.columns, _coefficients(element), backlash, has_back)
-
-
-def switches(element: Piece, x, theta) -> np.ndarray:
+def _switches(element: Element, x, theta) -> np.ndarray:
     """Arguments (..., m) of the positive parts of an element at deflections x (..., g, d); none if smooth."""
-    x = np.asarray(x, float)
-    if isinstance(element, _SharpMeshes):
-        return element.switches(x, theta)
-    if isinstance(element, PiecewiseSprings) and not element.smoothing:
-        return (x - element.breaks).reshape(*x.shape[:-2], -1)
-    if isinstance(element, RadialBearings) and element.springs is not None and not element.smoothing:
-        return _ring_overlaps(element, x).reshape(*x.shape[:-2], -1)
-    return np.zeros((*x.shape[:-2], 0))
-
-
-def _ring_overlaps(element: RadialBearings, x) -> np.ndarray:
-    """Overlaps (..., g, springs) of the springs of bearings at deflections x (..., g, 2) [m]."""
-    assert element.directions is not None
-    return x @ element.directions.T - np.asarray(element.clearance)[:, None]
-
-
-def frozen(element: Piece, x, theta, closed) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (g, d) and tangents (g, d, d) of an element whose switches are closed as given, one instant."""
-    if not len(closed):
-        return element.evaluate(x, theta)
-    if isinstance(element, _SharpMeshes):
-        return element.frozen(x, theta, closed)
-    groups = len(element.columns)
-    closed = closed.reshape(groups, -1)
-    if isinstance(element, PiecewiseSprings):
-        change = np.diff(element.slopes)
-        rest = np.maximum(-element.breaks, 0.0) @ change
-        force = element.slopes[0] * x[:, 0] + ((x - element.breaks) * closed) @ change - rest
-        return force[:, None], (element.slopes[0] + closed @ change)[:, None, None]
-    assert isinstance(element, RadialBearings) and element.directions is not None and element.springs
-    each = (4.0 * np.asarray(element.stiffness) / element.springs)[:, None] * closed
-    tangents = np.einsum("gs,si,sj->gij", each, element.directions, element.directions)
-    return (each * _ring_overlaps(element, x)) @ element.directions, tangents
+    if has_corners(element):
+        return element.switches(np.asarray(x, float), theta)
+    return np.zeros((*np.shape(x)[:-2], 0))
 
 
 @dataclass(frozen=True)
@@ -433,7 +349,7 @@ class Contacts:
     ``closed``: one bool array an element; none where the elements are evaluated as they are.
     """
 
-    elements: tuple[Piece, ...]
+    elements: tuple[Element, ...]
     columns: int
     closed: tuple[np.ndarray, ...] = ()
 
@@ -442,8 +358,8 @@ class Contacts:
         total, tangent = np.zeros(self.columns), np.zeros((self.columns, self.columns))
         for number, element in enumerate(self.elements):
             own = x[element.columns]
-            if self.closed:
-                force, slope = frozen(element, own, theta, self.closed[number])
+            if self.closed and len(self.closed[number]) and has_corners(element):
+                force, slope = element.frozen(own, theta, self.closed[number])
             else:
                 force, slope = element.evaluate(own, theta)
             if element.columns.shape[1] == 1:
@@ -460,7 +376,7 @@ class Contacts:
 
         Closed switches are ``u``, open ones ``-u``: a negative value says that the state has to change.
         """
-        sides = [switches(e, x[..., e.columns], theta) for e in self.elements]
+        sides = [_switches(e, x[..., e.columns], theta) for e in self.elements]
         return np.concatenate(sides, axis=-1) * np.where(np.concatenate(self.closed), 1.0, -1.0)
 
     def flipped(self, which) -> Contacts:
@@ -475,12 +391,12 @@ def contacts(problem: NonlinearSystem, x, theta, rate, *, events: bool) -> Conta
 
     A switch at zero within rounding is closed when its deflection rate opens the next instant so.
     """
-    elements, columns = tuple(map(_sharp, problem.elements)), problem.system.W.shape[1]
+    elements, columns = problem.elements, problem.system.W.shape[1]
     if not events:
         return Contacts(elements, columns)
     size = np.abs(x).max(initial=0.0)
     ahead = x + 1e-9 * (size or 1.0) * rate / (np.abs(rate).max(initial=0.0) or 1.0)
-    closed = tuple(switches(e, ahead[e.columns], theta) > 0.0 for e in elements)
+    closed = tuple(_switches(e, ahead[e.columns], theta) > 0.0 for e in elements)
     return Contacts(elements, columns, closed)
 
 
@@ -511,37 +427,8 @@ def _next_break(steps, time: float) -> float:
 
 def held(problem: NonlinearSystem, theta) -> NonlinearSystem:
     """The problem with its step series at their values at the phases ``theta``, constant."""
-    elements = []
-    for element in problem.elements:
-        changed = {
-            name: constant(series.at(theta))
-            for name, series in coefficients_of(element).items()
-            if isinstance(series, StepSeries)
-        }
-        elements.append(replace(element, **changed) if changed and is_dataclass(element) else element)
-    return replace(problem, elements=tuple(elements))
 
+    def at_theta(series):
+        return constant(series.at(theta)) if isinstance(series, StepSeries) else series
 
-def _coefficients(element: GearMeshes):
-    """A function of the phases (..., n_bases): ``k``, deflection and force (3, ..., g)."""
-    assert element.deflection is not None and element.force is not None
-    series = element.stiffness, element.deflection, element.force
-    waves = [s for s in series if isinstance(s, FourierSeries)]
-    changing = {s.orders for s in series if not (isinstance(s, FourierSeries) and s.amplitudes.shape[1] == 1)}
-    if len(changing) > 1 or len(waves) < len(series):
-        return lambda theta: np.stack(np.broadcast_arrays(*(s.at(theta) for s in series)))
-    count, groups = max(s.amplitudes.shape[1] for s in waves), len(element.columns)
-    table = np.zeros((3, groups, count), np.complex128)
-    for row, s in zip(table, waves):
-        row[:, : s.amplitudes.shape[1]] = s.amplitudes
-    means = np.ascontiguousarray(np.real(table[..., 0]))
-    if not changing:
-        return lambda theta: means.reshape(3, *[1] * (np.ndim(theta) - 1), groups)
-    orders, table, harmonic = changing.pop(), table.reshape(3 * groups, count).T, 1j * np.arange(count)
-
-    def at(theta):
-        wave = np.exp(np.asarray(phase_of(theta, orders))[..., None] * harmonic)
-        values = (wave @ table).real.reshape(*wave.shape[:-1], 3, groups)
-        return values if values.ndim == 2 else np.moveaxis(values, -2, 0)
-
-    return at
+    return replace(problem, elements=tuple(with_coefficients(one, at_theta) for one in problem.elements))

@@ -20,7 +20,6 @@ from femgear.solvers.time.steps import (
     march_times,
     stability_limit,
 )
-from femgear.system.elements import GearMeshes, PiecewiseSprings
 from femgear.system.system import (
     NonlinearSystem,
     checked_bases,
@@ -196,18 +195,14 @@ def step_scheme(
 def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
     """Largest stiffness (n_columns,) of every column over the phases, for the stability of steps [N/m].
 
-    Meshes count with the top of k(t), piecewise springs with their steepest part, others as their reference.
+    Elements count with what they call steepest, meshes with the top of k(t), others as their reference.
     """
     turns = np.random.default_rng(0).random((_PHASES, len(np.atleast_1d(frequency))))
     turns[:, 0] = np.arange(_PHASES) / _PHASES
     total = np.zeros(problem.system.W.shape[1])
     for element in problem.elements:
-        top = element.reference
-        if isinstance(element, GearMeshes):
-            top = element.stiffness.at(2.0 * np.pi * turns).max(axis=0)[:, None]
-        if isinstance(element, PiecewiseSprings):
-            top = np.full((len(element.columns), 1), element.slopes.max())
-        np.add.at(total, element.columns, top)
+        steepest = getattr(element, "steepest", lambda _, element=element: element.reference)
+        np.add.at(total, element.columns, steepest(2.0 * np.pi * turns))
     return total
 
 

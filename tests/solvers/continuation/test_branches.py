@@ -4,19 +4,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from validation.reference.branch_switching import branch_maximum, crossing_branches
+from validation.reference.cornered_springs import PiecewiseSprings
+from validation.reference.stability_boundary import stability_boundary
 
 from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import (
-    branch_maximum,
-    crossing_branches,
     frequency_response_curve,
     parameter_curve,
 )
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.stability.parametric import stability_boundary
-from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings
+from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 

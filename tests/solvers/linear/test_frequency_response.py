@@ -8,6 +8,7 @@ import pytest
 from published.planetary_sets import lin_parker_set
 from validation.reference.frequency_response import (
     complex_modal_response,
+    direct_response,
     mesh_error_response,
     resonance_peaks,
     unit_force,
@@ -15,7 +16,7 @@ from validation.reference.frequency_response import (
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, solve_modes
-from femgear.solvers.linear.receptance import direct_response, modal_response
+from femgear.solvers.linear.receptance import modal_response
 from femgear.system.assembler import gear_set_system
 from femgear.system.system import MechanicalSystem
 from femgear.trains.gear_set import gear_set_modes

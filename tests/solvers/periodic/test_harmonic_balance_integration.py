@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
 from scipy.integrate import solve_ivp
+from validation.reference.cornered_springs import BearingSprings
 
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.system.assembler import mesh_elements
@@ -137,13 +138,15 @@ def test_planetary_set_with_backlash():
     assert difference(fine, reference) < 1e-6
 
 
-@pytest.mark.parametrize("springs", [None, 8])
-def test_rotor_in_a_bearing_with_clearance(springs):
+@pytest.mark.parametrize(
+    "bearing",
+    [RadialBearings([[0, 1]], 1.0, clearance=0.3), BearingSprings([[0, 1]], 1.0, clearance=0.3, springs=8)],
+)
+def test_rotor_in_a_bearing_with_clearance(bearing):
     """Weight that turns in the rotating frame, against the sense of rotation, and a constant load."""
     system = MechanicalSystem(
         np.eye(2), 0.2 * np.eye(2), np.diag([0.1, 0.15]), np.eye(2), np.array([0.15, -0.08]), ("x", "y")
     )
-    bearing = RadialBearings([[0, 1]], 1.0, clearance=0.3, springs=springs)
     problem = NonlinearSystem(system, (bearing,), (HarmonicForce([0.12, 0.12j], (-1,)),))
     found = solve_harmonic_balance(problem, 0.5, harmonics=24, samples=4096)
     radius = np.linalg.norm(found.at(np.linspace(0.0, 4.0 * np.pi, 400)), axis=1)

@@ -7,7 +7,6 @@ from small_trains import gear_pair
 from femgear.errors import ConvergenceError
 from femgear.solvers.continuation.branches import frequency_response_curve
 from femgear.solvers.periodic.harmonic_balance import (
-    adapt_harmonics,
     periodic_response,
     solve_harmonic_balance,
 )
@@ -50,8 +49,6 @@ def test_other_entry_points_say_so_too():
     problem = pair(-120.0)
     found = periodic_response(problem, 2.7e4, harmonics=5)
     assert not found.solution.converged and found.stable is None and NOTE in found.solution.message
-    found = adapt_harmonics(problem, 2.7e4)
-    assert not found.converged and NOTE in found.message
     with pytest.raises(ConvergenceError) as error:
         frequency_response_curve(problem, (1.6e4, 3.5e4), harmonics=5)
     assert NOTE in error.value.message and "16000 rad/s (2546.48 Hz)" in error.value.message

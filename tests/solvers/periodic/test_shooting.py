@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipk
+from validation.reference.cornered_springs import PiecewiseSprings
 from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError
@@ -14,7 +15,7 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import monodromy
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
+from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 
@@ -111,13 +112,6 @@ def test_gear_pair_with_backlash_against_integration_and_harmonic_balance(gear_p
     assert force[0, 0].real == pytest.approx(0.4, abs=1e-5)
 
 
-def test_multiple_shooting_finds_the_same(gear_pair):
-    single = solve_shooting(gear_pair, 0.9, settle=40)
-    several = solve_shooting(gear_pair, 0.9, settle=40, segments=4)
-    np.testing.assert_allclose(several.displacement, single.displacement, atol=1e-8)
-    np.testing.assert_allclose(several.monodromy, single.monodromy, atol=1e-7)
-
-
 def test_multipliers_of_rectangular_stiffness_are_matrix_exponentials():
     """Lin and Parker's rectangular k(t), contact ratio 1.635: 2 omega_n excitation is unstable."""
     mesh = GearMeshes([0], StepSeries([[1.0, 0.65]], [0.0, 0.635]), force=constant([0.3]), separates=False)
@@ -177,7 +171,6 @@ def test_bad_input_is_refused(duffing):
     for arguments, options in (
         ((duffing, 0.0), {}),
         ((duffing, [1.0, np.sqrt(2.0)]), {}),
-        ((duffing, 1.0), {"segments": 0}),
         ((duffing, 1.0), {"harmonics": 20, "samples": 30}),
     ):
         with pytest.raises(CaseError, match=r"E-RANGE|E-RANGE"):

@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
 from validation.parametric import NATURAL, RATIO, SOFT, rectangular_monodromy
+from validation.reference.stability_boundary import stability_boundary
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.solvers.stability.parametric import stability, stability_boundary, stability_chart
+from femgear.solvers.stability.parametric import stability, stability_chart
 from femgear.system.fourier import FourierSeries, StepSeries
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from validation.reference.sections import bifurcation_diagram, stroboscopic_section
 
 from femgear.errors import CaseError
-from femgear.solvers.time.stroboscopic import bifurcation_diagram, stroboscopic_section
 from femgear.system.elements import PolynomialSprings
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 

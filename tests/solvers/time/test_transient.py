@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from validation.reference.cornered_springs import BearingSprings, PiecewiseSprings
 from validation.reference.step_rules import numerical_damping, period_error
 
 from femgear.errors import CaseError, ConvergenceError
@@ -17,7 +18,7 @@ from femgear.solvers.time.steps import (
     stability_limit,
 )
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
+from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import (
     HarmonicForce,
@@ -304,7 +305,7 @@ def test_tabulated_laws_are_the_elements():
             GearMeshes([2, 1], k, separates=False, **options),
             PolynomialSprings([0, 0], [[1, 2, 3], [0, 1, 0]]),
         ),
-        (PiecewiseSprings([1], [-0.2, 0.5], [1.0, 0.0, 2.0]), RadialBearings([[0, 2]], 3.0, 0.4, springs=7)),
+        (PiecewiseSprings([1], [-0.2, 0.5], [1.0, 0.0, 2.0]), BearingSprings([[0, 2]], 3.0, 0.4, springs=7)),
     ]
     theta = rng.uniform(0.0, 9.0, (6, 1))
     system = MechanicalSystem(np.eye(3), np.zeros((3, 3)), np.zeros((3, 3)), np.eye(3), np.zeros(3), ())
@@ -325,7 +326,7 @@ def test_a_bearing_with_clearance_against_adaptive_integration():
     system = MechanicalSystem(
         np.eye(2), 0.2 * np.eye(2), np.zeros((2, 2)), np.eye(2), np.array([0.0, -0.3]), ("x", "y")
     )
-    ring = RadialBearings([[0, 1]], 4.0, 0.1, springs=9)
+    ring = BearingSprings([[0, 1]], 4.0, 0.1, springs=9)
     problem = NonlinearSystem(system, (ring,), (HarmonicForce(np.array([0.4, -0.4j])),))
     times = np.linspace(0.0, 20.0, 4)
     exact = solve_transient(problem, 0.9, times, method="DOP853", events=True, tolerance=1e-11)

@@ -11,13 +11,12 @@ import numpy as np
 
 from femgear.errors import CaseError, checked_numbers
 from femgear.solvers.periodic.shooting import (
-    _SINGULAR,
+    SINGULAR,
     ShootingOptions,
     ShootingSolution,
     _judged,
     _result,
-    _shoot,
-    _size,
+    shoot,
 )
 from femgear.solvers.time.adaptive import Contacts, Flow, checked_start, flow
 from femgear.system.system import NonlinearSystem
@@ -71,16 +70,16 @@ def solve_free_vibration(
     free = np.setdiff1d(np.arange(2 * n), [n + fixed, fixed] if conservative else [n + fixed])
     integrator, history = chosen.integrator(moving, start), []
     while True:
-        ends, maps = _shoot(moving, y[None], period, integrator)
-        defect = ends[0] - y
-        history.append(float(np.abs(defect).max() / _size(y)))
+        end, monodromy = shoot(moving, y, period, integrator)
+        defect = end - y
+        history.append(float(np.abs(defect).max() / np.abs(y).max()))
         if history[-1] <= chosen.tolerance or len(history) > chosen.max_iterations:
             break
-        slope = _derivative(moving, ends[0], period)
-        matrix = np.column_stack([(maps[0] - np.eye(2 * n))[:, free], slope / moving.rate])
-        update = np.linalg.lstsq(matrix, -defect, rcond=_SINGULAR)[0]
+        slope = _derivative(moving, end, period)
+        matrix = np.column_stack([(monodromy - np.eye(2 * n))[:, free], slope / moving.rate])
+        update = np.linalg.lstsq(matrix, -defect, rcond=SINGULAR)[0]
         y, period = _closer(moving, y, period, free, update, np.abs(defect).max(), integrator)
-    found = _result(moving, y, maps[0], period, chosen, integrator, history)
+    found = _result(moving, y, monodromy, period, chosen, integrator, history)
     # the phase is free, and so is the amplitude of a conservative system
     trivial = 2 if conservative else 1
     found = _judged(moving, found, chosen, trivial=trivial)
@@ -99,8 +98,7 @@ def _closer(moving: Flow, y, period, free, update, before, options):
     for _ in range(8):
         tried, longer = y.copy(), period + share * update[-1] / moving.rate
         tried[free] += share * update[:-1]
-        ends, _ = _shoot(plain, tried[None], longer, options)
-        if np.abs(ends[0] - tried).max() < before:
+        if np.abs(shoot(plain, tried, longer, options)[0] - tried).max() < before:
             break
         share *= 0.5
     return tried, longer

@@ -1,4 +1,4 @@
-"""Frequency response to mesh errors and by complex modes; resonances and damping read from a response.
+"""Frequency response by dense solutions, to mesh errors and by complex modes; resonance peaks.
 
 Of one viscously damped mode ``1 / |H|^2`` is a parabola in ``x = f^2`` (D. J. Ewins, Modal Testing, 2nd ed.,
 2000, section 4.2), which makes parabolic interpolation exact; a verdict says whether modes overlap.
@@ -6,15 +6,17 @@ Of one viscously damped mode ``1 / |H|^2`` is a parabola in ``x = f^2`` (D. J. E
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.modal import ComplexModes
-from femgear.solvers.linear.receptance import MeshErrorResponse, direct_response
+from femgear.solvers.linear.modal import ComplexModes, damping_matrix, modal_damping, total_stiffness
+from femgear.solvers.linear.receptance import MeshErrorResponse, _checked, _resonance
 from femgear.system.system import MechanicalSystem
 
+# Bytes of dynamic stiffness that are solved in one batch.
+_BATCH = 2**26
 # Shift of the half-power band against the peak, relative to the band, of a mode that stands alone.
 _ALONE = 0.05
 # Samples inside the half-power band that its interpolation needs.
@@ -60,6 +62,68 @@ class ResonancePeak:
     band: tuple[float, float]
     asymmetry: float
     verdict: str
+
+
+def direct_response(
+    system: MechanicalSystem,
+    frequency,
+    inputs,
+    outputs,
+    *,
+    mesh_stiffness,
+    speed: float = 0.0,
+    damping_ratio=None,
+) -> np.ndarray:
+    """``L (K' + i omega D - omega^2 M)^-1 B`` by one dense solution a frequency, many in a batch.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    frequency : (F,) array
+        [Hz], positive or zero.
+    inputs : (n, n_inputs) array
+        ``B``, one column a force; `unit_force` makes them from names.
+    outputs : (n_outputs, n) array
+        ``L``.
+    mesh_stiffness : (n_meshes,) array
+        [N/m]
+    speed : float
+        That multiplies the gyroscopic matrix [rad/s].
+    damping_ratio : float or (n,) array, optional
+        Modal damping that is added to ``C``; see `modal.modal_damping`.
+
+    Returns
+    -------
+    (F, n_outputs, n_inputs) complex array
+        Receptances [m/N and the like].
+
+    Raises
+    ------
+    CaseError
+        Arrays that do not fit (E-SHAPE), frequencies that are none (E-RANGE).
+    ConvergenceError
+        An undamped resonance, or rigid motions at frequency zero (E-RESONANCE).
+    """
+    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
+    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
+    damping = damping_matrix(system, speed)
+    if damping_ratio is not None:
+        bare = replace(system, gyroscopic=None, C=np.zeros_like(system.C))
+        damping = damping + modal_damping(bare, mesh_stiffness, damping_ratio)
+    result = np.empty((len(omega), len(outputs), inputs.shape[1]), complex)
+    step = max(1, _BATCH // (16 * len(stiffness) ** 2))
+    for start in range(0, len(omega), step):
+        w = omega[start : start + step, None, None]
+        dynamic = stiffness - w**2 * system.M + 1j * w * damping
+        try:
+            result[start : start + step] = outputs @ np.linalg.solve(dynamic, inputs.astype(complex))
+        except np.linalg.LinAlgError as error:
+            f = w.ravel() / (2.0 * np.pi)
+            raise _resonance(f"between {f[0]:.6g} and {f[-1]:.6g} Hz") from error
+    if not np.all(np.isfinite(result)):
+        bad = np.flatnonzero(~np.isfinite(result).all(axis=(1, 2)))[0]
+        raise _resonance(f"at {omega[bad] / (2.0 * np.pi):.6g} Hz")
+    return result
 
 
 def mesh_error_response(

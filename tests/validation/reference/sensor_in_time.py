@@ -7,7 +7,7 @@ import numpy as np
 from femgear.housing.orders import OrderSpectrum
 
 
-def point_signals(field, z_ring: int, *, points: int, samples: int, first_point: float = 0.0) -> np.ndarray:
+def point_signals(field, z_ring: int, *, points: int, samples: int) -> np.ndarray:
     """Signals u_j(t) of P equidistant points that stand still in the carrier frame, over one revolution.
 
     Parameters
@@ -16,7 +16,7 @@ def point_signals(field, z_ring: int, *, points: int, samples: int, first_point:
         Carrier-frame components; give them times -(h omega_m)^2 for the accelerations of the points.
     z_ring : int
         Teeth of the ring: mesh periods in a revolution.
-    points, first_point
+    points : int
         As in `femgear.housing.sensor.heaviside_linear_lines`.
     samples : int
         Number of time samples.
@@ -26,18 +26,18 @@ def point_signals(field, z_ring: int, *, points: int, samples: int, first_point:
     (..., points, samples) array
     """
     n = np.arange(field.shape[-1]) - field.shape[-1] // 2
-    angle = first_point + 2 * np.pi * np.arange(points) / points
+    angle = 2 * np.pi * np.arange(points) / points
     turns = np.outer(np.arange(field.shape[-2]) * z_ring, np.arange(samples)) % samples / samples
     at_points = np.swapaxes(field @ np.exp(1j * np.outer(n, angle)), -1, -2)
     return (at_points @ np.exp(2j * np.pi * turns)).real
 
 
-def passages(points: int, sensor_angle: float, *, direction: int = 1, first_point: float = 0.0) -> np.ndarray:
+def passages(points: int, sensor_angle: float, *, direction: int = 1) -> np.ndarray:
     """When a fixed sensor passes P equidistant carrier-frame points, as fractions of the revolution 0..1.
 
     Parameters
     ----------
-    points, first_point
+    points : int
         As in `femgear.housing.sensor.heaviside_linear_lines`.
     sensor_angle : float
         Angle of the sensor on the housing [rad].
@@ -48,7 +48,7 @@ def passages(points: int, sensor_angle: float, *, direction: int = 1, first_poin
     -------
     (points,) array, in the order of the points.
     """
-    start = direction * (sensor_angle - first_point) * points / (2 * np.pi)
+    start = direction * sensor_angle * points / (2 * np.pi)
     passed = np.mod(start - direction * np.arange(points), points) / points
     # mod rounds the smallest negative numbers up to the end of the revolution
     return np.where(passed < 1, passed, 0.0)
