@@ -30,16 +30,21 @@ app = App(
 )
 
 
-class _Progress:
+class Progress:
     """Bars on the terminal, or one line a stage where standard error is a file; called by the stages."""
 
     def __enter__(self):
+        from rich import progress
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         self._console = Console(stderr=True, markup=False, highlight=False)
-        columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
-        self._bars = Progress(*columns, console=self._console, disable=not self._console.is_terminal)
+        self._bars = progress.Progress(
+            progress.TextColumn("{task.description}", markup=False),
+            progress.BarColumn(),
+            progress.TimeElapsedColumn(),
+            console=self._console,
+            disable=not self._console.is_terminal,
+        )
         self._tasks = {}
         self._bars.start()
         return self
@@ -84,15 +89,8 @@ def _fail(error: FemgearError) -> int:
     return error.exit_code
 
 
-def wrong_arguments(error: CycloptsError, program: str = "femgear") -> CaseError:
-    """What is wrong with a command line, in one sentence.
-
-    Parameters
-    ----------
-    error : CycloptsError
-    program : str
-        Name of the program, for the remedy.
-    """
+def _wrong_arguments(error: CycloptsError, program: str) -> CaseError:
+    """Tell what is wrong with a command line, in one sentence."""
     absent = isinstance(error, MissingArgumentError) and not (error.argument and error.argument.tokens)
     message = " ".join(str(error).split())
     if absent and error.argument is not None and "--" + error.argument.name.lstrip("-") not in _given(error):
@@ -107,12 +105,12 @@ def _given(error: CycloptsError) -> list[str]:
 
 
 def _warn(findings) -> None:
-    """Print what deserves a look on standard error, as `show_warning` does."""
+    """Print what deserves a look on standard error, as `_show_warning` does."""
     for finding in findings:
         print(f"warning: {finding}", file=sys.stderr)
 
 
-def show_warning(message, category, filename, lineno, file=None, line=None) -> None:
+def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
     """Print a warning as one line on standard error; takes the place of `warnings.showwarning`."""
     text = message if category is UserWarning else f"{message} ({category.__name__}, {filename}:{lineno})"
     print(f"warning: {text}", file=sys.stderr)
@@ -131,7 +129,7 @@ def check(case: Path, /) -> int:
     from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
-    _print(train_of(data).describe(data))
+    _print(train_of(data).describe_case(data))
     try:
         check_case(data)
     except FemgearError as error:
@@ -166,7 +164,6 @@ def run(
     force
         Replace the results that the folder holds, once the new ones are complete.
     """
-    from femgear.report.page import case_warnings, describe_results, result_warnings
     from femgear.run import run_case
     from femgear.storage.results import run_folder
     from femgear.trains.reading import open_results, read_case
@@ -185,12 +182,12 @@ def run(
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
     train = train_of(data)
-    _warn(case_warnings(train, data))
-    with run_folder(output, force=force) as folder, _Progress() as progress:
+    _warn(train.case_warnings(data))
+    with run_folder(output, force=force) as folder, Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(output)
-    _print(describe_results(train, results))
-    _warn(result_warnings(train, results))
+    _print(train.describe_results(results))
+    _warn(train.result_warnings(results))
     print(f"results: {output}")
     if "report.html" in results.manifest.files:
         print(f"report:  {output / 'report.html'}")
@@ -281,7 +278,7 @@ def sweep(
 
     data = read_case(case)
     need_set(data)
-    with _Progress() as progress:
+    with Progress() as progress:
         options = {"speeds": speeds, "cache": grid_cache(), "progress": progress}
         found, names = sweep_into(data, output, over=over, of=of, **options)
     failed = sum(bool(error) for error in found.errors)
@@ -320,14 +317,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         Exit code: 0, 2 (bad input), 3 (numerical failure), 4 (storage), 130 (interrupted).
     """
+    return call(app, arguments, program="femgear")
+
+
+def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> int:
+    """Call a program with its arguments, its warnings and errors as lines on standard error.
+
+    Parameters
+    ----------
+    program_app : App
+    arguments : sequence of str or None
+        As of `main`.
+    program : str
+        Its name, for remedies.
+
+    Returns
+    -------
+    int
+        Exit code as of `main`.
+    """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = show_warning
-            result = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+            warnings.showwarning = _show_warning
+            result = program_app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         return result if isinstance(result, int) else 0
     except CycloptsError as error:
-        return _fail(wrong_arguments(error))
+        return _fail(_wrong_arguments(error, program))
     except FemgearError as error:
         return _fail(error)
     except KeyboardInterrupt:

@@ -1,15 +1,15 @@
-"""What the scripts share: the reference case, progress, tables, CSV files, errors as messages."""
+"""What the scripts share: the reference case, progress, tables, CSV files, the command line."""
 
 from __future__ import annotations
 
 import csv
 import io
 import sys
-import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from femgear.errors import FemgearError
+from femgear.cli import Progress as Progress
+from femgear.cli import call
 
 REFERENCE_CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 
@@ -29,10 +29,8 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
     int
         Exit code: 0, 2 (bad input), 3 (numerical failure), 4 (storage), 130 (interrupted).
     """
-    from cyclopts import App, CycloptsError
+    from cyclopts import App
 
-    from femgear.cli import show_warning, wrong_arguments
-    from femgear.storage.files import storage_error
     from femgear.trains.protocol import one_blas_thread
 
     program = Path(sys.argv[0]).name
@@ -43,32 +41,8 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
         suppress_keyboard_interrupt=False,
     )
     app.default(command)
-    try:
-        with one_blas_thread(), warnings.catch_warnings():
-            warnings.showwarning = show_warning
-            app(
-                sys.argv[1:] if arguments is None else list(arguments),
-                exit_on_error=False,
-                print_error=False,
-                result_action="return_value",
-            )
-        return 0
-    except CycloptsError as error:
-        return _fail(wrong_arguments(error, program))
-    except FemgearError as error:
-        return _fail(error)
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        return 0
-    except OSError as error:
-        return _fail(storage_error(error, error.filename))
-
-
-def _fail(error: FemgearError) -> int:
-    print(error, file=sys.stderr)
-    return error.exit_code
+    with one_blas_thread():
+        return call(app, arguments, program=program)
 
 
 def ready_folder(folder: Path) -> Path:
@@ -78,34 +52,6 @@ def ready_folder(folder: Path) -> Path:
     with storage_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
     return folder
-
-
-class Progress:
-    """One bar a stage on the terminal, or one line a stage where standard error is a file.
-
-    Entered with ``with``; called by the stages with (stage, done, total).
-    """
-
-    def __enter__(self):
-        from rich.console import Console
-        from rich.progress import Progress as Bars
-
-        self._console = Console(stderr=True, markup=False, highlight=False)
-        self._bars = Bars(console=self._console, disable=not self._console.is_terminal)
-        self._tasks = {}
-        self._bars.start()
-        return self
-
-    def __exit__(self, *_):
-        self._bars.stop()
-
-    def __call__(self, stage: str, done: float = 0.0, total: float = 1.0) -> None:
-        """Say that ``done`` of ``total`` steps of a stage are done."""
-        if stage not in self._tasks:
-            self._tasks[stage] = self._bars.add_task(stage, total=total)
-            if not self._console.is_terminal:
-                self._console.print(stage)
-        self._bars.update(self._tasks[stage], completed=done, total=total)
 
 
 def print_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -18,40 +18,8 @@ from femgear.storage.files import checksum, storage_errors, write_text
 from femgear.storage.results import Results
 
 if TYPE_CHECKING:
-    from femgear.errors import Finding
     from femgear.storage.results import Results
     from femgear.trains.protocol import Drawn, Figures, Progress, Train
-
-
-def describe_results(train: Train, results: Results) -> tuple[Block, ...]:
-    """Tabulate the numbers of a run, one block a stage, and the time that each took.
-
-    Parameters
-    ----------
-    train : Train
-        Of the case.
-    results : Results
-
-    """
-    blocks = [stage.describe(results) for stage in train.stages if stage.name in results.stages]
-    timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
-    return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
-
-
-def case_warnings(train: Train, case) -> tuple[Finding, ...]:
-    """What a case is allowed to be but deserves a look, each once.
-
-    Raises
-    ------
-    FemgearError
-        What cannot be computed at all.
-    """
-    return tuple(dict.fromkeys(train.warnings(case)))
-
-
-def result_warnings(train: Train, results: Results) -> tuple[Finding, ...]:
-    """What the solvers say against their own results, each once."""
-    return tuple(dict.fromkeys(train.result_warnings(results)))
 
 
 def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
@@ -167,18 +135,17 @@ def page(train: Train, results: Results) -> str:
     """Make the page as text; see `write_report`."""
     case = results.case
     pictures, skipped = _pictures(train, results)
-    title, *geometry = train.describe(case)
-    warnings = [*case_warnings(train, case), *result_warnings(train, results), *skipped]
-    numbers = {block.title: block for block in describe_results(train, results)}
+    warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
+    numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
     head = "".join(
         (
-            f"<h1>{escape(title.title)}</h1>\n",
+            f"<h1>{escape(case.title)}</h1>\n",
             f'<p class="lead">{escape(_lead(results))}</p>\n',
             _contents(sections, numbers, pictures),
             _warnings(warnings),
             '<h2 id="gears">Gears and operation</h2>\n',
-            "".join(_table(block) for block in geometry if block.title != "Warnings"),
+            "".join(map(_table, train.describe(case))),
         )
     )
     body = "".join(_section(name, numbers, pictures, train, results) for name in sections)
@@ -187,7 +154,7 @@ def page(train: Train, results: Results) -> str:
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
         "style-src 'unsafe-inline'\">\n"
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
+        f"<title>{escape(case.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
         f"{head}{body}{_provenance(results, numbers)}</body>\n</html>\n"
     )
 
@@ -282,12 +249,11 @@ def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
     """Find place in the order, section and caption of a picture from its file name."""
-    figures = train.figures
     captions = [
         (stage.title, *one)
         for stage in train.stages
-        if stage.name in figures
-        for one in figures[stage.name].captions.items()
+        if stage.name in train.figures
+        for one in train.figures[stage.name].captions.items()
     ]
     for rank, (section, prefix, caption) in enumerate(captions):
         if stem == prefix or stem.startswith(prefix + "_"):

@@ -376,11 +376,11 @@ def _fluctuation(at, values, harmonics: int, position):
     return at, value - mean, (line @ np.exp(2j * np.pi * np.outer(h, position))).real
 
 
-def panels(count: int):
-    """Make a figure with `count` axes of one vertical scale, two in a row."""
+def panels(count: int, *, above: float = 0.8):
+    """Make a figure with `count` axes of one vertical scale, two in a row, and room above them [in]."""
     rows, columns = -(-count // 2), min(count, 2)
     figure, axes = new_figure(
-        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=0.8 + 3.6 * rows, sharey=True
+        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=above + 3.6 * rows, sharey=True
     )
     for ax in axes[count:]:
         figure.delaxes(ax)

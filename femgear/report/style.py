@@ -177,6 +177,12 @@ def periodic(position, values):
     return np.append(position, length + position[0]), np.concatenate([values, values[..., :1]], axis=-1)
 
 
+def runs(chosen) -> list[slice]:
+    """Find runs of chosen segments (n - 1,) of a curve as slices of its points."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
+
+
 def excited_to(data, speed_index: int) -> str:
     """Write the highest frequency of the excitation at a speed, for a title; empty where it is not known."""
     if "excitation_limit" not in data:

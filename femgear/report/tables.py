@@ -14,11 +14,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MANY = 8
-"""Rows of a table that shows the speeds."""
+"""Rows of a table that shows the speeds, and speeds that a warning names."""
 _MODES = 16
 """Rows of the table of modes."""
-_NAMED = 8
-"""Speeds that a warning names."""
 
 
 @dataclass(frozen=True)
@@ -57,17 +55,40 @@ def tabulate(
     return Block(title, tuple(columns), rows, tuple(notes))
 
 
-def describe_modes(data: xr.Dataset) -> Block:
-    """Tabulate natural frequencies, kinds and nodal diameters of the first modes of modes.nc."""
+def describe_modes(
+    data: xr.Dataset,
+    more: Mapping[str, Callable[[xr.Dataset], str]] | None = None,
+    *,
+    digits: int = 2,
+    note: str = "",
+) -> Block:
+    """Tabulate natural frequencies and kinds of the first modes of modes.nc.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    more : mapping of str to callable, optional
+        Further columns, the text of a mode from its part of the file; nodal diameters when not given.
+    digits : int
+        Of the frequencies [Hz] behind the point.
+    note : str
+        Behind the number of modes.
+    """
     count, shown = data.sizes["mode"], min(data.sizes["mode"], _MODES)
     columns = {
         "mode": lambda i: str(i + 1),
-        "frequency [Hz]": lambda i: f"{float(data.frequency[i]):.2f}",
+        "frequency [Hz]": lambda i: f"{float(data.frequency[i]):.{digits}f}",
         "kind": lambda i: str(data.kind.values[i]),
-        "nodal diameters": lambda i: "-" if data.nodal_diameter[i] < 0 else str(int(data.nodal_diameter[i])),
     }
-    note = f"{count} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown"
-    return tabulate("Modes", range(shown), columns, (note,))
+    for name, text in (more or {"nodal diameters": _nodal_diameters}).items():
+        columns[name] = lambda i, text=text: text(data.isel(mode=i))
+    found = f"{count} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown"
+    return tabulate("Modes", range(shown), columns, (found + note,))
+
+
+def _nodal_diameters(mode: xr.Dataset) -> str:
+    """Write the nodal diameters of the ring in a mode, a dash where it is rigid."""
+    return "-" if mode.nodal_diameter < 0 else str(int(mode.nodal_diameter))
 
 
 def describe_response(data: xr.Dataset) -> Block:
@@ -117,6 +138,10 @@ def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         (~data["stable"].values.astype(bool), "the periodic solution is unstable at"),
     ):
         if bad.any():
-            shown = ", ".join(f"{value:.6g}" for value in speed[bad][:_NAMED])
-            rest = np.count_nonzero(bad) - _NAMED
-            yield remark(f"{text} {shown} rpm{f' and {rest} more speeds' if rest > 0 else ''}")
+            rest = np.count_nonzero(bad) - MANY
+            yield remark(f"{text} {first_speeds(speed[bad])}{f' and {rest} more speeds' if rest > 0 else ''}")
+
+
+def first_speeds(speeds: np.ndarray) -> str:
+    """Write the first of some speeds (p,) [rpm], as many as a warning names."""
+    return ", ".join(f"{value:.6g}" for value in speeds[:MANY]) + " rpm"

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 # only libraries that are loaded can be limited to one thread, and SciPy brings a BLAS of its own
 import scipy.linalg  # noqa: F401
 
+from femgear.report.tables import Block
+
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
     from femgear.errors import CaseError, Finding
-    from femgear.report.tables import Block
     from femgear.storage.results import Results
 
 Progress = Callable[[str, float, float], None]
@@ -110,6 +112,8 @@ class Stage:
         ``(case)``: refuses, before a run, what the stage cannot represent.
     tables : callable
         ``(Results) -> blocks`` that the page shows beside the numbers.
+    warnings : callable
+        ``(Dataset) -> findings``: what the solver says against the contents of the stage's file.
     """
 
     name: str
@@ -123,6 +127,7 @@ class Stage:
     asked: Callable[[Any], Any] = lambda case: case
     check: Callable[[Any], object] | None = None
     tables: Callable[[Results], Iterable[Block]] = lambda results: ()
+    warnings: Callable[[xr.Dataset], Iterable[Finding]] = lambda data: ()
 
 
 @dataclass(frozen=True)
@@ -155,11 +160,9 @@ class Train:
     stages : tuple of Stage
         In order.
     describe : callable
-        ``(case) -> blocks``: its title first, its warnings last.
+        ``(case) -> blocks`` between its title and its warnings.
     warnings : callable
         ``(case) -> findings``: what is allowed but deserves a look.
-    result_warnings : callable
-        ``(Results) -> findings``: what the solvers say against their own results.
     figures : mapping of str to Figures
         By stage; ``""`` are those of the case, whatever is computed of it.
     remarks : callable
@@ -180,7 +183,6 @@ class Train:
     stages: tuple[Stage, ...]
     describe: Callable[[Any], tuple[Block, ...]]
     warnings: Callable[[Any], Iterable[Finding]]
-    result_warnings: Callable[[Results], Iterable[Finding]] = lambda results: ()
     figures: Mapping[str, Figures] = field(default_factory=dict)
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
     section: str = ""
@@ -191,3 +193,33 @@ class Train:
     def stage(self, name: str) -> Stage | None:
         """The stage of a name, None where the train has none of it."""
         return next((stage for stage in self.stages if stage.name == name), None)
+
+    def describe_case(self, case: Any) -> tuple[Block, ...]:
+        """Tabulate a case: its title, what it is, and its warnings."""
+        warnings = tuple(map(str, self.warnings(case)))
+        return Block(case.title), *self.describe(case), Block("Warnings", notes=warnings or ("none",))
+
+    def describe_results(self, results: Results) -> tuple[Block, ...]:
+        """Tabulate the numbers of a run, one block a stage, and the time that each took."""
+        blocks = [stage.describe(results) for stage in self._in(results)]
+        timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
+        return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
+
+    def case_warnings(self, case: Any) -> tuple[Finding, ...]:
+        """What a case is allowed to be but deserves a look, each once.
+
+        Raises
+        ------
+        FemgearError
+            What cannot be computed at all.
+        """
+        return tuple(dict.fromkeys(self.warnings(case)))
+
+    def result_warnings(self, results: Results) -> tuple[Finding, ...]:
+        """What the solvers say against their own results, each once."""
+        found = (stage.warnings(results[stage.name]) for stage in self._in(results))
+        return tuple(dict.fromkeys(chain.from_iterable(found)))
+
+    def _in(self, results: Results) -> list[Stage]:
+        """Stages whose results there are."""
+        return [stage for stage in self.stages if stage.name in results.stages]

@@ -88,7 +88,7 @@ def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
 
 
 def with_value(case: Case, key: str, value: object) -> Case:
-    """The case with one entry changed, checked again as a whole; see `with_values` for several at once.
+    """The case with one entry changed, checked again as a whole; see `with_values`.
 
     Parameters
     ----------
@@ -98,15 +98,6 @@ def with_value(case: Case, key: str, value: object) -> Case:
         ``"sun.modifications[0].amount"``.
     value : object
         As the file would hold it: ``"50 N m"``, 0.3, 27, a list or table of such; None leaves the entry out.
-
-    Returns
-    -------
-    Case
-
-    Raises
-    ------
-    CaseError
-        As `read_case`; unknown keys are refused with the nearest valid one.
     """
     return with_values(case, {key: value})
 
@@ -123,14 +114,10 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
         Keys and values as of `with_value`, as in
         ``{"operation.input": "carrier", "operation.fixed": "ring"}``.
 
-    Returns
-    -------
-    Case
-
     Raises
     ------
     CaseError
-        As `with_value`.
+        As `read_case`; unknown keys are refused with the nearest valid one.
     """
     data = case_text.parse(case.source, case.name)
     for key, value in values.items():

@@ -91,7 +91,7 @@ OSCILLATOR = Train(
             needs=lambda case: ("modes",),
         ),
     ),
-    describe=lambda case: (Block(case.title), Block("Oscillator"), Block("Warnings", notes=("none",))),
+    describe=lambda case: (Block("Oscillator"),),
     warnings=lambda case: (),
     figures={"receptance": Figures({"receptance": "Displacement of the mass for a unit force."}, draw)},
 )

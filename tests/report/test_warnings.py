@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 
 from femgear import cli
-from femgear.report.page import case_warnings, result_warnings
 from femgear.trains.drivetrain.results import describe_transient, transient_warnings
 from femgear.trains.reading import open_results, read_case, with_value
 from femgear.trains.registry import train_of
@@ -32,9 +31,9 @@ def warned(printed: str) -> list[str]:
 )
 def test_warnings_are_those_of_check(name, key, value, words):
     case = with_value(read_case(CASES / f"{name}.toml"), key, value)
-    found = [str(one) for one in case_warnings(train_of(case), case)]
+    found = [str(one) for one in train_of(case).case_warnings(case)]
     assert any(text.startswith(words) for text in found) and len(set(found)) == len(found)
-    assert set(found) == set(train_of(case).describe(case)[-1].notes)
+    assert set(found) == set(train_of(case).describe_case(case)[-1].notes)
 
 
 @pytest.mark.parametrize("name", ["nrel_pga", "wind_turbine_drivetrain"])
@@ -44,7 +43,7 @@ def test_run_prints_warnings_of_the_case_once(name, tmp_path, capsys):
     path.write_text(case.source, encoding="utf-8")
     assert cli.main(["run", str(path), "-o", str(tmp_path / "out"), "--only", "modes", "--no-pictures"]) == 0
     printed = capsys.readouterr()
-    assert warned(printed.err) == [str(one) for one in case_warnings(train_of(case), case)] != []
+    assert warned(printed.err) == [str(one) for one in train_of(case).case_warnings(case)] != []
     assert "warning:" not in printed.out and printed.err.index("warning:") < printed.err.index("modes")
 
 
@@ -59,8 +58,8 @@ def test_run_and_report_say_what_results_say_against_themselves(tmp_path, capsys
     assert cli.main(["run", str(path), "-o", str(out)]) == 0
     found = warned(capsys.readouterr().err)
     results = open_results(out)
-    said = [str(one) for one in result_warnings(train_of(results.case), results)]
-    warned_of = [str(one) for one in case_warnings(train_of(case), case)]
+    said = [str(one) for one in train_of(results.case).result_warnings(results)]
+    warned_of = [str(one) for one in train_of(case).case_warnings(case)]
     assert found == [*warned_of, *said] and len(set(found)) == len(found)
     assert "[W-RATE]" in found[0] and any("[W-PULL]" in text and "pulls for" in text for text in said)
     page = (out / "report.html").read_text(encoding="utf-8")

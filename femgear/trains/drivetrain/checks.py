@@ -410,15 +410,15 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
     )  # fmt: skip
 
 
-def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[Finding, ...]:
-    """What is allowed but deserves a look; the model is made where it is not given.
+def drivetrain_warnings(case: DrivetrainCase) -> tuple[Finding, ...]:
+    """What is allowed but deserves a look.
 
     Raises
     ------
     CaseError
-        As `check_drivetrain`, without a model.
+        As `check_drivetrain`.
     """
-    model = model or check_drivetrain(case)
+    model = check_drivetrain(case)
     speeds = case_speeds(case, model)
     return (
         *case.notices,

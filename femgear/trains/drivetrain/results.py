@@ -9,15 +9,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import Finding
-from femgear.report.tables import Block
+from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.storage.results import RPM, dataset
-from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
+from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
 from femgear.trains.drivetrain.data import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
@@ -46,9 +46,6 @@ _GAINED = 1e3
 # A force that is rounding [N].
 _NOTHING = 1e-6
 
-# Modes of the table.
-_SHOWN = 16
-
 
 @dataclass(frozen=True)
 class DrivetrainModesResult:
@@ -65,7 +62,8 @@ class DrivetrainModesResult:
         members, energy, rotation = _energies(model, modes.shape)
         bases = np.unique(model.mesh_base)
         orders = model.base_ratio[bases]
-        critical = found.critical
+        critical, over_speed = found.critical, "natural frequency over the speed"
+        at = [one.speed / RPM for one in critical]
         line = orders * self.speed / (2 * np.pi)
         variables = {
             "frequency": ("mode", modes.frequency, "Hz", "undamped natural frequency"),
@@ -79,18 +77,8 @@ class DrivetrainModesResult:
             "ratio": ("body", list(model.ratio.values()), "1", "speed over that of the first body"),
             "base_order": ("base", orders, "1", "mesh frequency over the first body's turn"),
             "mesh_frequency": ("base", line, "Hz", "mesh frequency at the speed of the operation"),
-            "campbell_frequency": (
-                "campbell_speed branch",
-                found.frequency,
-                "Hz",
-                "natural frequency over the speed",
-            ),
-            "critical_speed": (
-                "crossing",
-                [c.speed / RPM for c in critical],
-                "rpm",
-                "speed of a mesh line on a branch",
-            ),
+            "campbell_frequency": ("campbell_speed branch", found.frequency, "Hz", over_speed),
+            "critical_speed": ("crossing", at, "rpm", "speed of a mesh line on a branch"),
             "critical_frequency": ("crossing", [c.frequency for c in critical], "Hz", "frequency there"),
         }
         coords = {
@@ -376,7 +364,7 @@ def _shown_factor(power: float) -> str:
 
 
 def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
-    """Bodies, shafts, gear stages, operation and warnings of a drivetrain case.
+    """Tabulate bodies, shafts, gear stages and operation of a drivetrain case.
 
     Raises
     ------
@@ -385,50 +373,46 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
     """
     model = check_drivetrain(case)
     return (
-        Block(case.title),
         _bodies(case, model),
         _shafts(model),
         _stages(case, model),
         _operation(case, model),
-        Block("Warnings", notes=tuple(map(str, drivetrain_warnings(case, model))) or ("none",)),
     )
 
 
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
-    rows = []
-    for body in model.train.bodies:
+
+    def bearings(body) -> str:
         # a bearing inside a shaft counts with its first body
         held = [one for one in model.train.bearings if body.name in (one.body, *(one.shaft or ())[:1])]
-        rows.append(
-            (
-                body.name,
-                f"{body.inertia:.6g}",
-                f"{body.mass:.6g}",
-                f"{body.transverse_inertia:.6g}" if body.tilts else "-",
-                _spring(sum(one.radial for one in held), 3) if held else "-",
-                f"{model.ratio[body.name]:.6g}",
-                f"{model.ratio[body.name] * case.operation.speed / RPM:.4f}",
-            )
-        )
-    header = (
-        "", "inertia [kg m^2]", "mass [kg]", "about a diameter", "bearings [N/m]", "ratio", "speed [rpm]",
-    )  # fmt: skip
+        return _spring(sum(one.radial for one in held), 3) if held else "-"
+
+    columns = {
+        "": lambda body: body.name,
+        "inertia [kg m^2]": lambda body: f"{body.inertia:.6g}",
+        "mass [kg]": lambda body: f"{body.mass:.6g}",
+        "about a diameter": lambda body: f"{body.transverse_inertia:.6g}" if body.tilts else "-",
+        "bearings [N/m]": bearings,
+        "ratio": lambda body: f"{model.ratio[body.name]:.6g}",
+        "speed [rpm]": lambda body: f"{model.ratio[body.name] * case.operation.speed / RPM:.4f}",
+    }
     notes = (
         f"{len(model.rigid)} degrees of freedom, {len(model.meshes)} meshes; inertia of the chain about the "
         f"axis of {model.train.bodies[0].name} {model.inertia:.6g} kg m^2",
     )
-    return Block("Bodies", header, tuple(rows), notes)
+    return tabulate("Bodies", model.train.bodies, columns, notes)
 
 
 def _shafts(model: DrivetrainModel) -> Block:
-    rows = []
-    for one in model.train.shafts:
-        s = one.springs
-        kind = f"beam, {one.elements} elements" if one.elements else "joint"
-        values = (_spring(value, 4) for value in (s.bending, s.torsion, s.shear))
-        rows.append((" - ".join(one.between), f"{one.length:.4g}", *values, kind))
-    header = ("", "length [m]", "bending [N m/rad]", "torsion [N m/rad]", "shear [N/m]", "model")
-    return Block("Shafts", header, tuple(rows))
+    columns = {
+        "": lambda one: " - ".join(one.between),
+        "length [m]": lambda one: f"{one.length:.4g}",
+        "bending [N m/rad]": lambda one: _spring(one.springs.bending, 4),
+        "torsion [N m/rad]": lambda one: _spring(one.springs.torsion, 4),
+        "shear [N/m]": lambda one: _spring(one.springs.shear, 4),
+        "model": lambda one: f"beam, {one.elements} elements" if one.elements else "joint",
+    }
+    return tabulate("Shafts", model.train.shafts, columns)
 
 
 def _spring(stiffness: float, digits: int) -> str:
@@ -491,22 +475,18 @@ def _damping(ratio: float) -> str:
 
 def describe_drivetrain_modes(data: xr.Dataset) -> Block:
     """Table of modes.nc of a drivetrain."""
-    shown = min(data.sizes["mode"], _SHOWN)
-    energy, members = data["energy"].values, [str(name) for name in data["member"].values]
-    rows = []
-    for i in range(shown):
-        most = np.argsort(-energy[:, i])[:2]
-        where = ", ".join(f"{members[m]} {energy[m, i]:.0%}" for m in most)
-        share = f"{float(data['rotation_share'][i]):.1%}"
-        hertz = f"{float(data['frequency'][i]):.3f}"
-        rows.append((str(i + 1), hertz, str(data["kind"].values[i]), share, where))
-    top = float(data["frequency"].max())
-    notes = [f"{data.sizes['mode']} modes up to {top:.0f} Hz, the first {shown} shown"]
+
+    def where(mode: xr.Dataset) -> str:
+        energy, members = mode["energy"].values, mode["member"].values
+        return ", ".join(f"{members[m]} {energy[m]:.0%}" for m in np.argsort(-energy)[:2])
+
+    columns = {"rotation": lambda mode: f"{float(mode.rotation_share):.1%}", "kinetic energy in": where}
+    block = describe_modes(data, columns, digits=3)
+    if not data.sizes["base"]:
+        return block
     lines = zip(data["base"].values, data["mesh_frequency"].values)
-    if data.sizes["base"]:
-        notes.append("mesh lines: " + ", ".join(f"{name} {float(value):.3f} Hz" for name, value in lines))
-    header = ("mode", "frequency [Hz]", "kind", "rotation", "kinetic energy in")
-    return Block("Modes", header, tuple(rows), tuple(notes))
+    text = ", ".join(f"{name} {float(value):.3f} Hz" for name, value in lines)
+    return replace(block, notes=(*block.notes, f"mesh lines: {text}"))
 
 
 def describe_transient(data: xr.Dataset) -> Block:

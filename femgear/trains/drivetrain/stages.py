@@ -56,6 +56,7 @@ from femgear.trains.drivetrain.section import (
 )
 from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
+from femgear.trains.rigid import modes_verdict
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -339,9 +340,7 @@ DRIVETRAIN = Train(
             name="modes",
             title="Modes",
             solve=lambda case, *_: solve_drivetrain_modes(case),
-            verdict=lambda result: {
-                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
-            },
+            verdict=modes_verdict,
             describe=lambda results: describe_drivetrain_modes(results.modes),
             check=check_drivetrain,
         ),
@@ -352,6 +351,7 @@ DRIVETRAIN = Train(
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
             check=check_drivetrain,
+            warnings=transient_warnings,
         ),
         Stage(
             name="spectrum",
@@ -369,9 +369,6 @@ DRIVETRAIN = Train(
     ),
     describe=describe_drivetrain,
     warnings=drivetrain_warnings,
-    result_warnings=lambda results: (
-        transient_warnings(results.transient) if "transient" in results.stages else ()
-    ),
     figures=FIGURES,
     remarks=remarks,
 )  # fmt: skip

@@ -83,7 +83,7 @@ from femgear.trains.elastic.results import (
 )
 from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import member_speeds, modes_verdict
-from femgear.trains.static.description import describe_case
+from femgear.trains.static.description import describe_set
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import (
     STATIC,
@@ -565,6 +565,7 @@ ELASTIC = Train(
             verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             needs=lambda case: ("modes",),
+            warnings=dynamics_warnings,
         ),
         Stage(
             name="housing",
@@ -576,11 +577,8 @@ ELASTIC = Train(
             tables=lambda results: (mesh_bands(results),),
         ),
     ),
-    describe=lambda case: describe_case(case, warnings=case_warnings(case)),
+    describe=describe_set,
     warnings=case_warnings,
-    result_warnings=lambda results: (
-        dynamics_warnings(results.dynamics) if "dynamics" in results.stages else ()
-    ),
     figures=FIGURES,
     notices=_notices,
 )  # fmt: skip

@@ -19,6 +19,7 @@ from femgear.report.style import (
     label,
     legend_below,
     new_figure,
+    runs,
 )
 from femgear.trains.gear_pair.model import STATE_NAMES
 from femgear.trains.protocol import Drawn, Figures
@@ -56,7 +57,7 @@ def amplitude_and_mean(
         segment = sound[:-1] & sound[1:]
         for ax, value in ((top, amplitude), (bottom, mean)):
             for wanted, dash in ((True, "-"), (False, "--")):
-                for part in _runs(segment == wanted):
+                for part in runs(segment == wanted):
                     ax.plot(ratio[part], value[part], dash, color=colour, linewidth=1.6)
         top.plot([], [], "-", color=colour, label=text)
     for marker, (text, ratio, amplitude, mean) in zip("^vso", sweeps):
@@ -149,12 +150,6 @@ def phase_sections(chaos: xr.Dataset) -> Figure:
         label(ax, "x [half backlash]", title=f"Ω = {ratio:.2f}, λ = {exponent:.3f} ± {error:.3f}")
     label(axes[0], y="velocity [b $\\omega_n$]")
     return figure
-
-
-def _runs(chosen: np.ndarray) -> list[slice]:
-    """Runs of chosen segments as slices of their points."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
-    return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
 
 
 def contact_rows(response: xr.Dataset | None, sweep: xr.Dataset | None) -> list[tuple]:

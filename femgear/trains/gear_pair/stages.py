@@ -252,7 +252,7 @@ def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> Chao
 
 
 def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
-    """Title, units, numbers of the pair, and warnings of a case."""
+    """Tabulate units and numbers of the pair of a case."""
     scales, pair = scales_of(case), pair_of(case)
     numbers = {
         "natural frequency [Hz]": scales.frequency / (2.0 * np.pi),
@@ -273,8 +273,7 @@ def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
         )
         ends = " and ".join(f"{ratio:.4f}" for ratio in parting) or "no ratio"
         notes = (f"with constant stiffness drive flanks begin to part at {ends} of the natural frequency",)
-    warnings = tuple(map(str, _case_warnings(case))) or ("none",)
-    return Block(case.title), Block("Gear pair", (), tuple(rows), notes), Block("Warnings", notes=warnings)
+    return (Block("Gear pair", (), tuple(rows), notes),)
 
 
 def _case_warnings(case: GearPairCase) -> Iterator[Finding]:
@@ -286,11 +285,13 @@ def _case_warnings(case: GearPairCase) -> Iterator[Finding]:
         yield Finding("W-EXCITATION", "mesh", text)
 
 
-def _result_warnings(results) -> Iterator[Finding]:
-    """What the solvers say against their own results."""
-    if "response" in results.stages and not results.response.attrs["complete"]:
-        yield Finding("W-BRANCH", "response", str(results.response.attrs["message"]))
-    if "sweep" in results.stages and (lost := int((~results.sweep["settled"].values.astype(bool)).sum())):
+def _response_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    if not data.attrs["complete"]:
+        yield Finding("W-BRANCH", "response", str(data.attrs["message"]))
+
+
+def _sweep_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    if lost := int((~data["settled"].values.astype(bool)).sum()):
         yield Finding("W-SETTLED", "sweep", f"{lost} motions do not repeat within sweep.most_periods")
 
 
@@ -348,6 +349,7 @@ GEAR_PAIR = Train(
             verdict=lambda result: {"points": len(result.lowest), "message": result.branch.message},
             describe=lambda results: _describe_response(results.response),
             unavailable=_no_response,
+            warnings=_response_warnings,
         ),
         Stage(
             name="sweep",
@@ -356,6 +358,7 @@ GEAR_PAIR = Train(
             verdict=lambda result: {"settled": int(result.up.settled.sum() + result.down.settled.sum())},
             describe=lambda results: _describe_sweep(results.sweep),
             unavailable=lambda case: "" if case.sweep else "the case has no section sweep",
+            warnings=_sweep_warnings,
         ),
         Stage(
             name="chaos",
@@ -368,6 +371,5 @@ GEAR_PAIR = Train(
     ),
     describe=_describe_case,
     warnings=_case_warnings,
-    result_warnings=_result_warnings,
     figures=FIGURES,
 )

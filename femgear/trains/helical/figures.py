@@ -22,6 +22,7 @@ from femgear.report.response import (
     fine_positions,
     harmonics_of,
     name_kinds,
+    panels,
     response_figures,
     some_speeds,
 )
@@ -212,12 +213,7 @@ def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
         Contents of dynamics.nc, of which at most four speeds are drawn, and of modes.nc.
     """
     speeds = some_speeds(dynamics.sizes["speed"])
-    rows, columns = -(-len(speeds) // 2), min(len(speeds), 2)
-    figure, axes = new_figure(
-        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=1.2 + 3.6 * rows, sharey=True
-    )
-    for ax in axes[len(speeds) :]:
-        figure.delaxes(ax)
+    figure, axes = panels(len(speeds), above=1.2)
     h = dynamics["harmonic"].values
     position = fine_positions(int(h.max()))
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
@@ -235,7 +231,7 @@ def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
         frequency = float(dynamics["mesh_frequency"].values[s])
         title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
         label(ax, "position in the mesh period [1]", title=title)
-    for ax in axes[: len(speeds) : 2]:
+    for ax in axes[::2]:
         label(ax, y="transmission error less its mean [µm]")
     name_kinds(axes[0], dynamics)
     legend_below(figure, columns=3)

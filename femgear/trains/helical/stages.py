@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,7 +52,7 @@ from femgear.trains.rigid import (
     rotation_sense,
 )
 from femgear.trains.static import stages as static_stages
-from femgear.trains.static.description import describe_case, set_warnings
+from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def solve_helical_modes(
         sense, cycle, beta = rotation_sense(case, gears), static.cycle, case.helical.helix_angle
         overlap = contact_ratios(gears, helix_angle=beta, face_width=case.set.face_width)[0, 1]
         base = profile.base_helix_angle(case.sun.pressure_angle, beta)
-        backlash = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], gears.n_planets)
+        backlash = static_stages.mesh_backlash(gears)
         spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, backlash)
         record = normal_record(spur, factor, base, reversed_time=sense < 0)
         hand = sense * (1 if case.helical.hand == "right" else -1)
@@ -216,13 +217,11 @@ HELICAL = Train(
     model=HelicalCase,
     section="helical",
     stages=(
-        Stage(
-            name="static",
-            title="Static",
+        replace(
+            static_stages.STATIC,
             solve=lambda case, _, context: solve_helical_static(
                 case, cache=context.cache, progress=context.progress
             ),
-            verdict=static_stages.static_verdict,
             describe=lambda results: describe_helical_static(
                 results.static,
                 results.modes if "modes" in results.stages else None,
@@ -233,7 +232,6 @@ HELICAL = Train(
                 if _given(case)
                 else ""
             ),
-            check=_check_gears,
         ),
         Stage(
             name="modes",
@@ -258,15 +256,11 @@ HELICAL = Train(
                 _NOTHING_EXCITES if _given(case) else ""
             ),
             needs=lambda case: ("modes",),
+            warnings=response_warnings,
         ),
     ),
-    describe=lambda case: describe_case(
-        case, model=tuple(describe_helical(case, planetary_set(case))), warnings=set_warnings(case)
-    ),
+    describe=lambda case: (*describe_set(case), *describe_helical(case, planetary_set(case))),
     warnings=set_warnings,
-    result_warnings=lambda results: (
-        response_warnings(results.dynamics) if "dynamics" in results.stages else ()
-    ),
     figures=FIGURES,
     remarks=_remarks,
     cross_check=check_helical,

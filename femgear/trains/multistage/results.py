@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import Finding
-from femgear.report.tables import Block
+from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
 from femgear.storage.results import FOURIER, RPM, complex_entries, dataset
 from femgear.system.assembler import mesh_names
 from femgear.trains.multistage.model import (
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 
     from femgear.solvers.linear.receptance import MeshErrorResponse
     from femgear.system.system import Modes
-
-_SHOWN = 16
-"""Modes of the table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +189,7 @@ def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
 
 
 def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
-    """Title, stages with speeds and torques, couplings, and warnings of a case."""
+    """Tabulate stages with speeds and torques, and couplings of a case."""
     train = multistage_of(case)
     header = ["stage", "teeth", "planets", "fixed", "sun-planet [N/m]", "planet-ring [N/m]"]
     rows = []
@@ -213,15 +210,15 @@ def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
             f"from {train.input} to {train.output}: ratio {speed_ratio(train):.6g}, {power:.4g} kW, output "
             f"torque {torques.output:.6g} N m",
         )
-    couplings = [
-        (str(one.first), str(one.second), f"{one.torsional:.4g}", f"{one.lateral:.4g}")
-        for one in train.couplings
-    ]
+    couplings = {
+        "from": lambda one: str(one.first),
+        "to": lambda one: str(one.second),
+        "torsional [N m/rad]": lambda one: f"{one.torsional:.4g}",
+        "lateral [N/m]": lambda one: f"{one.lateral:.4g}",
+    }
     return (
-        Block(case.title),
         Block("Stages", tuple(header), tuple(map(tuple, rows)), notes),
-        Block("Couplings", ("from", "to", "torsional [N m/rad]", "lateral [N/m]"), tuple(couplings)),
-        Block("Warnings", notes=tuple(map(str, multistage_warnings(case))) or ("none",)),
+        tabulate("Couplings", train.couplings, couplings),
     )
 
 
@@ -233,41 +230,33 @@ def multistage_warnings(case: MultistageCase) -> Iterator[Finding]:
         yield Finding("W-RESPONSE", "response", text)
 
 
-def describe_modes(data: xr.Dataset) -> Block:
-    """First modes of modes.nc: frequency, kind, and the stage in which each one lives."""
-    shown = min(data.sizes["mode"], _SHOWN)
-    rows = tuple(
-        (
-            str(i + 1), f"{float(data.frequency[i]):.2f}", str(data.kind.values[i]),
-            str(int(data.main_stage[i])), f"{100.0 * float(data.energy[:, i].max()):.0f}",
-        )
-        for i in range(shown)
-    )  # fmt: skip
-    notes = (
-        f"{data.sizes['mode']} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown; "
-        "stage: with most of the kinetic energy",
-    )
-    return Block("Modes", ("mode", "frequency [Hz]", "kind", "stage", "its energy [%]"), rows, notes)
+def describe_stage_modes(data: xr.Dataset) -> Block:
+    """Tabulate the first modes of modes.nc, with the stage in which each one lives."""
+    columns = {
+        "stage": lambda mode: str(int(mode.main_stage)),
+        "its energy [%]": lambda mode: f"{100.0 * float(mode.energy.max()):.0f}",
+    }
+    return describe_modes(data, columns, note="; stage: with most of the kinetic energy")
 
 
 def describe_forces(data: xr.Dataset, title: str) -> Block:
     """Largest r.m.s. force in sun-planet 1 of every stage, of response.nc or balance.nc."""
-    rows = []
-    for n, force in zip(data["stage"].values, data["total_force"].values.T):
-        known = np.nan_to_num(force)
-        place = int(known.argmax())
-        rows.append((str(n), f"{known[place]:.4g}", f"{float(data['speed'][place]):.6g}"))
+    force = np.nan_to_num(data["total_force"].values)
+    largest = data["speed"].values[force.argmax(axis=0)]
+    columns = {
+        "stage": lambda n: str(data["stage"].values[n]),
+        "largest force in sun-planet 1 [N r.m.s.]": lambda n: f"{force[:, n].max():.4g}",
+        "at [rpm]": lambda n: f"{largest[n]:.6g}",
+    }
     count = f"{data.sizes['speed']} speeds of the input"
     if "converged" in data:
         count += f", {int(data['converged'].sum())} converged"
-    header = ("stage", "largest force in sun-planet 1 [N r.m.s.]", "at [rpm]")
-    return Block(title, header, tuple(rows), (count,))
+    return tabulate(title, range(data.sizes["stage"]), columns, (count,))
 
 
 def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """What harmonic balance says against balance.nc."""
     lost = data["speed"].values[~data["converged"].values.astype(bool)]
     if len(lost):
-        shown = ", ".join(f"{value:.6g}" for value in lost[:8])
-        text = f"harmonic balance did not converge at {len(lost)} speeds: {shown} rpm"
+        text = f"harmonic balance did not converge at {len(lost)} speeds: {first_speeds(lost)}"
         yield Finding("W-BALANCE", "", text)

@@ -39,8 +39,8 @@ from femgear.trains.multistage.results import (
     ResponseResult,
     balance_warnings,
     describe_forces,
-    describe_modes,
     describe_multistage,
+    describe_stage_modes,
     multistage_warnings,
 )
 from femgear.trains.multistage.section import (
@@ -393,7 +393,7 @@ MULTISTAGE = Train(
             title="Modes",
             solve=lambda case, *_: solve_multistage_modes(case),
             verdict=lambda result: {"modes": len(result.modes.frequency)},
-            describe=lambda results: describe_modes(results.modes),
+            describe=lambda results: describe_stage_modes(results.modes),
         ),
         RunStage(
             name="response",
@@ -411,10 +411,10 @@ MULTISTAGE = Train(
             verdict=lambda result: {"speeds": len(result.speed), "converged": int(result.converged.sum())},
             describe=lambda results: describe_forces(results.balance, "Harmonic balance"),
             unavailable=_no_balance,
+            warnings=balance_warnings,
         ),
     ),
     describe=describe_multistage,
     warnings=multistage_warnings,
-    result_warnings=lambda results: balance_warnings(results.balance) if "balance" in results.stages else (),
     figures=FIGURES,
 )

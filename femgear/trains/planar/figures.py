@@ -14,7 +14,7 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.report.response import MODE_CAPTIONS, harmonics_of, mode_shapes, shown_speeds
-from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure
+from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure, runs
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
 from femgear.trains.planar.results import PHASES
 from femgear.trains.protocol import Drawn, Figures
@@ -44,9 +44,7 @@ def pieces(stable, wanted: int) -> list[slice]:
     A segment is drawn once: unknown where one of its ends is, otherwise unstable where one is.
     """
     stable = np.asarray(stable, int)
-    segment = np.minimum(stable[:-1], stable[1:]) == wanted
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], segment, [False]]).astype(int)))
-    return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
+    return runs(np.minimum(stable[:-1], stable[1:]) == wanted)
 
 
 def orbits(curves: Sequence[tuple], *, title: str = "") -> Figure:

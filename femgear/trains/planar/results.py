@@ -2,7 +2,7 @@
 
 Lines of motions and forces belong to the real signals ``x(t) = Re sum_l x_l exp(i (order_l . theta(t)))``;
 every variable of a file carries its units. The tables say what the case is and what was found;
-`tail_warnings` and `planar_verdicts` say what speaks against it.
+`branch_warnings` and `response_warnings` say what speaks against it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from femgear.case.sections import output_member
 from femgear.errors import Finding, remark
 from femgear.gears.kinematics import torques
-from femgear.report.tables import MANY, Block, chosen
+from femgear.report.tables import Block, chosen, first_speeds, tabulate
 from femgear.storage.results import MEMBERS, RPM, complex_entries, dataset
 from femgear.trains.planar.model import (
     TAIL_LIMIT,
@@ -340,22 +340,15 @@ def describe_branch(data: xr.Dataset) -> Block:
     named |= {int(point): "fold" for point in merged_folds(hertz, data["fold"].values)}
     named[int(np.argmax(rms[:, 0, 0]))] = "largest carrier x"
     named[int(np.argmax(rms[:, 1, 0]))] = "largest ring x"
-    rows = []
-    for point in sorted(named):
-        back = float(data["back_contact"].values[point].max())
-        rows.append(
-            (
-                f"{hertz[point]:.4f}",
-                named[point],
-                *(f"{1e6 * rms[point, member, 0]:.3f}" for member in range(3)),
-                f"{back:.3f}",
-                _STABLE[int(stable[point])] if known else "-",
-            )
-        )
-    header = (
-        "weight [Hz]", "", "carrier x rms [um]", "ring x rms [um]", "sun x rms [um]", "back contact",
-        "stable",
-    )  # fmt: skip
+    columns = {
+        "weight [Hz]": lambda point: f"{hertz[point]:.4f}",
+        "": lambda point: named[point],
+        "carrier x rms [um]": lambda point: f"{1e6 * rms[point, 0, 0]:.3f}",
+        "ring x rms [um]": lambda point: f"{1e6 * rms[point, 1, 0]:.3f}",
+        "sun x rms [um]": lambda point: f"{1e6 * rms[point, 2, 0]:.3f}",
+        "back contact": lambda point: f"{float(data['back_contact'].values[point].max()):.3f}",
+        "stable": lambda point: _STABLE[int(stable[point])] if known else "-",
+    }
     notes = [
         f"{len(hertz)} points; {data.attrs['message']!s}",
         "back contact: largest share of the cycle in which back flanks touch",
@@ -363,7 +356,7 @@ def describe_branch(data: xr.Dataset) -> Block:
     notes += _verdicts(data) if known else ["stability was not computed"]
     notes += _truncation(data) if known else []
     notes += [_tails(data), *map(str, tail_warnings(data, "planar.branch.harmonics"))]
-    return Block("Response to the weight", header, tuple(rows), tuple(notes))
+    return tabulate("Response to the weight", sorted(named), columns, notes)
 
 
 def _tails(data: xr.Dataset) -> str:
@@ -406,18 +399,19 @@ def _where(data: xr.Dataset, bad: np.ndarray) -> str:
     if "weight_frequency" in data:
         hertz = data["weight_frequency"].values[bad]
         return f"{len(hertz)} of {len(bad)} points, {hertz.min():.4g} to {hertz.max():.4g} Hz"
-    listed = ", ".join(f"{value:.6g}" for value in data["speed"].values[bad][:MANY])
-    return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {listed} rpm"
+    return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {first_speeds(data['speed'].values[bad])}"
 
 
-def planar_verdicts(branch: xr.Dataset | None, response: xr.Dataset | None) -> Iterator[Finding]:
-    """What speaks against results of a planar case, for the head of the report."""
-    if branch is not None:
-        if not bool(branch.attrs["complete"]):
-            yield remark(f"the branch of the response to the weight: {branch.attrs['message']!s}")
-        yield from tail_warnings(branch, "planar.branch.harmonics")
-    if response is not None:
-        yield from tail_warnings(response, _response_key(response))
+def branch_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """What speaks against branch.nc: an early end, and truncation of its lines."""
+    if not bool(data.attrs["complete"]):
+        yield remark(f"the branch of the response to the weight: {data.attrs['message']!s}")
+    yield from tail_warnings(data, "planar.branch.harmonics")
+
+
+def response_warnings(data: xr.Dataset) -> tuple[Finding, ...]:
+    """What truncation of the lines does to response.nc."""
+    return tail_warnings(data, _response_key(data))
 
 
 def _response_key(data: xr.Dataset) -> str:
@@ -453,27 +447,18 @@ def _verdicts(data: xr.Dataset) -> Iterator[str]:
 
 def describe_response(data: xr.Dataset) -> Block:
     """Tabulate response.nc, a row a speed."""
-    rows = []
     force = np.hypot(data["mesh_force_real"].values, data["mesh_force_imag"].values)
     varying = fluctuation(force).max(axis=1)
-    for i in chosen(data.sizes["speed"]):
-        one = data.isel(speed=i)
-        rows.append(
-            (
-                f"{float(one.speed):.4g}",
-                f"{float(one.mesh_frequency):.4f}",
-                f"{1e6 * one.rms.values[0, 0]:.4f}",
-                f"{1e-3 * varying[i]:.4f}",
-                f"{float(one.drive_contact.min()):.3f}",
-                f"{float(one.back_contact.max()):.3f}",
-                f"{float(one['tail']):.2g}",
-                f"{float(one['force_tail']):.2g}",
-            )
-        )
-    header = (
-        "speed [rpm]", "mesh [Hz]", "carrier x rms [um]", "mesh force rms [kN]", "drive contact",
-        "back contact", "tail", "force tail",
-    )  # fmt: skip
+    columns = {
+        "speed [rpm]": lambda i: f"{float(data.speed[i]):.4g}",
+        "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.4f}",
+        "carrier x rms [um]": lambda i: f"{1e6 * data.rms.values[i, 0, 0]:.4f}",
+        "mesh force rms [kN]": lambda i: f"{1e-3 * varying[i]:.4f}",
+        "drive contact": lambda i: f"{float(data.drive_contact[i].min()):.3f}",
+        "back contact": lambda i: f"{float(data.back_contact[i].max()):.3f}",
+        "tail": lambda i: f"{float(data['tail'][i]):.2g}",
+        "force tail": lambda i: f"{float(data['force_tail'][i]):.2g}",
+    }
     notes = [
         f"{data.sizes['line']} {_kind_of_lines(data)}; mesh force: the largest fluctuation of "
         "all meshes; contact: least share of the time of the drive flanks, largest of the back flanks",
@@ -485,8 +470,8 @@ def describe_response(data: xr.Dataset) -> Block:
             "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
             "weight to the mesh frequency; r.m.s. values count such lines apart"
         )
-    notes += map(str, tail_warnings(data, _response_key(data)))
-    return Block("Weight and mesh frequency", header, tuple(rows), tuple(notes))
+    notes += map(str, response_warnings(data))
+    return tabulate("Weight and mesh frequency", chosen(data.sizes["speed"]), columns, notes)
 
 
 def _kind_of_lines(data: xr.Dataset) -> str:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set
-from femgear.errors import CaseError, ConvergenceError, Finding
+from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -33,13 +33,14 @@ from femgear.trains.planar.results import (
     BranchResult,
     PlanarModesResult,
     PlanarResponseResult,
+    branch_warnings,
     comparisons,
     describe_branch,
     describe_planar,
     describe_response,
     doubts,
-    planar_verdicts,
     published_modes,
+    response_warnings,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
 from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
@@ -51,7 +52,7 @@ from femgear.trains.rigid import (
     modes_verdict,
     needed,
 )
-from femgear.trains.static.description import describe_case, set_warnings
+from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS
 
@@ -59,7 +60,6 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
     from femgear.solvers.continuation.branches import Branch
     from femgear.solvers.periodic.solution import PeriodicSolution
-    from femgear.storage.results import Results
     from femgear.trains.planar.model import MotionLines, PlanarModel
     from femgear.trains.planar.section import BranchSection
 
@@ -409,13 +409,6 @@ def _lacks(section: str) -> Callable[[PlanarCase], str]:
     return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
 
 
-def _result_warnings(results: Results) -> Iterator[Finding]:
-    branch, response = (
-        results.stage(name) if name in results.stages else None for name in ("branch", "response")
-    )
-    return planar_verdicts(branch, response)
-
-
 PLANAR = Train(
     name="planar",
     words="a planar case",
@@ -444,6 +437,7 @@ PLANAR = Train(
             describe=lambda results: describe_branch(results.branch),
             unavailable=_lacks("branch"),
             needs=lambda case: ("modes",),
+            warnings=branch_warnings,
         ),
         Stage(
             name="response",
@@ -455,13 +449,11 @@ PLANAR = Train(
             describe=lambda results: describe_response(results.response),
             unavailable=_lacks("response"),
             needs=lambda case: ("modes",),
+            warnings=response_warnings,
         ),
     ),
-    describe=lambda case: describe_case(
-        case, model=(describe_planar(case, planetary_set(case)),), warnings=set_warnings(case)
-    ),
+    describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),
     warnings=set_warnings,
-    result_warnings=_result_warnings,
     figures=FIGURES,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
     cross_check=check_planar,

@@ -9,7 +9,7 @@ refuses one whose displacements are not small.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,31 +39,14 @@ _ROWS = 8
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
 
 
-def describe_case(
-    case: Case, *, model: tuple[Block, ...] = (), warnings: Sequence[Finding]
-) -> tuple[Block, ...]:
-    """Describe a planetary set in tables: geometry, operation and warnings.
-
-    Parameters
-    ----------
-    case : Case
-    model : tuple of Block
-        What a train adds about its model.
-    warnings : sequence of Finding
-
-    Returns
-    -------
-    tuple of Block
-    """
+def describe_set(case: Case) -> tuple[Block, ...]:
+    """Tabulate geometry, phasing and operation of a planetary set."""
     planetary = planetary_set(case)
     return (
-        Block(case.title),
         _gears(planetary),
         _meshes(planetary),
         *describe_phasing(planetary),
         _operation(case, planetary),
-        *model,
-        Block("Warnings", notes=tuple(map(str, warnings)) or ("none",)),
     )
 
 

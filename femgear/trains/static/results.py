@@ -38,11 +38,7 @@ STATIC_VARIABLES = {
     "mesh_force": ("mesh position", "N", "mesh force along the line of action"),
     "back_force": ("mesh position", "N", "force on the back flanks of the mesh"),
     "member_motion": ("member position", "m", "displacement of the axis of a member that moves"),
-    "bearing_force": (
-        "planet axis position",
-        "N",
-        "force of the pin on the planet in the frame of the carrier",
-    ),
+    "bearing_force": ("planet axis position", "N", _PIN_FORCE),
     "mesh_stiffness": ("mesh position", "N/m", "tangent mesh stiffness"),
     "mesh_stiffness_secant": ("mesh position", "N/m", "secant mesh stiffness"),
     "tooth_load": ("mesh tooth position", "N", "load of a tooth pair"),
@@ -90,11 +86,7 @@ STRESS_VARIABLES = {
     "tooth_root_maximum": ("mesh gear tooth", "Pa", f"largest {_OF_TOOTH}"),
     "tooth_root_minimum": ("mesh gear tooth", "Pa", f"smallest {_OF_TOOTH}"),
     "contact_pressure": ("mesh position", "Pa", "largest contact pressure away from flank ends"),
-    "pressure_distribution": (
-        "mesh pair cell position",
-        "Pa",
-        "contact pressure in the cells of a tooth pair",
-    ),
+    "pressure_distribution": ("mesh pair cell position", "Pa", _PRESSURE),
     "pressure_offset": ("mesh cell", "m", _CELL_PLACE),
     "pressure_centre": ("mesh pair position", "m", "middle of the window from the path point"),
     "pressure_path": ("mesh pair position", "m", "path of the tooth pair from the pitch point"),
@@ -108,19 +100,6 @@ STRESS_VARIABLES = {
     "iso_root_stress": ("mesh gear", "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
 }
 """Variables of stress.nc; records of one mesh period have none of single teeth, longer ones no pressures."""
-
-
-_STRESS_COLUMNS = (
-    "[MPa]",
-    "FE",
-    "ISO 6336",
-    "FE/ISO",
-    "position",
-    "arc [mm]",
-    "tangent [°]",
-    "range",
-    "cycles",
-)
 
 
 @dataclass(frozen=True)
@@ -414,7 +393,8 @@ def describe_stress(data: xr.Dataset) -> Block:
         notes.append(f"outside the range of ISO 6336: {data.attrs['iso']}")
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
-    return Block("Stresses", _STRESS_COLUMNS, (*contact, *roots), tuple(notes))
+    header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [°]", "range", "cycles"
+    return Block("Stresses", header, (*contact, *roots), tuple(notes))
 
 
 def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:

@@ -11,8 +11,8 @@ from femgear.case import text as case_text
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError
 from femgear.trains.drivetrain.checks import case_model, check_drivetrain
-from femgear.trains.drivetrain.results import describe_drivetrain
 from femgear.trains.drivetrain.section import DrivetrainCase, drivetrain_of, torque_histories
+from femgear.trains.drivetrain.stages import DRIVETRAIN
 from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_value
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -257,7 +257,7 @@ def test_other_cases_are_read_as_before(own):
 
 
 def test_check_prints_the_chain(paper):
-    blocks = {block.title: block for block in describe_drivetrain(paper)}
+    blocks = {block.title: block for block in DRIVETRAIN.describe_case(paper)}
     assert set(blocks) >= {"Bodies", "Shafts", "Gear stages", "Operation", "Warnings"}
     stages = {row[0]: row for row in blocks["Gear stages"].rows}
     assert stages["carrier-sun"][-1] == "18.4000" and stages["gear 2-gear 3"][-1] == "128.8766"

@@ -9,7 +9,7 @@ import pytest
 from femgear.case import text as case_text
 from femgear.errors import CaseError
 from femgear.trains.drivetrain.checks import case_model, check_drivetrain, check_spectrum, record_rate
-from femgear.trains.drivetrain.results import describe_drivetrain
+from femgear.trains.drivetrain.stages import DRIVETRAIN
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -33,7 +33,7 @@ def refused_model(case):
 
 def warnings_of(case, *codes):
     """Those of the codes that the case is warned of, and the text."""
-    notes = " ".join(describe_drivetrain(case)[-1].notes)
+    notes = " ".join(DRIVETRAIN.describe_case(case)[-1].notes)
     return {code for code in codes if code in notes}, notes
 
 
@@ -229,7 +229,7 @@ def test_teeth_of_planets_are_compared():
 
 def test_rigid_springs_are_called_so(own):
     case = with_value(with_value(own, "shaft[0].bending", "rigid"), "bearing[0].radial", "rigid")
-    blocks = {block.title: block for block in describe_drivetrain(case)}
+    blocks = {block.title: block for block in DRIVETRAIN.describe_case(case)}
     assert blocks["Shafts"].rows[0][2] == "rigid" and blocks["Bodies"].rows[0][4] == "rigid"
 
 

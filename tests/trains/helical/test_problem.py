@@ -127,7 +127,7 @@ def test_parting_teeth_by_shooting_and_harmonic_balance():
     phase = 2 * np.pi * np.arange(400) / 400
     force = element_forces(problem, balance.at(phase / omega), phase[:, None])[0]
     assert 0.2 < (force == 0.0).mean() < 0.4
-    options = {"integration": 1e-8, "tolerance": 1e-6, "samples": 512, "radius": False}
+    options = {"integration": 1e-8, "tolerance": 1e-6, "samples": 512}
     shot = solve_shooting(problem, omega, start=state_of(problem, balance), harmonics=12, **options).solution
     size = np.abs(balance.deflection[:, 1:]).max()
     assert shot.converged and np.abs(shot.deflection - balance.deflection).max() < 1e-4 * size

@@ -28,7 +28,7 @@ from femgear.trains.planar.figures import (
     weight_response,
 )
 from femgear.trains.planar.model import TAIL_LIMIT, judged_branch, merged_folds, motion_lines, planar_model
-from femgear.trains.planar.results import comparisons, describe_branch, doubts, planar_verdicts, tail_warnings
+from femgear.trains.planar.results import branch_warnings, comparisons, describe_branch, doubts, tail_warnings
 from femgear.trains.planar.stages import solve_branch, solve_planar_modes, solve_planar_response
 from femgear.trains.reading import open_results, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
@@ -481,7 +481,7 @@ def test_a_branch_that_ran_out_of_points_says_which_entry_to_raise(pgb):
     )
     assert found.ending.startswith("NOT COMPLETE") and "raise planar.branch.points" in found.ending
     assert "before 45 Hz" in describe_branch(found.dataset()).notes[0]
-    assert any("planar.branch.points" in finding.text for finding in planar_verdicts(found.dataset(), None))
+    assert any("planar.branch.points" in finding.text for finding in branch_warnings(found.dataset()))
 
 
 def test_equal_forces_are_drawn_once(results):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from femgear.report.page import describe_results, page, write_figures
+from femgear.report.page import page, write_figures
 from femgear.run import run_case
 from femgear.storage.results import run_folder
 from femgear.trains.elastic.stages import ELASTIC
@@ -119,7 +119,7 @@ def test_only_stress_of_no_torque_is_a_valid_run(tmp_path, recwarn):
     results = run(tmp_path / "out", case, only="stress")
     assert results.stages == ("static", "stress") and "pressure_distribution" in results.stress
     assert not results.stress["root_worst"].values.any()
-    blocks = {block.title: block for block in describe_results(ELASTIC, results)}
+    blocks = {block.title: block for block in ELASTIC.describe_results(results)}
     assert len(blocks["Stresses"].rows) == 6
     names = write_figures(tmp_path, ELASTIC, Drawn(case, {"stress": results.stress}))
     assert len(names) == 5
@@ -127,7 +127,7 @@ def test_only_stress_of_no_torque_is_a_valid_run(tmp_path, recwarn):
 
 
 def test_table_of_the_summary(results):
-    block = next(block for block in describe_results(ELASTIC, results) if block.title == "Stresses")
+    block = next(block for block in ELASTIC.describe_results(results) if block.title == "Stresses")
     assert all(len(row) == len(block.header) for row in block.rows)
     assert [row[0].split()[0] for row in block.rows] == ["contact"] * 2 + ["root"] * 4
     for row, name in zip(block.rows[:2], ("sun-planet", "planet-ring"), strict=True):
