@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from femgear.errors import CaseError, checked_count
 from femgear.housing.sensor import ReadOnlyArrays, SensorLines
@@ -179,6 +178,8 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
     CaseError
         ``E-SHAPE`` for an envelope or a threshold that cannot be used.
     """
+    from scipy.signal import find_peaks
+
     values = np.asarray(periodic_envelope, dtype=float)
     usable = values.ndim == 1 and values.size > 2 and np.all(np.isfinite(values)) and np.all(values >= 0)
     if not usable or not 0 < threshold < 1:

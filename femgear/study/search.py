@@ -24,7 +24,6 @@ from typing import Literal, get_args
 
 import numpy as np
 from scipy.optimize import differential_evolution, linprog, minimize
-from scipy.stats.qmc import LatinHypercube
 
 from femgear.case.case import set_deviations
 from femgear.case.dependencies import FLANK_ENTRIES
@@ -341,6 +340,8 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
 
 def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
     """Middle of the bounds, and a Latin hypercube of ``count`` points."""
+    from scipy.stats.qmc import LatinHypercube
+
     low, high = problem.bounds.T
     spread = LatinHypercube(len(low), rng=seed).random(max(count, 1))
     return low + (high - low) * np.vstack([np.full(len(low), 0.5), spread])

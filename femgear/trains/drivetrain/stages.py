@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import welch, windows
 
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
@@ -273,6 +272,8 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     resolution : float
         Wanted distance of lines [Hz]; the segments take ``1 / resolution`` seconds of the signal.
     """
+    from scipy.signal import welch, windows
+
     signal = np.asarray(signal, float)
     length = round(1.0 / (resolution * step))
     hop = max(1, round(0.5 * length))

@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import firwin, kaiserord, savgol_coeffs, upfirdn
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.trains.drivetrain.data import TorqueHistory
@@ -492,6 +491,8 @@ class Decimator:
     """
 
     def __init__(self, every: int, count: int):
+        from scipy.signal import firwin, kaiserord, savgol_coeffs
+
         self.every, self.count, self.seen = every, count, 0
         self.rows = count // every + 1
         length, beta = kaiserord(_STOP, (1.0 - PASS_BAND) / every)
@@ -530,6 +531,8 @@ class Decimator:
 
     def _filtered(self) -> np.ndarray:
         """Records whose whole window is in the buffer."""
+        from scipy.signal import upfirdn
+
         reach = self.first + len(self.buffer) - 1 - self.half
         stop = min(reach // self.every + 1, self.rows)
         if stop <= self.done:

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from femgear.case.case import material_of, planetary_set
 from femgear.case.sections import RPM
@@ -263,6 +262,8 @@ def _draw_signal(ax, signal, around, title, *, text="envelope", colour=VERMILION
 
 def _extremes(signal, ring_teeth):
     """Largest and smallest value within one mesh period around every sample: signals may lack symmetry."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     size = max(len(signal) // ring_teeth, 1)
     return maximum_filter1d(signal, size, mode="wrap"), minimum_filter1d(signal, size, mode="wrap")
 
@@ -429,6 +430,8 @@ def modulation_polar(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
 
 def _around(values):
     """Mean over the fifteenth of a turn around every value."""
+    from scipy.ndimage import uniform_filter1d
+
     return uniform_filter1d(values, max(len(values) // 15, 1), mode="wrap")
 
 
