@@ -134,7 +134,7 @@ def write_tables(folder: Path, modes, rpm: np.ndarray, forces: dict[str, np.ndar
 
 def print_train(train, operation) -> None:
     """Speeds and torques of all stages as a table."""
-    from femgear.case.sections import RPM
+    from femgear.case.quantities import RPM
     from femgear.trains.multistage.model import speed_ratio, train_speeds, train_torques
 
     speeds, torques = train_speeds(train, operation.speed), train_torques(train, operation.torque)

@@ -53,6 +53,8 @@ class Dimension:
 LENGTH = Dimension("a length", "m", "mm", 1e-3)
 ANGLE = Dimension("an angle", "rad", "deg", math.pi / 180)
 SPEED = Dimension("a speed of rotation", "rad/s", "rpm", math.pi / 30)
+RPM = SPEED.scale
+"""One revolution a minute [rad/s]."""
 TORQUE = Dimension("a torque", "N m", "N m", 1.0)
 MASS = Dimension("a mass", "kg", "kg", 1.0)
 INERTIA = Dimension("a moment of inertia", "kg m^2", "kg m^2", 1.0)

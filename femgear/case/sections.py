@@ -23,6 +23,7 @@ from femgear.case.quantities import (
     LENGTH,
     MASS,
     MODULUS,
+    RPM,
     SPEED,
     STIFFNESS,
     TORQUE,
@@ -190,7 +191,6 @@ class PinError(Section):
 
 FORMAT = 1
 """Newest format of the case file."""
-RPM = SPEED.scale
 """One revolution a minute [rad/s]."""
 CODE = "E-PUBLISHED"
 """Of refusals of published lines."""

@@ -118,6 +118,8 @@ def forward(lower, columns):
 def solve_step(problem: Problem, active: np.ndarray) -> Step:
     """Solve the linear conditions of one active set and list the candidates that violate the others.
 
+    ``active`` (n,) tells the candidates that carry; pressures are forces [N], motions and gaps [m].
+
     Raises
     ------
     ContactError

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 from femgear.report.style import save_figure
 from femgear.report.tables import Block
 from femgear.storage.files import checksum, storage_errors, write_text
-from femgear.storage.results import Results
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results

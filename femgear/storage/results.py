@@ -40,9 +40,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-RPM = np.pi / 30.0
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
-MEMBERS = ("carrier", "ring", "sun")
 
 
 def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:

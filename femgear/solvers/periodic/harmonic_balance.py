@@ -175,7 +175,19 @@ def periodic_response(
 
 
 def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int) -> PeriodicSolution:
-    """Newton's method from the unknowns y with backtracking on the size of the residual."""
+    """Solve harmonic equations by Newton's method with backtracking on the size of the residual.
+
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    frequency : (n_bases,) array
+        [rad/s]
+    y : (size,) array
+        First unknowns: harmonics of the nonlinear deflections, real and imaginary parts [m].
+    tolerance : float
+        Of the residual over the largest deflection.
+    max_iterations : int
+    """
     receptance = balance.receptance(frequency)[0]
     evaluate = linearised if balance.size > MANY else _with_matrix
     error, tangent = evaluate(balance, receptance, y)

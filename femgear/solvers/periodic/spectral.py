@@ -129,9 +129,10 @@ class Twins:
 
 
 def compliance(modes: Modes, omega: np.ndarray) -> np.ndarray:
-    """Modal receptances ``1 / (w_k^2 - omega^2 + 2 i zeta w_k omega)`` (..., n_modes) [s^2].
+    """Compute modal receptances ``1 / (w_k^2 - omega^2 + 2 i zeta w_k omega)`` (..., n_modes) [s^2].
 
-    Zero for rigid modes, which no self-equilibrated force moves.
+    Zero for rigid modes, which no self-equilibrated force moves. ``omega`` (...) are angular frequencies
+    [rad/s].
 
     Raises
     ------
@@ -294,7 +295,7 @@ def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
 
 
 def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np.ndarray:
-    """Spectral radius of ``T G`` per speed.
+    """Compute the spectral radius (n_speeds,) of ``T G``, a number without unit.
 
     Eigenvalues of the full matrices while their number of entries cubed, times the speeds, stays below
     `exact_limit`; otherwise the largest Ritz value of 20 Arnoldi steps from one random vector (Saad,

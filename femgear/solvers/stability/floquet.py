@@ -161,7 +161,7 @@ class Frame:
 
 
 def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
-    """Modes of a problem about its reference stiffness, at most so many, lowest first.
+    """Compute the modes [rad/s] of a problem about its reference stiffness, at most so many, lowest first.
 
     Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
     positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static

@@ -206,7 +206,11 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
 def exponents_of(
     problem: NonlinearSystem, finer, coarser, start, chosen: LyapunovOptions, *, beside: int
 ) -> LyapunovExponents:
-    """Exponents of a run, its error told by a coarser one over the first ``beside`` of its points."""
+    """Compute Lyapunov exponents [1/s] of a run, and their error from a coarser one beside it.
+
+    ``finer`` and ``coarser`` integrate the problem and its tangents from passage to passage, ``start`` is the
+    first position and velocity (n,) each; the coarser run covers the first ``beside`` of the points.
+    """
     count, points = chosen.count, chosen.points
     if count > finer.size:
         raise CaseError(

@@ -17,10 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
-from femgear.case.quantities import FREQUENCY, SPEED, TIME
+from femgear.case.quantities import FREQUENCY, RPM, SPEED, TIME
 from femgear.errors import CaseError, Finding
 from femgear.solvers.linear.modal import solve_modes
-from femgear.storage.results import RPM
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.data import Drivetrain, TorqueHistory
 from femgear.trains.drivetrain.geometry import speed_ratios, springs_of

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.quantities import RPM
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure
-from femgear.storage.results import RPM
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.checks import case_model
 from femgear.trains.drivetrain.data import numbered

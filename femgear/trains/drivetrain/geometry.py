@@ -91,7 +91,10 @@ class Springs:
 
 
 def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
-    """Springs of shafts (a group an element), bearings, planet bearings; infinite ones are conditions."""
+    """Collect the springs of shafts (a group an element), bearings and planet bearings.
+
+    Stiffnesses [N/m] along and [N m/rad] about the coordinates of ``place``; infinite ones are conditions.
+    """
     found, turns = [], np.array([False, False, True, True, True])
     stations = {shaft.between: inner for shaft, inner in zip(train.shafts, place.inner)}
     for shaft, inner in zip(train.shafts, place.inner):

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.report.tables import Block, describe_modes, tabulate
-from femgear.storage.results import RPM, dataset
+from femgear.storage.results import dataset
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
 from femgear.trains.drivetrain.data import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel

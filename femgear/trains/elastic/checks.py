@@ -14,7 +14,8 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.checks import check_floating
-from femgear.case.sections import RPM, Case, output_member
+from femgear.case.quantities import RPM
+from femgear.case.sections import Case, output_member
 from femgear.errors import CaseError, Finding
 from femgear.gears.kinematics import torques
 from femgear.report.tables import response_warnings

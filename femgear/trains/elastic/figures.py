@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import material_of, planetary_set
-from femgear.case.sections import RPM
+from femgear.case.quantities import RPM
 from femgear.contact.bodies import active_flank_load, make_sectors
 from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis

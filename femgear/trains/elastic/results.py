@@ -13,6 +13,7 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import Entries
+from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.housing.orders import analyse_band, order_level, order_spectrum
 from femgear.housing.sensor import (
@@ -23,7 +24,7 @@ from femgear.housing.sensor import (
     hanning_model,
 )
 from femgear.report.tables import Block, chosen
-from femgear.storage.results import FOURIER, RPM, complex_entries, dataset, response_entries
+from femgear.storage.results import FOURIER, complex_entries, dataset, response_entries
 from femgear.system.assembler import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.report.tables import Block
 from femgear.solvers.continuation.branches import Branch, parameter_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.stability.lyapunov import LyapunovExponents, lyapunov_exponents
 from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
-from femgear.storage.results import FOURIER, RPM, complex_entries, dataset
+from femgear.storage.results import FOURIER, complex_entries, dataset
 from femgear.trains.gear_pair.figures import FIGURES
 from femgear.trains.gear_pair.model import (
     BACK,

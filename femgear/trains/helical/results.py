@@ -13,17 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.quantities import RPM
 from femgear.gears import profile
 from femgear.gears.planetary import virtual_teeth
 from femgear.report.tables import Block
-from femgear.storage.results import (
-    FOURIER,
-    MEMBERS,
-    RPM,
-    complex_entries,
-    dataset,
-    response_entries,
-)
+from femgear.storage.results import FOURIER, complex_entries, dataset, response_entries
+from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness, contact_ratios
 from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
@@ -156,7 +151,7 @@ def _coordinates(result: HelicalDynamicsResult) -> dict[str, tuple]:
         "slice": (("slice",), data.slice_heights, "m", "height of the slice above mid-face"),
         "planet": (("planet",), planets, "1", "planet"),
         "direction": (("direction",), ["radial", "tangential", "axial"], "1", "direction at the planet"),
-        "member": (("member",), list(MEMBERS), "1", "member"),
+        "member": (("member",), list(CENTRAL), "1", "member"),
         "axis": (("axis",), ["x", "y", "z"], "1", "axis of the frame of the carrier"),
     }
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
-from femgear.storage.results import FOURIER, RPM, complex_entries, dataset
+from femgear.storage.results import FOURIER, complex_entries, dataset
 from femgear.system.assembler import mesh_names
 from femgear.trains.multistage.model import (
     MultistageSet,

@@ -17,6 +17,7 @@ from femgear.case.quantities import (
     ANGLE,
     LENGTH,
     PAIR,
+    RPM,
     SPEED,
     STIFFNESS,
     TORQUE,
@@ -53,7 +54,7 @@ from femgear.trains.multistage.model import (
 )
 
 _MEMBER = re.compile(r"stage ([1-9]\d?) (carrier|ring|sun)")
-_RPM = SPEED.scale
+
 # entries of the file for those that refusals of gears and of lumped sets name
 _ENTRIES = {
     "profile_shift": "gears.profile_shifts", "centre_distance": "gears.profile_shifts",
@@ -77,7 +78,7 @@ def _member(value: object) -> str:
 
 MemberName = Annotated[str, BeforeValidator(_member)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
-Speed = Annotated[float, Quantity(SPEED, 1e-3 * _RPM, 1e6 * _RPM)]
+Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
 Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
 PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
 Teeth = Annotated[int, Count(4, 5000)]

@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.quantities import RPM
 from femgear.case.sections import output_member
 from femgear.errors import Finding, remark
 from femgear.gears.kinematics import torques
 from femgear.report.tables import Block, chosen, first_speeds, tabulate
-from femgear.storage.results import MEMBERS, RPM, complex_entries, dataset
+from femgear.storage.results import complex_entries, dataset
+from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.planar.model import (
     TAIL_LIMIT,
     MotionLines,
@@ -259,7 +261,7 @@ def _coordinates(gears) -> dict[str, tuple]:
     return {
         "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
         "planet": (("planet",), numbers, "1", "planet"),
-        "member": (("member",), list(MEMBERS), "1", "member"),
+        "member": (("member",), list(CENTRAL), "1", "member"),
         "axis": (("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
         "direction": (("direction",), ["radial", "tangential"], "1", "direction at the planet"),
     }

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set
+from femgear.case.quantities import RPM
 from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.storage.results import RPM
 from femgear.system.fourier import side_bands
 from femgear.trains.planar.figures import FIGURES
 from femgear.trains.planar.model import (

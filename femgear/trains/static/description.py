@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations, shaft_lines
+from femgear.case.quantities import RPM
 from femgear.errors import ContactError, Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
@@ -22,7 +23,6 @@ from femgear.gears.gear import tooth_thickness
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_set, phasing_table
 from femgear.report.tables import Block, chosen, tabulate
-from femgear.storage.results import RPM
 
 if TYPE_CHECKING:
     import xarray as xr
