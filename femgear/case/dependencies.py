@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from femgear.case.case import planetary_set
@@ -142,24 +142,20 @@ class Steps:
     def __init__(self):
         self._found: dict[str, OrderedDict[str, Any]] = {}
 
-    def take(self, step: str, entries: Entries, compute: Callable[[], Result]) -> Result:
-        """Result of a step for these entries, computed now where it is not kept.
-
-        Parameters
-        ----------
-        step : str
-            Name of what is computed.
-        entries : mapping
-            All that decides it.
-        compute : callable
-        """
+    def kept(self, step: str, entries: Entries) -> Any:
+        """Result of a step for these entries, all that decide it; None where it is not kept."""
         key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
-        if key not in found:
-            found[key] = compute()
-            if len(found) > _KEPT:
-                found.popitem(last=False)
-        found.move_to_end(key)
-        return found[key]
+        if key in found:
+            found.move_to_end(key)
+        return found.get(key)
+
+    def keep(self, step: str, entries: Entries, result: Result) -> Result:
+        """Keep the result of a step for these entries, and return it."""
+        found = self._found.setdefault(step, OrderedDict())
+        found[fingerprint(entries)] = result
+        if len(found) > _KEPT:
+            found.popitem(last=False)
+        return result
 
 
 def fingerprint(entries: Entries) -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic_core import core_schema
 
-from femgear.case.text import found, shown
-from femgear.case.units import ANGLE, Dimension, to_si
+from femgear.case.text import described, found, shown
+from femgear.case.units import Dimension, to_si
 from femgear.errors import CaseError
 
 
@@ -46,62 +47,9 @@ def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = 
     open_low : bool
         The low end itself is refused too.
     """
-    ends = dimension.show(low), dimension.show(high)
-    limit = f"above {ends[0]} up to {ends[1]}" if open_low else f"{ends[0]} to {ends[1]}"
-
-    def convert(value: object) -> float:
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            raise refuse(
-                f"{dimension.name} needs its unit",
-                code="E-UNIT",
-                value=value,
-                remedy=_as_text(value, low, high, dimension),
-            )
-        if not isinstance(value, str):
-            raise refuse(f"{dimension.name} is needed, not {described(value)}", code="E-TYPE", value=value)
-        try:
-            number = to_si(value, dimension)
-        except CaseError as error:
-            raise refuse(
-                error.message, code=error.code, value=value, limit=error.limit, remedy=error.remedy
-            ) from None
-        if not (low < number <= high if open_low else low <= number <= high):
-            message = f"{dimension.name} of {dimension.show(number)} is not plausible"
-            hint = _factor_hint(number, low, high, dimension, value)
-            raise refuse(message, code="E-RANGE", value=value, limit=limit, remedy=hint)
-        return number
-
-    schema = {"type": "string", "description": f"{dimension.name} with its unit, {limit}"}
-    return _Reader(convert, schema)
-
-
-def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
-    """How to write a bare number: in the unit of messages, or that of an SI value, where it is plausible."""
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    readings = []
-    if low <= number * dimension.scale <= high:
-        readings.append(f'"{value} {dimension.shown}"')
-    if dimension.scale != 1.0 and low <= number <= high:
-        readings.append(f'"{dimension.show(number)}" if it is in {dimension.si}')
-    shown = ", or ".join(readings) or f'such as "{dimension.show(dimension.scale)}"'
-    return f"write it as text with the unit, {shown}"
-
-
-def _factor_hint(number: float, low: float, high: float, dimension: Dimension, text: str) -> str | None:
-    """Guess of the mistaken unit where a usual factor brings the number into its window."""
-    if dimension is ANGLE:
-        for factor, read, written in ((math.pi / 180, "deg", "rad"), (180 / math.pi, "rad", "deg")):
-            if written in text and low <= number * factor <= high:
-                return f"degrees and radians seem to be mixed up: {read} would be plausible"
-        return None
-    for factor in (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9):
-        if low <= number * factor <= high:
-            shown = dimension.show(number * factor)
-            return f"a factor of {factor:g} would make it plausible ({shown}): check the unit"
-    return None
+    read = partial(to_si, dimension=dimension, low=low, high=high, open_low=open_low)
+    limit = dimension.window(low, high, open_low=open_low)
+    return _Reader(read, {"type": "string", "description": f"{dimension.name} with its unit, {limit}"})
 
 
 def Number(
@@ -122,13 +70,13 @@ def Number(
     def convert(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             remedy = "write it without quotes" if isinstance(value, str) else None
-            raise refuse(
+            raise CaseError(
                 f"a number is needed, not {described(value)}", code="E-TYPE", value=value, remedy=remedy
             )
         above = low < value if open_low else low <= value
         below = value < high if open_high else value <= high
         if not (above and below):
-            raise refuse(
+            raise CaseError(
                 f"the number is out of range{': ' + note if note else ''}",
                 code="E-RANGE",
                 value=found(value) if isinstance(value, int) else value,
@@ -170,13 +118,13 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
     def convert(value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
             remedy = "write it without quotes" if isinstance(value, str) else None
-            raise refuse(
+            raise CaseError(
                 f"a whole number is needed, not {described(value)}", code="E-TYPE", value=value, remedy=remedy
             )
         number = abs(value) if signed else value
         if not low <= number <= high:
             why = note if number > high else ""
-            raise refuse(
+            raise CaseError(
                 f"{shown(value)} is out of range{': ' + why if why else ''}",
                 code="E-RANGE",
                 value=found(value),
@@ -191,9 +139,9 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
 def _one_line(value: object) -> str:
     """A printable text of at most 200 characters."""
     if not isinstance(value, str):
-        raise refuse(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
+        raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
     if len(value) > 200 or not value.isprintable():
-        raise refuse(
+        raise CaseError(
             "the title must be one printable line",
             code="E-RANGE",
             value=value,
@@ -203,23 +151,3 @@ def _one_line(value: object) -> str:
 
 
 Title = Annotated[str, BeforeValidator(_one_line)]
-
-
-def refuse(
-    message: str,
-    *,
-    code: str,
-    value: object = None,
-    limit: str | None = None,
-    remedy: str | None = None,
-) -> PydanticCustomError:
-    """Validation error that `femgear.case.problems` turns into a `CaseError` with these fields."""
-    kind: Any = code
-    told = {"message": message, "found": value, "limit": limit, "remedy": remedy}
-    return PydanticCustomError(kind, "{message}", told)
-
-
-def described(value: object) -> str:
-    """What a TOML value is, in words."""
-    names = {bool: "true or false", int: "an integer", float: "a number", str: "a text", list: "a list"}
-    return names.get(type(value), "a table" if isinstance(value, dict) else "a date or time")

@@ -22,8 +22,8 @@ from femgear.case.deviations import (
     PlanetModificationSection,
     RingErrors,
 )
-from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
-from femgear.case.text import ReadCase
+from femgear.case.fields import Count, Number, Quantity, Section, Title
+from femgear.case.text import ReadCase, described
 from femgear.case.units import (
     ANGLE,
     DENSITY,
@@ -44,6 +44,8 @@ FORMAT = 1
 """Newest format of the case file."""
 RPM = SPEED.scale
 """One revolution a minute [rad/s]."""
+LARGEST_TORQUE = 1e9
+"""Largest plausible torque [N m]."""
 CODE = "E-PUBLISHED"
 """Of refusals of published lines."""
 _MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
@@ -185,7 +187,7 @@ def _speed_range(value: object) -> object:
     if not isinstance(value, dict):
         if not isinstance(value, list) or not value:
             message = f"a list of speeds is needed, not {'an empty one' if value == [] else described(value)}"
-            raise refuse(message, code="E-TYPE", value=value, remedy='write ["250 rpm", "3100 rpm"]')
+            raise CaseError(message, code="E-TYPE", value=value, remedy='write ["250 rpm", "3100 rpm"]')
         return value
     ends = _SpeedRange.model_validate(value)
     step = (ends.to - ends.start) / (ends.count - 1)
@@ -205,7 +207,7 @@ class OperationSection(Section):
 
     input: Member
     fixed: Member
-    torque: Annotated[float, Quantity(TORQUE, -1e9, 1e9)]
+    torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
     speeds: Annotated[tuple[_Speed, ...], BeforeValidator(_speed_range), Field(max_length=100_000)]
 
 

@@ -8,6 +8,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from femgear.case.text import described
 from femgear.errors import CaseError
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
@@ -41,6 +42,12 @@ class Dimension:
         """Text of an SI value in the unit ``shown``."""
         return f"{value / self.scale:.6g} {self.shown}"
 
+    def window(self, low: float, high: float, *, open_low: bool = False) -> str:
+        """Text of a range of SI values, whose low end may be left out."""
+        return (
+            f"{'above ' if open_low else ''}{self.show(low)} {'up ' if open_low else ''}to {self.show(high)}"
+        )
+
 
 LENGTH = Dimension("a length", "m", "mm", 1e-3)
 ANGLE = Dimension("an angle", "rad", "deg", math.pi / 180)
@@ -58,15 +65,26 @@ ACCELERATION = Dimension("an acceleration", "m/s^2", "m/s^2", 1.0)
 FOUNDATION = Dimension("a foundation stiffness per area", "N/m^3", "N/m^3", 1.0)
 
 
-def to_si(text: str, dimension: Dimension) -> float:
+def to_si(
+    value: object,
+    dimension: Dimension,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    open_low: bool = False,
+) -> float:
     """SI value of a quantity such as ``"1.5 mm"``, ``"20 deg"`` or ``"1e-4 kg m^2"``.
 
     Parameters
     ----------
-    text : str
+    value : str
         A number and a product of units; radians and degrees count as a dimension, so that neither
         ``"5 Hz"`` passes as a speed of rotation nor ``"20 %"`` as an angle.
     dimension : Dimension
+    low, high : float
+        Plausible window, in ``dimension.si``.
+    open_low : bool
+        The low end itself is refused too.
 
     Returns
     -------
@@ -76,26 +94,74 @@ def to_si(text: str, dimension: Dimension) -> float:
     Raises
     ------
     CaseError
-        ``E-UNIT``: no number, no unit, an unknown unit or another dimension. ``E-FINITE``: overflow.
+        ``E-TYPE``: no text. ``E-UNIT``: no number, no unit, an unknown unit or another dimension.
+        ``E-FINITE``: overflow. ``E-RANGE``: outside the window.
     """
+    if not isinstance(value, str):
+        raise _no_text(value, dimension, low, high)
     example = f'write it as in "{dimension.show(dimension.scale)}"'
-    match = _NUMBER.fullmatch(text)
-    if re.match(r"\s*[+-]?\d+,\d", text):
+    match = _NUMBER.fullmatch(value)
+    if re.match(r"\s*[+-]?\d+,\d", value):
         message = f"{dimension.name} has a comma in its number"
-        raise CaseError(message, code="E-UNIT", value=text, remedy="use a decimal point")
+        raise CaseError(message, code="E-UNIT", value=value, remedy="use a decimal point")
     if not match:
         message = f"{dimension.name} must start with a number"
-        raise CaseError(message, code="E-UNIT", value=text, remedy=example)
+        raise CaseError(message, code="E-UNIT", value=value, remedy=example)
     number, unit = float(match[1]), " ".join(match[2].split())
     if not unit:
-        raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=text, remedy=example)
-    factor = _factor(unit, dimension, text, example)
+        raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=example)
+    factor = _factor(unit, dimension, value, example)
     inverse = round(1 / factor)
     # 51/1000 is 0.051 to the last digit, 51*0.001 is not.
-    value = number / inverse if abs(inverse * factor - 1) < 1e-12 else number * factor
-    if not math.isfinite(value):
-        raise CaseError("the number is not finite", code="E-FINITE", value=text, limit="finite numbers")
-    return value
+    number = number / inverse if abs(inverse * factor - 1) < 1e-12 else number * factor
+    if not math.isfinite(number):
+        raise CaseError("the number is not finite", code="E-FINITE", value=value, limit="finite numbers")
+    if not (low < number <= high if open_low else low <= number <= high):
+        raise CaseError(
+            f"{dimension.name} of {dimension.show(number)} is not plausible",
+            code="E-RANGE",
+            value=value,
+            limit=dimension.window(low, high, open_low=open_low),
+            remedy=_factor_hint(number, low, high, dimension, value),
+        )
+    return number
+
+
+def _no_text(value: object, dimension: Dimension, low: float, high: float) -> CaseError:
+    """Refusal of a bare number, or of what is no quantity at all."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        remedy = _as_text(value, low, high, dimension)
+        return CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=remedy)
+    return CaseError(f"{dimension.name} is needed, not {described(value)}", code="E-TYPE", value=value)
+
+
+def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
+    """How to write a bare number: in the unit of messages, or that of an SI value, where it is plausible."""
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    readings = []
+    if low <= number * dimension.scale <= high:
+        readings.append(f'"{value} {dimension.shown}"')
+    if dimension.scale != 1.0 and low <= number <= high:
+        readings.append(f'"{dimension.show(number)}" if it is in {dimension.si}')
+    shown = ", or ".join(readings) or f'such as "{dimension.show(dimension.scale)}"'
+    return f"write it as text with the unit, {shown}"
+
+
+def _factor_hint(number: float, low: float, high: float, dimension: Dimension, text: str) -> str | None:
+    """Guess of the mistaken unit where a usual factor brings the number into its window."""
+    if dimension is ANGLE:
+        for factor, read, written in ((math.pi / 180, "deg", "rad"), (180 / math.pi, "rad", "deg")):
+            if written in text and low <= number * factor <= high:
+                return f"degrees and radians seem to be mixed up: {read} would be plausible"
+        return None
+    for factor in (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9):
+        if low <= number * factor <= high:
+            shown = dimension.show(number * factor)
+            return f"a factor of {factor:g} would make it plausible ({shown}): check the unit"
+    return None
 
 
 def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:

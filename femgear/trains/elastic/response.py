@@ -9,7 +9,7 @@ at all speeds, and the level of the housing is computed again with twice that fr
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -45,6 +45,10 @@ class FrequencyLimit:
     excitation: np.ndarray
     response: np.ndarray
     frequency: np.ndarray
+
+    def at(self, speeds: np.ndarray) -> FrequencyLimit:
+        """The same at some of the speeds, by their numbers."""
+        return FrequencyLimit(self.excitation[speeds], self.response[speeds], self.frequency[speeds])
 
 
 def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
@@ -90,34 +94,10 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     return FrequencyLimit(excitation, response, excitation * frequency)
 
 
-def periodic_response(
-    case: Case, modes: ModesResult, mesh_frequency, up_to: float, *, given: int | None
-) -> tuple[FrequencyLimit, Response]:
-    """Periodic response to excitation up to a frequency, or of a given number of mesh harmonics.
-
-    Parameters
-    ----------
-    case : Case
-    modes : ModesResult
-    mesh_frequency, up_to, given
-        As for `limited`.
-    """
-    limit = limited(case, mesh_frequency, up_to, given=given)
-    response = solve_spectral(
-        modes.modes,
-        modes.excitation,
-        mesh_frequency,
-        excitation_harmonics=limit.excitation,
-        response_harmonics=limit.response,
-        tolerance=case.dynamics.tolerance,
-    )
-    return limit, response
-
-
-def checked_response(
+def excitation_limit(
     case: Case, modes: ModesResult, all_speeds: tuple[Speeds, ...]
-) -> tuple[FrequencyLimit, Response, np.ndarray, float]:
-    """Response, its frequency limit, what the level changes beyond it [dB], and the limit compared with [Hz].
+) -> tuple[FrequencyLimit, np.ndarray, float]:
+    """How far the excitation reaches, what the level changes beyond [dB], and the limit compared with [Hz].
 
     Where the case sets no limit it is doubled once where that changes the level by 1 dB or more. The changes
     (n_speeds,) are nan at speeds that were not looked at.
@@ -127,31 +107,26 @@ def checked_response(
     given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
     automatic = given is None and case.dynamics.up_to is None
     some = checked_speeds(len(frequency))
-    limit, response = periodic_response(case, modes, frequency, up_to, given=given)
+    limit = limited(case, frequency, up_to, given=given)
     while True:
         beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
-        further, wider = periodic_response(case, modes, frequency[some], beyond, given=None)
-        parts = {name: getattr(response, name)[some] for name in ("deflection", "force", "modal")}
-        lines = (
-            _sensor_lines(case, modes, one, carrier[some]) for one in (replace(response, **parts), wider)
+        further = limited(case, frequency[some], beyond)
+        level, wider_level = (
+            order_level(_sensor_lines(case, modes, frequency[some], carrier[some], one))
+            for one in (limit.at(some), further)
         )
-        level, wider_level = (order_level(one) for one in lines)
         change = np.full(len(frequency), np.nan)
         change[some] = 20.0 * np.log10(wider_level / level)
         reached = further.frequency > beyond - frequency[some]
         doubted = np.abs(change[some][reached]).max(initial=0.0) >= NOTICEABLE
         if not (automatic and doubted) or up_to > modes.reach:
             break
-        up_to = beyond
-        if len(some) == len(frequency):
-            limit, response = further, wider
-        else:
-            limit, response = periodic_response(case, modes, frequency, up_to, given=None)
+        up_to, limit = beyond, limited(case, frequency, beyond)
     slow = frequency * HARMONICS < beyond - frequency
     if slow.any():
         share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
         change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
-    return limit, response, change, beyond
+    return limit, change, beyond
 
 
 def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
@@ -162,15 +137,25 @@ def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense
     speed (within 1 dB from 250 to 60 rpm of the reference set).
     """
     fast = np.array([beyond / HARMONICS * (1.0 + 1e-9)])
-    _, response = periodic_response(case, modes, fast, beyond, given=None)
-    lines = _sensor_lines(case, modes, response, sense * 2.0 * np.pi * fast / case.ring.teeth)
+    carrier = sense * 2.0 * np.pi * fast / case.ring.teeth
+    lines = _sensor_lines(case, modes, fast, carrier, limited(case, fast, beyond))
     power = np.cumsum(np.abs(lines.acceleration[0]) ** 2)
     place = np.searchsorted(lines.frequency[0], frequency, side="right") - 1
     return np.sqrt(power[place] / power[-1])
 
 
-def _sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np.ndarray) -> SensorLines:
-    """Lines of the fixed sensor at speeds of the carrier [rad/s]."""
+def _sensor_lines(
+    case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, limit: FrequencyLimit
+) -> SensorLines:
+    """Lines of the fixed sensor at mesh frequencies [Hz] with their speeds of the carrier [rad/s]."""
+    response = solve_spectral(
+        modes.modes,
+        modes.excitation,
+        frequency,
+        excitation_harmonics=limit.excitation,
+        response_harmonics=limit.response,
+        tolerance=case.dynamics.tolerance,
+    )
     field = mesh_and_ring_outputs(modes, response)[1][0]
     return fixed_sensor_lines(field, case.ring.teeth, carrier, case.housing.sensor_angle)
 

@@ -25,6 +25,7 @@ from femgear.case.dependencies import (
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, active_flank_load, with_ring
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
+from femgear.contact.supports import Supports
 from femgear.errors import Finding, remark
 from femgear.fe.elasticity import mass
 from femgear.gears.kinematics import Speeds
@@ -32,9 +33,10 @@ from femgear.gears.planetary import PlanetarySet
 from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, heaviside_linear_lines
 from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
+from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
-from femgear.system.system import Response
+from femgear.system.system import MeshExcitation, Response
 from femgear.trains.elastic.checks import (
     case_warnings,
     check_dynamic_case,
@@ -54,10 +56,10 @@ from femgear.trains.elastic.model import (
     ring_model,
 )
 from femgear.trains.elastic.response import (
-    checked_response,
+    excitation_limit,
     highest_excitation,
+    limited,
     mesh_and_ring_outputs,
-    periodic_response,
 )
 from femgear.trains.elastic.results import (
     DynamicsResult,
@@ -111,82 +113,93 @@ def solve_modes(
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_dynamic_case(case, static.planetary_set)
-    steps, entries = steps or Steps(), ring_entries(case)
-    bodies = _ring_states(case, static, steps)
-    state = steps.take(
+    steps, gears, torque = steps or Steps(), static.planetary_set, static.sun_torque
+    bodies, deviations, known = _ring_bodies(case, static, steps), set_deviations(case), state_entries(case)
+    state = steps.kept("loaded state", known) or steps.keep(
         "loaded state",
-        state_entries(case),
-        lambda: state_on_supports(case, bodies, static.sun_torque, progress=progress),
+        known,
+        loaded_period(
+            gears,
+            *bodies,
+            sun_torque=torque,
+            positions=case.static.positions,
+            contact=case.static.contact,
+            deviations=None if deviations.ideal else deviations,
+            supports=linear_supports(case),
+            progress=None if progress is None else lambda done, total: progress("modes", done, total),
+        ),
     )
-    reach, side = _excitation_reach(case, state, static.sun_torque), 1.0 if static.sun_torque >= 0 else -1.0
-    ring = steps.take(
-        "ring model",
-        {**entries, "reach": reach, "side": side},
-        lambda: _ring_of_case(case, static, reach=reach, side=side),
-    )
-    return _modal_basis(case, ring, bodies, state, sun_torque=static.sun_torque, reach=reach)
-
-
-def _ring_states(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
-    """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
-    fixed = case.static.members == "fixed"
-
-    def other() -> Bodies:
-        springs = ring_foundation(case, static.sectors.ring) if fixed else None
-        return with_ring(static.bodies, static.sectors, depth=case.static.depth, ring_foundation=springs)
-
-    found = steps.take("ring compliances", ring_entries(case), other)
-    return (found, static.bodies) if fixed else (static.bodies, found)
-
-
-def _ring_of_case(case: Case, static: StaticResult, *, reach: float, side: float) -> RingModel:
-    """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz].
-
-    ``side`` is the sign of the sun's torque.
-    """
-    gears, sector = static.planetary_set, static.sectors.ring
-    return ring_model(
-        gears,
-        sector.grid,
-        sector.stiffness,
-        mass(sector.grid, material_of(case), gears.ring.face_width),
-        ring_foundation(case, sector),
-        active_flank_load(sector.grid, gears, side),
-        max_diameter=max_nodal_diameter(case),
+    stiffness = state.resampled("held_stiffness", RECORD).mean(axis=1)
+    mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
+    reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
+    ring = _ring_of_case(case, static, steps, reach)
+    excitation, flexibility = _excitation(gears, ring, state)
+    model = elastic_set(case, gears, ring, sun_torque=torque, flexibility=flexibility)
+    modes = solve_eigenproblem(
+        model.system,
+        excitation.stiffness.mean(axis=1),
+        damping_ratio=case.dynamics.damping_ratio,
         max_frequency=MODES_ABOVE * reach,
-        side=side,
+    )
+    kinds, diameters = mode_kinds(
+        modes.shape,
+        np.diag(model.system.M),
+        model.system.dofs,
+        frequency=modes.frequency,
+        ring_diameter=model.ring_diameter,
+        ring_slice=model.ring_slice,
+        planet_angles=model.planet_angles,
+    )
+    modes = replace(modes, kind=kinds, nodal_diameter=diameters)
+    return ModesResult(ring, model, excitation, modes, bodies, state, reach, modal_entries(case))
+
+
+def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
+    """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
+    fixed, known = case.static.members == "fixed", ring_entries(case)
+    other = steps.kept("ring compliances", known) or steps.keep(
+        "ring compliances",
+        known,
+        with_ring(
+            static.bodies,
+            static.sectors,
+            depth=case.static.depth,
+            ring_foundation=ring_foundation(case, static.sectors.ring) if fixed else None,
+        ),
+    )
+    return (other, static.bodies) if fixed else (static.bodies, other)
+
+
+def linear_supports(case: Case) -> Supports:
+    """Supports of the members without clearance: the bearings of the dynamic model are linear."""
+    return replace(case_supports(case), planet_clearance=0.0)
+
+
+def _ring_of_case(case: Case, static: StaticResult, steps: Steps, reach: float) -> RingModel:
+    """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz]."""
+    gears, sector, side = static.planetary_set, static.sectors.ring, 1.0 if static.sun_torque >= 0 else -1.0
+    known = {**ring_entries(case), "reach": reach, "side": side}
+    return steps.kept("ring model", known) or steps.keep(
+        "ring model",
+        known,
+        ring_model(
+            gears,
+            sector.grid,
+            sector.stiffness,
+            mass(sector.grid, material_of(case), gears.ring.face_width),
+            ring_foundation(case, sector),
+            active_flank_load(sector.grid, gears, side),
+            max_diameter=max_nodal_diameter(case),
+            max_frequency=MODES_ABOVE * reach,
+            side=side,
+        ),
     )
 
 
-def state_on_supports(case: Case, bodies, sun_torque: float, *, progress=None) -> LoadedPeriod:
-    """Loaded state of the set on its supports, over one mesh period.
-
-    ``bodies`` are flank compliances with the ring on its foundation, and with the ring held.
-    """
-    deviations = set_deviations(case)
-    return loaded_period(
-        planetary_set(case),
-        *bodies,
-        sun_torque=sun_torque,
-        positions=case.static.positions,
-        contact=case.static.contact,
-        deviations=None if deviations.ideal else deviations,
-        # the bearings of the dynamic model are linear
-        supports=replace(case_supports(case), planet_clearance=0.0),
-        progress=None if progress is None else lambda done, total: progress("modes", done, total),
-    )
-
-
-def _excitation_reach(case: Case, state: LoadedPeriod, sun_torque: float) -> float:
-    """Frequency to which the excitation reaches [Hz], see `highest_excitation`."""
-    gears, stiffness = planetary_set(case), state.resampled("held_stiffness", RECORD).mean(axis=1)
-    mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=sun_torque)
-    return highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
-
-
-def _modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun_torque, reach):
-    """Modes of the set with the ring given and the meshes of the loaded state."""
-    gears = planetary_set(case)
+def _excitation(
+    gears: PlanetarySet, ring: RingModel, state: LoadedPeriod
+) -> tuple[MeshExcitation, np.ndarray]:
+    """Mesh springs of the loaded state, and the compliance (2N, 2N) of the bodies between them [m/N]."""
     held, compliance = (
         ring_mesh_compliance(values, gears.ring.teeth, gears.planet_angles)
         for values in (ring.held_compliance, ring.compliance)
@@ -203,33 +216,7 @@ def _modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, su
         flexibility=flexibility,
         backlash=mesh_backlash(gears),
     )
-    model = elastic_set(case, gears, ring, sun_torque=sun_torque, flexibility=flexibility)
-    modes = solve_eigenproblem(
-        model.system,
-        excitation.stiffness.mean(axis=1),
-        damping_ratio=case.dynamics.damping_ratio,
-        max_frequency=MODES_ABOVE * reach,
-    )
-    kinds, diameters = mode_kinds(
-        modes.shape,
-        np.diag(model.system.M),
-        model.system.dofs,
-        frequency=modes.frequency,
-        ring_diameter=model.ring_diameter,
-        ring_slice=model.ring_slice,
-        planet_angles=model.planet_angles,
-    )
-    return ModesResult(
-        ring=ring,
-        model=model,
-        excitation=excitation,
-        modes=replace(modes, kind=kinds, nodal_diameter=diameters),
-        max_diameter=len(ring.compliance) - 1,
-        bodies=bodies,
-        state=state,
-        reach=reach,
-        entries=modal_entries(case),
-    )
+    return excitation, flexibility
 
 
 @one_blas_thread()
@@ -247,10 +234,17 @@ def solve_dynamics(
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
     gears, basis = static.planetary_set, modes.modes
-    all_speeds = _turning_speeds(case, gears)
     check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
-    check_rim_speed(modes.ring.modes, [s.carrier for s in all_speeds])
-    limit, response, change, compared_to = checked_response(case, modes, all_speeds)
+    all_speeds = _turning_speeds(case, modes)
+    limit, change, compared_to = excitation_limit(case, modes, all_speeds)
+    response = solve_spectral(
+        basis,
+        modes.excitation,
+        [s.mesh_frequency for s in all_speeds],
+        excitation_harmonics=limit.excitation,
+        response_harmonics=limit.response,
+        tolerance=case.dynamics.tolerance,
+    )
     if progress is not None:
         progress("dynamics", 1, 2)
     verdict = stability(
@@ -287,16 +281,24 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     CaseError
         E-SPEED, as there.
     """
-    found = _turning_speeds(case, planetary_set(case))
+    frequency = [s.mesh_frequency for s in _turning_speeds(case, modes)]
+    limit = limited(case, frequency, case.dynamics.up_to or modes.reach, given=case.dynamics.mesh_harmonics)
+    return solve_spectral(
+        modes.modes,
+        modes.excitation,
+        frequency,
+        excitation_harmonics=limit.excitation,
+        response_harmonics=limit.response,
+        tolerance=case.dynamics.tolerance,
+    )
+
+
+def _turning_speeds(case: Case, modes: ModesResult) -> tuple[Speeds, ...]:
+    """Speeds of all members at the speeds of the input, refused where the ring has no modes for them."""
+    gears = planetary_set(case)
+    found = tuple(member_speeds(case, gears, speed) for speed in case.operation.speeds)
     check_rim_speed(modes.ring.modes, [s.carrier for s in found])
-    frequency = np.array([s.mesh_frequency for s in found])
-    up_to = case.dynamics.up_to or modes.reach
-    return periodic_response(case, modes, frequency, up_to, given=case.dynamics.mesh_harmonics)[1]
-
-
-def _turning_speeds(case: Case, gears: PlanetarySet) -> tuple[Speeds, ...]:
-    """Speeds of all members at the speeds of the input."""
-    return tuple(member_speeds(case, gears, speed) for speed in case.operation.speeds)
+    return found
 
 
 @one_blas_thread()
@@ -328,8 +330,8 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )
 
 
-def _notices(data: dict) -> Iterator[Finding]:
-    if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
+def _notices(data: dict, case: Case) -> Iterator[Finding]:
+    if "bearing_clearance" in data["planet"] and case.static.members == "fixed":
         yield remark(
             'planet.bearing_clearance has no effect while static.members is "fixed": write '
             'static.members = "elastic"'
@@ -352,9 +354,9 @@ ELASTIC = Train(
         Stage(
             name="modes",
             title="Modes",
-            solve=lambda case, results, context: solve_modes(
-                case, results["static"], progress=context.progress
-            ),
+            solve=solve_modes,
+            takes=("static",),
+            options=("progress",),
             verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
@@ -363,9 +365,9 @@ ELASTIC = Train(
         Stage(
             name="dynamics",
             title="Dynamics",
-            solve=lambda case, results, context: solve_dynamics(
-                case, results["static"], results["modes"], progress=context.progress
-            ),
+            solve=solve_dynamics,
+            takes=("static", "modes",),
+            options=("progress",),
             verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             needs=lambda case: ("modes",),
@@ -373,7 +375,8 @@ ELASTIC = Train(
         Stage(
             name="housing",
             title="Housing",
-            solve=lambda case, results, _: solve_housing(case, results["dynamics"]),
+            solve=solve_housing,
+            takes=("dynamics",),
             verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(results.housing),
             needs=lambda case: ("dynamics",),

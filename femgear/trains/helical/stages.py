@@ -224,9 +224,8 @@ HELICAL = Train(
         Stage(
             name="static",
             title="Static",
-            solve=lambda case, _, context: solve_helical_static(
-                case, cache=context.cache, progress=context.progress
-            ),
+            solve=solve_helical_static,
+            options=("cache", "progress"),
             verdict=static_stages.static_verdict,
             describe=lambda results: describe_helical_static(
                 results.static,
@@ -243,9 +242,9 @@ HELICAL = Train(
         Stage(
             name="modes",
             title="Modes",
-            solve=lambda case, results, context: solve_helical_modes(
-                case, results.get("static"), cache=context.cache
-            ),
+            solve=solve_helical_modes,
+            takes=("static",),
+            options=("cache",),
             verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=lambda case: () if _given(case) else ("static",),
@@ -254,9 +253,9 @@ HELICAL = Train(
         Stage(
             name="dynamics",
             title="Dynamics",
-            solve=lambda case, results, context: solve_helical_dynamics(
-                case, results["modes"], progress=context.progress
-            ),
+            solve=solve_helical_dynamics,
+            takes=("modes",),
+            options=("progress",),
             verdict=static_stages.response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             unavailable=lambda case: (
@@ -275,5 +274,5 @@ HELICAL = Train(
     figures=_figures,
     remarks=_remarks,
     cross_check=check_helical,
-    notices=helical_notices,
+    notices=lambda tables, case: helical_notices(tables),
 )  # fmt: skip

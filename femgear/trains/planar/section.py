@@ -14,8 +14,9 @@ from pydantic import (
     model_validator,
 )
 
-from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
+from femgear.case.fields import Count, Number, Quantity, Section, Title
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
+from femgear.case.text import described
 from femgear.case.units import ACCELERATION, ANGLE, FREQUENCY, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
@@ -52,9 +53,9 @@ FigureName = Literal[
 
 def _sentence(value: object) -> str:
     if not isinstance(value, str):
-        raise refuse(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
+        raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
     if len(value) > 600 or not value.isprintable():
-        raise refuse(
+        raise CaseError(
             "the comparison must be one printable line", code="E-RANGE", limit="600 printable characters"
         )
     return value
@@ -63,7 +64,7 @@ def _sentence(value: object) -> str:
 def _some(values: tuple) -> tuple:
     # pydantic's own min_length counts valid entries alone, and would complain twice
     if not values:
-        raise refuse("there is no entry", code="E-RANGE", limit="1 or more")
+        raise CaseError("there is no entry", code="E-RANGE", limit="1 or more")
     return values
 
 
@@ -130,7 +131,7 @@ class PlanarPublished(Section):
             name for name in ("kind", "frequency", "figure", "comparison") if getattr(self, name) is not None
         }
         if given not in ({"kind", "frequency"}, {"figure", "comparison"}):
-            raise refuse(
+            raise CaseError(
                 "a published entry is a frequency with its kind, or a figure with a comparison",
                 code="E-CHOICE",
                 remedy='write kind = "rotational" and frequency = "69.5 Hz"',
