@@ -273,6 +273,7 @@ def test_tip_relief_at_the_end_of_its_range_is_no_minimum(quick_case, tmp_path):
     assert "NOT A MINIMUM: amount" in done.stdout and "end of the range searched to more" in done.stdout
 
 
+@pytest.mark.slow
 def test_tip_relief_design(quick_case, tmp_path):
     arguments = ("--points", "4", "--positions", "16", "--also", "60 N m", "--largest", "6 um")
     done = run("tip_relief_design.py", quick_case, *arguments, "-o", tmp_path / "o", folder=tmp_path)

@@ -104,6 +104,14 @@ def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
     assert contact_pressure().compute(variant) == data["max_pressure"].values.max()
 
 
+@pytest.fixture(scope="module")
+def left(coarse, grids):
+    """Steps with all that a variant leaves behind."""
+    steps = Steps()
+    Variant(coarse, steps, grids).response(RANGE)
+    return steps
+
+
 @pytest.mark.parametrize(
     "changes",
     [
@@ -116,12 +124,10 @@ def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
     ],
     ids=lambda changes: next(iter(changes)),
 )
-def test_shared_steps_change_no_number(coarse, grids, changes):
-    """A variant that differs in masses, loads or supports, with all that another one left behind."""
-    steps = Steps()
-    Variant(coarse, steps, grids).response(RANGE)
+def test_shared_steps_change_no_number(coarse, grids, left, changes):
+    """A variant that differs in masses, loads or supports, with all that others left behind."""
     case = with_values(coarse, changes)
-    shared, alone = Variant(case, steps, grids), Variant(case, Steps(), grids)
+    shared, alone = Variant(case, left, grids), Variant(case, Steps(), grids)
     np.testing.assert_array_equal(shared.static().cycle.deflection, alone.static().cycle.deflection)
     np.testing.assert_array_equal(shared.response(RANGE).force, alone.response(RANGE).force)
 
@@ -222,6 +228,7 @@ def test_a_planar_case_has_no_ring_to_shake():
         at_speeds(case, RANGE)
 
 
+@pytest.mark.slow
 def test_the_optimum_of_the_page_is_one():
     """The rounded reliefs of docs/optimise.md on the grid of the case, which is not that of their search."""
     import re

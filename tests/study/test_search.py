@@ -200,7 +200,7 @@ KILLED = """
     import os, sys
     from pathlib import Path
     sys.path.insert(0, {tests!r})
-    from test_optimisation import CASE, ROSENBROCK, X, Y
+    from test_search import CASE, ROSENBROCK, X, Y
     from femgear import read_case
     from femgear.study import Problem, SearchOptions, minimise
 
@@ -217,7 +217,7 @@ KILLED = """
 
 def test_a_killed_search_goes_on_and_repeats_nothing(case, tmp_path):
     journal = tmp_path / "journal.jsonl"
-    code = textwrap.dedent(KILLED).format(tests=str(Path(__file__).parents[1]), journal=str(journal))
+    code = textwrap.dedent(KILLED).format(tests=str(Path(__file__).parent), journal=str(journal))
     killed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert killed.returncode == -9, killed.stderr
     assert len(journal.read_bytes().splitlines()) == 1 + 9

@@ -173,6 +173,7 @@ def test_relief_starts_at_the_ends_of_single_pair_contact(basis):
     assert planet == pytest.approx(line - tips[0] + gears.sun.base_pitch, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_optimum_is_far_under_the_unmodified_pair_and_the_map_has_its_minimum_there(basis):
     gears = basis.gears
     grid = relief_grid(
@@ -191,6 +192,7 @@ def test_the_optimum_is_far_under_the_unmodified_pair_and_the_map_has_its_minimu
     np.testing.assert_allclose(found.peak_to_peak[1, 1], found.peak_to_peak[0, 1], rtol=0.01)
 
 
+@pytest.mark.slow
 def test_the_slopes_of_the_optimum_are_those_of_single_mesh_cycles(basis):
     """Same peaks as mesh cycles with the reliefs beside it; a search cut short says it is no minimum."""
     from femgear.study.relief import two_pair_length

@@ -1,4 +1,4 @@
-"""Small systems shared by the solver tests."""
+"""Small systems with meshes, as fixtures of the tests of systems and solvers."""
 
 import numpy as np
 import pytest
