@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,14 @@ class FrequencyLimit:
     excitation: np.ndarray
     response: np.ndarray
     frequency: np.ndarray
+
+    def options(self, case: Case) -> dict[str, Any]:
+        """What `solve_spectral` takes beside modes, excitation and frequencies."""
+        return {
+            "excitation_harmonics": self.excitation,
+            "response_harmonics": self.response,
+            "tolerance": case.dynamics.tolerance,
+        }
 
     def at(self, speeds: np.ndarray) -> FrequencyLimit:
         """The same at some of the speeds, by their numbers."""
@@ -148,14 +157,7 @@ def _sensor_lines(
     case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, limit: FrequencyLimit
 ) -> SensorLines:
     """Lines of the fixed sensor at mesh frequencies [Hz] with their speeds of the carrier [rad/s]."""
-    response = solve_spectral(
-        modes.modes,
-        modes.excitation,
-        frequency,
-        excitation_harmonics=limit.excitation,
-        response_harmonics=limit.response,
-        tolerance=case.dynamics.tolerance,
-    )
+    response = solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
     field = mesh_and_ring_outputs(modes, response)[1][0]
     return fixed_sensor_lines(field, case.ring.teeth, carrier, case.housing.sensor_angle)
 

@@ -237,14 +237,8 @@ def solve_dynamics(
     check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
     all_speeds = _turning_speeds(case, modes)
     limit, change, compared_to = excitation_limit(case, modes, all_speeds)
-    response = solve_spectral(
-        basis,
-        modes.excitation,
-        [s.mesh_frequency for s in all_speeds],
-        excitation_harmonics=limit.excitation,
-        response_harmonics=limit.response,
-        tolerance=case.dynamics.tolerance,
-    )
+    frequency = [s.mesh_frequency for s in all_speeds]
+    response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case))
     if progress is not None:
         progress("dynamics", 1, 2)
     verdict = stability(
@@ -283,14 +277,7 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     """
     frequency = [s.mesh_frequency for s in _turning_speeds(case, modes)]
     limit = limited(case, frequency, case.dynamics.up_to or modes.reach, given=case.dynamics.mesh_harmonics)
-    return solve_spectral(
-        modes.modes,
-        modes.excitation,
-        frequency,
-        excitation_harmonics=limit.excitation,
-        response_harmonics=limit.response,
-        tolerance=case.dynamics.tolerance,
-    )
+    return solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
 
 
 def _turning_speeds(case: Case, modes: ModesResult) -> tuple[Speeds, ...]:
