@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from femgear.case.case import set_deviations
+from femgear.case.gear_set import set_deviations
 from femgear.case.sections import Case, MeshStiffnessSection, RigidCase, output_member
 from femgear.errors import CaseError
 from femgear.gears.deviations import common_period

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
 from femgear.case.checks import check_floating
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case, output_member
 from femgear.errors import CaseError, Finding

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import material_of, planetary_set
+from femgear.case.gear_set import material_of, planetary_set
 from femgear.case.quantities import RPM
 from femgear.contact.bodies import active_flank_load, make_sectors
 from femgear.fe.elasticity import mass

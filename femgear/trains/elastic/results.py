@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
 from femgear.case.dependencies import Entries
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.housing.orders import analyse_band, order_level, order_spectrum

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.case.dependencies import (
     Steps,
     check_entries,
@@ -29,6 +28,7 @@ from femgear.case.dependencies import (
     state_entries,
     static_entries,
 )
+from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, active_flank_load, with_ring
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period

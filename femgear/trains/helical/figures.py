@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.phasing import MeshPhasing, PhasingTable, phase_factors, phasing_of_set, phasing_table
 from femgear.report.response import (

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from femgear.case.case import material_of
+from femgear.case.gear_set import material_of
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError

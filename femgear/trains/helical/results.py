@@ -22,7 +22,7 @@ from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness, contact_ratios
 from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
-from femgear.trains.static.description import static_warnings
+from femgear.trains.static.results import static_warnings
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears import profile
 from femgear.report.tables import describe_modes, describe_response, response_warnings

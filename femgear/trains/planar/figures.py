@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.report.response import MODE_CAPTIONS, harmonics_of, mode_shapes, shown_speeds
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure, runs
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case.case import material_of, planetary_set, set_deviations
+from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import Case
 from femgear.contact.bodies import make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle

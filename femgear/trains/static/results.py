@@ -1,4 +1,4 @@
-"""Results of the stages "static" and "stress": static.nc, stress.nc, and their tables.
+"""Results of the stages "static" and "stress": static.nc, stress.nc, their tables and warnings.
 
 Every variable of a file carries its units. The table of stresses sets those of finite elements beside the
 nominal stresses of ISO 6336.
@@ -6,6 +6,7 @@ nominal stresses of ISO 6336.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,6 @@ from femgear.contact.root_stress import BACK, LOADED, RootCycle
 from femgear.errors import Finding
 from femgear.report.tables import Block, tabulate
 from femgear.storage.results import dataset, declared
-from femgear.trains.static.description import static_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -334,6 +334,66 @@ def _by_gear(rows) -> np.ndarray:
         rows = [np.pad(row, [*missing, (0, longest - row.shape[-1])], constant_values=np.nan) for row in rows]
     values = np.array(rows)
     return values.reshape(-1, 2, *values.shape[1:])
+
+
+def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
+    """What is wrong with the contents of static.nc in an engineer's eyes.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    module : float
+        Of the gears, of helical ones in their transverse section [m].
+    """
+    names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
+    force, back, pressure, motion, approach = (data[name].values for name in names)
+    if pressure.max(initial=0.0) > 4e9:
+        text = (
+            f"the contact pressure reaches {pressure.max() * 1e-6:.0f} MPa: no steel carries that, and the "
+            "model stays elastic"
+        )
+        yield Finding("W-PRESSURE", "", text)
+    moved = np.abs(motion).max(initial=0.0)
+    if np.abs(approach).max(initial=0.0) > 0.05 * module:
+        yield Finding("W-DEFLECTION", "", _deflection(approach, moved, members=len(motion)))
+    if moved > 0.05 * module:
+        text = (
+            f"a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points and arms "
+            "are those of the unmoved set"
+        )
+        yield Finding("W-MOTION", "", text)
+    if ((force > 0) & (pressure <= 0)).any():
+        text = (
+            "at some positions every contact of a mesh lies at the end of a flank: its pressure has no limit "
+            "and is not given"
+        )
+        yield Finding("W-EDGE", "", text)
+    unloaded = (force + back)[: len(force) // 2] <= 0.0
+    if unloaded.any() and force.any():
+        planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
+        yield Finding("W-OPEN", "", f"planet {planets} carries nothing at some positions")
+    if ((force > 0) & (back > 0)).any():
+        yield Finding("W-WEDGED", "", "some meshes are loaded on both flanks at once")
+    if ((back > 0) & ~(force > 0)).any():
+        text = "some meshes carry on their back flanks alone: planets work against one another"
+        yield Finding("W-BACK", "", text)
+
+
+def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
+    """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(approach, 2))
+    if not members:
+        return (
+            f"the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: small displacements "
+            "no longer hold"
+        )
+    return (
+        f"the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
+        "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
+        "not the deflection of the teeth alone: it contains the motion of the members, up to "
+        f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "
+        'static.members = "fixed" shows the teeth'
+    )
 
 
 def describe_static(data: xr.Dataset, module: float) -> Block:

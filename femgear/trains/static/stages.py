@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
+from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, Sector, Sectors, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
@@ -27,14 +27,13 @@ from femgear.contact.root_stress import (
 )
 from femgear.contact.supports import RIGID, Supports
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
-from femgear.errors import GeometryError
+from femgear.errors import ContactError, GeometryError
 from femgear.fe.elasticity import foundation
 from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import PlanetarySet
 from femgear.trains.protocol import Progress, Stage, one_blas_thread
-from femgear.trains.static.description import check_motions
 from femgear.trains.static.results import (
     NominalStresses,
     StaticResult,
@@ -93,8 +92,30 @@ def solve_static(
             progress=None if progress is None else lambda done, total: progress("contact", done, total),
         ),
     )
-    check_motions(cycle, gears.sun.module)
+    _check_motions(cycle, gears.sun.module)
     return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)
+
+
+def _check_motions(cycle: MeshCycle, module: float) -> None:
+    """Refuse flanks that approach by half a module, members that move by two: no small displacements."""
+    for name, motion, modules, remedy in (
+        ("the flanks approach", cycle.deflection, 0.5, "reduce operation.torque or the errors"),
+        (
+            "a member moves",
+            cycle.member_motion,
+            2.0,
+            "stiffen the supports and bearings, reduce the clearance or operation.torque",
+        ),
+    ):
+        largest = float(np.abs(motion).max(initial=0.0))
+        if largest > modules * module:
+            raise ContactError(
+                f"{name} by {largest * 1e3:.4g} mm: the model is one of small displacements",
+                code="E-MOTION",
+                value=f"{largest * 1e3:.4g} mm",
+                limit=f"{modules:g} modules, {modules * module * 1e3:.4g} mm",
+                remedy=remedy,
+            )
 
 
 def flank_compliances(
