@@ -203,9 +203,6 @@ def set_deviations(case: Case) -> SetDeviations:
     planets = [_planet_errors(case, n) for n in range(1, s.n_planets + 1)]
     pitch = [_pitch(errors, s.planet) for errors in planets]
     oval = ring.ovality
-    pins = np.zeros((s.n_planets, 2))
-    for pin in case.set.pin_errors:
-        pins[pin.planet - 1] = pin.radial, pin.tangential
     found = replace(
         no_deviations(s),
         sun=_flank_form(case, s.sun),
@@ -221,7 +218,7 @@ def set_deviations(case: Case) -> SetDeviations:
         planet_runout=tuple(_runout(errors) for errors in planets),
         ring_runout=_runout(ring),
         carrier_runout=_runout(case.carrier.errors or CarrierErrors()),
-        pin_errors=pins,
+        pin_errors=pin_errors(case, s),
         ovality=Ovality(**oval.model_dump()) if oval else Ovality(),
         sun_thickness=sun.thickness_reduction or 0.0,
         planet_thickness=[errors.thickness_reduction or 0.0 for errors in planets],
@@ -233,6 +230,14 @@ def set_deviations(case: Case) -> SetDeviations:
         error.file = case.location(error.key or "")
         raise
     return found
+
+
+def pin_errors(case: Case, gears: PlanetarySet) -> np.ndarray:
+    """Displacement (N, 2) of the pins of all planets, radial and tangential [m]."""
+    pins = np.zeros((gears.n_planets, 2))
+    for pin in case.set.pin_errors:
+        pins[pin.planet - 1] = pin.radial, pin.tangential
+    return pins
 
 
 def _planet_errors(case: Case, number: int) -> GearErrors:

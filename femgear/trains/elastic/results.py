@@ -24,7 +24,7 @@ from femgear.housing.sensor import (
     hanning_model,
 )
 from femgear.report.tables import Block, chosen
-from femgear.storage.results import FOURIER, complex_entries, dataset, response_entries
+from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
 from femgear.system.assembler import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 _FEW = 4
 _FIRST, _STRONGEST = 6, 4
 _HIGHEST = "highest frequency of the excitation"
+_DIRECTIONS = {RADIAL: "radial", TANGENTIAL: "tangential"}
 
 
 @dataclass(frozen=True)
@@ -91,12 +92,10 @@ class ModesResult:
             "supported_stiffness": (record, state.stiffness, "N/m", "tangent mesh stiffness on the supports"),
             "flexibility": ("mesh other_mesh", model.system.flexibility, "m/N", between),
         }
-        coordinates = modes.shape[model.ring_slice].T
+        motions = modes.shape[model.ring_slice].T
         for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
-            field = ring_field(model, self.ring.modes, coordinates, output, n_max)
-            words = (
-                f"outer {'radial' if output == RADIAL else 'tangential'} displacement, component exp(i n phi)"
-            )
+            field = ring_field(model, self.ring.modes, motions, output, n_max)
+            words = f"outer {_DIRECTIONS[output]} displacement, component exp(i n phi)"
             for part in ("real", "imag"):
                 variables[f"{name}_{part}"] = ("mode circumferential", getattr(field, part), "kg^-1/2", words)
         names, diameters = mesh_names(len(modes.mesh_stiffness) // 2), np.arange(-n_max, n_max + 1)
@@ -104,12 +103,10 @@ class ModesResult:
         return dataset(
             variables,
             coords={
-                "mode": ("mode", np.arange(len(modes.frequency)), "1", "mode"),
-                "dof": ("dof", list(modes.dofs), "1", "degree of freedom"),
-                "mesh": ("mesh", names, "1", "gear mesh"),
                 "other_mesh": ("other_mesh", names, "1", "gear mesh"),
                 "supported_position": ("supported_position", state.position, "1", denser),
-                "circumferential": ("circumferential", diameters, "1", "signed nodal diameter n"),
+                **coordinates(mode=np.arange(len(modes.frequency)), dof=modes.dofs, mesh=names),
+                **coordinates(circumferential=diameters),
             },
             attrs={
                 "title": "modal basis with mean mesh stiffnesses",
@@ -153,20 +150,14 @@ class DynamicsResult:
     def dataset(self) -> xr.Dataset:
         """Contents of dynamics.nc."""
         response, lines, field = self.response, "speed mesh harmonic", "speed harmonic circumferential"
-        n_max, harmonics = self.ring_radial.shape[-1] // 2, np.arange(response.force.shape[-1])
-        diameters = np.arange(-n_max, n_max + 1)
+        words = "outer tangential displacement of the ring"
+        n_max = self.ring_radial.shape[-1] // 2
         entries = (
             ("dte", lines, self.dte, "m", "dynamic transmission error"),
             ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
             ("mesh_deflection", lines, response.deflection, "m", "deflection of the mesh spring"),
             ("ring", field, self.ring_radial, "m", "outer radial displacement of the ring"),
-            (
-                "ring_tangential",
-                field,
-                self.ring_tangential,
-                "m",
-                "outer tangential displacement of the ring",
-            ),
+            ("ring_tangential", field, self.ring_tangential, "m", words),
         )
         change = "change of the housing level with excitation up to the frequency compared_to"
         reach = {
@@ -175,12 +166,12 @@ class DynamicsResult:
         }
         return dataset(
             response_entries(self) | reach | complex_entries(entries),
-            coords={
-                "speed": ("speed", self.input_speed / RPM, "rpm", "speed of the input"),
-                "mesh": ("mesh", mesh_names(self.dte.shape[1] // 2), "1", "gear mesh"),
-                "harmonic": ("harmonic", harmonics, "1", "harmonic of the mesh frequency"),
-                "circumferential": ("circumferential", diameters, "1", "signed nodal diameter n"),
-            },
+            coords=coordinates(
+                speed=self.input_speed / RPM,
+                mesh=mesh_names(self.dte.shape[1] // 2),
+                harmonic=np.arange(response.force.shape[-1]),
+                circumferential=np.arange(-n_max, n_max + 1),
+            ),
             attrs={
                 "title": "periodic response by the spectral method",
                 "message": response.message,
@@ -231,8 +222,8 @@ class HousingResult:
         }
         return dataset(
             variables,
-            coords={
-                "speed": ("speed", self.input_speed / RPM, "rpm", "speed of the input"),
+            coords=coordinates(speed=self.input_speed / RPM)
+            | {
                 "time": ("time", signal.revolution, "1", "fraction of one carrier revolution"),
                 "order": ("order", lines.order, "1", "carrier order"),
             },

@@ -224,7 +224,7 @@ def helical_excitation(
         eps_beta, 0 or more.
     slices : int
         Number S of equal slices of the face width; each has a row of its own with its part of stiffness and
-        force, in the order of the columns of `mesh_directions`.
+        force, in the order of the columns of `femgear.system.assembler.mesh_directions`.
     hand : {1, -1}
         1 where height +z runs ahead: a right-handed sun that turns counter-clockwise against the carrier, or
         a left-handed one that turns clockwise. Only slices see it.

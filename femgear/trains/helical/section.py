@@ -84,13 +84,7 @@ class HelicalSection(Section):
 
 
 def helical_notices(data: dict) -> Iterator[Finding]:
-    """What a helical case gives without effect.
-
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file that was checked, with a section helical.
-    """
+    """What a helical case gives without effect, by the tables of its checked file."""
     unused = entries_without_effect(data)
     unused += [f"static.{key}" for key in ("stresses", "back_flanks") if key in data.get("static", {})]
     if data["planet"].get("bearing_clearance"):

@@ -43,7 +43,7 @@ from femgear.trains.planar.results import (
     response_warnings,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
 from femgear.trains.rigid import (
     check_one_period,
     gear_set_modes,
@@ -286,7 +286,7 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
 
 @one_blas_thread()
 def solve_branch(
-    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress | None = None
+    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress = silent
 ) -> BranchResult:
     """Follow periodic responses to the weight past limit points, with a Floquet verdict at each.
 
@@ -315,9 +315,8 @@ def solve_branch(
     )
     branch, lines = _bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
     if wanted.stability:
-        tell = progress or (lambda stage, done, total: None)
         branch = judged_branch(
-            model.problem, branch, lambda done, total: tell("branch", 0.3 * total + 0.7 * done, total)
+            model.problem, branch, lambda done, total: progress("branch", 0.3 * total + 0.7 * done, total)
         )
     ending = _end_of_branch(branch, wanted)
     return BranchResult(gears, model, branch, lines, carrier_sense(case, gears), ending)
@@ -325,7 +324,7 @@ def solve_branch(
 
 @one_blas_thread()
 def solve_planar_response(
-    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress | None = None
+    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress = silent
 ) -> PlanarResponseResult:
     """Solve for responses to weight and mesh frequency together at the speeds of the operation.
 
@@ -356,8 +355,7 @@ def solve_planar_response(
             found = solve_harmonic_balance(model.problem, frequency, **options)
         solutions.append(found)
         lines.append(motion_lines(model, found))
-        if progress is not None:
-            progress("response", number + 1, len(turning))
+        progress("response", number + 1, len(turning))
     _check_response_motions(operation.speeds, solutions, lines, gears)
     return PlanarResponseResult(gears, np.array(operation.speeds), turning, tuple(solutions), tuple(lines))
 

@@ -8,6 +8,7 @@ excite; neighbouring tooth numbers are listed with what they would change in tha
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,27 +46,19 @@ def describe_set(case: Case) -> tuple[Block, ...]:
     )
 
 
-def set_warnings(case: Case) -> tuple[Finding, ...]:
+def set_warnings(case: Case) -> Iterator[Finding]:
     """What is allowed in any planetary set but deserves a look."""
     planetary = planetary_set(case)
-    found = [*check_set(planetary), *case.notices, *check_deviations(set_deviations(case), planetary)]
-    if case.operation.torque == 0:
-        text = "without torque no tooth touches; only static results exist"
-        found.append(Finding("W-TORQUE", "operation.torque", text))
-    if case.operation.torque < 0:
-        text = "a negative torque loads the other flanks"
-        found.append(Finding("W-TORQUE", "operation.torque", text))
-    return tuple(found)
+    yield from (*check_set(planetary), *case.notices)
+    yield from check_deviations(set_deviations(case), planetary)
+    if case.operation.torque <= 0:
+        nothing = "without torque no tooth touches; only static results exist"
+        text = "a negative torque loads the other flanks" if case.operation.torque < 0 else nothing
+        yield Finding("W-TORQUE", "operation.torque", text)
 
 
 def describe_phasing(planetary_set: PlanetarySet) -> tuple[Block, Block]:
-    """Tabulate the phasing of the first harmonics of the mesh frequency, and neighbouring tooth numbers.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-        Of a case that `femgear.gears.checks.check_set` accepts.
-    """
+    """Tabulate the phasing of the first harmonics of the mesh frequency, and neighbouring tooth numbers."""
     return _harmonics(planetary_set), _neighbours(planetary_set)
 
 

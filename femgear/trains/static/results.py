@@ -16,7 +16,7 @@ from femgear.case.dependencies import Entries
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
 from femgear.errors import Finding
 from femgear.report.tables import Block, tabulate
-from femgear.storage.results import dataset, declared
+from femgear.storage.results import coordinates, dataset, declared
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -127,16 +127,15 @@ class StaticResult:
         cycle, gears = self.cycle, self.planetary_set
         bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
         values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in STATIC_VARIABLES}
-        teeth, planets = cycle.tooth_load.shape[1], gears.n_planets
+        teeth, planets = cycle.tooth_load.shape[1], np.arange(1, gears.n_planets + 1)
         found = dataset(
             declared(STATIC_VARIABLES, values),
             coords={
-                "mesh": ("mesh", list(gears.mesh_names), "1", "gear mesh"),
-                "position": ("position", cycle.position, "1", "position in mesh periods"),
-                "planet": ("planet", np.arange(1, planets + 1), "1", "planet"),
-                "axis": ("axis", ["x", "y"], "1", "axis of the frame of the carrier"),
                 "member": ("member", list(cycle.member_names), "1", "moving member and direction"),
                 "tooth": ("tooth", np.arange(teeth), "1", "tooth pair in the order of the path"),
+                **coordinates(
+                    mesh=gears.mesh_names, position=cycle.position, planet=planets, axis=["x", "y"]
+                ),
             },
             attrs={
                 "title": "static transmission error, load sharing and mesh stiffness",
@@ -236,11 +235,9 @@ class StressResult:
                 "pressure_centre": cycle.pressure_centre,
                 "pressure_path": cycle.path,
             }
-        coords = {
-            "mesh": ("mesh", list(self.planetary_set.mesh_names), "1", "gear mesh"),
+        coords = coordinates(mesh=self.planetary_set.mesh_names, position=cycle.position) | {
             "gear": ("gear", ["first", "second"], "1", "gear of the mesh"),
             "root": ("root", ["loaded", "back"], "1", "flank above the root"),
-            "position": ("position", cycle.position, "1", "position in mesh periods"),
             "load_bin": ("load_bin", 0.5 * (edges[1:] + edges[:-1]), "N", "middle of the load class"),
         }
         if "planet_root_stress" in values:

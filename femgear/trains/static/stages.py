@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import PlanetarySet
-from femgear.trains.protocol import Progress, Stage, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.static.results import (
     NominalStresses,
     StaticResult,
@@ -51,7 +52,7 @@ _UNLIMITED = 10**12
 
 @one_blas_thread()
 def solve_static(
-    case: Case, *, cache: Path | None = None, progress: Progress | None = None, steps: Steps | None = None
+    case: Case, *, cache: Path | None = None, progress: Progress = silent, steps: Steps | None = None
 ) -> StaticResult:
     """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
 
@@ -89,7 +90,7 @@ def solve_static(
         options=CycleOptions(
             both_flanks=case.static.back_flanks,
             pressures=case.static.stresses and periods == 1,
-            progress=None if progress is None else lambda done, total: progress("contact", done, total),
+            progress=partial(progress, "contact"),
         ),
     )
     _check_motions(cycle, gears.sun.module)
@@ -138,7 +139,7 @@ def flank_compliances(
 
 
 @one_blas_thread()
-def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None = None) -> StressResult:
+def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silent) -> StressResult:
     """Find root stresses of every gear in every mesh, their ranges over a turn, load and nominal stresses.
 
     The static solution need not have pressures (`StaticResult.cycle.pressure`); where it has, they are part
@@ -160,8 +161,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
     check_entries(static, StaticResult, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
     influences = _influences(case, static)
-    if progress is not None:
-        progress("stress", 1, 2)
+    progress("stress", 1, 2)
     repeats, _ = common_period(set_deviations(case), gears, limit=_UNLIMITED)
     closes = repeats == cycle.periods
     teeth = loaded_teeth(cycle, reverse=reverse)
