@@ -8,6 +8,7 @@ shaft its support stiffness. Refusals name the entries of the case file, with fi
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -172,21 +173,18 @@ def _name_root_radius(error: GeometryError, case: Case) -> None:
 def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float | None:
     """Largest root radius [modules] of four decimals that is not refused with one of the codes, if any."""
 
-    def fits(steps: int) -> bool:
+    def refused(steps: int) -> bool:
         rack = rack_at(case, key).model_copy(update={"root_radius": steps / 1e4})
         gear = key.partition(".")[0]
         owner = {} if gear == "rack" else {gear: getattr(case, gear).model_copy(update={"rack": rack})}
         try:
             check_set(_closed_set(case.model_copy(update=owner or {"rack": rack})))
         except GeometryError as other:
-            return other.code not in codes
-        return True
+            return other.code in codes
+        return False
 
-    low, high = -1, round(1e4 * rack_at(case, key).root_radius)
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low / 1e4 if low >= 0 else None
+    first = bisect_left(range(round(1e4 * rack_at(case, key).root_radius)), True, key=refused)
+    return (first - 1) / 1e4 if first else None
 
 
 def set_deviations(case: Case) -> SetDeviations:

@@ -337,8 +337,8 @@ def printable_line(value: object, *, name: str = "title", most: int = 200) -> st
     if not isinstance(value, str):
         raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
     if len(value) > most or not value.isprintable():
-        message, limit = f"the {name} must be one printable line", f"{most} printable characters"
-        raise CaseError(message, code="E-RANGE", value=value, limit=limit)
+        limit = f"{most} printable characters"
+        raise CaseError(f"the {name} must be one printable line", code="E-RANGE", value=value, limit=limit)
     return value
 
 

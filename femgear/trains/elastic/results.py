@@ -119,12 +119,13 @@ class ModesResult:
 
 @dataclass(frozen=True)
 class DynamicsResult:
-    """Periodic response at every speed, its stability, and the field on the ring's outer surface.
+    """Periodic response at every ``input_speed`` (speeds,) [rad/s], stability, and field of the ring.
 
     ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial`` and
-    ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m]. The excitation ends
-    at ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
-    changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at.
+    ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its
+    outer surface. The excitation ends at ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB]
+    is what the level of the housing changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that
+    were not looked at.
     """
 
     input_speed: np.ndarray
@@ -185,7 +186,7 @@ class DynamicsResult:
 
 @dataclass(frozen=True)
 class HousingResult:
-    """What a fixed sensor on the ring hears.
+    """What a fixed sensor on the ring hears at every ``input_speed`` (speeds,) [rad/s].
 
     ``lines`` are of the case's ``form``, "exact" or "linear" (interpolated over ``points`` points of the
     ring), and ``signal`` is theirs; ``exact`` are the exact ones. The excitation ends at

@@ -43,7 +43,8 @@ class HelicalModesResult:
     """Modes with mean mesh stiffness, and what excites them.
 
     ``excitation`` has a row a slice, ``whole`` a row a mesh at its static state with fixed centres, both
-    along the tooth normals and None where the mesh stiffness is given; ``phasing`` is that of every mode.
+    along the tooth normals and None where the mesh stiffness is given; ``phasing`` is that of every mode,
+    ``flank`` the sign of `femgear.system.assembler.mesh_directions`.
     """
 
     planetary_set: PlanetarySet
@@ -85,7 +86,7 @@ class HelicalModesResult:
 
 @dataclass(frozen=True)
 class HelicalDynamicsResult:
-    """Periodic response at every speed, its stability, and loads.
+    """Periodic response at every ``input_speed`` (speeds,) [rad/s], its stability, and loads.
 
     ``loads`` holds complex harmonics by name: ``pin`` (speeds, N, 6, H + 1) and ``support``
     (speeds, 3, 6, H + 1), three forces [N] and three moments [N m] each.

@@ -95,7 +95,11 @@ class PlanarModesResult:
 
 @dataclass(frozen=True)
 class BranchResult:
-    """Periodic responses to the weight over its frequency in the carrier frame."""
+    """Periodic responses to the weight over its frequency in the carrier frame.
+
+    ``lines`` has one entry a point of the branch; ``sense`` is 1 where the carrier turns counter-clockwise,
+    else -1; ``ending`` says where the branch ended and why.
+    """
 
     planetary_set: PlanetarySet
     model: PlanarModel
@@ -159,7 +163,7 @@ class BranchResult:
 
 @dataclass(frozen=True)
 class PlanarResponseResult:
-    """Responses to weight and mesh frequency together, one a speed."""
+    """Responses to weight and mesh frequency together, one at every ``input_speed`` (speeds,) [rad/s]."""
 
     planetary_set: PlanetarySet
     input_speed: np.ndarray

@@ -106,7 +106,8 @@ STRESS_VARIABLES = {
 class StaticResult:
     """Static transmission error, load sharing and mesh stiffness of all meshes.
 
-    ``entries`` are those of the case that it depends on, as in the results that follow.
+    ``sun_torque`` [N m] keeps its sign, ``period_message`` tells how the errors repeat, and ``entries`` are
+    those of the case that it depends on, as in the results that follow.
     """
 
     planetary_set: PlanetarySet
