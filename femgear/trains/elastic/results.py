@@ -23,7 +23,7 @@ from femgear.housing.sensor import (
     fixed_sensor_signal,
     hanning_model,
 )
-from femgear.report.tables import Block, chosen
+from femgear.report.tables import Block, chosen, tabulate
 from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
 from femgear.system.assembler import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
@@ -239,24 +239,24 @@ class HousingResult:
 
 
 def describe_housing(data: xr.Dataset) -> Block:
-    """Level and largest lines at every speed of housing.nc."""
-    rows = []
-    for i in chosen(data.sizes["speed"]):
-        one = data.isel(speed=i)
-        amplitude = one.order_amplitude.values
-        largest = np.argsort(-amplitude, kind="stable")[:5]
-        lines = ", ".join(f"{round(float(one.order[j]))} ({amplitude[j]:.3g})" for j in largest)
-        limit = f"{float(one.excitation_limit) / 1e3:.2f}"
-        rows.append((f"{float(one.speed):.2f}", limit, f"{float(one.level):.4g}", lines))
-    header = (
-        "speed [rpm]",
-        "excited up to [kHz]",
-        "rms [m/s^2]",
-        "largest lines: carrier order (amplitude [m/s^2])",
-    )
+    """Tabulate level and largest lines at every speed of housing.nc."""
+    columns = {
+        "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
+        "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
+        "rms [m/s^2]": lambda one: f"{float(one.level):.4g}",
+        "largest lines: carrier order (amplitude [m/s^2])": _largest_lines,
+    }
     form = data.attrs["form"]
     note = f"form of the signal: {form}" + (f", {data.attrs['points']} points" if form == "linear" else "")
-    return Block("Housing", header, tuple(rows), (note,))
+    speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
+    return tabulate("Housing", speeds, columns, (note,))
+
+
+def _largest_lines(one: xr.Dataset) -> str:
+    """Write the five largest lines of one speed."""
+    amplitude = one.order_amplitude.values
+    largest = np.argsort(-amplitude, kind="stable")[:5]
+    return ", ".join(f"{round(float(one.order[j]))} ({amplitude[j]:.3g})" for j in largest)
 
 
 def mesh_bands(results: Results) -> Block:

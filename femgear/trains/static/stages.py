@@ -46,6 +46,8 @@ from femgear.trains.static.results import (
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
 # would take a quarter of a gigabyte for three planets
 WHOLE_RECORD = 16
+LARGEST_MOTION, LARGEST_APPROACH = 2.0, 0.5
+"""Of a member and of the flanks of a mesh for which displacements count as small [modules]."""
 # longer than any record: the true common period of a set
 _UNLIMITED = 10**12
 
@@ -100,11 +102,11 @@ def solve_static(
 def _check_motions(cycle: MeshCycle, module: float) -> None:
     """Refuse flanks that approach by half a module, members that move by two: no small displacements."""
     for name, motion, modules, remedy in (
-        ("the flanks approach", cycle.deflection, 0.5, "reduce operation.torque or the errors"),
+        ("the flanks approach", cycle.deflection, LARGEST_APPROACH, "reduce operation.torque or the errors"),
         (
             "a member moves",
             cycle.member_motion,
-            2.0,
+            LARGEST_MOTION,
             "stiffen the supports and bearings, reduce the clearance or operation.torque",
         ),
     ):
