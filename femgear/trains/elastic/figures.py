@@ -72,6 +72,8 @@ _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 _ROOM = 0.068
 # numbers along an axis, and lines of a spectrum that can be told apart, at most
 _TICKS, _STEMS = 20, 4000
+# between ticks, times powers of ten
+_STEPS = [1, 2, 2.5, 5, 10]
 # lines of a band that are labelled, at most
 _LABELS = 12
 _LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
@@ -226,7 +228,7 @@ def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
     axes[0].set_xlim(0, end + 0.5 * ring_teeth)
     top = axes[0].secondary_xaxis("top", functions=(lambda x: x / ring_teeth, lambda h: h * ring_teeth))
     # at most twenty numbers, that none covers another
-    top.xaxis.set_major_locator(MaxNLocator(_TICKS, integer=True))
+    top.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=_STEPS, integer=True, prune="lower"))
     top.tick_params(labelsize=SIZE - 2)
     top.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
     label(axes[0], "carrier order [1]", _ACCELERATION)
@@ -330,7 +332,7 @@ def modulation_polar(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
         # a polygon would search the extremes of every one of its sides
         ax.fill_between(angle, 0.0, value, color=COLOURS[i % len(COLOURS)], alpha=0.15, linewidth=0)
         ax.plot(2 * np.pi * lobes.position, lobes.height, "v", color=BLACK, markersize=6, label="lobe")
-        ax.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))
+        ax.yaxis.set_major_locator(MaxNLocator(4, steps=_STEPS, prune="lower"))
         ax.set_ylim(0, 1.12 * value.max(initial=0.0) or 1.0)
         for text in ax.get_yticklabels():
             text.set_bbox({"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0})

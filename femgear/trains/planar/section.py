@@ -28,6 +28,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
+    Gravity,
     entries_without_effect,
     flank_entries,
     listed,
@@ -94,8 +95,8 @@ class CarrierBearingSection(Section):
 class GravitySection(Section):
     """Weight of all bodies; its direction counts from the x axis when the carrier's phase is zero."""
 
-    acceleration: Annotated[float, Quantity(ACCELERATION, 1e-3, 1e3)] = 9.80665
-    direction: Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)] = -0.5 * math.pi
+    acceleration: Annotated[float, Quantity(ACCELERATION, 1e-3, 1e3)] = Gravity.acceleration
+    direction: Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)] = Gravity.direction
 
 
 class BranchSection(Section):
