@@ -7,7 +7,7 @@ Find contact loads ``p`` (n candidates) and motions ``q`` (m bodies) with
 These are the optimality conditions of ``min p^T H p / 2 + gap^T p`` under ``p >= 0`` and ``G^T p = load``
 (the motions are its multipliers), so ``p`` is unique when ``H`` is positive definite.
 
-The steps are in `femgear.contact.pivoting`; daqp is the last resort.
+The steps are in `femgear.contact.active_set`; daqp is the last resort.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.contact.pivoting import Problem, Step, factor, forward, pivot, solve_step
+from femgear.contact.active_set import Problem, Step, factor, forward, pivot, solve_step
 from femgear.errors import ContactError
 
 

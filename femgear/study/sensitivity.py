@@ -35,7 +35,7 @@ from femgear.contact.assembly import (
     mesh_windows,
 )
 from femgear.contact.flank_pairs import mesh_pairs, separation
-from femgear.contact.pivoting import factor
+from femgear.contact.active_set import factor
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
 from femgear.errors import CaseError
