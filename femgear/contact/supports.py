@@ -181,20 +181,15 @@ def solve_position(
     if springs is None:
         state = solve_contact(H, gap, G, load, start=start)
         return state, state.active
-    cells = len(gap)
-    near = np.ones(len(springs.arms), bool) if start is None else _beside(start[cells:])
-    while True:
-        guess = None if start is None else np.concatenate([start[:cells], start[cells:][near]])
-        state = solve_contact(*_with_springs(H, gap, G, springs, near), load, start=guess)
-        moved = springs.arms @ state.motions[-springs.arms.shape[1] :]
-        # those left out must be open; where one is not, all are asked
-        if near.all() or (moved[~near] <= springs.clearance).all():
-            break
-        near = np.ones(len(near), bool)
-    active = np.concatenate([state.active[:cells], np.zeros(len(near), bool)])
-    active[cells:][near] = state.active[cells:]
+    cells, count = len(gap), len(springs.arms)
+    whole = np.zeros((cells + count, cells + count))
+    whole[:cells, :cells] = H
+    whole[range(cells, len(whole)), range(cells, len(whole))] = springs.compliance
+    gap = np.append(gap, np.full(count, springs.clearance))
+    others = np.zeros((count, G.shape[1] - springs.arms.shape[1]))
+    state = solve_contact(whole, gap, np.vstack([G, np.hstack([others, springs.arms])]), load, start=start)
     meshes = {name: getattr(state, name)[:cells] for name in ("loads", "gaps", "active")}
-    return replace(state, **meshes), active
+    return replace(state, **meshes), state.active
 
 
 def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
@@ -226,24 +221,4 @@ def _one_side(planetary_set: PlanetarySet, supports: Supports, back: bool) -> Mo
         names=tuple(f"{name}: {axis}" for name, _, _ in found for axis in "xy"),
         approach=np.hstack([np.zeros((2 * N, 0)), *(effect for _, _, effect in found)]),
         stiffness=np.array([value for _, value, _ in found for _ in "xy"], float),
-    )
-
-
-def _beside(active: np.ndarray) -> np.ndarray:
-    """Springs that carried and three on either side of them, around every pin."""
-    around = active.reshape(-1, SPRINGS)
-    return np.logical_or.reduce([np.roll(around, k, axis=1) for k in range(-3, 4)]).ravel()
-
-
-def _with_springs(H, gap, G, springs: BearingSprings, near: np.ndarray):
-    """Compliance, gaps and arms of the cells and then of the springs `near`."""
-    cells, arms = len(gap), springs.arms[near]
-    whole = np.zeros((cells + len(arms), cells + len(arms)))
-    whole[:cells, :cells] = H
-    whole[range(cells, len(whole)), range(cells, len(whole))] = springs.compliance
-    others = np.zeros((len(arms), G.shape[1] - arms.shape[1]))
-    return (
-        whole,
-        np.append(gap, np.full(len(arms), springs.clearance)),
-        np.vstack([G, np.hstack([others, arms])]),
     )
