@@ -244,7 +244,7 @@ class Candidates:
     def by_pairs(self, values: np.ndarray) -> np.ndarray:
         """Values (P, W, ...) of the windows as (meshes, pairs, ..., P), zero where there is no window."""
         P, (meshes, _, pairs) = len(self.position), self.setup.near.shape
-        found = np.zeros((P, meshes, pairs, *values.shape[2:]))
+        found = np.zeros((P, meshes, pairs, *values.shape[2:]), values.dtype)
         found[np.arange(P)[:, None], self.mesh, self.pair] = values
         return np.moveaxis(found, 0, -1)
 
@@ -267,7 +267,7 @@ class Candidates:
         window, cell = np.nonzero(self.candidate[at])
         filled = np.flatnonzero(self.candidate[at].any(axis=1))
         values = self.polynomials[at, filled]
-        smooth = self.smooth[at][np.ix_(filled, range(3), filled, range(3))].transpose(0, 2, 1, 3)
+        smooth = self.smooth[at, filled][:, :, filled].transpose(0, 2, 1, 3)
         H = values[:, None] @ smooth @ values.transpose(0, 2, 1)
         H[range(len(filled)), range(len(filled))] += self.local[at, filled]
         keep, size = self.candidate[at, filled].ravel(), len(filled) * self.setup.cells

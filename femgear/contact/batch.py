@@ -83,7 +83,7 @@ class ContactTangents:
 
     def __init__(self, found: Candidates, state: BatchState):
         active, cells = state.active, state.active.shape[-1]
-        loaded = active.any(axis=-1)
+        loaded = np.asarray(active.any(axis=-1))
         # of every window the first and the last touching cell, and the open candidates beside them, (P, W, 2)
         ends = np.stack([active.argmax(axis=-1), cells - 1 - active[..., ::-1].argmax(axis=-1)], axis=-1)
         beside = np.clip(ends + np.array([-1, 1]), 0, cells - 1)
@@ -92,7 +92,8 @@ class ContactTangents:
             return np.take_along_axis(values, cell, axis=2)
 
         rows, self.mesh = np.nonzero(loaded), found.mesh
-        self.open = (beside != ends) & at(found.candidate, beside) & loaded[..., None]
+        self.open = at(found.candidate, beside) & loaded[..., None]
+        self.open &= beside != ends
         self.alone = np.repeat(ends[..., :1] == ends[..., 1:], 2, axis=-1)
         self.load, self.gap = at(state.loads, ends), at(state.gaps, beside)
         right, columns = np.zeros((2, *active.shape, 7))
@@ -272,7 +273,7 @@ class _ActiveSets:
         """Planets that touch nothing and whose bearings hold their axes in place, (t, N)."""
         N = self.found.setup.n_planets
         on_planet = self.found.mesh % N == np.arange(N)[:, None]
-        touching = self.active[todo].any(axis=-1)[:, None] & on_planet
+        touching = np.asarray(self.active[todo].any(axis=-1))[:, None] & on_planet
         return ~touching.any(axis=-1) & (self.bearings is None)
 
     def _conditions(self, todo, loads, motions):
@@ -335,7 +336,7 @@ class _ActiveSets:
         sure = ~(doubtful.any(axis=(1, 2)) | conditions[1].any(axis=1))
         return sure & (self.residual[done] < _RESIDUAL)
 
-    def _alone(self, at: int) -> None:
+    def _alone(self, at) -> None:
         """Solve one position by itself."""
         problem, candidate = self.found.problem(at), self.found.candidate[at]
         start = np.concatenate([self.active[at][candidate], self.springs[at]])

@@ -407,7 +407,7 @@ class _Walk:
         motion[sprung] = -pulled / members.stiffness[sprung, None]
         at_edge = found.at_flank_end(state.active)
         pressure = _equal_cell_pressure(found, state.loads)
-        largest = np.where(at_edge, 0.0, pressure.max(axis=2)).reshape(P, len(tooth_load), -1).max(axis=2).T
+        inner = np.where(at_edge, 0.0, pressure.max(axis=2))
         tangents = ContactTangents(found, state)
         values = {
             "deflection": rotation_approach(N) @ state.motions.T[: N + 1]
@@ -418,14 +418,13 @@ class _Walk:
             "stiffness": _both_flanks(tangents, found.smooth, N),
             "tooth_load": tooth_load[: 2 * N],
             "member_motion": motion,
-            "edge_contact": at_edge.reshape(P, len(tooth_load), -1).any(axis=2).T[: 2 * N],
-            "max_pressure": largest[: 2 * N],
+            "edge_contact": found.by_pairs(at_edge)[: 2 * N].any(axis=1),
+            "max_pressure": found.by_pairs(inner).max(axis=1)[: 2 * N],
             "residual": state.residual,
             "iterations": state.iterations,
         }
-        values["back_tooth_load"] = (
-            tooth_load[2 * N :] if options.both_flanks else np.zeros(values["tooth_load"].shape)
-        )
+        looked = options.both_flanks
+        values["back_tooth_load"] = tooth_load[2 * N :] if looked else np.zeros(tooth_load.shape)
         if options.pressures:
             values["pressure"] = found.by_pairs(pressure)[: 2 * N]
         if options.held_bodies is not None:
