@@ -638,12 +638,15 @@ def _corner_part(setup: MeshWindows, bodies: Bodies, mesh, position, pair, polyn
     sun_side = mesh // setup.n_planets % 2 == 0
     of_gear = ((bodies.sun, bodies.planet), (bodies.planet, bodies.ring))
     for rows, flanks in zip((sun_side, ~sun_side), of_gear, strict=True):
-        for gear, flank in enumerate(flanks):
-            arc = setup.roll[gear, mesh[rows], position[rows], pair[rows]] ** 2 / (2 * flank.base_radius)
-            away = np.einsum("wcn,wn->wc", polynomials[rows], np.abs(arc - flank.corner.arc))
+        place, values = (mesh[rows], position[rows], pair[rows]), polynomials[rows]
+        parts = []
+        for roll, flank in zip(setup.roll, flanks, strict=True):
+            arc = roll[place] ** 2 / (2 * flank.base_radius)
+            away = (values @ np.abs(arc - flank.corner.arc)[..., None])[..., 0]
             # cells beyond the end of a flank are no candidates
             away = np.maximum(away, 1e-12)
-            total[rows] += flank.corner.surface(away[:, :, None], away[:, None, :])
+            parts.append(flank.corner.surface(away[:, :, None], away[:, None, :]))
+        total[rows] = parts[0] + parts[1]
     return total / bodies.face_width
 
 

@@ -9,7 +9,7 @@ up to one, so that a motion q approaches the cells of all windows by ``Pi e G q`
 
 has three unknowns a window instead of its cells. All cells that pull or penetrate change sides at once, until
 there are none. Positions where that does not end, motions that nothing restrains, and loads that may be
-rounding are left to `femgear.contact.supports.solve_position`.
+rounding are left to `femgear.contact.solve.solve_contact`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ import numpy as np
 
 from femgear.contact.active_set import NULL, RIGID, ROUNDING
 from femgear.contact.assembly import ROUGH_STIFFNESS, Candidates
-from femgear.contact.supports import BearingSprings, solve_position
+from femgear.contact.solve import solve_contact
+from femgear.contact.supports import BearingSprings
 
 _MOST_STEPS = 30
 """Linear solutions before a position is left to the single solver."""
@@ -339,14 +340,15 @@ class _ActiveSets:
     def _alone(self, at) -> None:
         """Solve one position by itself."""
         problem, candidate = self.found.problem(at), self.found.candidate[at]
+        arrays = problem.compliance, problem.gap, problem.G
+        if self.bearings is not None:
+            arrays = self.bearings.joined(*arrays)
         start = np.concatenate([self.active[at][candidate], self.springs[at]])
-        state = solve_position(
-            problem.compliance, problem.gap, problem.G, self.given, self.bearings, start=start
-        )[0]
+        state = solve_contact(*arrays, self.given, start=start)
         for name in ("loads", "gaps", "active"):
             values = getattr(self, name)
             values[at] = 0
-            values[at][candidate] = getattr(state, name)
+            values[at][candidate] = getattr(state, name)[: len(problem.gap)]
         self.motions[at], self.residual[at] = state.motions, state.residual
         self.iterations[at] += state.iterations
 

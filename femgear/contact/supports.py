@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.contact.solve import ContactState, solve_contact
 from femgear.errors import ContactError
 from femgear.gears.kinematics import MEMBERS, member_approach, mesh_normals, unheld_members
 from femgear.gears.planetary import PlanetarySet
@@ -105,6 +104,15 @@ class BearingSprings:
     compliance: float
     arms: np.ndarray
 
+    def joined(self, H, gap, G) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Compliance, separations and arms of pressure cells, as of `solve_contact`, and all springs."""
+        cells, count = len(gap), len(self.arms)
+        whole = np.zeros((cells + count, cells + count))
+        whole[:cells, :cells] = H
+        whole[range(cells, len(whole)), range(cells, len(whole))] = self.compliance
+        arms = np.pad(self.arms, ((0, 0), (G.shape[1] - self.arms.shape[1], 0)))
+        return whole, np.append(gap, np.full(count, self.clearance)), np.vstack([G, arms])
+
 
 def moving_members(
     planetary_set: PlanetarySet, supports: Supports, *, both_flanks: bool = False
@@ -150,46 +158,6 @@ def bearing_springs(
         arms[planet, :, column], arms[planet, :, column + 1] = np.cos(angle[planet]), np.sin(angle[planet])
     compliance = n / (4.0 * supports.planet)
     return BearingSprings(supports.planet_clearance, compliance, arms.reshape(N * n, -1))
-
-
-def solve_position(
-    H, gap, G, load, springs: BearingSprings | None = None, *, start=None
-) -> tuple[ContactState, np.ndarray]:
-    """Solve the contact of all meshes and bearings at one position.
-
-    Parameters
-    ----------
-    H, gap, G, load
-        Of the pressure cells and all motions, as for `solve_contact`.
-    springs : BearingSprings, optional
-        Of the bearings; their motions are the last columns of ``G``.
-    start : bool array, optional
-        Candidates thought to touch: cells, then springs.
-
-    Returns
-    -------
-    state : ContactState
-        Of the pressure cells alone, with all motions.
-    active : bool array
-        Cells and springs that carry load, the ``start`` of the next position.
-
-    Raises
-    ------
-    ContactError
-        As `solve_contact`.
-    """
-    if springs is None:
-        state = solve_contact(H, gap, G, load, start=start)
-        return state, state.active
-    cells, count = len(gap), len(springs.arms)
-    whole = np.zeros((cells + count, cells + count))
-    whole[:cells, :cells] = H
-    whole[range(cells, len(whole)), range(cells, len(whole))] = springs.compliance
-    gap = np.append(gap, np.full(count, springs.clearance))
-    others = np.zeros((count, G.shape[1] - springs.arms.shape[1]))
-    state = solve_contact(whole, gap, np.vstack([G, np.hstack([others, springs.arms])]), load, start=start)
-    meshes = {name: getattr(state, name)[:cells] for name in ("loads", "gaps", "active")}
-    return replace(state, **meshes), state.active
 
 
 def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
