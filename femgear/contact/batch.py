@@ -211,7 +211,7 @@ class _ActiveSets:
         # back flanks carry nothing unless the solution says so
         reached[:, 2 * N :] = False
         force = share / np.maximum(reached.sum(axis=-1, keepdims=True), 1)
-        edge = np.where(reached, smallest + 2 * force / (np.pi * modulus * width), -np.inf)
+        edge = np.where(reached, smallest + 2 * force / (np.pi * modulus * width), -np.inf if share else 0.0)
         pushed = -self.arms @ (found.approach[: 2 * N] / self.arm).sum(axis=0)
         springs = pushed > 0.8 * pushed.max(initial=0.0)
         return gap <= edge.reshape(*gap.shape[:2], 1), np.tile(springs, (len(gap), 1))
@@ -221,7 +221,7 @@ class _ActiveSets:
         found, first = self.found, (self.active.copy(), self.springs.copy())
         todo, solved = np.arange(len(found.position)), np.zeros(len(found.position), bool)
         changed = self.active.any(axis=-1)
-        for _ in range(_MOST_STEPS if self.load.any() else 0):
+        for _ in range(_MOST_STEPS):
             rows, window = np.nonzero(changed)
             place = todo[rows], window
             right = np.dstack([found.gap[place], found.polynomials[place]])
@@ -299,7 +299,8 @@ class _ActiveSets:
         length = np.maximum(moved, RIGID * np.abs(gap).max(axis=(1, 2)))
         apart = np.where(active, np.abs(gaps), -gaps).max(axis=(1, 2)) / np.where(length > 0, length, 1.0)
         pull = np.maximum(-loads.min(axis=(1, 2)), np.abs(imbalance).max(axis=1))
-        self.residual[todo] = np.maximum(apart, pull / np.maximum(largest[:, 0, 0], np.abs(self.load).max()))
+        force = np.maximum(largest[:, 0, 0], np.abs(self.load).max())
+        self.residual[todo] = np.maximum(apart, pull / np.where(force > 0, force, 1.0))
         self.loads[todo], self.motions[todo], self.imbalance[todo] = loads, motions, imbalance
         self.gaps[todo] = np.where(candidate, gaps, 0.0)
         self.iterations[todo] += 1
