@@ -16,7 +16,6 @@ from itertools import pairwise
 
 import numpy as np
 from scipy import linalg
-from scipy.optimize import root_scalar
 
 from femgear.errors import CaseError, FemgearError
 
@@ -498,6 +497,7 @@ def bracketed_root(function: Callable[[float], float], known: dict[float, float]
 
     ``known`` collects all values.
     """
+    from scipy.optimize import root_scalar
 
     def value(h: float) -> float:
         if h not in known:

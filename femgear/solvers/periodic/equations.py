@@ -22,7 +22,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, gmres
 
 from femgear.errors import CaseError, ConvergenceError, checked_count
@@ -439,6 +439,8 @@ def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] |
     None where some forces within the reach of all elements balance the load on the free motions: a linear
     programme that minimises what is left over. Of several columns the least forces are the wanted ones.
     """
+    from scipy.optimize import linprog
+
     strain, load = _free_balance(balance)
     columns = np.flatnonzero(np.abs(strain).max(axis=0, initial=0.0) > _UNSTRAINED)
     if not len(columns) or not np.any(load):
@@ -449,7 +451,7 @@ def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] |
     rows, eye = strain[:, columns], np.eye(len(load))
     bounds = np.clip(reach / size, -_FAR, _FAR).tolist() + [(0.0, None)] * (2 * len(load))
     cost = np.concatenate([np.zeros(len(columns)), np.ones(2 * len(load))])
-    left = optimize.linprog(cost, A_eq=np.hstack([rows, eye, -eye]), b_eq=load / size, bounds=bounds)
+    left = linprog(cost, A_eq=np.hstack([rows, eye, -eye]), b_eq=load / size, bounds=bounds)
     if not left.success or left.fun <= _BEYOND * np.abs(load / size).max():
         return None
     worst = int(np.argmax(np.maximum(reach[:, 0] - wanted, wanted - reach[:, 1])))

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfftn, next_fast_len, rfftn
 
 from femgear.errors import CaseError
 from femgear.system.elements import Element, coefficients_of, with_coefficients
@@ -67,6 +66,8 @@ class PhaseGrid:
 
     def values(self, lines: np.ndarray) -> np.ndarray:
         """Signals (N, n) of one-sided lines (n, L)."""
+        from scipy.fft import irfftn
+
         shape = (*self.samples[:-1], self.samples[-1] // 2 + 1)
         spectrum = np.zeros((len(lines), int(np.prod(shape))), complex)
         place, mirrored = self.lines
@@ -80,6 +81,8 @@ class PhaseGrid:
 
     def transform(self, signals: np.ndarray) -> np.ndarray:
         """Two-sided coefficients (n, M) of signals (N, n), the last base half."""
+        from scipy.fft import rfftn
+
         grid = np.ascontiguousarray(signals.T).reshape(-1, *self.samples)
         axes = tuple(range(1, grid.ndim))
         return np.asarray(rfftn(grid, axes=axes)).reshape(len(grid), -1) / len(self.theta)
@@ -138,6 +141,8 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
     coefficient jumps, the error falls with the square of the spacing (with the spacing for a jump): 128 H and
     at least 2048 samples for one base, 8 H and at least 64 along each of several.
     """
+    from scipy.fft import next_fast_len
+
     top = np.abs(orders).max(axis=0)
     counts = np.ones(orders.shape[1], int)
     for element in problem.elements:

@@ -15,8 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import integrate, linalg
-from scipy.optimize import root_scalar
+from scipy import linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error, state_matrix
@@ -297,6 +296,8 @@ def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, toler
 
 
 def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
+    from scipy import integrate
+
     if method not in METHODS or (motion.variational and method != "DOP853"):
         raise CaseError(f"no integrator {method}", code="E-CHOICE", limit=", ".join(METHODS))
     options = {"rtol": max(tolerance, 3e-14), "atol": atol}
@@ -309,6 +310,8 @@ def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
 
 def _first_change(motion: Flow, law: Contacts, dense, t0, t1, small):
     """Instant of the first contact change in a step and the switches that change, or the end and None."""
+    from scipy.optimize import root_scalar
+
     times = np.linspace(t0, t1, _SAMPLES + 1)
     gaps = _gaps(motion, law, dense, times)
     wrong = gaps[1:] < 0.0
