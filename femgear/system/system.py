@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from femgear.errors import CaseError, checked_numbers
-from femgear.system.elements import Element, GearMeshes, coefficients_of, tabulated_element
+from femgear.system.force_laws import Element, GearMeshes, coefficients_of, tabulated_element
 from femgear.system.fourier import harmonics_of, phase_of, series_of
 
 Law = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]

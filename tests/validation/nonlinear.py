@@ -21,7 +21,7 @@ from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.shooting import ShootingSolution, solve_shooting
 from femgear.solvers.stability.floquet import floquet_verdict
-from femgear.system.elements import PolynomialSprings
+from femgear.system.force_laws import PolynomialSprings
 from femgear.system.fourier import harmonics_of
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 from validation.reference.branch_switching import branch_maximum

@@ -36,7 +36,7 @@ from femgear.solvers.periodic.phase_grid import (
     sample_counts,
 )
 from femgear.solvers.periodic.solution import PeriodicSolution
-from femgear.system.elements import Element
+from femgear.system.force_laws import Element
 from femgear.system.fourier import checked_lines, harmonic_lines, line_tail
 from femgear.system.system import NonlinearSystem
 

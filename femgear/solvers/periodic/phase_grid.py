@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.elements import Element, coefficients_of, with_coefficients
+from femgear.system.force_laws import Element, coefficients_of, with_coefficients
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import NonlinearSystem
 
@@ -96,7 +96,7 @@ class PhaseGrid:
     def products(self, coefficients: np.ndarray) -> np.ndarray:
         """Matrices (n, L, 2 L - 1) that give the lines of a product from ``Re X_0, Re X_1, Im X_1, ...``.
 
-        Toeplitz and Hankel parts as in `series.product_matrix`; they are the exact derivatives of the
+        Toeplitz and Hankel parts as in `fourier.product_matrix`; they are the exact derivatives of the
         sampled transform, aliasing included.
         """
         toeplitz, hankel = _pick(coefficients, self.differences), _pick(coefficients, self.sums)

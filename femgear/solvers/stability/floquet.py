@@ -25,7 +25,7 @@ from femgear.solvers.periodic.solution import (
     open_verdict,
     verdict_of,
 )
-from femgear.system.elements import tangent_jumps
+from femgear.system.force_laws import tangent_jumps
 from femgear.system.system import Modes, NonlinearSystem, element_forces
 
 # Angle [rad] that the fastest mode turns in a step of the first sequence, and sequences of halved steps.

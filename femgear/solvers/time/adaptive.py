@@ -19,7 +19,7 @@ from scipy import linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error, state_matrix
-from femgear.system.elements import Element, coefficients_of, has_corners, with_coefficients
+from femgear.system.force_laws import Element, coefficients_of, has_corners, with_coefficients
 from femgear.system.fourier import StepSeries, constant, phase_of
 from femgear.system.system import NonlinearSystem
 

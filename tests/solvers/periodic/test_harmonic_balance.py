@@ -14,7 +14,7 @@ from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, harmonic_lines, harmonics_of, side_bands
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 

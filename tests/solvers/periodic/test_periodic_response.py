@@ -14,7 +14,7 @@ from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_h
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability import floquet
 from femgear.solvers.stability.floquet import floquet_verdict, floquet_verdicts
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, harmonics_of
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 

@@ -7,7 +7,7 @@ import pytest
 
 from femgear.errors import CaseError, ConvergenceError, FemgearError
 from femgear.solvers.linear.receptance import reduce_problem, respond, source_columns
-from femgear.system.elements import PolynomialSprings
+from femgear.system.force_laws import PolynomialSprings
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 OMEGA = np.array([0.3, 0.9, 1.7, 4.0])

@@ -17,7 +17,7 @@ from femgear.solvers.stability.floquet import (
     tangents_of,
 )
 from femgear.solvers.stability.parametric import stability
-from femgear.system.elements import GearMeshes, PolynomialSprings, tangent_jumps
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, tangent_jumps
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 
