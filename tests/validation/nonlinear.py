@@ -27,6 +27,7 @@ from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSyst
 from validation.reference.branch_switching import branch_maximum
 from validation.reference.cornered_springs import PiecewiseSprings
 from validation.reference.free_vibration import solve_free_vibration
+from validation.reference.hill import hill_verdict
 from validation.rows import Row, at_most, counted, printed, within
 
 NLVIB = "computed for example 1 of NLvib (Krack and Gross, 2019), confirmed by time integration"
@@ -195,7 +196,7 @@ def three_motions() -> tuple[Row, ...]:
         found = solve_harmonic_balance(duffing(), 1.2, harmonics=15, start=lines)
         shot = shooting_motion(float(amplitude))
         known = floquet_verdict(duffing(), found, tolerance=1e-11)
-        hill = floquet_verdict(duffing(), found, method="hill")
+        hill = hill_verdict(duffing(), found)
         stable = int(name != "middle")
         label = f"Duffing, Omega = 1.2, {name} solution:"
         for route, deflection, values, verdict in (

@@ -145,19 +145,18 @@ def periodic_response(
     problem: NonlinearSystem,
     frequency,
     *,
-    method: str = "monodromy",
     stability_tolerance: float = 1e-7,
     **options,
 ) -> PeriodicResponse:
-    """`solve_harmonic_balance` with a choice of the method of the verdict; refuses the frequency zero.
+    """`solve_harmonic_balance` with the accuracy of the verdict; refuses the frequency zero.
 
     Parameters
     ----------
     problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s]; a single one must be positive.
-    method, stability_tolerance
-        Method and tolerance of `floquet_verdicts`.
+    stability_tolerance : float
+        Relative error of the monodromy matrix.
     options
         Those of `solve_harmonic_balance`; harmonics or orders must be given.
 
@@ -171,7 +170,7 @@ def periodic_response(
     require_period(frequency)
     options = {"radius": True, **options}
     solution = solve_harmonic_balance(problem, frequency, stability=False, **options)
-    return PeriodicResponse(judged(problem, [solution], method=method, tolerance=stability_tolerance)[0])
+    return PeriodicResponse(judged(problem, [solution], tolerance=stability_tolerance)[0])
 
 
 def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int) -> PeriodicSolution:
