@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.errors import CaseError, checked_count, checked_numbers, checked_tolerance
+from femgear.errors import CaseError, ConvergenceError, checked_count, checked_numbers, checked_tolerance
+from femgear.solvers.continuation.arclength import continue_curve
+from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.equations import (
     MANY,
@@ -221,17 +223,40 @@ def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterati
 def _embed(
     balance: HarmonicBalance, frequency, failed: PeriodicSolution, tolerance: float, max_iterations: int
 ) -> PeriodicSolution:
-    """Solution found by Newton's method from the end of an `_Embedding`; ``failed`` where it has no end."""
-    curve = _Embedding(balance, balance.receptance(frequency)[0])
-    y, steps = curve.follow()
-    work = failed.factorisations + curve.factorisations
-    if y is None:
-        note = f" The embedding of the reference springs was lost after {steps} steps."
-        return replace(failed, factorisations=work, message=failed.message + note)
-    found = newton(balance, frequency, y, tolerance, max_iterations)
-    note = f" Newton's method alone failed; started from {steps} steps of embedding."
+    """Solution found by Newton's method from the end of an embedding; ``failed`` where it has no end.
+
+    The arc of ``X + t T (F - reference X) = T_load S`` from t = 0, where it is linear, to t = 1: reference
+    springs turn gradually into the elements, through limit points if there are any (Allgower and Georg,
+    Introduction to Numerical Continuation Methods, 2003, chapters 2 and 6).
+    """
+    receptance = balance.receptance(frequency)[0]
+    forces = balance.forces(np.zeros((len(balance.reduction.reference), len(balance.orders))))
+    nothing = np.zeros_like(forces.lines)
+    linear = -balance.unknowns(balance.residual(nothing, replace(forces, lines=nothing), receptance))
+
+    def evaluate(y, t):
+        full, forces = _with_matrix(balance, receptance, y)
+        change = full - (y - linear)
+        jacobian = t * balance.jacobian(forces, receptance)
+        jacobian[np.diag_indices(len(y))] += 1.0 - t
+        return y - linear + t * change, jacobian, change
+
+    scale = max(np.linalg.norm(linear), balance.scale)
+    options = StepOptions(
+        first=_FIRST, smallest=_LEAST, largest=_LONGEST, angle=0.3, contraction=0.25, max_points=_STEPS,
+    )  # fmt: skip
+    try:
+        curve = continue_curve(evaluate, linear, 0.0, limits=(0.0, 1.0), scale=scale, options=options)
+    except ConvergenceError:
+        curve = None
+    if curve is None or curve.parameter[-1] != 1.0:
+        note = " The embedding of the reference springs was lost."
+        return replace(failed, message=failed.message + note)
+    found = newton(balance, frequency, curve.points[-1], tolerance, max_iterations)
+    note = f" Newton's method alone failed; started from {len(curve.points) - 1} steps of embedding."
+    work = failed.factorisations + int(curve.iterations.sum()) + found.factorisations
     return replace(
-        found, factorisations=work + found.factorisations, iterations=failed.iterations + found.iterations,
+        found, factorisations=work, iterations=failed.iterations + found.iterations,
         message=found.message + note,
     )  # fmt: skip
 
@@ -242,74 +267,6 @@ def with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSo
         return found
     value = balance.spectral_radius(balance.unknowns(found.deflection), found.frequency)
     return replace(found, spectral_radius=value)
-
-
-class _Embedding:
-    """The arc of ``X + t T (F - reference X) = T_load S`` from t = 0, where it is linear, to t = 1.
-
-    Reference springs turn gradually into the elements, through limit points if there are any (Allgower and
-    Georg, Introduction to Numerical Continuation Methods, 2003, chapters 2 and 6). Unknowns are scaled by the
-    linear solution.
-    """
-
-    def __init__(self, balance: HarmonicBalance, receptance):
-        self.balance, self.receptance = balance, receptance
-        forces = balance.forces(np.zeros((len(balance.reduction.reference), len(balance.orders))))
-        nothing = np.zeros_like(forces.lines)
-        self.linear = -balance.unknowns(balance.residual(nothing, replace(forces, lines=nothing), receptance))
-        self.scale = max(np.linalg.norm(self.linear), balance.scale)
-        self.factorisations = 0
-
-    def follow(self) -> tuple[np.ndarray | None, int]:
-        """Unknowns near t = 1, or none, and the number of steps."""
-        point = np.append(self.linear / self.scale, 0.0)
-        length, tangent = _FIRST, self._tangent(point, np.append(np.zeros(len(self.linear)), 1.0))
-        for number in range(_STEPS):
-            new, rounds = self._correct(point + length * tangent, tangent)
-            if new is None:
-                length *= 0.5
-                if length < _LEAST:
-                    return None, number
-                continue
-            if new[-1] >= 1.0:
-                share = (1.0 - point[-1]) / (new[-1] - point[-1])
-                end = point + share * (new - point)
-                return self.scale * end[:-1], number + 1
-            point, tangent = new, self._tangent(new, tangent)
-            length = min(_LONGEST, 1.5 * length) if rounds <= 3 else length
-        return None, _STEPS
-
-    def _system(self, point):
-        """Residual and its derivative (n_y, n_y + 1) by the scaled unknowns and t."""
-        y, t = self.scale * point[:-1], point[-1]
-        full, forces = _with_matrix(self.balance, self.receptance, y)
-        change = full - (y - self.linear)
-        jacobian = t * self.balance.jacobian(forces, self.receptance)
-        jacobian[np.diag_indices(len(y))] += 1.0 - t
-        return y - self.linear + t * change, np.column_stack([self.scale * jacobian, change])
-
-    def _solve(self, matrix, row, right):
-        self.factorisations += 1
-        return np.linalg.solve(np.vstack([matrix / self.scale, row]), right)
-
-    def _tangent(self, point, before):
-        right = np.append(np.zeros(len(point) - 1), 1.0)
-        tangent = self._solve(self._system(point)[1], before, right)
-        return tangent / np.linalg.norm(tangent)
-
-    def _correct(self, guess, tangent):
-        """Point of the arc in the plane through the guess, normal to the tangent, and the rounds it took."""
-        point = guess
-        for rounds in range(1, 9):
-            error, matrix = self._system(point)
-            right = np.append(-error / self.scale, tangent @ (guess - point))
-            if np.abs(right).max() < 1e-8:
-                return point, rounds
-            try:
-                point = point + self._solve(matrix, tangent, right)
-            except np.linalg.LinAlgError:
-                return None, rounds
-        return None, rounds
 
 
 def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineForces]:
