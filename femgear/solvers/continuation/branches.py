@@ -311,7 +311,7 @@ class ContinuationProblem:
         balance = self.balance_at(parameter)
         lines = balance.lines(y)
         value = balance.receptance(self.frequency_at(parameter))[0]
-        return balance.unknowns(balance.residual(lines, balance.forces(lines), value))
+        return balance.unknowns(balance.residual(lines, balance.forces(lines)[0], value))
 
     def first(self, parameter: float, start) -> PeriodicSolution:
         """Solution at the start of the curve, near a given one."""

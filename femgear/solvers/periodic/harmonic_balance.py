@@ -17,7 +17,6 @@ from femgear.solvers.linear.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.equations import (
     MANY,
     HarmonicBalance,
-    LineForces,
     LineTangent,
     harmonic_balance,
     linearised,
@@ -230,18 +229,17 @@ def _embed(
     Introduction to Numerical Continuation Methods, 2003, chapters 2 and 6).
     """
     receptance = balance.receptance(frequency)[0]
-    forces = balance.forces(np.zeros((len(balance.reduction.reference), len(balance.orders))))
-    nothing = np.zeros_like(forces.lines)
-    linear = -balance.unknowns(balance.residual(nothing, replace(forces, lines=nothing), receptance))
+    nothing = np.zeros((len(balance.reduction.reference), len(balance.orders)), complex)
+    linear = -balance.unknowns(balance.residual(nothing, nothing, receptance))
 
     def evaluate(y, t):
-        full, forces = _with_matrix(balance, receptance, y)
+        full, products = _with_matrix(balance, receptance, y)
         change = full - (y - linear)
-        jacobian = t * balance.jacobian(forces, receptance)
+        jacobian = t * balance.jacobian(products, receptance)
         jacobian[np.diag_indices(len(y))] += 1.0 - t
         return y - linear + t * change, jacobian, change
 
-    scale = max(np.linalg.norm(linear), balance.scale)
+    scale = max(float(np.linalg.norm(linear)), balance.scale)
     options = StepOptions(
         first=_FIRST, smallest=_LEAST, largest=_LONGEST, angle=0.3, contraction=0.25, max_points=_STEPS,
     )  # fmt: skip
@@ -269,11 +267,11 @@ def with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSo
     return replace(found, spectral_radius=value)
 
 
-def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineForces]:
-    """Residual (n_y,) at the unknowns y, and what its derivative is made of."""
+def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, np.ndarray]:
+    """Residual (n_y,) [m] at the unknowns y, and the products of which its derivative is made."""
     lines = balance.lines(y)
-    forces = balance.forces(lines)
-    return balance.unknowns(balance.residual(lines, forces, receptance)), forces
+    force, products = balance.forces(lines)
+    return balance.unknowns(balance.residual(lines, force, receptance)), products
 
 
 def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.ndarray:
@@ -282,7 +280,7 @@ def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.
         step = tangent.solve(error)
         if step is not None:
             return step
-        tangent = balance.forces(balance.lines(y))
+        tangent = balance.forces(balance.lines(y))[1]
     return np.linalg.solve(balance.jacobian(tangent, receptance), error)
 
 
