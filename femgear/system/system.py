@@ -513,15 +513,10 @@ def check_matrices(
 
 def _coupled_law(problem: NonlinearSystem, theta) -> Law:
     """Elements on groups of columns, evaluated as they are."""
-    reference = np.diag(problem.reference)
+    reference, springs = problem.reference, np.diag(problem.reference)
 
     def law(i, x):
-        total, tangent = -reference @ x, -reference
-        for element in problem.elements:
-            force, slope = element.evaluate(x[element.columns], theta[i])
-            for columns, f, t in zip(element.columns, force, slope):
-                total[columns] += f
-                tangent[columns[:, None], columns] += t
-        return total, tangent
+        force, tangent = element_forces(problem, x, theta[i])
+        return force - reference * x, tangent - springs
 
     return law

@@ -88,29 +88,19 @@ class Flow:
 
     def derivative(self, law: Contacts):
         """``dy/dt`` as a function of time and state, with the contact state of ``law``."""
-        n, frequency = self.size, self.frequency
-        matrix, columns, rows, loads = self.matrix, self.columns, self.rows, self.loads
-        constant, harmonic, phases = loads[0].real, loads[1:], self.phases
+        n, constant, harmonic = self.size, self.loads[0].real, self.loads[1:]
 
         def motion(t, y):
-            force, _ = law.forces(rows @ y[:n], t * frequency)
-            out = matrix @ y
-            out[n:] += constant - columns @ force
-            if len(phases):
-                out[n:] += (np.exp(1j * phases * t) @ harmonic).real
-            return out
-
-        def both(t, y):
             table = y.reshape(2 * n, -1)
-            force, tangent = law.forces(rows @ table[:n, 0], t * frequency)
-            out = matrix @ table
-            out[n:, 0] += constant - columns @ force
-            if len(phases):
-                out[n:, 0] += (np.exp(1j * phases * t) @ harmonic).real
-            out[n:, 1:] -= columns @ (tangent @ (rows @ table[:n, 1:]))
+            force, tangent = law.forces(self.rows @ table[:n, 0], t * self.frequency)
+            out = self.matrix @ table
+            out[n:, 0] += constant - self.columns @ force
+            if len(self.phases):
+                out[n:, 0] += (np.exp(1j * self.phases * t) @ harmonic).real
+            out[n:, 1:] -= self.columns @ (tangent @ (self.rows @ table[:n, 1:]))
             return out.ravel()
 
-        return both if self.variational else motion
+        return motion
 
     def jacobian(self, law: Contacts):
         """Derivative of the motion by the state, (2n, 2n)."""
