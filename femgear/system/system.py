@@ -213,6 +213,8 @@ def gear_meshes(
         Mesh harmonics kept.
     columns : (g,) int array, optional
         Columns of ``W``; the first ones when not given.
+    separates, smoothing
+        Of `GearMeshes`.
     orders : tuple of int
         Orders of the mesh frequency; the record's own period counts ``periods`` mesh periods, so with
         ``periods`` above one the base frequency must be the mesh frequency over ``periods``.

@@ -251,7 +251,8 @@ class ContinuationProblem:
 
     ``balance`` has them at the start. Of the base frequencies ``frequency`` [rad/s] the one numbered ``base``
     is the parameter, unless there is a ``family``: parameter -> NonlinearSystem, whose harmonic equations
-    take ``samples``.
+    take ``samples``. ``limits`` are the lowest and the highest parameter; with ``radius`` the solutions get
+    the spectral radius of their fixed point.
     """
 
     balance: HarmonicBalance

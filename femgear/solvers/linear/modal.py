@@ -356,7 +356,11 @@ def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray
 
 
 def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
-    """``C`` as given, or of modal ratios."""
+    """Make the viscous damping (n, n) of a system at rest: its own ``C``, a matrix, or modal ratios.
+
+    ``reference`` (n_columns,) are the stiffnesses of the columns in the modes [N/m]; ``damping`` is None, a
+    ratio, one ratio a mode or a matrix (n, n) [N s/m, ...].
+    """
     if damping is None:
         return still.C
     array = np.asarray(damping, float)
@@ -371,7 +375,10 @@ def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> 
 
 
 def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
-    """``K + W diag(mesh_stiffness) W^T`` (n, n) [N/m], with the flexibility between the meshes, checked."""
+    """``K + W diag(mesh_stiffness) W^T`` (n, n) [N/m], with the flexibility between the meshes, checked.
+
+    ``mesh_stiffness`` (n_meshes,) [N/m].
+    """
     meshes = np.asarray(mesh_stiffness, dtype=float)
     check_matrices(system, symmetric=("M", "K"), columns=len(meshes))
     if not np.all(np.isfinite(meshes)) or np.any(meshes < 0.0):
@@ -409,6 +416,7 @@ def rigid_basis(system: MechanicalSystem, modes: Modes):
 def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
     """``K^+ loads``: elastic displacement, mass-orthogonal to the rigid modes, of self-equilibrated loads.
 
+    Mass and stiffness (n, n), mass-normalised rigid modes (n, r), loads and displacements (n, n_loads).
     ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
     """
     carried = mass @ rigid

@@ -320,7 +320,8 @@ def _element_name(problem: NonlinearSystem, column: int) -> str:
 class LineTangent:
     """``dR/dX`` of the harmonic equations at one deflection, without a matrix of its size.
 
-    ``stiffness`` (N, n_pairs) [N/m]: tangents of the coupled pairs less the reference springs, on the grid.
+    ``receptance`` (L, n_columns, n_columns + n_loads) [m/N] of the lines; ``stiffness`` (N, n_pairs) [N/m]:
+    tangents of the coupled pairs less the reference springs, on the grid.
     """
 
     balance: HarmonicBalance
@@ -347,7 +348,10 @@ class LineTangent:
 
 
 def linearised(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineTangent]:
-    """Residual (n_y,) [m] of the harmonic equations at the unknowns y, and its derivative."""
+    """Residual (n_y,) [m] of the harmonic equations at the unknowns y (n_y,) [m], and its derivative.
+
+    ``receptance`` as `LineTangent` has it.
+    """
     lines = balance.lines(y)
     force, stiffness = balance.beyond_reference(lines)
     beyond = balance.grid.amplitudes(balance.grid.transform(force))

@@ -134,7 +134,7 @@ def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
 
 
 def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ...]:
-    """Samples along every base that keep aliasing out of the lines.
+    """Samples along every base that keep aliasing out of the lines ``orders`` (L, n_bases).
 
     Products of the lines with polynomials of degree p and with Fourier series of n harmonics are exact with
     ``(p + 1) H + 2 n + 1`` samples, H the highest order along the base. Where contact opens and closes, or a
@@ -177,7 +177,10 @@ def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:
 
 
 def forces_on_grid(elements, pairs, x, theta) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (N, n_columns) and tangents (N, n_pairs) of coupled pairs at deflections x (N, n_columns)."""
+    """Forces (N, n_columns) [N] and tangents (N, n_pairs) [N/m] of the coupled pairs (n_pairs, 2).
+
+    At deflections x (N, n_columns) [m] and phases theta (N, n_bases) [rad].
+    """
     force, tangent = np.zeros_like(x), np.zeros((len(x), len(pairs)))
     place = {tuple(pair): number for number, pair in enumerate(pairs.tolist())}
     for element in elements:

@@ -74,7 +74,9 @@ def monodromy(matrices, durations) -> np.ndarray:
 
 
 def stiffness_in_series(change: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
-    """Put a static flexibility (n_c, n_c) in series with stiffnesses (..., n_c, n_c), ``k (1 + T k)^-1``.
+    """Put a flexibility T (n_c, n_c) [m/N] in series with stiffnesses k (..., n_c, n_c) [N/m].
+
+    ``k (1 + T k)^-1`` (..., n_c, n_c) [N/m].
 
     Raises
     ------
@@ -217,6 +219,7 @@ def passage(
 
     Parameters
     ----------
+    frame : Frame
     period : (p,) array
         [s]
     tangents : callable

@@ -51,6 +51,8 @@ class Flow:
         ``M^-1`` of the constant load and the harmonic forces, over rate.
     phases : (n_forces,) array
         Angular frequencies of the harmonic forces [rad/s].
+    rows : (n_c, n) array
+        ``W^T``.
     variational : bool
         Carry the derivatives of the state by the state at the start along.
     """
@@ -116,7 +118,7 @@ class Flow:
 
 
 def flow(problem: NonlinearSystem, frequency, *, variational=False) -> Flow:
-    """First-order form of a problem; M is factorised once."""
+    """First-order form of a problem at base frequencies (n_bases,) [rad/s]; M is factorised once."""
     system, n = problem.system, len(problem.system.M)
     frequency = np.atleast_1d(np.asarray(frequency, float))
     loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
@@ -144,12 +146,17 @@ def trajectory(
 
     Parameters
     ----------
+    start : array
+        State, of ``Flow.state``.
+    begin, end : float
+        [s].
     method : str
         One of `METHODS`; with tangents only "DOP853".
     tolerance : float
         Relative local error, and absolute of ``scale``, the size of the motion [m].
     events : bool
         Stop at every contact change and at every break of a step series.
+    max_steps : int
 
     Raises
     ------
@@ -189,7 +196,8 @@ def trajectory(
 def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
     """States (n_times, size) of an adaptive integration at ascending instants, and the number of its steps.
 
-    ``pieces`` comes from `trajectory`; instants before its first step have the state ``start``.
+    ``times`` (n_times,) [s]; ``pieces`` comes from `trajectory`; instants before its first step have the
+    state ``start``.
     """
     found, filled, steps = np.empty((len(times), len(start))), 0, 0
     for begin, end, dense in pieces:
@@ -339,7 +347,8 @@ def _switches(element: Element, x, theta) -> np.ndarray:
 class Contacts:
     """Elements of a problem with the contact state between two changes.
 
-    ``closed``: one bool array an element; none where the elements are evaluated as they are.
+    ``columns``: number of columns of ``W``. ``closed``: one bool array an element; none where the
+    elements are evaluated as they are.
     """
 
     elements: tuple[Element, ...]
