@@ -326,9 +326,7 @@ class NonlinearSystem:
     @property
     def damping(self) -> np.ndarray:
         """``C + speed G`` (n, n)."""
-        if self.system.gyroscopic is None or not self.speed:
-            return self.system.C
-        return self.system.C + self.speed * self.system.gyroscopic
+        return damping_matrix(self.system, self.speed)
 
     @property
     def reference(self) -> np.ndarray:
@@ -350,6 +348,13 @@ class NonlinearSystem:
         for element in self.elements:
             orders += [series.orders for series in coefficients_of(element).values()]
         return max([len(o) for o in orders if any(o)], default=1)
+
+
+def damping_matrix(system: MechanicalSystem, speed: float) -> np.ndarray:
+    """``C + speed G`` (n, n) at a speed of rotation [rad/s]."""
+    if system.gyroscopic is None or not speed:
+        return system.C
+    return system.C + speed * system.gyroscopic
 
 
 def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
