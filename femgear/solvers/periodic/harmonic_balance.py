@@ -43,6 +43,7 @@ def solve_harmonic_balance(
     tolerance: float = 1e-10,
     max_iterations: int = 50,
     stability: bool = True,
+    stability_tolerance: float = 1e-7,
     radius: bool | None = None,
     **equations,
 ) -> PeriodicSolution:
@@ -63,6 +64,8 @@ def solve_harmonic_balance(
     stability : bool
         Floquet verdict and spectral radius of the fixed point. With several base frequencies or the frequency
         zero the verdict says "not covered". Loops that need neither are quicker without.
+    stability_tolerance : float
+        Relative error of the monodromy matrix.
     radius : bool, optional
         The radius alone, with or without the verdict; it takes all eigenvalues of one matrix of the size of
         the unknowns.
@@ -93,7 +96,7 @@ def solve_harmonic_balance(
         found = replace(found, message=found.message + note)
     if stability if radius is None else radius:
         found = with_radius(balance, found)
-    return judged(problem, [found])[0] if stability else found
+    return judged(problem, [found], tolerance=stability_tolerance)[0] if stability else found
 
 
 def displacements(
@@ -142,36 +145,10 @@ class PeriodicResponse:
     spectral_radius = of_solution("spectral_radius", "Of the fixed point; it says nothing on stability.")
 
 
-def periodic_response(
-    problem: NonlinearSystem,
-    frequency,
-    *,
-    stability_tolerance: float = 1e-7,
-    **options,
-) -> PeriodicResponse:
-    """`solve_harmonic_balance` with the accuracy of the verdict; refuses the frequency zero.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    frequency : float or (n_bases,) array
-        Base frequencies [rad/s]; a single one must be positive.
-    stability_tolerance : float
-        Relative error of the monodromy matrix.
-    options
-        Those of `solve_harmonic_balance`; harmonics or orders must be given.
-
-    Raises
-    ------
-    CaseError
-        Input that cannot be used, a single base frequency of zero (E-RANGE).
-    ConvergenceError
-        An undamped resonance of the system with reference springs at a line.
-    """
+def periodic_response(problem: NonlinearSystem, frequency, **options) -> PeriodicResponse:
+    """`solve_harmonic_balance` with the verdict at hand; refuses the single base frequency zero (E-RANGE)."""
     require_period(frequency)
-    options = {"radius": True, **options}
-    solution = solve_harmonic_balance(problem, frequency, stability=False, **options)
-    return PeriodicResponse(judged(problem, [solution], tolerance=stability_tolerance)[0])
+    return PeriodicResponse(solve_harmonic_balance(problem, frequency, **options))
 
 
 def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int) -> PeriodicSolution:
