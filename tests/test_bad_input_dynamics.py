@@ -11,6 +11,7 @@ from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, MeshExcitation, NonlinearSystem
@@ -67,6 +68,14 @@ def test_too_few_harmonics_show_in_the_tail():
     few = periodic_response(rectangular(), 1.0, harmonics=4)
     many = periodic_response(rectangular(), 1.0, harmonics=32)
     assert few.solution.converged and many.tail**2 < 1e-6 < few.tail**2
+
+
+def test_a_step_beyond_the_stability_limit_is_refused_with_the_limit():
+    """Central differences: h < T/pi (T. J. R. Hughes, The Finite Element Method, 2000, 9.1)."""
+    problem = oscillator(PolynomialSprings([0], [[(2.0 * np.pi) ** 2]]))
+    with pytest.raises(CaseError, match="E-RANGE") as error:
+        solve_transient(problem, 0.0, [0.0, 100.0], method="central difference", step=0.4)
+    assert "0.3183" in error.value.limit
 
 
 def test_a_lost_branch_names_its_last_good_point():

@@ -1,24 +1,36 @@
-"""Time integration: period errors, order and energy, all measured on marched steps."""
+"""Time integration: period errors, stability limits, order and energy, all measured on marched steps."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import Branch
+from femgear.solvers.time.steps import (
+    AVERAGE_ACCELERATION,
+    CENTRAL_DIFFERENCE,
+    FOX_GOODWIN,
+    LINEAR_ACCELERATION,
+    StepRule,
+    stability_limit,
+)
 from femgear.solvers.time.stroboscopic import sweep_response
 from femgear.solvers.time.transient import solve_transient
 from validation.nonlinear import duffing, oscillator, response_curve
-from validation.rows import Row, at_most, counted, printed, within
+from validation.reference.step_rules import numerical_damping, period_error
+from validation.rows import REPEATED, Row, at_most, counted, printed, within
 
+HUGHES = "T. J. R. Hughes, The Finite Element Method (2000), Eq. 9.1.22"
+STEP = f"eigenvalues of the step ({REPEATED})"
 # m = 1, c = 0.1, k = 4, p = cos 3 t, start (1, 0): the closed form at t = 10
 END = 0.2650852834949518
 
 
-def marched_roots(ratio: float) -> np.ndarray:
+def marched_roots(ratio: float, method: str, **options) -> np.ndarray:
     """Roots (2,) of ``x_(k+2) = (z1 + z2) x_(k+1) - z1 z2 x_k``, which marched steps h / T = ratio obey."""
     found = solve_transient(
         oscillator(stiffness=(2.0 * np.pi) ** 2), 0.0, ratio * np.arange(40), start=([1.0], [0.3]),
-        step=ratio,
+        method=method, step=ratio, **options,
     )  # fmt: skip
     # of Newmark's family the third root is zero: it acts in the first step only
     x = found.displacement[2:, 0]
@@ -27,23 +39,74 @@ def marched_roots(ratio: float) -> np.ndarray:
 
 
 def period_errors() -> tuple[Row, ...]:
-    """I1: period of free vibration."""
+    """I1: period and damping of free vibration."""
     rows = []
-    for ratio in (0.01, 0.05, 0.1, 0.2):
-        square = (2.0 * np.pi * ratio) ** 2
-        angle = np.arccos(1.0 - 0.5 * square / (1.0 + 0.25 * square))
-        turn = np.abs(np.angle(marched_roots(ratio))).max()
-        quantity = f"average acceleration, h/T = {ratio:g}: relative error of the period"
-        expected, ours = (2.0 * np.pi * ratio / value - 1.0 for value in (angle, turn))
-        source = "w h / arccos(1 - (w h)^2 / 2 / (1 + beta (w h)^2)) - 1"
-        rows.append(within("I1", source, quantity, expected, ours, 1e-10, relative=False))
+    for method, rule in (
+        ("average acceleration", AVERAGE_ACCELERATION),
+        ("linear acceleration", LINEAR_ACCELERATION),
+        ("central difference", CENTRAL_DIFFERENCE),
+    ):
+        for ratio in (0.01, 0.05, 0.1, 0.2):
+            square = (2.0 * np.pi * ratio) ** 2
+            angle = np.arccos(1.0 - 0.5 * square / (1.0 + rule.beta * square))
+            turn = np.abs(np.angle(marched_roots(ratio, method))).max()
+            quantity = f"{method}, h/T = {ratio:g}: relative error of the period"
+            expected, ours = (2.0 * np.pi * ratio / value - 1.0 for value in (angle, turn))
+            source = "w h / arccos(1 - (w h)^2 / 2 / (1 + beta (w h)^2)) - 1"
+            rows.append(within("I1", source, quantity, expected, ours, 1e-10, relative=False))
+    roots = marched_roots(0.1, "newmark", gamma=0.6, beta=0.3025)
+    turn, size = np.abs(np.angle(roots)).max(), np.abs(roots[0])
+    name = "gamma = 0.6, beta = 0.3025, h/T = 0.1:"
+    ours = 0.2 * np.pi / turn - 1.0, -np.log(size) / turn
+    rule = StepRule(0.6, 0.3025)
+    formula = float(period_error(rule, 0.1)), float(numerical_damping(rule, 0.1))
+    return (
+        *rows,
+        printed("I1", STEP, f"{name} relative error of the period", "0.0329459", ours[0]),
+        printed("I1", STEP, f"{name} damping ratio", "0.0295125", ours[1]),
+        within("I1", "marched steps", f"{name} period error of the formula", ours[0], formula[0], 1e-9),
+        within("I1", "marched steps", f"{name} damping ratio of the formula", ours[1], formula[1], 1e-9),
+    )
+
+
+def stability_limits() -> tuple[Row, ...]:
+    """I2: limits from marched steps, and whether they are kept."""
+    rows = []
+    for method, rule, value in (
+        ("linear acceleration", LINEAR_ACCELERATION, "0.5513288954"),
+        ("central difference", CENTRAL_DIFFERENCE, "0.3183098862"),
+        ("Fox-Goodwin", FOX_GOODWIN, "0.3898484006"),
+    ):
+        # 1 / (2 - z1 - z2) = 1 / (w h)^2 + beta; the limit is where z1 + z2 = -2
+        ratio = 0.3
+        beta = 1.0 / (2.0 - marched_roots(ratio, method).sum().real) - 1.0 / (2.0 * np.pi * ratio) ** 2
+        limit = 1.0 / (2.0 * np.pi * np.sqrt(0.25 - beta))
+        rows.append(printed("I2", HUGHES, f"{method}: limit of h/T, marched", value, limit))
+        rows.append(printed("I2", HUGHES, f"{method}: limit of h/T, formula", value, stability_limit(rule)))
+        problem, step = oscillator(stiffness=(2.0 * np.pi) ** 2), float(value)
+        found = solve_transient(
+            problem, 0.0, 0.999 * step * np.arange(2001), start=([1.0], [0.0]), method=method,
+            step=0.999 * step,
+        )  # fmt: skip
+        largest = np.abs(found.displacement).max()
+        rows.append(
+            at_most("I2", "theory", f"{method}: largest motion at 0.999 of the limit", 100.0, largest)
+        )
+        refused = 0
+        try:
+            solve_transient(problem, 0.0, [0.0, 100.1 * step], method=method, step=1.001 * step)
+        except CaseError as error:
+            refused = int(error.code == "E-RANGE")
+        rows.append(counted("I2", "theory", f"{method}: 1.001 of the limit refused (1 yes)", 1, refused))
     return tuple(rows)
 
 
-def forced_error(method: str, count: int) -> float:
+def forced_error(method: str, count: int, **options) -> float:
     """Error at t = 10 of the forced oscillator in ``count`` steps."""
     problem = oscillator(damping=0.1, stiffness=4.0, forces=[(1.0, (1,))])
-    found = solve_transient(problem, 3.0, [0.0, 10.0], start=([1.0], [0.0]), method=method, step=10.0 / count)
+    found = solve_transient(
+        problem, 3.0, [0.0, 10.0], start=([1.0], [0.0]), method=method, step=10.0 / count, **options
+    )
     return float(found.displacement[-1, 0] - END)
 
 
@@ -56,9 +119,17 @@ def order() -> tuple[Row, ...]:
         counts, errors, ("0.04471915", "0.01136473", "0.00285250", "0.000713829"), strict=True
     ):
         rows.append(printed("I3", closed, f"average acceleration, {count} steps: error", value, error))
-    quantity = "average acceleration: order between 400 and 800 steps"
-    rows.append(printed("I3", closed, quantity, "1.999", np.log2(errors[2] / errors[3])))
-    for method in ("generalised alpha", "modal"):
+    for method, expected, options in (
+        ("average acceleration", "1.999", {}),
+        ("Fox-Goodwin", "1.99", {}),
+        ("newmark", "0.84", {"gamma": 0.6, "beta": 0.3025}),
+    ):
+        low, high = (forced_error(method, count, **options) for count in (400, 800))
+        name = "gamma = 0.6, beta = 0.3025" if options else method
+        rows.append(
+            printed("I3", closed, f"{name}: order between 400 and 800 steps", expected, np.log2(low / high))
+        )
+    for method in ("linear acceleration", "central difference", "generalised alpha", "modal"):
         low, high = (abs(forced_error(method, count)) for count in (400, 800))
         quantity = f"{method}: order between 400 and 800 steps"
         rows.append(within("I3", "theory", quantity, 2.0, np.log2(low / high), 0.01))

@@ -149,6 +149,18 @@ def test_fixed_point_and_multipliers_of_a_rectangular_stiffness(ratio, radius, m
     assert np.abs(np.linalg.eigvals(operator)).max() == pytest.approx(radius, abs=5e-4)
 
 
+def test_damped_step_of_newmark():
+    # gamma 0.6, beta 0.3025, h/T 0.1: eigenvalues of one step of free motion
+    gamma, beta, w = 0.6, 0.3025, 2 * math.pi * 0.1
+    ahead = np.array([[1 + beta * w**2, 0.0], [gamma * w**2, 1.0]])
+    # displacement and h times velocity; the acceleration -w^2 x of either end
+    now = np.array([[1 - (0.5 - beta) * w**2, 1.0], [-(1 - gamma) * w**2, 1.0]])
+    found = np.log(np.linalg.eigvals(np.linalg.solve(ahead, now))[0])
+    angle, decay = abs(found.imag), -found.real
+    assert w / angle - 1 == pytest.approx(0.0329459, abs=5e-8)
+    assert decay / angle == pytest.approx(0.0295125, abs=5e-8)
+
+
 @pytest.mark.parametrize(("cells", "printed"), [(40, -1.286e-3), (80, -3.234e-4), (160, -8.116e-5)])
 def test_peak_pressure_of_uniform_cells(cells, printed):
     """Cylinder in a bore on a half plane: strips of uniform pressure (Johnson, Eq. 2.30d), an active set."""

@@ -319,10 +319,11 @@ THEMES = (
     Theme(
         "time integration",
         "Time integration",
-        "Periods and orders are measured on marched steps. I1: free vibration without "
+        "Periods, limits and orders are measured on marched steps. I1 and I2: free vibration without "
         "damping; I3: x'' + 0.1 x' + 4 x = cos 3t from (1, 0), at t = 10.",
         (
             integration.period_errors,
+            integration.stability_limits,
             integration.order,
             integration.energy,
         ),

@@ -1,4 +1,4 @@
-"""Fixed time steps: average acceleration, the generalised-alpha method and exact steps of the modes.
+"""Fixed time steps: Newmark's family, the generalised-alpha method and steps of the modes that are exact.
 
 Every scheme is a linear map of the state and of the column forces: ``x_1 = x_free - A g_1`` with x the
 deflections of the columns at the end of the step, ``g = f - c x`` their forces beyond the reference stiffness
@@ -53,6 +53,20 @@ class StepRule:
     mass: float = 0.0
     force: float = 0.0
 
+    def __post_init__(self):
+        numbers = np.array([self.gamma, self.beta, self.mass, self.force], float)
+        if not np.all(np.isfinite(numbers)) or self.beta < 0.0 or max(self.mass, self.force) >= 1.0:
+            raise CaseError(
+                f"a step rule with gamma = {self.gamma}, beta = {self.beta}", code="E-RANGE",
+                limit="finite numbers, beta of 0 or more, weights below 1",
+            )  # fmt: skip
+        # below this the rule feeds energy in at every step length
+        if self.gamma < 0.5 - self.mass + self.force - 1e-12:
+            raise CaseError(
+                f"a step rule with gamma = {self.gamma} has negative damping", code="E-RANGE",
+                limit=f"gamma of {0.5 - self.mass + self.force:.4g} or more", remedy="take gamma = 1/2",
+            )  # fmt: skip
+
     def predictor(self, h: float) -> np.ndarray:
         """Rows (6, 3) on (q, v, a): q, v, a without ``a_1``; then q, v and inertia of the force balance."""
         predict = np.array(
@@ -63,6 +77,15 @@ class StepRule:
 
 
 AVERAGE_ACCELERATION = StepRule(0.5, 0.25)
+LINEAR_ACCELERATION = StepRule(0.5, 1.0 / 6.0)
+FOX_GOODWIN = StepRule(0.5, 1.0 / 12.0)
+CENTRAL_DIFFERENCE = StepRule(0.5, 0.0)
+RULES = {
+    "average acceleration": AVERAGE_ACCELERATION,
+    "linear acceleration": LINEAR_ACCELERATION,
+    "Fox-Goodwin": FOX_GOODWIN,
+    "central difference": CENTRAL_DIFFERENCE,
+}
 
 
 def generalised_alpha(radius: float) -> StepRule:
@@ -76,6 +99,22 @@ def generalised_alpha(radius: float) -> StepRule:
         )
     mass, force = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
     return StepRule(0.5 - mass + force, 0.25 * (1.0 - mass + force) ** 2, mass, force)
+
+
+def stability_limit(rule: StepRule) -> float:
+    """Largest ``h / T`` of a rule for an undamped mode of period T; infinite for unconditionally stable ones.
+
+    T. J. R. Hughes, The Finite Element Method (2000), Eq. 9.1.22, for Newmark's family: linear acceleration
+    0.5513, central difference 0.3183, Fox-Goodwin 0.3898.
+    """
+    if rule.mass or rule.force:
+        # the methods of Chung and Hulbert are made to be unconditionally stable
+        stable = rule.mass <= rule.force <= 0.5 and rule.beta >= 0.25 + 0.5 * (rule.force - rule.mass) - 1e-12
+        return np.inf if stable else np.nan
+    short = 0.5 * rule.gamma - rule.beta
+    if short <= 1e-15:
+        return np.inf
+    return np.sqrt(short) / short / (2.0 * np.pi)
 
 
 class RuleScheme:

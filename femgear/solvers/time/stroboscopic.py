@@ -93,7 +93,7 @@ def stroboscopic_map(
     Raises
     ------
     CaseError
-        Base frequencies that do not repeat then, steps out of range.
+        Base frequencies that do not repeat then, steps out of range or beyond the stability limit.
     """
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     period = common_period(frequency, periods)

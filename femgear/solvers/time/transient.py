@@ -10,13 +10,15 @@ from femgear.errors import CaseError, checked_numbers, checked_tolerance
 from femgear.solvers.time import adaptive
 from femgear.solvers.time.adaptive import checked_start, motion_scale
 from femgear.solvers.time.steps import (
-    AVERAGE_ACCELERATION,
+    RULES,
     ModalScheme,
     RuleScheme,
     Scheme,
+    StepRule,
     generalised_alpha,
     highest_frequency,
     march_times,
+    stability_limit,
 )
 from femgear.system.system import (
     NonlinearSystem,
@@ -37,7 +39,7 @@ _WRONG = 1.0
 _PHASES = 256
 # Largest residual of the column equations in a step, local error of the adaptive methods, Newton iterations.
 _COLUMNS, _LOCAL, _ITERATIONS = 1e-10, 1e-9, 30
-METHODS = ("average acceleration", "generalised alpha", "modal", *adaptive.METHODS)
+METHODS = (*RULES, "newmark", "generalised alpha", "modal", *adaptive.METHODS)
 
 
 @dataclass(frozen=True)
@@ -110,8 +112,8 @@ def solve_transient(
     start : pair of (n,) arrays, optional
         Displacement and velocity at the start; at rest without deflection when not given.
     method : str
-        "average acceleration", "generalised alpha", "modal" (exact linear part), see `steps`, all stable for
-        any step, or SciPy's "DOP853", "Radau", "LSODA".
+        "average acceleration", "linear acceleration", "Fox-Goodwin", "central difference", "newmark",
+        "generalised alpha", "modal" (exact linear part), see `steps`, or SciPy's "DOP853", "Radau", "LSODA".
     step : float, optional
         Of the fixed-step methods [s], shortened to divide the time evenly; a 40th of the shortest natural
         period when not given. Between steps a cubic of displacements and velocities is used.
@@ -120,13 +122,13 @@ def solve_transient(
     events : bool
         Adaptive methods stop at contact changes, see `adaptive`.
     parameters
-        Of a fixed-step method: ``radius``, ``count``, see `step_scheme`.
+        Of a fixed-step method: ``gamma``, ``beta``, ``radius``, ``count``, see `step_scheme`.
 
     Raises
     ------
     CaseError
-        A step that is not positive, instants that do not ascend, unknown methods, a start that does not fit
-        (E-START), more base frequencies than the problem has (E-RANGE).
+        A step beyond the stability limit, instants that do not ascend, unknown methods, a start that
+        does not fit (E-START), more base frequencies than the problem has (E-RANGE).
     ConvergenceError
         A mass matrix that is not positive definite, an adaptive integrator that gives up.
     """
@@ -155,6 +157,8 @@ def step_scheme(
     span: float,
     step: float | None = None,
     *,
+    gamma: float = 0.5,
+    beta: float = 0.25,
     radius: float = 0.8,
     count: int | None = None,
 ) -> tuple[Scheme, int]:
@@ -166,6 +170,8 @@ def step_scheme(
         As for `solve_transient`.
     span : float
         Time that the steps divide evenly [s].
+    gamma, beta : float
+        Of "newmark".
     radius : float
         Spectral radius at infinite frequency of "generalised alpha".
     count : int, optional
@@ -174,14 +180,15 @@ def step_scheme(
     Raises
     ------
     CaseError
-        An unknown method (E-CHOICE), a step that is not positive (E-RANGE).
+        An unknown method (E-CHOICE), a step that is not positive or beyond the stability limit (E-RANGE).
     """
-    if method not in METHODS or method in adaptive.METHODS:
+    made = {"newmark": lambda: StepRule(gamma, beta), "generalised alpha": lambda: generalised_alpha(radius)}
+    if method not in RULES and method not in made and method != "modal":
         raise CaseError(f"no method {method}", code="E-CHOICE", key="method", limit=", ".join(METHODS))
-    number, step = _steps(problem, np.atleast_1d(frequency), span, step)
-    if method == "modal":
+    rule = made[method]() if method in made else RULES.get(method)
+    number, step = _steps(problem, np.atleast_1d(frequency), rule, span, step)
+    if rule is None:
         return ModalScheme(problem, step, count=count), number
-    rule = AVERAGE_ACCELERATION if method == "average acceleration" else generalised_alpha(radius)
     return RuleScheme(problem, rule, step), number
 
 
@@ -199,9 +206,10 @@ def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
     return total
 
 
-def _steps(problem, frequency, span, step) -> tuple[int, float]:
-    """Number and length of the steps."""
+def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
+    """Number and length of the steps; refuses a length beyond the stability limit of the rule."""
     highest = highest_frequency(problem, column_stiffness(problem, frequency))
+    period = 2.0 * np.pi / highest if highest else np.inf
     if step is None:
         fastest = max(highest, np.abs(frequency).max(initial=0.0))
         step = 2.0 * np.pi / fastest / _STEPS_A_PERIOD if fastest else span / 100.0
@@ -209,7 +217,17 @@ def _steps(problem, frequency, span, step) -> tuple[int, float]:
     if not (np.isfinite(step) and step > 0.0):
         raise CaseError(f"a time step of {step} s", code="E-RANGE", key="step", limit="above 0 s")
     number = max(1, int(np.ceil(span / step * (1.0 - 1e-12))))
-    return number, span / number
+    step = span / number
+    limit = np.inf if rule is None else stability_limit(rule)
+    if np.isnan(limit):
+        raise CaseError("a step rule of unknown stability", code="E-RANGE")
+    if step > limit * period:
+        raise CaseError(
+            f"a step of {step:.6g} s is {step / period:.4g} of the shortest natural period, {period:.6g} s",
+            code="E-RANGE", key="step", limit=f"h / T up to {limit:.4g}, {limit * period:.6g} s",
+            remedy="shorten the step, or take average acceleration, which is stable for any",
+        )  # fmt: skip
+    return number, step
 
 
 def _stepped(

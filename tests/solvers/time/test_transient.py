@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 from validation.reference.cornered_springs import BearingSprings, PiecewiseSprings
+from validation.reference.step_rules import numerical_damping, period_error
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.stability.floquet import monodromy
 from femgear.solvers.time.steps import (
+    AVERAGE_ACCELERATION,
+    CENTRAL_DIFFERENCE,
+    FOX_GOODWIN,
+    LINEAR_ACCELERATION,
+    StepRule,
     generalised_alpha,
+    stability_limit,
 )
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
@@ -23,9 +30,19 @@ from femgear.system.system import (
 )
 
 RATIOS = np.array([0.01, 0.05, 0.1, 0.2])
-FIXED = "average acceleration", "generalised alpha"
+FIXED = (
+    "average acceleration",
+    "linear acceleration",
+    "Fox-Goodwin",
+    "central difference",
+    "generalised alpha",
+)
 # T. J. R. Hughes, The Finite Element Method (2000), chapter 9, evaluated in extended precision
-PERIOD_ERRORS = 0.000328900, 0.008171243, 0.032074911, 0.120033
+PERIOD_ERRORS = {
+    AVERAGE_ACCELERATION: (0.000328900, 0.008171243, 0.032074911, 0.120033),
+    LINEAR_ACCELERATION: (0.000164447, 0.004083787, 0.016001854, 0.059145),
+    CENTRAL_DIFFERENCE: (-0.000164539, -0.00414145, -0.0169342, -0.0751724),
+}
 # m = 1, c = 0.1, k = 4, p = cos 3 t, start (1, 0): closed form at t = 10
 FORCED_END = 0.2650852834949518
 
@@ -51,26 +68,71 @@ def geared_set(planet_set, planet_excitation):
     return NonlinearSystem(system, (gear_meshes(excitation, harmonics=3),))
 
 
-@pytest.mark.parametrize("h, error", list(zip(RATIOS, PERIOD_ERRORS)))
-def test_marched_period_is_the_printed_one(h, error):
-    """The period of the steps themselves: those of a free oscillator over 550 steps."""
-    times = h * np.arange(550)
-    found = solve_transient(
-        oscillator(k=(2.0 * np.pi) ** 2), 0.0, times, start=([1.0], [0.3]), method=FIXED[0], step=h
-    )
-    x = found.displacement[:, 0]
-    # a free step obeys x_2 - 2 cos(angle) x_1 + x_0 = 0
-    angle = np.arccos(0.5 * (x[2:] + x[:-2]) @ x[1:-1] / (x[1:-1] @ x[1:-1]))
-    assert 2.0 * np.pi * h / angle - 1.0 == pytest.approx(error, abs=1e-6)
-    assert angle == pytest.approx(2.0 * np.arctan(np.pi * h), rel=1e-9)
-    np.testing.assert_allclose(x[2:] + x[:-2], 2.0 * np.cos(angle) * x[1:-1], atol=1e-12)
+@pytest.mark.parametrize("rule", PERIOD_ERRORS)
+def test_period_errors(rule):
+    np.testing.assert_allclose(period_error(rule, RATIOS), PERIOD_ERRORS[rule], atol=1e-6)
+    w = 2.0 * np.pi * RATIOS
+    if rule is AVERAGE_ACCELERATION:
+        np.testing.assert_allclose(period_error(rule, RATIOS), 0.5 * w / np.arctan(0.5 * w) - 1.0, rtol=1e-9)
 
 
-def forced_errors(method, counts=(100, 200, 400, 800)):
+def test_dissipative_rule():
+    rule = StepRule(0.6, 0.3025)
+    assert period_error(rule, 0.1) == pytest.approx(0.0329459, abs=1e-7)
+    assert numerical_damping(rule, 0.1) == pytest.approx(0.0295125, abs=1e-7)
+
+
+def test_marched_period_is_the_predicted_one():
+    """The steps themselves, not only the formula: zero crossings of a free oscillator over 50 periods."""
+    for rule, name in ((AVERAGE_ACCELERATION, FIXED[0]), (CENTRAL_DIFFERENCE, FIXED[3])):
+        h = 0.1
+        times = h * np.arange(550)
+        # a start off the crest so that no step falls on a crossing
+        found = solve_transient(
+            oscillator(k=(2.0 * np.pi) ** 2), 0.0, times, start=([1.0], [0.3]), method=name, step=h
+        )
+        x = found.displacement[:, 0]
+        angle = np.angle(np.exp(2j * np.pi * h / (1.0 + period_error(rule, h))))
+        # a free step obeys x_2 - 2 cos(angle) x_1 + x_0 = 0
+        np.testing.assert_allclose(x[2:] + x[:-2], 2.0 * np.cos(angle) * x[1:-1], atol=1e-12)
+
+
+def test_stability_limits():
+    assert stability_limit(LINEAR_ACCELERATION) == pytest.approx(0.5513288954, abs=1e-10)
+    assert stability_limit(CENTRAL_DIFFERENCE) == pytest.approx(0.3183098862, abs=1e-10)
+    assert stability_limit(FOX_GOODWIN) == pytest.approx(0.3898484006, abs=1e-10)
+    assert stability_limit(AVERAGE_ACCELERATION) == np.inf
+    assert stability_limit(generalised_alpha(0.3)) == np.inf
+
+
+@pytest.mark.parametrize(
+    "method, rule",
+    [(FIXED[1], LINEAR_ACCELERATION), (FIXED[2], FOX_GOODWIN), (FIXED[3], CENTRAL_DIFFERENCE)],
+)
+def test_steps_beyond_the_limit_are_refused_and_those_below_stay_bounded(method, rule):
+    problem, limit = oscillator(k=(2.0 * np.pi) ** 2), stability_limit(rule)
+    h = 0.999 * limit
+    found = solve_transient(problem, 0.0, h * np.arange(2001), start=([1.0], [0.0]), method=method, step=h)
+    assert np.abs(found.displacement).max() < 100.0
+    with pytest.raises(CaseError, match="E-RANGE") as error:
+        solve_transient(problem, 0.0, [0.0, 100.1 * limit], method=method, step=1.001 * limit)
+    assert f"{limit:.4g}" in error.value.limit
+
+
+def test_a_mesh_counts_in_the_limit_with_its_largest_stiffness():
+    meshes = GearMeshes([0], FourierSeries([[1.0, 0.5]]))
+    shortest = 2.0 * np.pi / np.sqrt(1.5)
+    problem, limit = oscillator(elements=[meshes]), stability_limit(CENTRAL_DIFFERENCE) * shortest
+    solve_transient(problem, 1.0, [0.0, 0.99 * limit], method=FIXED[3], step=0.99 * limit)
+    with pytest.raises(CaseError, match="E-RANGE"):
+        solve_transient(problem, 1.0, [0.0, 1.01 * limit], method=FIXED[3], step=1.01 * limit)
+
+
+def forced_errors(method, counts=(100, 200, 400, 800), **options):
     problem = oscillator(1.0, 0.1, 4.0, force=1.0)
     ends = [
         solve_transient(
-            problem, 3.0, [0.0, 10.0], start=([1.0], [0.0]), method=method, step=10.0 / n
+            problem, 3.0, [0.0, 10.0], start=([1.0], [0.0]), method=method, step=10.0 / n, **options
         ).displacement[-1, 0]
         for n in counts
     ]
@@ -86,6 +148,13 @@ def test_average_acceleration_errors_to_the_digits():
 def test_second_order_in_the_step(method):
     errors = np.abs(forced_errors(method))
     assert np.log2(errors[-2] / errors[-1]) == pytest.approx(2.0, abs=0.015)
+
+
+def test_fox_goodwin_is_of_second_order_and_gamma_above_a_half_of_first():
+    errors = np.abs(forced_errors("Fox-Goodwin"))
+    assert np.log2(errors[-2] / errors[-1]) == pytest.approx(1.99, abs=0.01)
+    errors = np.abs(forced_errors("newmark", gamma=0.6, beta=0.3025))
+    assert np.log2(errors[-2] / errors[-1]) == pytest.approx(0.84, abs=0.1)
 
 
 @pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
@@ -174,7 +243,7 @@ def test_modes_left_out_count_as_static_flexibility(geared_chain):
     np.testing.assert_allclose(part.displacement[2:], full.displacement[2:], atol=2e-3 * size)
 
 
-@pytest.mark.parametrize("method", [*FIXED, "modal"])
+@pytest.mark.parametrize("method", [FIXED[0], FIXED[4], "modal"])
 def test_planet_set_with_backlash_approaches_contact_events_by_the_square_of_the_step(geared_set, method):
     times = np.linspace(0.0, 4.0 * np.pi, 81)
     # the sun turns backwards at first, so that the drive flanks part
@@ -283,6 +352,7 @@ def test_bad_input_is_refused():
         ({"events": True}, "E-CHOICE"),
         ({"start": ([1.0, 2.0], [0.0])}, "E-START"),
         ({"step": -1.0}, "E-RANGE"),
+        ({"method": "newmark", "gamma": 0.4}, "E-RANGE"),
         ({"method": "generalised alpha", "radius": 1.2}, "E-RANGE"),
     ):
         with pytest.raises(CaseError) as error:
