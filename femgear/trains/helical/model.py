@@ -214,12 +214,11 @@ def helical_excitation(
 
     Parameters
     ----------
-    record : MeshExcitation or MeshCycle
+    record : MeshExcitation
         Of the spur gears of the normal section, all of it loaded as the whole helical mesh; stiffnesses and
         deflections along the tooth normals. Their teeth are as long as the contact lines, so that the face
         width is ``b / cos beta_b`` (ISO 6336-1, method B: ``c' b cos beta_b`` in the transverse section).
-        Mesh phases are those at mid-face. A `femgear.contact.cycle.MeshCycle` knows no backlash, which is
-        then zero.
+        Mesh phases are those at mid-face.
     overlap_ratio : float or (n_meshes,) array
         eps_beta, 0 or more.
     slices : int
@@ -242,7 +241,6 @@ def helical_excitation(
     count = len(record.stiffness)
     overlap = np.broadcast_to(np.asarray(overlap_ratio, float), count)
     ahead = slice_phases(np.zeros(count), overlap, slices=slices, hand=hand).reshape(count, slices)
-    backlash = np.broadcast_to(getattr(record, "backlash", 0.0), count)
     filtered = [
         _sliced(values, record.periods, ahead, overlap / slices) / slices
         for values in (record.stiffness, record.force, record.stiffness * record.deflection)
@@ -257,7 +255,7 @@ def helical_excitation(
         stiffness=stiffness,
         deflection=weighted / stiffness,
         force=force,
-        backlash=np.repeat(backlash, slices),
+        backlash=np.repeat(np.broadcast_to(record.backlash, count), slices),
         periods=record.periods,
     )
 

@@ -41,7 +41,8 @@ _INSTANTS = 20_000
 def pieces(stable, wanted: int) -> list[slice]:
     """Find runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
 
-    A segment is drawn once: unknown where one of its ends is, otherwise unstable where one is.
+    A segment between two of the points (p,) is drawn once: unknown where one of its ends is, otherwise
+    unstable where one is.
     """
     stable = np.asarray(stable, int)
     return runs(np.minimum(stable[:-1], stable[1:]) == wanted)
