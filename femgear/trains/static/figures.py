@@ -356,7 +356,7 @@ def _crossing(slope, arc, angle) -> float | None:
 
 
 def _four_panels(draw: Callable[[int, Any], str], y: str, *, columns: int, sharex: bool = False) -> Figure:
-    """Draw sun, planets (either side) and ring in panels of one scale; `draw(panel, axes)` gives titles."""
+    """Draw sun, planets (either side) and ring in panels of one scale; ``draw(panel, axes)`` gives titles."""
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharex=sharex, sharey=True)
     for number, ax in enumerate(axes):
         label(ax, title=draw(number, ax))
