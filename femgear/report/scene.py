@@ -24,7 +24,7 @@ from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
-from femgear.storage.files import replace_file
+from femgear.storage.files import replace_file, write_bytes
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -370,8 +370,7 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
         plotter.close()
     stream = io.BytesIO()
     iio.imwrite(stream, image, extension=".png")
-    data = stream.getvalue()
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+    write_bytes(stream.getvalue(), path)
 
 
 _SECONDS = 6.0

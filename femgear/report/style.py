@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from femgear.storage.files import replace_file
+from femgear.storage.files import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -115,8 +115,7 @@ def save_figure(figure: Figure, path: str | os.PathLike) -> None:
     StorageError
         When the file cannot be written.
     """
-    data = png_bytes(figure)
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+    write_bytes(png_bytes(figure), path)
 
 
 def png_bytes(figure: Figure) -> bytes:
