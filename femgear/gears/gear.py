@@ -102,7 +102,10 @@ class Gear:
     name: str = field(default="gear", compare=False)
 
     def __post_init__(self):
-        _check_gear(self)
+        _check_numbers(self)
+        _check_circles(self)
+        _check_tool(self)
+        _check_flank(self)
 
     @property
     def reference_radius(self) -> float:
@@ -288,14 +291,6 @@ def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
         gap_angle=math.pi / gear.teeth,
         end_angle=0.5 * math.pi - working,
     )
-
-
-def _check_gear(gear: Gear) -> None:
-    """Refuse a gear that cannot be made; see the errors of `Gear`."""
-    _check_numbers(gear)
-    _check_circles(gear)
-    _check_tool(gear)
-    _check_flank(gear)
 
 
 def _check_numbers(gear: Gear) -> None:

@@ -34,7 +34,7 @@ from femgear.contact.assembly import (
     in_windows,
     mesh_windows,
 )
-from femgear.contact.flank_pairs import mesh_pairs, separation
+from femgear.contact.flank_pairs import mesh_pairs, separation, tooth_steps
 from femgear.contact.pivoting import factor
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
@@ -256,9 +256,7 @@ def _touching(solved: PlanetarySet, setup, numbers, cells) -> _TouchingCells:
     mesh, pair, cell, weight = (np.concatenate([c[i] for c in cells]) for i in range(4))
     place = mesh, numbers[at], pair
     turns = setup.turns[numbers[at]]
-    # with every mesh period the sun's teeth move on by one, those of planets and ring back
-    tooth_1 = setup.tooth[0][mesh, pair] + np.where(mesh < N, -1, 1) * turns
-    tooth_2 = setup.tooth[1][mesh, pair] + turns
+    tooth_1, tooth_2 = (setup.tooth[gear][mesh, pair] + tooth_steps(mesh, gear, N) * turns for gear in (0, 1))
     roll_1, roll_2 = np.zeros((2, len(mesh)))
     for kind, contact in enumerate(mesh_pairs(solved)):
         rows = mesh // N == kind

@@ -13,6 +13,7 @@ again with one unknown a planet. What is lost is the change of C with the loads,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -214,13 +215,10 @@ class Sharing:
     residual : float
         Largest violation: separation of loaded planets over the largest deflection, imbalance and overlap
         likewise.
-    one_by_one : int
-        Samples that Newton's method left to the general contact solver.
     """
 
     share: np.ndarray
     residual: float
-    one_by_one: int
 
     @property
     def factor(self) -> np.ndarray:
@@ -262,7 +260,7 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
             f"pin errors of shape {pins.shape} or not finite", code="E-RANGE", limit=f"(samples, {N}, 2)"
         )
     separation = (pins * model.pin).sum(axis=2)
-    curves, forces = _Curves.of(model), np.full((len(pins), N), model.load / N)
+    curves, forces = _monotone_curves(model), np.full((len(pins), N), model.load / N)
     motions, active = np.zeros((len(pins), m)), np.ones((len(pins), N), bool)
     left = np.arange(len(pins))
     for _ in range(max_steps):
@@ -282,30 +280,25 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
             code="E-CONTACT",
             limit="1e-6",
         )
-    return Sharing(forces / model.load, residual, len(left))
+    return Sharing(forces / model.load, residual)
 
 
-@dataclass(frozen=True)
-class _Curves:
-    """Monotone piecewise cubics through the curves, straight beyond their ends."""
+def _monotone_curves(model: SharingModel) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Deflections (S, N) and their slopes at forces (S, N): piecewise cubics, straight beyond their ends."""
+    if not np.all(np.diff(model.deflection, axis=1) > 0):
+        raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
+    values = [PchipInterpolator(model.force, row) for row in model.deflection]
+    slopes = [one.derivative() for one in values]
 
-    value: tuple
-    slope: tuple
-    last: float
-
-    @classmethod
-    def of(cls, model: SharingModel) -> _Curves:
-        if not np.all(np.diff(model.deflection, axis=1) > 0):
-            raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
-        found = [PchipInterpolator(model.force, row) for row in model.deflection]
-        return cls(tuple(found), tuple(f.derivative() for f in found), float(model.force[-1]))
-
-    def at(self, forces):
-        """Deflections and their slopes at (S, N) forces."""
-        inside = np.clip(forces, 0.0, self.last)
-        slope = np.stack([f(inside[:, n]) for n, f in enumerate(self.slope)], axis=1)
-        value = np.stack([f(inside[:, n]) for n, f in enumerate(self.value)], axis=1)
+    def at(forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        inside = np.clip(forces, 0.0, model.force[-1])
+        value, slope = (
+            np.stack([one(inside[:, n]) for n, one in enumerate(curves)], axis=1)
+            for curves in (values, slopes)
+        )
         return value + slope * (forces - inside), slope
+
+    return at
 
 
 def _newton(model, curves, separation, forces, active):
@@ -313,7 +306,7 @@ def _newton(model, curves, separation, forces, active):
     S, N = forces.shape
     G, m = model.approach, model.approach.shape[1]
     unit = float(model.deflection[:, -1].mean() / model.load)
-    value, slope = curves.at(forces)
+    value, slope = curves(forces)
     matrix = np.zeros((S, N + m, N + m))
     matrix[:, :N, :N] = model.coupling / unit
     matrix[:, np.arange(N), np.arange(N)] += slope / unit
@@ -341,7 +334,7 @@ def _one(model, curves, separation):
     load[0] = model.load
     forces = np.full((1, N), model.load / N)
     for step in range(200):
-        value, slope = curves.at(forces)
+        value, slope = curves(forces)
         gap = (value - slope * forces)[0] + separation
         state = solve_contact(model.coupling + np.diag(slope[0]), gap, model.approach, load)
         change = np.abs(state.loads - forces[0]).max()
@@ -353,7 +346,7 @@ def _one(model, curves, separation):
 
 def _residual(model, curves, separation, forces, motions) -> float:
     """Largest violation of contact and equilibrium over all samples."""
-    value, _ = curves.at(forces)
+    value, _ = curves(forces)
     gap = value + forces @ model.coupling + separation - motions @ model.approach.T
     gap = np.where(forces > 0, np.abs(gap), np.maximum(-gap, 0.0)).max() / model.deflection[:, -1].max()
     load = np.zeros(model.approach.shape[1])

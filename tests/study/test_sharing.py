@@ -301,5 +301,5 @@ def test_newton_agrees_with_the_general_contact_solver(sun):
     model = replace(model, deflection=4e-6 * (model.deflection / model.deflection.max()) ** 0.7)
     pins = pin_samples(5, samples=60, radial=1e-6, tangential=3e-6, seed=9)
     fast, slow = sharing_of_samples(model, pins), sharing_of_samples(model, pins, max_steps=0)
-    assert slow.one_by_one == 60 and fast.open_planets.any()
+    assert fast.open_planets.any()
     np.testing.assert_allclose(fast.share, slow.share, atol=1e-7)
