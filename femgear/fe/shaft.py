@@ -82,7 +82,7 @@ class ShaftSection:
         return 6.0 * (1.0 + nu) * both / ((7.0 + 6.0 * nu) * both + (20.0 + 12.0 * nu) * m2)
 
     def shear_ratio(self, length: float) -> float:
-        """``Phi = 12 E I / (kappa G A l^2)``: deflection by shear over that by bending."""
+        """``Phi = 12 E I / (kappa G A l^2)`` at a length [m]: deflection by shear over that by bending."""
         shear = self.shear_coefficient * self.shear_modulus * self.area
         return 12.0 * self.young * self.second_moment / (shear * length**2)
 
@@ -125,8 +125,8 @@ def joint_springs(section: ShaftSection, length: float) -> JointSprings:
 def joint_deflections(length: float) -> np.ndarray:
     """Rows (5, 10) of the joint's deflections: shear along x and y, bend about x and y, twist.
 
-    Each link moves with the station at its end; a tilt about y moves the joint along x, one about x along
-    -y.
+    Each link, half the length [m] of the shaft, moves with the station at its end; a tilt about y moves the
+    joint along x, one about x along -y.
     """
     half = 0.5 * length
     first, second = np.eye(5), np.eye(5)
@@ -136,7 +136,7 @@ def joint_deflections(length: float) -> np.ndarray:
 
 
 def beam_element(section: ShaftSection, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass, stiffness and gyroscopic matrix (10, 10) of an element between two stations.
+    """Mass, stiffness and gyroscopic matrix (10, 10) of an element of a length [m] between two stations.
 
     Returns
     -------
@@ -180,6 +180,7 @@ def _mass_terms(l: float, phi: float) -> tuple[np.ndarray, np.ndarray]:
 def disc_matrices(mass: float, polar: float, transverse: float) -> tuple[np.ndarray, np.ndarray]:
     """Mass (5, 5) and gyroscopic matrix (5, 5) of a rigid disc on its station.
 
+    Its mass is in kg, its polar and transverse moments of inertia I_p and I_t are in kg m^2:
     ``I_t tilt_x'' + I_p Omega tilt_y' = moment``, ``I_t tilt_y'' - I_p Omega tilt_x' = moment``.
     """
     G = np.zeros((5, 5))
@@ -218,10 +219,10 @@ class ShaftStep:
 
 
 def timoshenko_flexibility(steps: Sequence[ShaftStep], material) -> np.ndarray:
-    """Deflection and tilt of the free end of a stepped cantilever per unit force and moment, (2, 2).
+    """Deflection [m] and tilt [rad] of the end of a stepped cantilever per force [N] and moment [N m].
 
     Unit-load integrals of ``M^2/(E I) + Q^2/(kappa G A)`` (S. Timoshenko, Strength of Materials, part I),
-    from the held end to the free one.
+    from the held end to the free one; a (2, 2) array.
     """
     far = sum(step.length for step in steps)
     result = np.zeros((2, 2))

@@ -341,7 +341,7 @@ def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
     ``z1/z2 (phi1 + inv(aa1) - inv(aw)) + inv(aw) - inv(aa2) - phi2`` with the angles phi1, phi2 of the
     crossing of both tip circles at the two centres (Colbourne, The Geometry of Involute Gears, ch. 8):
     negative means that the teeth strike each other outside the path of contact. ``inf`` when the tip
-    circles do not cross.
+    circles do not cross. The centre distance is in m.
     """
     a, tip_1, tip_2 = centre_distance, planet.tip_radius, ring.tip_radius
     cos_1 = (tip_2**2 - tip_1**2 - a**2) / (2.0 * a * tip_1)
@@ -355,7 +355,7 @@ def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
 
 
 def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None:
-    """Refuse an internal pair whose tips strike each other outside the path of contact (E-INTERFERENCE)."""
+    """Refuse tips that strike each other outside the path of contact (E-INTERFERENCE), see `tip_margin`."""
     margin = tip_margin(planet, ring, centre_distance)
     if margin < 0.0:
         raise GeometryError(

@@ -158,7 +158,7 @@ class Gear:
 
     @cached_property
     def fillet_end(self) -> float:
-        """Parameter ``theta`` [rad] of the tool's `fillet_point` where fillet and involute meet."""
+        """Direction ``theta`` [rad], see `CutterTip.fillet_point`, where fillet and involute meet."""
         if self.undercut and isinstance(self.tool, RackTip):
             return self.tool.undercut_end(self.base_radius, self.base_half_angle)
         return self.tool.end_angle

@@ -52,12 +52,15 @@ class NominalRootStress:
 
 
 def zone_factor(pressure_angle: float, working_angle: float) -> float:
-    """Z_H = ``sqrt(2 cos(alpha_w) / (cos^2(alpha) sin(alpha_w)))`` of spur gears (ISO 6336-2, section 6)."""
+    """Z_H = ``sqrt(2 cos(alpha_w) / (cos^2(alpha) sin(alpha_w)))`` of spur gears (ISO 6336-2, section 6).
+
+    Pressure angle alpha and working pressure angle alpha_w are in rad.
+    """
     return math.sqrt(2.0 / math.tan(working_angle)) / math.cos(pressure_angle)
 
 
 def elasticity_factor(youngs_modulus: float, poisson_ratio: float) -> float:
-    """Z_E = ``sqrt(E / (2 pi (1 - nu^2)))`` [Pa^0.5] of two gears of one material (ISO 6336-2, section 7)."""
+    """Z_E = ``sqrt(E / (2 pi (1 - nu^2)))`` [Pa^0.5] of one material, E in Pa (ISO 6336-2, section 7)."""
     return math.sqrt(youngs_modulus / (2.0 * math.pi * (1.0 - poisson_ratio**2)))
 
 

@@ -298,7 +298,10 @@ def add_coloured(
     limits=None,
     colours: int = 256,
 ) -> None:
-    """Add a mesh coloured by its point data `text`, with a colour bar of that title under the scene."""
+    """Add a mesh coloured by its point data `text`, with a colour bar of that title under the scene.
+
+    ``limits`` are those of the colours, in the unit of the data; the picture has ``size`` pixels a side.
+    """
     plotter.add_mesh(
         mesh,
         scalars=text,
@@ -348,7 +351,7 @@ def rounded(value: float) -> str:
 
 
 def look_down(plotter: pv.Plotter, half_height: float) -> None:
-    """Set a parallel view on the plane of the set [m], with room for title and colour bar."""
+    """Set a parallel view on the plane of the set, half as high as given [m] and more for title and bar."""
     view: Any = plotter  # its methods have decorators that hide what they take
     view.set_background("white")
     view.view_xy()

@@ -36,7 +36,7 @@ def new_figure(
     sharey: bool = False,
     polar: bool = False,
 ):
-    """Make a figure outside pyplot, and its axes as a flat list.
+    """Make a figure outside pyplot, width and height in inches, and its axes as a flat list.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = Fal
 
 
 def periodic(position, values):
-    """Append the first sample at the end of a record of whole periods, so that the curve closes."""
+    """Append the first sample to positions (P,) and values (..., P) of whole periods: the curve closes."""
     position, values = np.asarray(position), np.asarray(values)
     length = np.floor(position[-1] - position[0]) + 1.0
     return np.append(position, length + position[0]), np.concatenate([values, values[..., :1]], axis=-1)

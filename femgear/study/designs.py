@@ -293,7 +293,9 @@ class Enough(Exception):
 
 
 class Evaluations:
-    """Costs of designs as a search sees them; use `evaluations`.
+    """Costs of designs as a search sees them; points x are (n,) in the units of the variables.
+
+    Use `evaluations`.
 
     Attributes
     ----------
@@ -415,7 +417,7 @@ class Tolerance:
     more: dict[str, float]
 
     def slope(self, name: str, value: float) -> tuple[float, float]:
-        """Rise of a quantity per unit of the variable towards less and towards more.
+        """Rise of a quantity, from its value [SI], per unit of the variable towards less and towards more.
 
         Both are positive at a corner, where a derivative does not exist.
         """

@@ -339,7 +339,7 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
 
 
 def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
-    """Middle of the bounds, and a Latin hypercube of ``count`` points."""
+    """Middle of the bounds, and a Latin hypercube of ``count`` points, (1 + count, n)."""
     from scipy.stats.qmc import LatinHypercube
 
     low, high = problem.bounds.T
@@ -355,8 +355,8 @@ def polish(
     The simplex may collapse before it reaches a minimum (K. I. M. McKinnon, SIAM J. Optim. 9, 1998,
     148-158): it begins again, half as large, from where it ended.
 
-    ``size`` is that of the first simplex over the ranges, ``rounds`` the number of simplexes one after the
-    other. The other method is Powell's.
+    ``cost`` and start ``x0`` (n,) are in the units of the variables, ``size`` is that of the first simplex
+    over the ranges, ``rounds`` the number of simplexes one after the other. The other method is Powell's.
     """
     low, high = run.problem.bounds.T
     width, n = high - low, len(low)
