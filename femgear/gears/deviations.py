@@ -479,6 +479,5 @@ def _wedging(d: SetDeviations, s: PlanetarySet):
             "set.backlash",
             f"pin errors and other deviations may exceed the backlash by {-least * 1e6:.3f} um {where} "
             f"(ideal gears have {nominal * 1e6:.3f} um): loaded and back flanks may touch at once",
-            least,
             "play of 0 um or more",
         )

@@ -34,19 +34,16 @@ PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
 
 @dataclass(frozen=True)
 class GeometryWarning(Finding):
-    """A finding on gears, with the number that drew it.
+    """A finding on gears, with what is usual.
 
     Parameters
     ----------
     code, key, text : str
         As of `femgear.errors.Finding`.
-    value : float
-        The number that drew the warning.
     limit : str
         What would not be warned about.
     """
 
-    value: float
     limit: str
 
     def __str__(self) -> str:
