@@ -215,8 +215,7 @@ def _solve(solved: DesignBasis, load: float, numbers, options):
             previous = (problem, state.active)
             answers.append(_answer(problem, state, members))
             overflow |= problem.touches_window_end(state.active, setup)
-            penetrates = ~setup.near[:, p] & (setup.smallest_gap[:, p] < answers[-1]["deflection"][:, None])
-            outside |= options["contact"] == "profile" and bool(penetrates.any())
+            outside |= options["contact"] == "profile" and setup.missed(p, answers[-1]["deflection"]) > 0.0
         return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
 
     return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * gears.sun.face_width))

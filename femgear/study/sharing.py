@@ -147,9 +147,8 @@ def _paths(solved: DesignBasis, force: float, position: float, contact: str):
         problem = assemble_contact(setup, bodies, 0)
         mesh = problem.mesh[:, None] == np.arange(2 * N)
         state = solve_contact(problem.H, problem.gap, mesh.astype(float), np.full(2 * N, force))
-        outside = ~setup.near[:, 0] & (setup.smallest_gap[:, 0] < state.motions[:, None])
         overflow = problem.touches_window_end(state.active, setup)
-        missed = contact == "profile" and outside.any()
+        missed = contact == "profile" and setup.missed(0, state.motions) > 0.0
         wider = share * (4.0 if overflow else 1.0), nearest * (2.0 if missed else 1.0)
         return (problem, mesh, state), *wider
 

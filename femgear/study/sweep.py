@@ -54,8 +54,6 @@ class Sweep:
         Why, one a point; empty where it can.
     computed : int
         Cases computed now; a journal held the others.
-    seconds : float
-        What a case computed now took on average.
     """
 
     keys: tuple[str, ...]
@@ -64,7 +62,6 @@ class Sweep:
     values: np.ndarray
     errors: tuple[str, ...]
     computed: int
-    seconds: float
 
     @property
     def header(self) -> tuple[str, ...]:
@@ -123,8 +120,7 @@ def sweep(
             if count >= _MANY and i < count - 1 and not warned and designs.computed == _TIMED:
                 warned = True
                 _warn_of_time(count - i - 1, designs.seconds / _TIMED)
-        seconds = designs.seconds / max(designs.computed, 1)
-        return Sweep(keys, points, quantities, table, tuple(errors), designs.computed, seconds)
+        return Sweep(keys, points, quantities, table, tuple(errors), designs.computed)
 
 
 def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity]) -> int:
