@@ -491,13 +491,15 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     variant = evaluations.designs.variant(problem.point(x))
     case, objective = variant.case, problem.objective
     static = variant.static(objective.torque)
-    linear = linearise(
-        DesignBasis(static.planetary_set, static.bodies, static_supports(case), set_deviations(case)),
-        sun_torque=static.sun_torque,
-        positions=case.static.positions,
-        periods=static.cycle.periods,
-        contact=case.static.contact,
+    basis = DesignBasis(
+        static.planetary_set,
+        static.bodies,
+        static_supports(case),
+        set_deviations(case),
+        case.static.positions,
+        case.static.contact,
     )
+    linear = linearise(basis, sun_torque=static.sun_torque, periods=static.cycle.periods)
     n, signal = static.planetary_set.n_planets, objective.signal
     assert signal is not None, "see has_derivatives"
     value = signal(linear.sun_arc, linear.deflection, n)

@@ -21,7 +21,6 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from femgear.contact.assembly import ROUGH_STIFFNESS, assemble_contact, in_windows, mesh_windows
-from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
 from femgear.errors import CaseError, ContactError
@@ -77,8 +76,6 @@ def sharing_model(
     *,
     sun_torque: float,
     position: int = 0,
-    positions: int = 8,
-    contact: str = "profile",
     loads: int = 40,
 ) -> SharingModel:
     """Load-deflection curves of all planets at one position, from the contact problem at several loads.
@@ -89,9 +86,8 @@ def sharing_model(
         Samples add to the pin errors of its deviations.
     sun_torque : float
         [N m]; the curves reach to where one planet carries all of it.
-    position, positions : int
-        Number of the position among those of one mesh period.
-    contact : {"profile", "line_of_action"}
+    position : int
+        Number of the position among those of the basis.
     loads : int
         Points of a curve.
 
@@ -107,15 +103,16 @@ def sharing_model(
     ContactError
     """
     solved, order = basis.loaded(sun_torque)
-    if not 0 <= position < positions:
-        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {positions - 1}")
+    if not 0 <= position < basis.positions:
+        limit = f"0 to {basis.positions - 1}"
+        raise CaseError("no such position", code="E-RANGE", value=position, limit=limit)
     N, load = solved.gears.n_planets, abs(sun_torque) / solved.gears.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
     force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
-    at = (-position if sun_torque < 0 else position) / positions
+    at = (-position if sun_torque < 0 else position) / basis.positions
     deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
     for k, one in enumerate(force):
-        deflection[:, k], coupling[k] = _paths(solved, max(one, 1e-9 * load), at, contact)
+        deflection[:, k], coupling[k] = _paths(solved, max(one, 1e-9 * load), at)
     mean = int(np.abs(force - load / N).argmin())
     between = coupling[mean]
     change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
@@ -136,10 +133,10 @@ def sharing_model(
     )
 
 
-def _paths(solved: DesignBasis, force: float, position: float, contact: str):
+def _paths(solved: DesignBasis, force: float, position: float):
     """Path deflections (N,) and compliance between planets (N, N) with the same force in all meshes."""
     gears, bodies, N = solved.gears, solved.bodies, solved.gears.n_planets
-    place = {"positions": np.array([position]), "contact": contact, "deviations": solved.deviations}
+    place = {"positions": np.array([position]), "contact": solved.contact, "deviations": solved.deviations}
 
     def attempt(share: float, nearest: float):
         setup = mesh_windows(gears, bodies, share=share, cells=36, nearest=nearest, **place)
@@ -148,7 +145,7 @@ def _paths(solved: DesignBasis, force: float, position: float, contact: str):
         mesh = problem.mesh[:, None] == np.arange(2 * N)
         state = solve_contact(problem.H, problem.gap, mesh.astype(float), np.full(2 * N, force))
         overflow = problem.touches_window_end(state.active, setup)
-        missed = contact == "profile" and setup.missed(0, state.motions) > 0.0
+        missed = solved.contact == "profile" and setup.missed(0, state.motions) > 0.0
         wider = share * (4.0 if overflow else 1.0), nearest * (2.0 if missed else 1.0)
         return (problem, mesh, state), *wider
 
@@ -355,15 +352,7 @@ def _residual(model, curves, separation, forces, motions) -> float:
 
 
 @one_blas_thread()
-def walked_shares(
-    basis: DesignBasis,
-    pins,
-    *,
-    sun_torque: float,
-    position: int = 0,
-    positions: int = 8,
-    contact: str = "profile",
-) -> np.ndarray:
+def walked_shares(basis: DesignBasis, pins, *, sun_torque: float, position: int = 0) -> np.ndarray:
     """Shares (S, N) of a few samples from the whole contact problem, to check `sharing_of_samples`.
 
     Arguments as for `sharing_model`, with the pin errors ``pins`` (S, N, 2) [m].
@@ -371,14 +360,7 @@ def walked_shares(
     base = no_deviations(basis.gears) if basis.deviations is None else basis.deviations
     shares = []
     for errors in np.asarray(pins, float):
-        cycle = walk_mesh_cycle(
-            basis.gears,
-            basis.bodies,
-            sun_torque=sun_torque,
-            positions=positions,
-            contact=contact,
-            supports=basis.supports,
-            deviations=replace(base, pin_errors=base.pin_errors + errors),
-        )
+        moved = replace(base, pin_errors=base.pin_errors + errors)
+        cycle = replace(basis, deviations=moved).walk(sun_torque)
         shares.append(cycle.load_share[:, position])
     return np.array(shares)
