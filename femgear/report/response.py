@@ -396,6 +396,6 @@ def shown_speeds(data: xr.Dataset) -> list[int]:
     return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
 
 
-def some_speeds(count: int, limit: int = 4) -> list[int]:
-    """Choose at most `limit` speeds, spread evenly."""
-    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, limit))})
+def some_speeds(count: int) -> list[int]:
+    """Choose at most four of so many speeds, spread evenly."""
+    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, 4))})

@@ -130,8 +130,10 @@ def family(name: str) -> str:
     return "planet-ring" if "ring" in name else "sun-planet"
 
 
-def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = False) -> list[tuple[str, int]]:
+def distinct_lines(names, values, *, partly: bool = False) -> list[tuple[str, int]]:
     """Rows of `values` to draw: one for a family of meshes whose rows agree, each row otherwise.
+
+    Rows agree that differ by less than a millionth of the largest value.
 
     Parameters
     ----------
@@ -139,8 +141,6 @@ def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = Fal
         Mesh labels.
     values : (n, ...) array
         One row a mesh.
-    tolerance : float
-        Largest difference of rows counted as equal, relative to the largest value.
     partly : bool
         Also one for some meshes of a family whose rows agree.
 
@@ -150,7 +150,7 @@ def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = Fal
         Legend text and row number.
     """
     values, names = np.asarray(values), [str(name) for name in names]
-    limit = tolerance * np.abs(values).max(initial=0.0)
+    limit = 1e-6 * np.abs(values).max(initial=0.0)
     lines = []
     for kind in dict.fromkeys(family(name) for name in names):
         rows = [i for i, name in enumerate(names) if family(name) == kind]
