@@ -321,14 +321,10 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
 
     Parameters
     ----------
-    grid : Grid
-        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
-    stiffness : (2n, 2n) sparse matrix
-        [N/m].
+    grid, stiffness, held
+        As for `condense_sector`.
     loads : (count, 2n) array
         Nodal forces of each sector in its own frame [N], none on the cuts.
-    held : str or None
-        Boundary that cannot move.
 
     Returns
     -------
