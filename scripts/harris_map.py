@@ -83,12 +83,7 @@ def main(
         progress("compliance", 1, 1)
         options = {"length": length, "back": back}
         variants = [with_tip_relief(basis.deviations, gears, amount=a, **options) for a in amounts]
-        found = harris_map(
-            basis,
-            torques=on_sun,
-            deviations=variants,
-            progress=lambda done, total: progress("contact", done, total),
-        )
+        found = harris_map(basis, torques=on_sun, deviations=variants, progress=progress)
     write_csv(folder / "harris_map.csv", HEADER, _records(amounts, inputs, found))
     names = [f"relief {a * 1e6:g} µm" for a in amounts]
     figure = harris_curves(inputs, found.peak_to_peak, names, design=data.operation.torque)

@@ -153,7 +153,7 @@ def _search(basis, amounts, on_sun, target, power, progress):
         lengths=np.linspace(0.4, 1.2, len(amounts)),
         torques=on_sun,
         power=power,
-        progress=lambda done, total: progress("contact", done, total),
+        progress=progress,
     )
     progress("optimum", 0, 1)
     best = optimise_relief(basis, grid, torque=target, power=power)

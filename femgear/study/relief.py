@@ -25,7 +25,7 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.kinematics import torques
 from femgear.gears.modifications import FlankForm, TipRelief
-from femgear.trains.protocol import one_blas_thread
+from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.static.stages import flank_compliances, static_supports
 
 if TYPE_CHECKING:
@@ -209,7 +209,7 @@ def harris_map(
     *,
     torques,
     deviations: Sequence[SetDeviations | None],
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> HarrisMap:
     """Transmission error peak to peak over torque for a list of deviations.
 
@@ -222,7 +222,7 @@ def harris_map(
     deviations : sequence of SetDeviations or None
         One a curve; the record spans the common period of each.
     progress : callable, optional
-        Called with (mesh cycles done, mesh cycles).
+        Called with (stage, mesh cycles done, mesh cycles).
 
     Raises
     ------
@@ -245,7 +245,7 @@ def harris_map(
             overall[v, t] = np.ptp(cycle.sun_arc)
             residual = max(residual, float(cycle.residual.max()))
             if progress is not None:
-                progress(v * len(torques) + t + 1, peaks[:, 0].size)
+                progress("contact", v * len(torques) + t + 1, peaks[:, 0].size)
     return HarrisMap(torques, peaks, overall, residual)
 
 
@@ -287,7 +287,7 @@ def relief_grid(
     lengths,
     torques,
     power: float = 1.0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> ReliefGrid:
     """Transmission error of the sun-planet meshes over amount and length of their tip relief.
 
