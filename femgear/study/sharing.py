@@ -104,8 +104,8 @@ def sharing_model(
     """
     solved, order = basis.loaded(sun_torque)
     if not 0 <= position < basis.positions:
-        limit = f"0 to {basis.positions - 1}"
-        raise CaseError("no such position", code="E-RANGE", value=position, limit=limit)
+        last = basis.positions - 1
+        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {last}")
     N, load = solved.gears.n_planets, abs(sun_torque) / solved.gears.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
     force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
