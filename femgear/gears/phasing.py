@@ -98,22 +98,15 @@ class MeshPhasing:
         return self.rotation * sun, self.rotation * self.ring_teeth
 
     @property
-    def ring_lag(self) -> float:
-        """Periods by which the ring mesh of a planet comes after its sun mesh; the sense and the flank count.
-
-        Turning back runs through the same contacts in the opposite order; the other flanks are the drive
-        flanks of the mirror image, which turns the other way.
-        """
-        return self.rotation * self.flank * self.lag
-
-    @property
     def phases(self) -> np.ndarray:
         """gamma_j in [0, 1), (2N,), sun meshes first; zero for "sun-planet 1".
 
-        With the convention "rotation" those of `PlanetarySet.mesh_phases`.
+        With the convention "rotation" those of `PlanetarySet.mesh_phases`. The ring mesh of a planet comes
+        after its sun mesh by the lag: turning back runs through the same contacts in the opposite order, and
+        the other flanks are the drive flanks of the mirror image, which turns the other way.
         """
         steps = np.mod(np.outer(self.turns, self.positions), self.teeth_sum)
-        phase = steps / self.teeth_sum - np.array([[0.0], [self.ring_lag]])
+        phase = steps / self.teeth_sum - np.array([[0.0], [self.rotation * self.flank * self.lag]])
         phase = np.mod(phase.ravel(), 1.0)
         return np.where(phase > 1.0 - 1e-12, 0.0, phase)
 
