@@ -44,7 +44,7 @@ _WRITTEN = {
 
 
 class Journal(dict[str, dict]):
-    """Records by key as first written, in memory and, where `open_designs` made it, on disk."""
+    """Records by key in their order, in memory and, where `open_designs` made it, on disk."""
 
     def __init__(self, path: Path | None = None, stream: BinaryIO | None = None):
         super().__init__()
