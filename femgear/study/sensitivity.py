@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cho_solve
 
+from femgear.contact.active_set import factor
 from femgear.contact.assembly import (
     ROUGH_STIFFNESS,
     assemble_contact,
@@ -35,7 +36,6 @@ from femgear.contact.assembly import (
     mesh_windows,
 )
 from femgear.contact.flank_pairs import mesh_pairs, separation, tooth_steps
-from femgear.contact.pivoting import factor
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
 from femgear.errors import CaseError
@@ -213,7 +213,8 @@ def _solve(solved: DesignBasis, load: float, position: np.ndarray, numbers):
             previous = (problem, state.active)
             answers.append(_answer(problem, state, members))
             overflow |= problem.touches_window_end(state.active, setup)
-            outside |= solved.contact == "profile" and setup.missed(p, answers[-1]["deflection"]) > 0.0
+            missed = setup.missed([p], answers[-1]["deflection"][:, None])
+            outside |= solved.contact == "profile" and bool(missed.any())
         return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
 
     return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * gears.sun.face_width))

@@ -145,7 +145,7 @@ def _paths(solved: DesignBasis, force: float, position: float):
         mesh = problem.mesh[:, None] == np.arange(2 * N)
         state = solve_contact(problem.H, problem.gap, mesh.astype(float), np.full(2 * N, force))
         overflow = problem.touches_window_end(state.active, setup)
-        missed = solved.contact == "profile" and setup.missed(0, state.motions) > 0.0
+        missed = solved.contact == "profile" and setup.missed([0], state.motions[:, None]).any()
         wider = share * (4.0 if overflow else 1.0), nearest * (2.0 if missed else 1.0)
         return (problem, mesh, state), *wider
 
