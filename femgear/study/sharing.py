@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from femgear.contact.assembly import ROUGH_STIFFNESS, assemble_contact, in_windows, mesh_windows
 from femgear.contact.solve import solve_contact
@@ -281,6 +280,8 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
 
 def _monotone_curves(model: SharingModel) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Deflections (S, N) and their slopes at forces (S, N): piecewise cubics, straight beyond their ends."""
+    from scipy.interpolate import PchipInterpolator
+
     if not np.all(np.diff(model.deflection, axis=1) > 0):
         raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
     values = [PchipInterpolator(model.force, row) for row in model.deflection]
