@@ -16,6 +16,12 @@ from femgear.fe import meshing
 from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_outline, mesh_outlines
 
 
+@pytest.fixture(autouse=True)
+def real_gmsh(monkeypatch):
+    """No grid from another test."""
+    monkeypatch.setattr(meshing, "_run_gmsh", meshing._run_gmsh.__wrapped__)
+
+
 def polygon(corners, *, name="edge", divide=1):
     """Closed polygon as one curve per side."""
     corners = np.asarray(corners, dtype=float)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from page_examples import check_documented, undocumented_keys
+from page_examples import undocumented_keys
 from published.multistage_example import CASES
 
 from femgear import cli, open_results
@@ -88,18 +88,6 @@ def test_sections_that_repeat_are_points(results):
         "no",
         "not told",
     }
-
-
-@pytest.mark.parametrize(
-    ("heading", "stage"),
-    [
-        ("### Response of gear pairs: response.nc", "response"),
-        ("### Sweeps of gear pairs: sweep.nc", "sweep"),
-        ("### Chaos of gear pairs: chaos.nc", "chaos"),
-    ],
-)
-def test_results_page_names_every_variable(results, heading, stage):
-    check_documented(results.stage(stage), heading)
 
 
 def test_case_page_names_every_key():
