@@ -1,11 +1,14 @@
 """Makes the modules that several tests share, and those of scripts, importable by name; shared fixtures."""
 
-import functools
-import os
+import contextlib
+import importlib.util
+import io
+import signal
+import subprocess
 import sys
+import threading
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 TESTS = Path(__file__).parent
@@ -16,28 +19,31 @@ from small_systems import chain_excitation, geared_chain, planet_excitation, pla
 
 
 @pytest.fixture(scope="session", autouse=True)
-def grids_are_made_once(tmp_path_factory):
-    """One process of Gmsh for each outline, whatever tests and workers ask for it.
+def gmsh_is_loaded_once():
+    """The worker of Gmsh runs within the tests: to start a process takes ten times as long as a grid.
 
-    The real function stays reachable as ``meshing._run_gmsh.__wrapped__``.
+    tests/fe/test_meshing.py has the process back.
     """
     from femgear.fe import meshing
 
-    # workers of pytest-xdist have folders of their own below a common one
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "outlines"
-    folder.mkdir(exist_ok=True)
+    spec = importlib.util.spec_from_file_location("gmsh_worker", meshing.WORKER)
+    worker = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(worker)
+    # Gmsh has one global model
+    one_at_a_time = threading.Lock()
 
-    @functools.wraps(meshing._run_gmsh)
-    def run_once(plan):
-        path = folder / f"{meshing._content_hash(plan)}.npz"
-        if not path.exists():
-            made = path.with_suffix(f".{os.getpid()}.{id(plan)}.npz")
-            np.savez(made, **run_once.__wrapped__(plan))
-            made.replace(path)
-        with np.load(path) as file:
-            return dict(file)
+    class Within:
+        TimeoutExpired, DEVNULL = subprocess.TimeoutExpired, subprocess.DEVNULL
+
+        @staticmethod
+        def run(command, **_):
+            said = io.StringIO()
+            with one_at_a_time, contextlib.redirect_stderr(said):
+                code = worker.main(*command[-2:])
+                if hasattr(signal, "alarm"):
+                    signal.alarm(0)
+            return subprocess.CompletedProcess(command, code, "", said.getvalue())
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(meshing, "_run_gmsh", run_once)
+        patch.setattr(meshing, "subprocess", Within)
         yield

@@ -17,9 +17,8 @@ from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_o
 
 
 @pytest.fixture(autouse=True)
-def real_gmsh(monkeypatch):
-    """No grid from another test."""
-    monkeypatch.setattr(meshing, "_run_gmsh", meshing._run_gmsh.__wrapped__)
+def a_process_for_every_grid(monkeypatch):
+    monkeypatch.setattr(meshing, "subprocess", subprocess)
 
 
 def polygon(corners, *, name="edge", divide=1):
