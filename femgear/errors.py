@@ -201,8 +201,8 @@ def _one_line(value: object, limit: int = 120) -> str:
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
-class CaseError(FemgearError):
-    """The case file cannot be used as it stands."""
+class CaseError(FemgearError, ValueError):
+    """The case file cannot be used as it stands; a `ValueError`, so that pydantic collects it."""
 
     exit_code = 2
     default_code = "E-CASE"

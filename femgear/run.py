@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from femgear.report.page import write_pictures, write_report
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, folder_lock, record
-from femgear.trains.protocol import Context, Drawn, Progress, Stage, one_blas_thread
+from femgear.trains.protocol import Drawn, Progress, Stage, one_blas_thread
 from femgear.trains.reading import open_results
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -29,7 +29,13 @@ def grid_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "femgear" / "meshes"
 
 
-def solve(case: Any, only: str | None = None, *, progress: Progress | None = None) -> dict[str, Any]:
+def solve(
+    case: Any,
+    only: str | None = None,
+    *,
+    progress: Progress | None = None,
+    done: Callable[[Stage, Any, float], None] | None = None,
+) -> dict[str, Any]:
     """Compute the stages of a case in memory: transmission error, modes, vibration, whatever its train has.
 
     Parameters
@@ -40,6 +46,8 @@ def solve(case: Any, only: str | None = None, *, progress: Progress | None = Non
         Last stage to compute; it is computed with what it needs.
     progress : callable, optional
         Called with (stage, done, total).
+    done : callable, optional
+        Called with every stage, its result and its seconds as soon as it is computed.
 
     Returns
     -------
@@ -52,23 +60,22 @@ def solve(case: Any, only: str | None = None, *, progress: Progress | None = Non
         Before anything is computed: what the stages cannot represent; E-STAGE: no such stage.
     """
     check_case(case, only)
-    context = Context(grid_cache(), progress)
-    return {stage.name: result for stage, result, _ in _solved(case, only, context)}
-
-
-def _solved(case: Any, only: str | None, context: Context) -> Iterator[tuple[Stage, Any, float]]:
-    """Stages of a case with their results and seconds, one after the other."""
     stages = stages_of(case, only)
     if only is not None:
         case = stages[-1].asked(case)
-    results, say = {}, context.progress or (lambda name, done, total: None)
+    results, options = {}, {"cache": grid_cache(), "progress": progress}
     with one_blas_thread():
         for stage in stages:
-            say(stage.name, 0, 1)
+            if progress is not None:
+                progress(stage.name, 0, 1)
             start = time.perf_counter()
-            results[stage.name] = stage.solve(case, results, context)
-            yield stage, results[stage.name], time.perf_counter() - start
-            say(stage.name, 1, 1)
+            given = {name: options[name] for name in stage.options}
+            results[stage.name] = stage.solve(case, *map(results.get, stage.takes), **given)
+            if done is not None:
+                done(stage, results[stage.name], time.perf_counter() - start)
+            if progress is not None:
+                progress(stage.name, 1, 1)
+    return results
 
 
 def run_case(
@@ -93,23 +100,22 @@ def run_case(
     progress : callable, optional
         Called with (stage, done, total).
     """
-    cache = grid_cache()
     check_case(case, only)
     write_text(case.source, folder / "case.toml")
-    names, timings, convergence = ["case.toml"], {}, {}
+    names, timings, convergence, data = ["case.toml"], {}, {}, {}
     record(folder, names, timings=timings, convergence=convergence)
-    results, data = {}, {}
-    for stage, result, seconds in _solved(case, only, Context(cache, progress)):
-        name = stage.name
-        results[name], timings[name] = result, seconds
-        data[name] = result.dataset()
-        write_dataset(data[name], folder / f"{name}.nc")
-        names.append(f"{name}.nc")
-        convergence[name] = stage.verdict(result)
+
+    def write(stage: Stage, result: Any, seconds: float) -> None:
+        data[stage.name] = result.dataset()
+        write_dataset(data[stage.name], folder / f"{stage.name}.nc")
+        names.append(f"{stage.name}.nc")
+        timings[stage.name], convergence[stage.name] = seconds, stage.verdict(result)
         record(folder, names, timings=timings, convergence=convergence)
+
+    results = solve(case, only, progress=progress, done=write)
     if pictures:
         start = time.perf_counter()
-        drawn = Drawn(case, data, results, cache)
+        drawn = Drawn(case, data, results, grid_cache())
         names += write_pictures(folder, train_of(case), drawn, progress=progress)
         timings["pictures"] = time.perf_counter() - start
     finish(folder, names, timings=timings, convergence=convergence)

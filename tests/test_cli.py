@@ -368,7 +368,7 @@ def test_an_interrupted_run_says_how_far_it_came(tmp_path, capsys, monkeypatch):
         return SimpleNamespace(dataset=lambda: dataset)
 
     stages = tuple(
-        replace(one, solve=lambda *_, name=one.name: solve(name), verdict=lambda _: {})
+        replace(one, solve=lambda *_, name=one.name, **__: solve(name), verdict=lambda _: {})
         for one in registry.ELASTIC.stages
     )
     monkeypatch.setattr(registry, "TRAINS", (replace(registry.ELASTIC, stages=stages),))

@@ -25,7 +25,7 @@ from femgear.gears.kinematics import unheld_members
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-_LEAST_TORQUE = 1e-6
+LEAST_TORQUE = 1e-6
 """Smallest torque that is told from none [N m]."""
 
 
@@ -49,13 +49,13 @@ def _check_operation(case: Case):
         )
     if len(set(operation.speeds)) < len(operation.speeds):
         yield CaseError("a speed is given twice", code="E-DUPLICATE", key="operation.speeds")
-    if 0.0 < abs(operation.torque) < _LEAST_TORQUE:
+    if 0.0 < abs(operation.torque) < LEAST_TORQUE:
         yield CaseError(
             "the torque is too small to be told from none",
             code="E-RANGE",
             key="operation.torque",
             value=f"{operation.torque:g} N m",
-            limit=f"0 N m, or at least {_LEAST_TORQUE:g} N m of either sign",
+            limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
         )
     if not case.rigid and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
         yield CaseError(

@@ -10,18 +10,16 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any, TypeVar
+from collections.abc import Iterator
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from femgear.case import text as case_text
-from femgear.case.quantities import ANGLE, LENGTH, described
+from femgear.case.quantities import ANGLE, LENGTH
 from femgear.case.sections import Case, RackSection
-from femgear.case.text import ReadCase
+from femgear.case.text import described
 from femgear.errors import CaseError, Finding, GeometryError, remark
-
-AnyCase = TypeVar("AnyCase", bound=ReadCase)
 
 _DIMENSIONS = {
     "centre_distance": LENGTH,
@@ -50,6 +48,9 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
         nested = item.get("ctx", {}).get("error")
         if isinstance(nested, ValidationError):
             problems += translate(nested, model, key)
+        elif isinstance(nested, CaseError):
+            nested.key = key
+            problems.append(nested)
         else:
             problems.append(_problem(item, key, model))
     return problems
@@ -58,9 +59,6 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
 def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
     """One error of pydantic's list."""
     kind, context, value = item["type"], item.get("ctx", {}), item.get("input")
-    if kind.startswith("E-"):
-        told = {name: context[name] for name in ("limit", "remedy")}
-        return CaseError(context["message"], code=kind, key=key, value=context["found"], **told)
     if kind == "missing":
         section = _section(model, item["loc"])
         remedy = f"add it: {_description(model, item['loc'])}".removesuffix(": ")
@@ -141,45 +139,6 @@ def _dotted(location: tuple, prefix: str) -> str:
         else:
             key += ("." if key else "") + case_text.printable(part)
     return key
-
-
-def checked_case(
-    model: type[AnyCase],
-    data: dict,
-    text: str,
-    name: str,
-    *,
-    check: Callable[[AnyCase], Iterable[CaseError]],
-    keys: Callable[[], type[BaseModel]] | None = None,
-) -> AnyCase:
-    """Case of the tables of a file, validated and checked as a whole.
-
-    Parameters
-    ----------
-    model : type
-    data, text, name : dict, str, str
-        Tables of the file; as for `combine`.
-    keys : callable, optional
-        ``() -> model`` whose field names are the valid keys; those of `model` when left out.
-    check : callable
-        ``(case) -> errors``: what no entry shows alone; an error that it raises is one of them.
-
-    Raises
-    ------
-    CaseError
-        Everything that is wrong, at once.
-    """
-    try:
-        case = model.model_validate(data)
-    except ValidationError as error:
-        raise combine(translate(error, keys() if keys else model), text, name) from None
-    try:
-        problems = list(check(case))
-    except CaseError as error:
-        problems = [error]
-    if problems:
-        raise combine(problems, text, name)
-    return case
 
 
 def combine(problems: list[CaseError], text: str, name: str) -> CaseError:

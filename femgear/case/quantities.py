@@ -10,12 +10,13 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic_core import core_schema
 
-from femgear.case.text import found, shown
+from femgear.case.text import described, found, shown
 from femgear.errors import CaseError
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
@@ -49,6 +50,10 @@ class Dimension:
         """Text of an SI value in the unit ``shown``."""
         return f"{value / self.scale:.6g} {self.shown}"
 
+    def window(self, low: float, high: float) -> str:
+        """Text of a range of SI values."""
+        return f"{self.show(low)} to {self.show(high)}"
+
 
 LENGTH = Dimension("a length", "m", "mm", 1e-3)
 ANGLE = Dimension("an angle", "rad", "deg", math.pi / 180)
@@ -68,39 +73,100 @@ ACCELERATION = Dimension("an acceleration", "m/s^2", "m/s^2", 1.0)
 FOUNDATION = Dimension("a foundation stiffness per area", "N/m^3", "N/m^3", 1.0)
 
 
-def to_si(text: str, dimension: Dimension) -> float:
+def to_si(
+    value: object,
+    dimension: Dimension,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+) -> float:
     """SI value of a quantity such as ``"1.5 mm"``, ``"20 deg"`` or ``"1e-4 kg m^2"``.
 
     Parameters
     ----------
-    text : str
+    value : str
         A number and a product of units; radians and degrees count as a dimension, so that neither
         ``"5 Hz"`` passes as a speed of rotation nor ``"20 %"`` as an angle.
     dimension : Dimension
+    low, high : float
+        Plausible window, in ``dimension.si``.
+
+    Returns
+    -------
+    float
+        Value in ``dimension.si``.
 
     Raises
     ------
     CaseError
-        ``E-UNIT``: no number, no unit, an unknown unit or another dimension. ``E-FINITE``: overflow.
+        ``E-TYPE``: no text. ``E-UNIT``: no number, no unit, an unknown unit or another dimension.
+        ``E-FINITE``: overflow. ``E-RANGE``: outside the window.
     """
+    if not isinstance(value, str):
+        raise _no_text(value, dimension, low, high)
     example = f'write it as in "{dimension.show(dimension.scale)}"'
-    match = _NUMBER.fullmatch(text)
-    if re.match(r"\s*[+-]?\d+,\d", text):
+    match = _NUMBER.fullmatch(value)
+    if re.match(r"\s*[+-]?\d+,\d", value):
         message = f"{dimension.name} has a comma in its number"
-        raise CaseError(message, code="E-UNIT", value=text, remedy="use a decimal point")
+        raise CaseError(message, code="E-UNIT", value=value, remedy="use a decimal point")
     if not match:
         message = f"{dimension.name} must start with a number"
-        raise CaseError(message, code="E-UNIT", value=text, remedy=example)
+        raise CaseError(message, code="E-UNIT", value=value, remedy=example)
     number, unit = float(match[1]), " ".join(match[2].split())
     if not unit:
-        raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=text, remedy=example)
-    factor = _factor(unit, dimension, text, example)
+        raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=example)
+    factor = _factor(unit, dimension, value, example)
     inverse = round(1 / factor)
     # 51/1000 is 0.051 to the last digit, 51*0.001 is not.
-    value = number / inverse if abs(inverse * factor - 1) < 1e-12 else number * factor
-    if not math.isfinite(value):
-        raise CaseError("the number is not finite", code="E-FINITE", value=text, limit="finite numbers")
-    return value
+    number = number / inverse if abs(inverse * factor - 1) < 1e-12 else number * factor
+    if not math.isfinite(number):
+        raise CaseError("the number is not finite", code="E-FINITE", value=value, limit="finite numbers")
+    if not low <= number <= high:
+        raise CaseError(
+            f"{dimension.name} of {dimension.show(number)} is not plausible",
+            code="E-RANGE",
+            value=value,
+            limit=dimension.window(low, high),
+            remedy=_factor_hint(number, low, high, dimension, value),
+        )
+    return number
+
+
+def _no_text(value: object, dimension: Dimension, low: float, high: float) -> CaseError:
+    """Refusal of a bare number, or of what is no quantity at all."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        remedy = _as_text(value, low, high, dimension)
+        return CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=remedy)
+    return CaseError(f"{dimension.name} is needed, not {described(value)}", code="E-TYPE", value=value)
+
+
+def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
+    """How to write a bare number: in the unit of messages, or that of an SI value, where it is plausible."""
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    readings = []
+    if low <= number * dimension.scale <= high:
+        readings.append(f'"{value} {dimension.shown}"')
+    if dimension.scale != 1.0 and low <= number <= high:
+        readings.append(f'"{dimension.show(number)}" if it is in {dimension.si}')
+    shown = ", or ".join(readings) or f'such as "{dimension.show(dimension.scale)}"'
+    return f"write it as text with the unit, {shown}"
+
+
+def _factor_hint(number: float, low: float, high: float, dimension: Dimension, text: str) -> str | None:
+    """Guess of the mistaken unit where a usual factor brings the number into its window."""
+    if dimension is ANGLE:
+        for factor, read, written in ((math.pi / 180, "deg", "rad"), (180 / math.pi, "rad", "deg")):
+            if written in text and low <= number * factor <= high:
+                return f"degrees and radians seem to be mixed up: {read} would be plausible"
+        return None
+    for factor in (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9):
+        if low <= number * factor <= high:
+            shown = dimension.show(number * factor)
+            return f"a factor of {factor:g} would make it plausible ({shown}): check the unit"
+    return None
 
 
 def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
@@ -174,61 +240,12 @@ def Quantity(dimension: Dimension, low: float, high: float) -> _Reader:
 
     ``low`` and ``high`` are the ends of the plausible window in SI units.
     """
-    limit = f"{dimension.show(low)} to {dimension.show(high)}"
-
-    def convert(value: object) -> float:
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            raise refuse(
-                f"{dimension.name} needs its unit",
-                code="E-UNIT",
-                value=value,
-                remedy=_as_text(value, low, high, dimension),
-            )
-        if not isinstance(value, str):
-            raise refuse(f"{dimension.name} is needed, not {described(value)}", code="E-TYPE", value=value)
-        try:
-            number = to_si(value, dimension)
-        except CaseError as error:
-            raise refuse(
-                error.message, code=error.code, value=value, limit=error.limit, remedy=error.remedy
-            ) from None
-        if not low <= number <= high:
-            message = f"{dimension.name} of {dimension.show(number)} is not plausible"
-            hint = _factor_hint(number, low, high, dimension, value)
-            raise refuse(message, code="E-RANGE", value=value, limit=limit, remedy=hint)
-        return number
-
-    schema = {"type": "string", "description": f"{dimension.name} with its unit, {limit}"}
-    return _Reader(convert, schema)
-
-
-def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
-    """How to write a bare number: in the unit of messages, or that of an SI value, where it is plausible."""
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    readings = []
-    if low <= number * dimension.scale <= high:
-        readings.append(f'"{value} {dimension.shown}"')
-    if dimension.scale != 1.0 and low <= number <= high:
-        readings.append(f'"{dimension.show(number)}" if it is in {dimension.si}')
-    shown = ", or ".join(readings) or f'such as "{dimension.show(dimension.scale)}"'
-    return f"write it as text with the unit, {shown}"
-
-
-def _factor_hint(number: float, low: float, high: float, dimension: Dimension, text: str) -> str | None:
-    """Guess of the mistaken unit where a usual factor brings the number into its window."""
-    if dimension is ANGLE:
-        for factor, read, written in ((math.pi / 180, "deg", "rad"), (180 / math.pi, "rad", "deg")):
-            if written in text and low <= number * factor <= high:
-                return f"degrees and radians seem to be mixed up: {read} would be plausible"
-        return None
-    for factor in (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9):
-        if low <= number * factor <= high:
-            shown = dimension.show(number * factor)
-            return f"a factor of {factor:g} would make it plausible ({shown}): check the unit"
-    return None
+    read = partial(to_si, dimension=dimension, low=low, high=high)
+    schema = {
+        "type": "string",
+        "description": f"{dimension.name} with its unit, {dimension.window(low, high)}",
+    }
+    return _Reader(read, schema)
 
 
 def Number(
@@ -249,13 +266,13 @@ def Number(
     def convert(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             remedy = "write it without quotes" if isinstance(value, str) else None
-            raise refuse(
+            raise CaseError(
                 f"a number is needed, not {described(value)}", code="E-TYPE", value=value, remedy=remedy
             )
         above = low < value if open_low else low <= value
         below = value < high if open_high else value <= high
         if not (above and below):
-            raise refuse(
+            raise CaseError(
                 f"the number is out of range{': ' + note if note else ''}",
                 code="E-RANGE",
                 value=found(value) if isinstance(value, int) else value,
@@ -297,13 +314,13 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
     def convert(value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
             remedy = "write it without quotes" if isinstance(value, str) else None
-            raise refuse(
+            raise CaseError(
                 f"a whole number is needed, not {described(value)}", code="E-TYPE", value=value, remedy=remedy
             )
         number = abs(value) if signed else value
         if not low <= number <= high:
             why = note if number > high else ""
-            raise refuse(
+            raise CaseError(
                 f"{shown(value)} is out of range{': ' + why if why else ''}",
                 code="E-RANGE",
                 value=found(value),
@@ -318,9 +335,9 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
 def _one_line(value: object) -> str:
     """A printable text of at most 200 characters."""
     if not isinstance(value, str):
-        raise refuse(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
+        raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
     if len(value) > 200 or not value.isprintable():
-        raise refuse(
+        raise CaseError(
             "the title must be one printable line",
             code="E-RANGE",
             value=value,
@@ -330,23 +347,3 @@ def _one_line(value: object) -> str:
 
 
 Title = Annotated[str, BeforeValidator(_one_line)]
-
-
-def refuse(
-    message: str,
-    *,
-    code: str,
-    value: object = None,
-    limit: str | None = None,
-    remedy: str | None = None,
-) -> PydanticCustomError:
-    """Validation error that `femgear.case.problems` turns into a `CaseError` with these fields."""
-    kind: Any = code
-    told = {"message": message, "found": value, "limit": limit, "remedy": remedy}
-    return PydanticCustomError(kind, "{message}", told)
-
-
-def described(value: object) -> str:
-    """What a TOML value is, in words."""
-    names = {bool: "true or false", int: "an integer", float: "a number", str: "a text", list: "a list"}
-    return names.get(type(value), "a table" if isinstance(value, dict) else "a date or time")

@@ -33,10 +33,8 @@ from femgear.case.quantities import (
     Quantity,
     Section,
     Title,
-    described,
-    refuse,
 )
-from femgear.case.text import ReadCase
+from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError, Finding, remark
 
 LARGEST_DEVIATION = 0.2
@@ -89,20 +87,22 @@ class ModificationSection(Section):
         unused += [name for name in laws if measured and getattr(self, name) is not None]
         unused += [name for name in ("shape", "power") if not relief and getattr(self, name) is not None]
         if unused:
-            raise refuse(f"a {self.kind} has no {' and no '.join(unused)}", code="E-MODIFICATION")
+            raise CaseError(f"a {self.kind} has no {' and no '.join(unused)}", code="E-MODIFICATION")
         if measured:
             _check_points(self)
         elif self.amount is None:
-            raise refuse(f"a {self.kind} needs its amount", code="E-KEY-MISSING", remedy='amount = "10 um"')
+            raise CaseError(
+                f"a {self.kind} needs its amount", code="E-KEY-MISSING", remedy='amount = "10 um"'
+            )
         elif relief and not any(getattr(self, f"start_{place}") is not None for place in _PLACES):
             starts = "start_diameter, start_roll_angle or start_roll_length"
-            raise refuse(f"a {self.kind} needs its start", code="E-KEY-MISSING", remedy=f"give {starts}")
+            raise CaseError(f"a {self.kind} needs its start", code="E-KEY-MISSING", remedy=f"give {starts}")
         for end in ("start", "end"):
             given = [f"{end}_{place}" for place in _PLACES if getattr(self, f"{end}_{place}") is not None]
             if len(given) > 1:
-                raise refuse(f"{' and '.join(given)} say the same", code="E-DUPLICATE", remedy="keep one")
+                raise CaseError(f"{' and '.join(given)} say the same", code="E-DUPLICATE", remedy="keep one")
         if self.shape is not None and self.power is not None:
-            raise refuse("shape and power say the same", code="E-DUPLICATE", remedy="keep one of them")
+            raise CaseError("shape and power say the same", code="E-DUPLICATE", remedy="keep one of them")
         return self
 
     @property
@@ -121,7 +121,7 @@ def _check_points(section: ModificationSection) -> None:
     """Refuse a measured profile without its columns; a file has been read into them before."""
     columns = [name for name in ("roll_angles", "diameters") if getattr(section, name) is not None]
     if len(columns) != 1 or section.deviations is None or section.file is not None:
-        raise refuse(
+        raise CaseError(
             "a measured profile is a file, or deviations over either roll_angles or diameters",
             code="E-MODIFICATION",
             remedy='file = "profile.csv"',
@@ -129,10 +129,10 @@ def _check_points(section: ModificationSection) -> None:
     count, places = len(section.deviations), getattr(section, columns[0])
     if count != len(places) or count < 2:
         message = f"{count} deviations over {len(places)} {columns[0]}"
-        raise refuse(message, code="E-COUNT", limit="two or more, and as many of both")
+        raise CaseError(message, code="E-COUNT", limit="two or more, and as many of both")
     rising = {b > a for a, b in pairwise(places) if a != b}
     if len(rising) > 1 or len(set(places)) < count:
-        raise refuse(f"{columns[0]} are neither ascending nor descending", code="E-RANGE")
+        raise CaseError(f"{columns[0]} are neither ascending nor descending", code="E-RANGE")
 
 
 class CarrierErrors(Section):
@@ -156,7 +156,7 @@ class GearErrors(CarrierErrors):
     @model_validator(mode="after")
     def _pitch_once(self):
         if self.pitch is not None and self.cumulative_pitch is not None:
-            raise refuse("pitch and cumulative_pitch say the same", code="E-DUPLICATE", remedy="keep one")
+            raise CaseError("pitch and cumulative_pitch say the same", code="E-DUPLICATE", remedy="keep one")
         return self
 
 
@@ -191,7 +191,8 @@ class PinError(Section):
 
 FORMAT = 1
 """Newest format of the case file."""
-"""One revolution a minute [rad/s]."""
+LARGEST_TORQUE = 1e9
+"""Largest plausible torque [N m]."""
 CODE = "E-PUBLISHED"
 """Of refusals of published lines."""
 _MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
@@ -333,7 +334,7 @@ def _speed_range(value: object) -> object:
     if not isinstance(value, dict):
         if not isinstance(value, list) or not value:
             message = f"a list of speeds is needed, not {'an empty one' if value == [] else described(value)}"
-            raise refuse(message, code="E-TYPE", value=value, remedy='write ["250 rpm", "3100 rpm"]')
+            raise CaseError(message, code="E-TYPE", value=value, remedy='write ["250 rpm", "3100 rpm"]')
         return value
     ends = _SpeedRange.model_validate(value)
     step = (ends.to - ends.start) / (ends.count - 1)
@@ -353,7 +354,7 @@ class OperationSection(Section):
 
     input: Member
     fixed: Member
-    torque: Annotated[float, Quantity(TORQUE, -1e9, 1e9)]
+    torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
     speeds: Annotated[tuple[_Speed, ...], BeforeValidator(_speed_range), Field(max_length=100_000)]
 
 

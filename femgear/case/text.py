@@ -357,3 +357,9 @@ def shown(number: int) -> str:
 def found(number: int) -> int | str:
     """An integer as messages show it: itself, or the size of one of thousands of digits."""
     return number if abs(number) < 10**15 else shown(number)
+
+
+def described(value: object) -> str:
+    """What a TOML value is, in words."""
+    names = {bool: "true or false", int: "an integer", float: "a number", str: "a text", list: "a list"}
+    return names.get(type(value), "a table" if isinstance(value, dict) else "a date or time")

@@ -124,26 +124,26 @@ def loaded_period(
     symmetry = planet_symmetry(planetary_set, deviations)
     parts = symmetry // gcd(symmetry, planetary_set.sun.teeth)
     first = -(-positions // parts)
-
-    def solved(tau) -> dict[str, np.ndarray]:
+    # the end of the part is there to see jumps before it, and then left out
+    wanted, record = np.arange(first + 1) / (first * parts), {}
+    while len(wanted):
         cycle = walk_mesh_cycle(
             planetary_set,
             bodies,
             sun_torque=sun_torque,
-            positions=tau,
+            positions=wanted,
             contact=contact,
             deviations=deviations,
             supports=supports,
             options=CycleOptions(held_bodies=held_bodies, progress=progress),
         )
-        return _record(cycle, planetary_set.base_pitch)
-
-    # the end of the part is there to see jumps before it, and then left out
-    record = solved(np.arange(first + 1) / (first * parts))
-    while len(gaps := _unresolved(record)):
-        middle = solved(0.5 * (record["position"][gaps] + record["position"][gaps + 1]))
-        order = np.argsort(np.concatenate([record["position"], middle["position"]]), kind="stable")
-        record = {name: np.concatenate([record[name], middle[name]], axis=-1)[..., order] for name in record}
+        found = _record(cycle, planetary_set.base_pitch)
+        if record:
+            found = {name: np.concatenate([record[name], found[name]], axis=-1) for name in found}
+        order = np.argsort(found["position"], kind="stable")
+        record = {name: values[..., order] for name, values in found.items()}
+        gaps = _unresolved(record)
+        wanted = 0.5 * (record["position"][gaps] + record["position"][gaps + 1])
     return _whole_period(planetary_set, record, symmetry, parts)
 
 

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from femgear.case.case import planetary_set
+from femgear.case.checks import LEAST_TORQUE
 from femgear.case.dependencies import Steps, static_entries
 from femgear.case.quantities import ACCELERATION, SPEED, TORQUE, Dimension, to_si
-from femgear.case.sections import Case
+from femgear.case.sections import LARGEST_TORQUE, Case
 from femgear.contact.root_stress import LOADED
 from femgear.errors import CaseError
 from femgear.gears.gear import tooth_thickness
@@ -76,13 +77,14 @@ class Variant:
     def static(self, torque: float | None = None) -> StaticResult:
         """Static solution under a torque on the input [N m], by default that of the case."""
         case, steps = self.case, self._steps
-        if torque is not None and torque != case.operation.torque:
-            case = with_value(case, "operation.torque", f"{torque!r} N m")
+        if torque is not None:
+            operation = case.operation.model_copy(update={"torque": torque})
+            case = case.model_copy(update={"operation": operation})
 
         def compute():
-            entries = {**static_entries(case), "static.stresses": case.static.stresses}
-            return steps.take(
-                "static", entries, lambda: static_stages.solve_static(case, cache=self._cache, steps=steps)
+            known = {**static_entries(case), "static.stresses": case.static.stresses}
+            return steps.kept("static", known) or steps.keep(
+                "static", known, static_stages.solve_static(case, cache=self._cache, steps=steps)
             )
 
         return self._once("static", case.operation.torque, compute=compute)
@@ -201,8 +203,8 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
         "planet-ring": lambda arc, deflection, n: deflection[n:],
     }
     signal = _chosen(mesh, rows, "mesh")
-    value = None if torque is None else to_si(torque, TORQUE)
-    if value == 0:
+    value = None if torque is None else to_si(torque, TORQUE, low=-LARGEST_TORQUE, high=LARGEST_TORQUE)
+    if value is not None and abs(value) < LEAST_TORQUE:
         raise CaseError("without torque no tooth bends", code="E-TORQUE", key="torque", value=torque)
 
     def compute(variant: Variant) -> float:

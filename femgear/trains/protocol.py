@@ -39,14 +39,6 @@ def one_blas_thread() -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Context:
-    """Where generated grids are kept, and whom to tell how far a stage has come."""
-
-    cache: Path | None = None
-    progress: Progress | None = None
-
-
-@dataclass(frozen=True)
 class Drawn:
     """What pictures are made of.
 
@@ -95,11 +87,16 @@ class Stage:
     name, title : str
         Of the file, and of its section on the page.
     solve : callable
-        ``(case, results, context) -> result`` from the results of the stages before, by name.
+        ``(case, *results of the stages in `takes`, **options) -> result``; the result of a stage that was
+        not computed is None.
     verdict : callable
         ``(result) -> dict`` for the manifest.
     describe : callable
         ``(Results) -> Block``: the numbers of the stage, read from its folder.
+    takes : tuple of str
+        Stages whose results it goes on from.
+    options : tuple of str
+        Of ``"cache"``, the folder of generated grids, and ``"progress"``, whom to tell how far it has come.
     wanted : callable
         ``(case) -> bool``: whether a run without ``only`` computes it.
     unavailable : callable
@@ -118,9 +115,11 @@ class Stage:
 
     name: str
     title: str
-    solve: Callable[[Any, Mapping[str, Any], Context], Any]
+    solve: Callable[..., Any]
     verdict: Callable[[Any], dict]
     describe: Callable[[Results], Block]
+    takes: tuple[str, ...] = ()
+    options: tuple[str, ...] = ()
     wanted: Callable[[Any], bool] = lambda case: True
     unavailable: Callable[[Any], str] = lambda case: ""
     needs: Callable[[Any], tuple[str, ...]] = lambda case: ()
@@ -137,14 +136,17 @@ class OwnFile:
     Parameters
     ----------
     claims : callable
-        ``(tables) -> bool``: further files of this kind.
-    build : callable, optional
-        ``(tables, text, name, *, numbered) -> case``, where the tables do not go to the model as they are;
-        see `femgear.trains.reading`.
+        ``(tables) -> str``: what only files of this kind have, such as "bodies"; empty where they have not.
+    embed : callable
+        ``(tables, name of the file) -> files by key``: puts the points of other files into the tables.
+    points, remedy : str
+        What such points are, and what to do where they are too many.
     """
 
-    claims: Callable[[dict], bool] = lambda tables: False
-    build: Callable[..., Any] | None = None
+    claims: Callable[[dict], str] = lambda tables: ""
+    embed: Callable[[dict, str], dict[str, str]] = lambda tables, name: {}
+    points: str = ""
+    remedy: str = ""
 
 
 @dataclass(frozen=True)
@@ -174,7 +176,7 @@ class Train:
     cross_check : callable
         ``(case) -> problems``: what no entry shows alone.
     notices : callable
-        ``(tables) -> findings``: what was read in a way that deserves to be said.
+        ``(tables, case) -> findings``: what was read in a way that deserves to be said.
     """
 
     name: str
@@ -188,7 +190,7 @@ class Train:
     section: str = ""
     own_file: OwnFile | None = None
     cross_check: Callable[[Any], Iterable[CaseError]] = lambda case: ()
-    notices: Callable[[dict], Iterable[Finding]] = lambda data: ()
+    notices: Callable[[dict, Any], Iterable[Finding]] = lambda tables, case: ()
 
     def stage(self, name: str) -> Stage | None:
         """The stage of a name, None where the train has none of it."""

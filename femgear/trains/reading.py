@@ -14,20 +14,22 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from pydantic import create_model
+from pydantic import ValidationError, create_model
 
 from femgear.case import text as case_text
 from femgear.case.case import with_shafts
 from femgear.case.checks import cross_check
-from femgear.case.problems import added_material, checked_case, combine, notices
-from femgear.case.quantities import described
+from femgear.case.problems import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.tables import embed_profiles
-from femgear.case.text import text_with_points
+from femgear.case.text import described, text_with_points
 from femgear.errors import CaseError, Finding
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
-from femgear.trains.protocol import Train
+from femgear.trains.protocol import OwnFile, Train
+
+_SET_FILE = OwnFile(embed=embed_profiles, points="measured profiles", remedy="measure at fewer points")
+"""Case file of a planetary set, whatever its train."""
 
 
 def read_case(path: str | os.PathLike) -> Any:
@@ -48,11 +50,10 @@ def read_case(path: str | os.PathLike) -> Any:
     CaseError
         Everything that is wrong with the file, at once; ``problems`` holds one `CaseError` for each.
     """
-    text, name = case_text.read_text(path), case_text.printable(os.fsdecode(path))
-    return _build(case_text.parse(text, name), text, name)
+    return parse_case(case_text.read_text(path), name=case_text.printable(os.fsdecode(path)))
 
 
-def parse_case(text: str, *, name: str = "") -> Case:
+def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     """Case of a TOML text; see `read_case`.
 
     Parameters
@@ -60,8 +61,32 @@ def parse_case(text: str, *, name: str = "") -> Case:
     text : str
     name : str
         File name for messages.
+    numbered : bool
+        Messages name the lines of the text: it is the user's.
     """
-    return _build(case_text.parse(text, name), text, name)
+    data, lines = case_text.parse(text, name), text if numbered else ""
+    train = _train_of_file(data, lines, name)
+    own_file = train.own_file or _SET_FILE
+    files = own_file.embed(data, name)
+    if files:
+        text = text_with_points(data, name, points=own_file.points, remedy=own_file.remedy)
+    try:
+        case = train.model.model_validate(data)
+    except ValidationError as error:
+        keys = every_section() if own_file is _SET_FILE else train.model
+        raise combine(translate(error, keys), lines, name) from None
+    try:
+        more = train.cross_check(case)
+        problems = cross_check(case, more) if own_file is _SET_FILE else list(more)
+    except CaseError as error:
+        problems = [error]
+    if problems:
+        raise combine(problems, lines, name)
+    said = tuple(train.notices(data, case))
+    if own_file is _SET_FILE:
+        said = (*notices(data), *said, *added_material(case))
+    case.read_from(text, lines, name, notices=said, profile_files=files)
+    return with_shafts(case) if own_file is _SET_FILE else case
 
 
 def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
@@ -129,13 +154,13 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
         raise
     said: tuple[Finding, ...] = ()
     try:
-        changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
+        changed = parse_case(text, name=case.name, numbered=False)
     except CaseError as error:
         published = any(key.startswith("housing") for key in values)
         if published or not (notice := without_uncomputed(data, error)):
             raise
         said, text = (notice,), case_text.write(data)
-        changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
+        changed = parse_case(text, name=case.name, numbered=False)
     changed._notices += said
     changed._profile_files = {
         k: file
@@ -211,8 +236,8 @@ def every_section() -> type[Case]:
     return create_model("Case", __base__=Case, __doc__=Case.__doc__, **fields)
 
 
-def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
-    """Case of tables; refusals name the lines of the text where it is the user's (`numbered`)."""
+def _train_of_file(data: dict, lines: str, name: str) -> Train:
+    """Train that the tables of a file are of; its lines and name are for refusals."""
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
         raise CaseError(
@@ -224,32 +249,22 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             remedy="update femgear",
             file=name,
         )
-    lines = text if numbered else ""
-    for train in _own_files().values():
-        own_file = train.own_file
-        if own_file is not None and (data.get("model") == train.name or own_file.claims(data)):
-            if own_file.build is not None:
-                return own_file.build(data, text, name, numbered=numbered)
-            case = checked_case(train.model, data, lines, name, check=train.cross_check)
-            case.read_from(text, lines, name)
-            return case
+    own = _own_files()
     if "model" in data:
-        raise combine([_unknown_model(data["model"])], lines, name)
-    train = _train_of_set(data, lines, name)
-    files = embed_profiles(data, name)
-    if files:
-        text = text_with_points(data, name, points="measured profiles", remedy="measure at fewer points")
-    case = checked_case(
-        train.model,
-        data,
-        lines,
-        name,
-        check=lambda case: cross_check(case, train.cross_check(case)),
-        keys=every_section,
-    )
-    said = (*notices(data), *train.notices(data), *added_material(case))
-    case.read_from(text, lines, name, notices=said, profile_files=files)
-    return with_shafts(case)
+        model = data["model"]
+        if not isinstance(model, str) or model not in own:
+            raise combine([_unknown_model(model)], lines, name)
+        return own[model]
+    for train in own.values():
+        if train.own_file is not None and (what := train.own_file.claims(data)):
+            problem = CaseError(
+                f"a file with {what} needs its model",
+                code="E-KEY-MISSING",
+                key="model",
+                remedy=f'write model = "{train.name}" before the first table',
+            )
+            raise combine([problem], lines, name)
+    return _train_of_set(data, lines, name)
 
 
 def _own_files() -> dict[str, Train]:

@@ -39,18 +39,18 @@ class ReceptanceResult:
         )
 
 
-def solve_modes(case, results, context):
+def solve_modes(case):
     """Natural frequency ``sqrt(k/m) / 2 pi``."""
     given = case.oscillator
     return ModesResult(float(np.sqrt(given.stiffness / given.mass) / (2 * np.pi)))
 
 
-def solve_receptance(case, results, context):
+def solve_receptance(case, modes):
     """Receptance ``1 / (k (1 - r^2 + 2 i zeta r))``, r the frequency over the natural one."""
     ratio = np.linspace(0.0, 3.0, 301)
     given = case.oscillator
     factor = 1 - ratio**2 + 2j * given.damping_ratio * ratio
-    frequency = results["modes"].frequency * ratio
+    frequency = modes.frequency * ratio
     return ReceptanceResult(frequency, np.abs(1 / (given.stiffness * factor)))
 
 
@@ -84,6 +84,7 @@ OSCILLATOR = Train(
             name="receptance",
             title="Receptance",
             solve=solve_receptance,
+            takes=("modes",),
             verdict=lambda result: {"points": len(result.frequency)},
             describe=lambda results: Block(
                 "Receptance", ("largest [m/N]",), ((f"{float(results.receptance['receptance'].max()):.4g}",),)

@@ -124,7 +124,8 @@ def at_rest() -> tuple[Row, ...]:
 
 def more_torque() -> tuple[Row, ...]:
     """Deflections under more torque, statically and by the dynamic model at rest."""
-    from femgear.trains.elastic.stages import solve_modes, state_on_supports
+    from femgear.contact.loaded_period import loaded_period
+    from femgear.trains.elastic.stages import linear_supports, solve_modes
     from femgear.trains.static.stages import solve_static
 
     step, rows = 0.02, []
@@ -140,7 +141,15 @@ def more_torque() -> tuple[Row, ...]:
         static = solve_static(case)
         modes = solve_modes(case, static)
         less, more = (
-            state_on_supports(case, modes.bodies, static.sun_torque * (1 + sign * step)) for sign in (-1, 1)
+            loaded_period(
+                static.planetary_set,
+                *modes.bodies,
+                sun_torque=static.sun_torque * (1 + sign * step),
+                positions=case.static.positions,
+                contact=case.static.contact,
+                supports=linear_supports(case),
+            )
+            for sign in (-1, 1)
         )
         mean = [one.resampled("deflection", 8192).mean(axis=1) for one in (less, more)]
         force = [one.resampled("force", 8192).mean(axis=1) for one in (less, more)]

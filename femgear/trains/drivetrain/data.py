@@ -32,9 +32,9 @@ from femgear.case.quantities import (
     Quantity,
     Section,
     StiffnessOrRigid,
-    described,
-    refuse,
 )
+from femgear.case.text import described
+from femgear.errors import CaseError
 from femgear.fe import shaft as shafts
 from femgear.gears.planetary import equal_planet_angles
 
@@ -43,9 +43,9 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
 
 def _name(value: object) -> str:
     if not isinstance(value, str):
-        raise refuse(f"a name is needed, not {described(value)}", code="E-TYPE", value=value)
+        raise CaseError(f"a name is needed, not {described(value)}", code="E-TYPE", value=value)
     if not _NAME.fullmatch(value) or value != value.strip() or re.match(r"(planet|shaft)\b", value):
-        raise refuse(
+        raise CaseError(
             "not a name for a body",
             code="E-CHOICE",
             value=value,
@@ -57,7 +57,7 @@ def _name(value: object) -> str:
 def _two(value: object) -> object:
     if not isinstance(value, list) or len(value) != 2:
         what = f"{len(value)} entries" if isinstance(value, list) else described(value)
-        raise refuse(
+        raise CaseError(
             f"two entries are needed, not {what}",
             code="E-COUNT",
             limit="a list of two: for the first and for the second body",
@@ -69,7 +69,7 @@ def _driver(value: str | None, info: ValidationInfo) -> str | None:
     """The driver of a stage; where the ends themselves are wrong, they alone are refused."""
     ends = info.data.get("between", ()) or [info.data[key] for key in ("carrier", "sun") if key in info.data]
     if value is not None and len(ends) == 2 and value not in ends:
-        raise refuse(
+        raise CaseError(
             "the driver is none of the two bodies of its stage",
             code="E-CHOICE",
             value=value,

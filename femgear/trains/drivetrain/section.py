@@ -1,9 +1,8 @@
 """The case file with ``model = "drivetrain"``: its chain, operation and simulation, and what it refuses.
 
-`build_drivetrain` reads such a case from the tables of a file; a torque series in a CSV file that the case
-names is read once and kept inside the case. What no entry shows alone is refused: names, chain, teeth and
-radii, places of the planets, torques, times; what is allowed but deserves a look is a notice. `drivetrain_of`
-and `torque_histories` are the chain and the torques of a case.
+A torque series in a CSV file that the case names is read once and kept inside the case. What no entry shows
+alone is refused: names, chain, teeth and radii, places of the planets, torques, times; what is allowed but
+deserves a look is a notice. `drivetrain_of` and `torque_histories` are the chain and the torques of a case.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, StrictBool
 
-from femgear.case.problems import checked_case, combine
 from femgear.case.quantities import (
     ACCELERATION,
     FREQUENCY,
@@ -33,7 +31,7 @@ from femgear.case.quantities import (
     Title,
 )
 from femgear.case.tables import Columns, embed_points, read_columns
-from femgear.case.text import ReadCase, text_with_points
+from femgear.case.text import ReadCase
 from femgear.errors import CaseError, Finding
 from femgear.trains.drivetrain.data import (
     BearingSection,
@@ -142,43 +140,6 @@ class DrivetrainCase(Section, ReadCase):
     simulation: SimulationSection
 
 
-def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True) -> DrivetrainCase:
-    """Build the case of the tables of a TOML text that names a model.
-
-    Parameters
-    ----------
-    data : dict
-        Modified: torque series of files take the place of the files.
-    text, name : str
-        Of the file.
-    numbered : bool
-        Whether messages may name lines.
-
-    Raises
-    ------
-    CaseError
-        Everything that is wrong, at once.
-    """
-    lines = text if numbered else ""
-    if "model" not in data:
-        remedy = f'write model = "{MODEL}" before the first table'
-        missing = CaseError(
-            "a file with bodies needs its model", code="E-KEY-MISSING", key="model", remedy=remedy
-        )
-        raise combine([missing], lines, name)
-    files = embed_torques(data, name)
-    if files:
-        text = text_with_points(data, name, points="torque series", remedy="give them at fewer points")
-    case = checked_case(DrivetrainCase, data, lines, name, check=_cross_check)
-    case.read_from(text, lines, name, notices=_notices(case), profile_files=files)
-    return case
-
-
-def is_drivetrain(data: dict) -> bool:
-    """Whether tables name this model, or have bodies, of which planetary sets have none."""
-    return data.get("model", MODEL) == MODEL and ("model" in data or isinstance(data.get("body"), list))
-
-
 def need_drivetrain(case: object) -> DrivetrainCase:
     """Return the case, refused where it is no drivetrain (E-MODEL)."""
     if not isinstance(case, DrivetrainCase):
@@ -232,7 +193,7 @@ def settle_time(case: DrivetrainCase) -> float:
     return 0.3 * s.duration if s.settle is None else s.settle
 
 
-def _cross_check(case: DrivetrainCase) -> list[CaseError]:
+def check_entries_together(case: DrivetrainCase) -> list[CaseError]:
     """What no entry shows alone."""
     names = list(_names(case))
     checks = (_bodies, _bearings, _shafts, _sizes, _torques, _simulation, _coordinates)
@@ -589,7 +550,7 @@ def _given(section, names) -> list[str]:
     return [name for name in names if getattr(section, name) is not None]
 
 
-def _notices(case: DrivetrainCase) -> Iterator[Finding]:
+def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
     """Remarks on a case that was checked."""
     stages = [(f"parallel[{i}]", stage) for i, stage in enumerate(case.parallel)]
     stages += [(f"planetary[{i}]", stage) for i, stage in enumerate(case.planetary)]

@@ -48,8 +48,9 @@ from femgear.trains.drivetrain.results import (
 )
 from femgear.trains.drivetrain.section import (
     DrivetrainCase,
-    build_drivetrain,
-    is_drivetrain,
+    check_entries_together,
+    drivetrain_notices,
+    embed_torques,
     settle_time,
     torque_histories,
 )
@@ -335,12 +336,19 @@ DRIVETRAIN = Train(
     name="drivetrain",
     words="a drivetrain",
     model=DrivetrainCase,
-    own_file=OwnFile(is_drivetrain, build_drivetrain),
+    own_file=OwnFile(
+        claims=lambda tables: "bodies" if isinstance(tables.get("body"), list) else "",
+        embed=embed_torques,
+        points="torque series",
+        remedy="give them at fewer points",
+    ),
+    cross_check=check_entries_together,
+    notices=lambda tables, case: drivetrain_notices(case),
     stages=(
         Stage(
             name="modes",
             title="Modes",
-            solve=lambda case, *_: solve_drivetrain_modes(case),
+            solve=solve_drivetrain_modes,
             verdict=modes_verdict,
             describe=lambda results: describe_drivetrain_modes(results.modes),
             check=check_drivetrain,
@@ -348,7 +356,8 @@ DRIVETRAIN = Train(
         Stage(
             name="transient",
             title="Transient",
-            solve=lambda case, _, context: solve_transient_run(case, progress=context.progress),
+            solve=solve_transient_run,
+            options=("progress",),
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
             check=check_drivetrain,
@@ -357,7 +366,8 @@ DRIVETRAIN = Train(
         Stage(
             name="spectrum",
             title="Spectrum",
-            solve=lambda case, results, _: solve_spectrum(case, results["transient"]),
+            solve=solve_spectrum,
+            takes=("transient",),
             verdict=lambda result: {
                 "lines": len(result.lines),
                 "segments": min(one.segments for one in result.spectra.values()),

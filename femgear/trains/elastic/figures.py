@@ -208,9 +208,7 @@ def _free_angle(angles) -> float:
 def _shown_harmonics(housing: xr.Dataset, ring_teeth: int) -> tuple[int, ...]:
     """The first mesh harmonic, and the one with the strongest line where that is another one."""
     order, amplitude = housing["order"].values, housing["order_amplitude"].values[0]
-    audible = order > ring_teeth / 2
-    strongest = round(float(order[audible][np.argmax(amplitude[audible])]) / ring_teeth)
-    return tuple(sorted({1, max(1, strongest)}))
+    return tuple(sorted({1, *_strongest_bands(order, amplitude, ring_teeth, 1)}))
 
 
 def _band(housing: xr.Dataset, ring_teeth: int, harmonic: int) -> BandAnalysis:
@@ -290,7 +288,7 @@ def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
     """
     order = housing["order"].values
     linear, exact = (housing[name].values[0] for name in ("order_amplitude", "order_amplitude_exact"))
-    bands = _strongest_bands(order, linear, ring_teeth)
+    bands = _strongest_bands(order, linear, ring_teeth, 2)
     figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.8 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
@@ -317,12 +315,12 @@ def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
     return figure
 
 
-def _strongest_bands(order, amplitude, ring_teeth):
-    """Two mesh harmonics whose bands hold the strongest lines, ascending."""
+def _strongest_bands(order, amplitude, ring_teeth, count: int) -> list[int]:
+    """So many mesh harmonics whose bands hold the strongest lines, ascending."""
     harmonics = np.rint(order / ring_teeth).astype(int)
     peaks = {int(h): amplitude[harmonics == h].max() for h in np.unique(harmonics) if h > 0}
     ranked = sorted((h for h in peaks if peaks[h] > 0), key=lambda h: (-peaks[h], h))
-    return sorted(ranked[:2])
+    return sorted(ranked[:count])
 
 
 def _stems(ax, order, amplitude, floor, *, text, colour=BLUE, width=1.0):

@@ -63,11 +63,15 @@ class ModesResult:
     model: ElasticSet
     excitation: MeshExcitation
     modes: Modes
-    max_diameter: int
     bodies: tuple[Bodies, Bodies]
     state: LoadedPeriod
     reach: float
     entries: Entries
+
+    @property
+    def max_diameter(self) -> int:
+        """Largest nodal diameter of the ring model."""
+        return len(self.ring.compliance) - 1
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from femgear.case.dependencies import (
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, active_flank_load, with_ring
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
+from femgear.contact.supports import Supports
 from femgear.errors import Finding, remark
 from femgear.fe.elasticity import mass
 from femgear.gears.kinematics import Speeds
@@ -48,7 +50,7 @@ from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
-from femgear.system.system import Response
+from femgear.system.system import MeshExcitation, Response
 from femgear.trains.elastic.checks import (
     HIGHEST_RESPONSE,
     NOTICEABLE,
@@ -115,6 +117,14 @@ class _FrequencyLimit:
     response: np.ndarray
     frequency: np.ndarray
 
+    def options(self, case: Case) -> dict[str, Any]:
+        """What `solve_spectral` takes beside modes, excitation and frequencies."""
+        return {
+            "excitation_harmonics": self.excitation,
+            "response_harmonics": self.response,
+            "tolerance": case.dynamics.tolerance,
+        }
+
 
 def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
     """Frequency to which the excitation reaches unless the case says less [Hz].
@@ -159,68 +169,25 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     return _FrequencyLimit(excitation, response, excitation * frequency)
 
 
-def periodic_response(
-    case: Case, modes: ModesResult, mesh_frequency, up_to: float, *, given: int | None
-) -> tuple[_FrequencyLimit, Response]:
-    """Periodic response to excitation up to a frequency, or of a given number of mesh harmonics.
+def _level_change(
+    case: Case, modes: ModesResult, all_speeds: tuple[Speeds, ...], response: Response, beyond: float
+) -> tuple[np.ndarray, float]:
+    """What the level of the housing changes when the excitation reaches a frequency beyond [dB].
 
-    Parameters
-    ----------
-    case : Case
-    modes : ModesResult
-    mesh_frequency, up_to, given
-        As for `limited`.
+    The changes (n_speeds,) are nan at speeds that were not looked at; the largest one of those whose
+    excitation comes as far is returned too.
     """
-    limit = limited(case, mesh_frequency, up_to, given=given)
-    response = solve_spectral(
-        modes.modes,
-        modes.excitation,
-        mesh_frequency,
-        excitation_harmonics=limit.excitation,
-        response_harmonics=limit.response,
-        tolerance=case.dynamics.tolerance,
-    )
-    return limit, response
-
-
-def _checked_response(
-    case: Case, modes: ModesResult, all_speeds: tuple[Speeds, ...]
-) -> tuple[_FrequencyLimit, Response, np.ndarray, float]:
-    """Response, its frequency limit, what the level changes beyond it [dB], and the limit compared with [Hz].
-
-    Where the case sets no limit it is doubled once where that changes the level by 1 dB or more. The changes
-    (n_speeds,) are nan at speeds that were not looked at.
-    """
-    frequency = np.array([s.mesh_frequency for s in all_speeds])
-    carrier = np.array([s.carrier for s in all_speeds])
-    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
-    automatic = given is None and case.dynamics.up_to is None
+    frequency, carrier = response.mesh_frequency, np.array([s.carrier for s in all_speeds])
     some = checked_speeds(len(frequency))
-    limit, response = periodic_response(case, modes, frequency, up_to, given=given)
-    while True:
-        beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
-        further, wider = periodic_response(case, modes, frequency[some], beyond, given=None)
-        parts = {name: getattr(response, name)[some] for name in ("deflection", "force", "modal")}
-        lines = (
-            _sensor_lines(case, modes, one, carrier[some]) for one in (replace(response, **parts), wider)
-        )
-        level, wider_level = (order_level(one) for one in lines)
-        change = np.full(len(frequency), np.nan)
-        change[some] = 20.0 * np.log10(wider_level / level)
-        reached = further.frequency > beyond - frequency[some]
-        doubted = np.abs(change[some][reached]).max(initial=0.0) >= NOTICEABLE
-        if not (automatic and doubted) or up_to > modes.reach:
-            break
-        up_to = beyond
-        if len(some) == len(frequency):
-            limit, response = further, wider
-        else:
-            limit, response = periodic_response(case, modes, frequency, up_to, given=None)
-    slow = frequency * HARMONICS < beyond - frequency
-    if slow.any():
-        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
-        change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
-    return limit, response, change, beyond
+    further = limited(case, frequency[some], beyond)
+    wider = solve_spectral(modes.modes, modes.excitation, frequency[some], **further.options(case))
+    parts = {name: getattr(response, name)[some] for name in ("deflection", "force", "modal")}
+    lines = (_sensor_lines(case, modes, one, carrier[some]) for one in (replace(response, **parts), wider))
+    level, wider_level = (order_level(one) for one in lines)
+    change = np.full(len(frequency), np.nan)
+    change[some] = 20.0 * np.log10(wider_level / level)
+    reached = further.frequency > beyond - frequency[some]
+    return change, np.abs(change[some][reached]).max(initial=0.0)
 
 
 def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
@@ -231,7 +198,8 @@ def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense
     speed (within 1 dB from 250 to 60 rpm of the reference set).
     """
     fast = np.array([beyond / HARMONICS * (1.0 + 1e-9)])
-    _, response = periodic_response(case, modes, fast, beyond, given=None)
+    options = limited(case, fast, beyond).options(case)
+    response = solve_spectral(modes.modes, modes.excitation, fast, **options)
     lines = _sensor_lines(case, modes, response, sense * 2.0 * np.pi * fast / case.ring.teeth)
     power = np.cumsum(np.abs(lines.acceleration[0]) ** 2)
     place = np.searchsorted(lines.frequency[0], frequency, side="right") - 1
@@ -313,82 +281,93 @@ def solve_modes(
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_dynamic_case(case, static.planetary_set)
-    steps, entries = steps or Steps(), ring_entries(case)
-    bodies = _ring_states(case, static, steps)
-    state = steps.take(
+    steps, gears, torque = steps or Steps(), static.planetary_set, static.sun_torque
+    bodies, deviations, known = _ring_bodies(case, static, steps), set_deviations(case), state_entries(case)
+    state = steps.kept("loaded state", known) or steps.keep(
         "loaded state",
-        state_entries(case),
-        lambda: state_on_supports(case, bodies, static.sun_torque, progress=progress),
+        known,
+        loaded_period(
+            gears,
+            *bodies,
+            sun_torque=torque,
+            positions=case.static.positions,
+            contact=case.static.contact,
+            deviations=None if deviations.ideal else deviations,
+            supports=linear_supports(case),
+            progress=None if progress is None else lambda done, total: progress("modes", done, total),
+        ),
     )
-    reach, side = _excitation_reach(case, state, static.sun_torque), 1.0 if static.sun_torque >= 0 else -1.0
-    ring = steps.take(
-        "ring model",
-        {**entries, "reach": reach, "side": side},
-        lambda: _ring_of_case(case, static, reach=reach, side=side),
-    )
-    return _modal_basis(case, ring, bodies, state, sun_torque=static.sun_torque, reach=reach)
-
-
-def _ring_states(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
-    """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
-    fixed = case.static.members == "fixed"
-
-    def other() -> Bodies:
-        springs = ring_foundation(case, static.sectors.ring) if fixed else None
-        return with_ring(static.bodies, static.sectors, depth=case.static.depth, ring_foundation=springs)
-
-    found = steps.take("ring compliances", ring_entries(case), other)
-    return (found, static.bodies) if fixed else (static.bodies, found)
-
-
-def _ring_of_case(case: Case, static: StaticResult, *, reach: float, side: float) -> RingModel:
-    """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz].
-
-    ``side`` is the sign of the sun's torque.
-    """
-    gears, sector = static.planetary_set, static.sectors.ring
-    return ring_model(
-        gears,
-        sector.grid,
-        sector.stiffness,
-        mass(sector.grid, material_of(case), gears.ring.face_width),
-        ring_foundation(case, sector),
-        active_flank_load(sector.grid, gears, side),
-        max_diameter=max_nodal_diameter(case),
+    stiffness = state.resampled("held_stiffness", RECORD).mean(axis=1)
+    mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
+    reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
+    ring = _ring_of_case(case, static, steps, reach)
+    excitation, flexibility = _excitation(gears, ring, state)
+    model = elastic_set(case, gears, ring, sun_torque=torque, flexibility=flexibility)
+    modes = solve_eigenproblem(
+        model.system,
+        excitation.stiffness.mean(axis=1),
+        damping_ratio=case.dynamics.damping_ratio,
         max_frequency=MODES_ABOVE * reach,
-        side=side,
+    )
+    kinds, diameters = mode_kinds(
+        modes.shape,
+        np.diag(model.system.M),
+        model.system.dofs,
+        frequency=modes.frequency,
+        ring_diameter=model.ring_diameter,
+        ring_slice=model.ring_slice,
+        planet_angles=model.planet_angles,
+    )
+    modes = replace(modes, kind=kinds, nodal_diameter=diameters)
+    return ModesResult(ring, model, excitation, modes, bodies, state, reach, modal_entries(case))
+
+
+def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
+    """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
+    fixed, known = case.static.members == "fixed", ring_entries(case)
+    other = steps.kept("ring compliances", known) or steps.keep(
+        "ring compliances",
+        known,
+        with_ring(
+            static.bodies,
+            static.sectors,
+            depth=case.static.depth,
+            ring_foundation=ring_foundation(case, static.sectors.ring) if fixed else None,
+        ),
+    )
+    return (other, static.bodies) if fixed else (static.bodies, other)
+
+
+def linear_supports(case: Case) -> Supports:
+    """Supports of the members without clearance: the bearings of the dynamic model are linear."""
+    return replace(case_supports(case), planet_clearance=0.0)
+
+
+def _ring_of_case(case: Case, static: StaticResult, steps: Steps, reach: float) -> RingModel:
+    """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz]."""
+    gears, sector, side = static.planetary_set, static.sectors.ring, 1.0 if static.sun_torque >= 0 else -1.0
+    known = {**ring_entries(case), "reach": reach, "side": side}
+    return steps.kept("ring model", known) or steps.keep(
+        "ring model",
+        known,
+        ring_model(
+            gears,
+            sector.grid,
+            sector.stiffness,
+            mass(sector.grid, material_of(case), gears.ring.face_width),
+            ring_foundation(case, sector),
+            active_flank_load(sector.grid, gears, side),
+            max_diameter=max_nodal_diameter(case),
+            max_frequency=MODES_ABOVE * reach,
+            side=side,
+        ),
     )
 
 
-def state_on_supports(case: Case, bodies, sun_torque: float, *, progress=None) -> LoadedPeriod:
-    """Loaded state of the set on its supports, over one mesh period.
-
-    ``bodies`` are flank compliances with the ring on its foundation, and with the ring held.
-    """
-    deviations = set_deviations(case)
-    return loaded_period(
-        planetary_set(case),
-        *bodies,
-        sun_torque=sun_torque,
-        positions=case.static.positions,
-        contact=case.static.contact,
-        deviations=None if deviations.ideal else deviations,
-        # the bearings of the dynamic model are linear
-        supports=replace(case_supports(case), planet_clearance=0.0),
-        progress=None if progress is None else lambda done, total: progress("modes", done, total),
-    )
-
-
-def _excitation_reach(case: Case, state: LoadedPeriod, sun_torque: float) -> float:
-    """Frequency to which the excitation reaches [Hz], see `highest_excitation`."""
-    gears, stiffness = planetary_set(case), state.resampled("held_stiffness", RECORD).mean(axis=1)
-    mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=sun_torque)
-    return highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
-
-
-def _modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun_torque, reach):
-    """Modes of the set with the ring given and the meshes of the loaded state."""
-    gears = planetary_set(case)
+def _excitation(
+    gears: PlanetarySet, ring: RingModel, state: LoadedPeriod
+) -> tuple[MeshExcitation, np.ndarray]:
+    """Mesh springs of the loaded state, and the compliance (2N, 2N) of the bodies between them [m/N]."""
     held, compliance = (
         ring_mesh_compliance(values, gears.ring.teeth, gears.planet_angles)
         for values in (ring.held_compliance, ring.compliance)
@@ -405,33 +384,7 @@ def _modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, su
         flexibility=flexibility,
         backlash=mesh_backlash(gears),
     )
-    model = elastic_set(case, gears, ring, sun_torque=sun_torque, flexibility=flexibility)
-    modes = solve_eigenproblem(
-        model.system,
-        excitation.stiffness.mean(axis=1),
-        damping_ratio=case.dynamics.damping_ratio,
-        max_frequency=MODES_ABOVE * reach,
-    )
-    kinds, diameters = mode_kinds(
-        modes.shape,
-        np.diag(model.system.M),
-        model.system.dofs,
-        frequency=modes.frequency,
-        ring_diameter=model.ring_diameter,
-        ring_slice=model.ring_slice,
-        planet_angles=model.planet_angles,
-    )
-    return ModesResult(
-        ring=ring,
-        model=model,
-        excitation=excitation,
-        modes=replace(modes, kind=kinds, nodal_diameter=diameters),
-        max_diameter=len(ring.compliance) - 1,
-        bodies=bodies,
-        state=state,
-        reach=reach,
-        entries=modal_entries(case),
-    )
+    return excitation, flexibility
 
 
 @one_blas_thread()
@@ -439,6 +392,9 @@ def solve_dynamics(
     case: Case, static: StaticResult, modes: ModesResult, *, progress: Progress | None = None
 ) -> DynamicsResult:
     """Periodic response at the case's speeds by the spectral method, with a Floquet verdict at each.
+
+    The response is compared with that to excitation up to a higher frequency. Where the case sets no limit it
+    is doubled once where that changes the level by 1 dB or more.
 
     Raises
     ------
@@ -449,10 +405,23 @@ def solve_dynamics(
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
     gears, basis = static.planetary_set, modes.modes
-    all_speeds = _turning_speeds(case, gears)
     check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
-    check_rim_speed(modes.ring.modes, [s.carrier for s in all_speeds])
-    limit, response, change, compared_to = _checked_response(case, modes, all_speeds)
+    all_speeds = _turning_speeds(case, modes)
+    frequency = np.array([s.mesh_frequency for s in all_speeds])
+    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
+    limit = limited(case, frequency, up_to, given=given)
+    response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case))
+    beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
+    change, largest = _level_change(case, modes, all_speeds, response, beyond)
+    if given is None and case.dynamics.up_to is None and largest >= NOTICEABLE:
+        limit = limited(case, frequency, beyond)
+        response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case))
+        beyond *= 2.0
+        change, _ = _level_change(case, modes, all_speeds, response, beyond)
+    slow = frequency * HARMONICS < beyond - frequency
+    if slow.any():
+        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(all_speeds[0].carrier))
+        change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
     if progress is not None:
         progress("dynamics", 1, 2)
     verdict = stability(
@@ -475,7 +444,7 @@ def solve_dynamics(
         ring_teeth=gears.ring.teeth,
         excitation_limit=limit.frequency,
         level_change=change,
-        compared_to=compared_to,
+        compared_to=beyond,
         entries=dynamic_entries(case),
     )
 
@@ -489,16 +458,17 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     CaseError
         E-SPEED, as there.
     """
-    found = _turning_speeds(case, planetary_set(case))
+    frequency = [s.mesh_frequency for s in _turning_speeds(case, modes)]
+    limit = limited(case, frequency, case.dynamics.up_to or modes.reach, given=case.dynamics.mesh_harmonics)
+    return solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
+
+
+def _turning_speeds(case: Case, modes: ModesResult) -> tuple[Speeds, ...]:
+    """Speeds of all members at the speeds of the input, refused where the ring has no modes for them."""
+    gears = planetary_set(case)
+    found = tuple(member_speeds(case, gears, speed) for speed in case.operation.speeds)
     check_rim_speed(modes.ring.modes, [s.carrier for s in found])
-    frequency = np.array([s.mesh_frequency for s in found])
-    up_to = case.dynamics.up_to or modes.reach
-    return periodic_response(case, modes, frequency, up_to, given=case.dynamics.mesh_harmonics)[1]
-
-
-def _turning_speeds(case: Case, gears: PlanetarySet) -> tuple[Speeds, ...]:
-    """Speeds of all members at the speeds of the input."""
-    return tuple(member_speeds(case, gears, speed) for speed in case.operation.speeds)
+    return found
 
 
 @one_blas_thread()
@@ -530,8 +500,8 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )
 
 
-def _notices(data: dict) -> Iterator[Finding]:
-    if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
+def _notices(data: dict, case: Case) -> Iterator[Finding]:
+    if "bearing_clearance" in data["planet"] and case.static.members == "fixed":
         yield remark(
             'planet.bearing_clearance has no effect while static.members is "fixed": write '
             'static.members = "elastic"'
@@ -548,9 +518,9 @@ ELASTIC = Train(
         Stage(
             name="modes",
             title="Modes",
-            solve=lambda case, results, context: solve_modes(
-                case, results["static"], progress=context.progress
-            ),
+            solve=solve_modes,
+            takes=("static",),
+            options=("progress",),
             verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
@@ -559,9 +529,9 @@ ELASTIC = Train(
         Stage(
             name="dynamics",
             title="Dynamics",
-            solve=lambda case, results, context: solve_dynamics(
-                case, results["static"], results["modes"], progress=context.progress
-            ),
+            solve=solve_dynamics,
+            takes=("static", "modes",),
+            options=("progress",),
             verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             needs=lambda case: ("modes",),
@@ -570,7 +540,8 @@ ELASTIC = Train(
         Stage(
             name="housing",
             title="Housing",
-            solve=lambda case, results, _: solve_housing(case, results["dynamics"]),
+            solve=solve_housing,
+            takes=("dynamics",),
             verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(results.housing),
             needs=lambda case: ("dynamics",),

@@ -346,7 +346,7 @@ GEAR_PAIR = Train(
         Stage(
             name="response",
             title="Response",
-            solve=lambda case, *_: solve_response(case),
+            solve=solve_response,
             verdict=lambda result: {"points": len(result.lowest), "message": result.branch.message},
             describe=lambda results: _describe_response(results.response),
             unavailable=_no_response,
@@ -355,7 +355,7 @@ GEAR_PAIR = Train(
         Stage(
             name="sweep",
             title="Sweep",
-            solve=lambda case, *_: solve_sweep(case),
+            solve=solve_sweep,
             verdict=lambda result: {"settled": int(result.up.settled.sum() + result.down.settled.sum())},
             describe=lambda results: _describe_sweep(results.sweep),
             unavailable=lambda case: "" if case.sweep else "the case has no section sweep",
@@ -364,7 +364,8 @@ GEAR_PAIR = Train(
         Stage(
             name="chaos",
             title="Chaos",
-            solve=lambda case, _, context: solve_chaos(case, progress=context.progress),
+            solve=solve_chaos,
+            options=("progress",),
             verdict=lambda result: {"ratios": len(result.ratio)},
             describe=lambda results: _describe_chaos(results.chaos),
             unavailable=lambda case: "" if case.chaos else "the case has no section chaos",

@@ -219,9 +219,7 @@ HELICAL = Train(
     stages=(
         replace(
             static_stages.STATIC,
-            solve=lambda case, _, context: solve_helical_static(
-                case, cache=context.cache, progress=context.progress
-            ),
+            solve=solve_helical_static,
             describe=lambda results: describe_helical_static(
                 results.static,
                 results.modes if "modes" in results.stages else None,
@@ -236,9 +234,9 @@ HELICAL = Train(
         Stage(
             name="modes",
             title="Modes",
-            solve=lambda case, results, context: solve_helical_modes(
-                case, results.get("static"), cache=context.cache
-            ),
+            solve=solve_helical_modes,
+            takes=("static",),
+            options=("cache",),
             verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=lambda case: () if _given(case) else ("static",),
@@ -247,9 +245,9 @@ HELICAL = Train(
         Stage(
             name="dynamics",
             title="Dynamics",
-            solve=lambda case, results, context: solve_helical_dynamics(
-                case, results["modes"], progress=context.progress
-            ),
+            solve=solve_helical_dynamics,
+            takes=("modes",),
+            options=("progress",),
             verdict=static_stages.response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             unavailable=lambda case: (
@@ -264,5 +262,5 @@ HELICAL = Train(
     figures=FIGURES,
     remarks=_remarks,
     cross_check=check_helical,
-    notices=helical_notices,
+    notices=lambda tables, case: helical_notices(tables),
 )  # fmt: skip

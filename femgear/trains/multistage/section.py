@@ -29,11 +29,9 @@ from femgear.case.quantities import (
     Section,
     StiffnessOrRigid,
     Title,
-    described,
-    refuse,
 )
 from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
-from femgear.case.text import ReadCase
+from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import ShaftSection, joint_springs
 from femgear.gears.checks import check_set
@@ -69,10 +67,10 @@ _REMEDIES = {
 
 def _member(value: object) -> str:
     if not isinstance(value, str):
-        raise refuse(f"a member of a stage is needed, not {described(value)}", code="E-TYPE", value=value)
+        raise CaseError(f"a member of a stage is needed, not {described(value)}", code="E-TYPE", value=value)
     if not _MEMBER.fullmatch(value):
         limit = 'a stage and its carrier, ring or sun, such as "stage 1 sun"'
-        raise refuse("not a member of a stage", code="E-CHOICE", value=value, limit=limit)
+        raise CaseError("not a member of a stage", code="E-CHOICE", value=value, limit=limit)
     return value
 
 

@@ -391,14 +391,15 @@ MULTISTAGE = Train(
         RunStage(
             name="modes",
             title="Modes",
-            solve=lambda case, *_: solve_multistage_modes(case),
+            solve=solve_multistage_modes,
             verdict=lambda result: {"modes": len(result.modes.frequency)},
             describe=lambda results: describe_stage_modes(results.modes),
         ),
         RunStage(
             name="response",
             title="Response",
-            solve=lambda case, results, _: solve_response(case, results["modes"]),
+            solve=solve_response,
+            takes=("modes",),
             verdict=lambda result: {"speeds": len(result.speed)},
             describe=lambda results: describe_forces(results.response, "Response"),
             unavailable=_no_response,
@@ -407,7 +408,8 @@ MULTISTAGE = Train(
         RunStage(
             name="balance",
             title="Harmonic balance",
-            solve=lambda case, _, context: solve_balance(case, progress=context.progress),
+            solve=solve_balance,
+            options=("progress",),
             verdict=lambda result: {"speeds": len(result.speed), "converged": int(result.converged.sum())},
             describe=lambda results: describe_forces(results.balance, "Harmonic balance"),
             unavailable=_no_balance,

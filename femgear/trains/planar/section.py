@@ -28,10 +28,9 @@ from femgear.case.quantities import (
     Quantity,
     Section,
     Title,
-    described,
-    refuse,
 )
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
+from femgear.case.text import described
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     entries_without_effect,
@@ -67,9 +66,9 @@ FigureName = Literal[
 
 def _sentence(value: object) -> str:
     if not isinstance(value, str):
-        raise refuse(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
+        raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
     if len(value) > 600 or not value.isprintable():
-        raise refuse(
+        raise CaseError(
             "the comparison must be one printable line", code="E-RANGE", limit="600 printable characters"
         )
     return value
@@ -78,7 +77,7 @@ def _sentence(value: object) -> str:
 def _some(values: tuple) -> tuple:
     # pydantic's own min_length counts valid entries alone, and would complain twice
     if not values:
-        raise refuse("there is no entry", code="E-RANGE", limit="1 or more")
+        raise CaseError("there is no entry", code="E-RANGE", limit="1 or more")
     return values
 
 
@@ -145,7 +144,7 @@ class PlanarPublished(Section):
             name for name in ("kind", "frequency", "figure", "comparison") if getattr(self, name) is not None
         }
         if given not in ({"kind", "frequency"}, {"figure", "comparison"}):
-            raise refuse(
+            raise CaseError(
                 "a published entry is a frequency with its kind, or a figure with a comparison",
                 code="E-CHOICE",
                 remedy='write kind = "rotational" and frequency = "69.5 Hz"',

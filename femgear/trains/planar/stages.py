@@ -420,7 +420,8 @@ PLANAR = Train(
         Stage(
             name="modes",
             title="Modes",
-            solve=lambda case, results, _: solve_planar_modes(case, results.get("static")),
+            solve=solve_planar_modes,
+            takes=("static",),
             verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=_needs_static,
@@ -430,9 +431,9 @@ PLANAR = Train(
         Stage(
             name="branch",
             title="Response to the weight",
-            solve=lambda case, results, context: solve_branch(
-                case, results.get("static"), progress=context.progress
-            ),
+            solve=solve_branch,
+            takes=("static",),
+            options=("progress",),
             verdict=_branch_verdict,
             describe=lambda results: describe_branch(results.branch),
             unavailable=_lacks("branch"),
@@ -442,9 +443,9 @@ PLANAR = Train(
         Stage(
             name="response",
             title="Weight and mesh frequency",
-            solve=lambda case, results, context: solve_planar_response(
-                case, results.get("static"), progress=context.progress
-            ),
+            solve=solve_planar_response,
+            takes=("static",),
+            options=("progress",),
             verdict=_response_verdict,
             describe=lambda results: describe_response(results.response),
             unavailable=_lacks("response"),
@@ -457,5 +458,5 @@ PLANAR = Train(
     figures=FIGURES,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
     cross_check=check_planar,
-    notices=planar_notices,
+    notices=lambda tables, case: planar_notices(tables),
 )  # fmt: skip

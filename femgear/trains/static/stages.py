@@ -71,9 +71,9 @@ def solve_static(
     GeometryError, GridError, ContactError
     """
     gears, deviations = planetary_set(case), set_deviations(case)
-    steps = steps or Steps()
-    sectors, bodies = steps.take(
-        "flank compliances", compliance_entries(case), lambda: flank_compliances(case, gears, cache=cache)
+    steps, known = steps or Steps(), compliance_entries(case)
+    sectors, bodies = steps.kept("flank compliances", known) or steps.keep(
+        "flank compliances", known, flank_compliances(case, gears, cache=cache)
     )
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
@@ -290,7 +290,8 @@ def response_verdict(result) -> dict:
 STATIC = Stage(
     name="static",
     title="Static",
-    solve=lambda case, _, context: solve_static(case, cache=context.cache, progress=context.progress),
+    solve=solve_static,
+    options=("cache", "progress"),
     verdict=static_verdict,
     describe=lambda results: describe_static(results.static, planetary_set(results.case).sun.module),
     check=planetary_set,
@@ -300,7 +301,9 @@ STATIC = Stage(
 STRESS = Stage(
     name="stress",
     title="Stresses",
-    solve=lambda case, results, context: solve_stress(case, results["static"], progress=context.progress),
+    solve=solve_stress,
+    takes=("static",),
+    options=("progress",),
     verdict=lambda result: {
         "root_points": sum(len(root.arc) for root in result.roots),
         "iso": result.nominal.message,

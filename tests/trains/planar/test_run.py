@@ -191,7 +191,7 @@ def test_stages_of_every_kind_of_case(pgb, coarse):
 
 
 def test_an_interrupted_run_keeps_its_finished_stages(tmp_path, pgb, monkeypatch):
-    def interrupt(*_):
+    def interrupt(*_, **__):
         raise KeyboardInterrupt
 
     stages = [
