@@ -5,7 +5,7 @@ import math
 import numpy as np
 from published.wind_turbine_drivetrain import wind_turbine_drivetrain
 
-from femgear.system.elements import positive_part
+from femgear.system.force_laws import positive_part
 from femgear.trains.drivetrain.data import (
     BearingSection,
     BodySection,
