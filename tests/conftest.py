@@ -1,10 +1,49 @@
 """Makes the modules that several tests share, and those of scripts, importable by name; shared fixtures."""
 
+import contextlib
+import importlib.util
+import io
+import signal
+import subprocess
 import sys
+import threading
 from pathlib import Path
+
+import pytest
 
 TESTS = Path(__file__).parent
 
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "scripts")]
 
 from small_systems import chain_excitation, geared_chain, planet_excitation, planet_set  # noqa: E402, F401
+
+
+@pytest.fixture(scope="session", autouse=True)
+def gmsh_is_loaded_once():
+    """The worker of Gmsh runs within the tests: to start a process takes ten times as long as a grid.
+
+    tests/fe/test_meshing.py has the process back.
+    """
+    from femgear.fe import meshing
+
+    spec = importlib.util.spec_from_file_location("gmsh_worker", meshing.WORKER)
+    worker = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(worker)
+    # Gmsh has one global model
+    one_at_a_time = threading.Lock()
+
+    class Within:
+        TimeoutExpired, DEVNULL = subprocess.TimeoutExpired, subprocess.DEVNULL
+
+        @staticmethod
+        def run(command, **_):
+            said = io.StringIO()
+            with one_at_a_time, contextlib.redirect_stderr(said):
+                code = worker.main(*command[-2:])
+                if hasattr(signal, "alarm"):
+                    signal.alarm(0)
+            return subprocess.CompletedProcess(command, code, "", said.getvalue())
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(meshing, "subprocess", Within)
+        yield

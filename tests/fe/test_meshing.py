@@ -16,6 +16,11 @@ from femgear.fe import meshing
 from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_outline, mesh_outlines
 
 
+@pytest.fixture(autouse=True)
+def a_process_for_every_grid(monkeypatch):
+    monkeypatch.setattr(meshing, "subprocess", subprocess)
+
+
 def polygon(corners, *, name="edge", divide=1):
     """Closed polygon as one curve per side."""
     corners = np.asarray(corners, dtype=float)

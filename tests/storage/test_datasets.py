@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from page_examples import check_documented
 
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_value
@@ -87,6 +88,16 @@ def test_everything_has_units_and_a_name_and_is_finite(datasets, stage):
         assert variable.attrs["units"] == UNITS.get(name, variable.attrs["units"])
         if variable.dtype.kind == "f":
             assert np.isfinite(variable.values).all(), name
+
+
+@pytest.mark.parametrize("stage", PLACES)
+def test_results_page_names_every_variable_and_attribute(datasets, stage):
+    check_documented(datasets[stage], f"## {stage}.nc")
+    page = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    # of modes and dynamics the page names the attributes that need words
+    if stage not in ("modes", "dynamics"):
+        for attribute in set(datasets[stage].attrs) - {"title", "fourier_convention"}:
+            assert f"`{attribute}`" in page, attribute
 
 
 def test_static_attributes_and_labels(datasets):

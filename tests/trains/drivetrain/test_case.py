@@ -16,19 +16,7 @@ from femgear.trains.drivetrain.stages import DRIVETRAIN
 from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_value
 
 CASES = Path(__file__).parents[3] / "cases"
-PAPER, GRC, OWN = (
-    CASES / f"{name}.toml" for name in ("wind_turbine_drivetrain", "grc_like_drivetrain", "own_chain")
-)
-
-
-@pytest.fixture(scope="module")
-def paper():
-    return read_case(PAPER)
-
-
-@pytest.fixture(scope="module")
-def own():
-    return read_case(OWN)
+PAPER, GRC = (CASES / f"{name}.toml" for name in ("wind_turbine_drivetrain", "grc_like_drivetrain"))
 
 
 def same(one, other) -> bool:
@@ -139,7 +127,6 @@ def refused(case, **changes):
         ("simulation.settle", "3 s", "E-RANGE", "simulation.settle"),
         ("simulation.duration", "9e4 s", "E-RANGE", "simulation.duration"),
         ("simulation.contact_loss", "yes", "E-TYPE", "simulation.contact_loss"),
-        ("model", "drivetrian", "E-CHOICE", "model"),
         ("model", 3, "E-TYPE", "model"),
     ],
 )  # fmt: skip
@@ -230,9 +217,6 @@ def test_what_only_the_model_can_tell(paper, own):
     assert case_model(
         with_value(with_value(paper, "planetary[0].planet_bearing", "1e9 N/m"), "simulation.turning", False)
     )
-    # few harmonics of a wave that nearly vanishes overshoot below zero
-    error = refused_model(with_value(own, "parallel[0].mesh.low_share", 0.02))
-    assert error.code == "E-STIFFNESS" and error.key == "parallel[0].mesh.low_share"
     loose = with_value(own, "bearing", [{"body": "motor", "radial": "1e8 N/m", "tilt": "1e6 N m/rad"}])
     error = refused_model(loose)
     assert error.code == "E-MECHANISM" and ("wheel" in error.message or "fan" in error.message)

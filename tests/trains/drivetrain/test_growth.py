@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drivetrain_references import held_pair
 from published.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -19,8 +20,6 @@ from femgear.trains.drivetrain.data import (
     BearingSection,
     BodySection,
     Drivetrain,
-    MeshSection,
-    ParallelSection,
     constant_torques,
 )
 from femgear.trains.drivetrain.model import balanced_torque, drivetrain_model, torsional_model
@@ -29,25 +28,8 @@ from femgear.trains.drivetrain.time import PIECE, FreeMotion, march_drivetrain
 TEETH, HARMONICS = 20, 3
 
 
-def pair(*, damping=0.0, backlash=math.inf, harmonics=HARMONICS):
-    """Two wheels on held axes: one mesh, one elastic coordinate."""
-    wave = MeshSection.in_si(stiffness=2e8, contact_ratio=1.5, low_share=0.8, phase=0.0, backlash=backlash)
-    train = Drivetrain(
-        (
-            BodySection.in_si(name="a", mass=10.0, inertia=0.2, tilts=False),
-            BodySection.in_si(name="b", mass=20.0, inertia=0.9, tilts=False),
-        ),
-        parallel=(
-            ParallelSection.in_si(between=("a", "b"), teeth=(TEETH, TEETH), radii=(0.05, 0.1), mesh=wave),
-        ),
-        bearings=(
-            BearingSection.in_si(body="a", radial=math.inf),
-            BearingSection.in_si(body="b", radial=math.inf),
-        ),
-        gravity=0.0,
-        damping_ratio=damping,
-    )
-    return drivetrain_model(train, harmonics=harmonics)
+def pair(*, harmonics=HARMONICS, **options):
+    return held_pair(harmonics=harmonics, teeth=TEETH, **options)
 
 
 def natural(model) -> float:

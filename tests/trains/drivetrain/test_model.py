@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drivetrain_references import torsional_matrices
+from drivetrain_references import planetary_stage, torsional_matrices
 from published.wind_turbine_drivetrain import (
     PRINTED,
     RADII_TEETH,
@@ -36,18 +36,6 @@ from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 SHORT_CUT = ShaftSection.in_si(between=("rotor", "generator"), length=3.0, bending=1e6, torsion=1e6)
-
-
-def gear_set(**changes):
-    """One planetary stage alone, in bearings."""
-    stage = TRAIN.planetary[0].changed(**changes)
-    bodies = tuple(b for b in TRAIN.bodies if b.name in ("carrier", "sun"))
-    bodies = tuple(b.changed(tilts=False) for b in bodies)
-    bearings = (
-        BearingSection.in_si(body="carrier", radial=2e8),
-        BearingSection.in_si(body="sun", radial=3e7),
-    )
-    return Drivetrain(bodies, planetary=(stage,), bearings=bearings, gravity=0.0)
 
 
 def test_36_coordinates_by_body():
@@ -160,7 +148,7 @@ def test_stiff_bearings_tend_to_the_torsional_model():
 
 def test_one_planetary_stage_is_the_planar_model():
     for bearing, turning in ((math.inf, True), (2e8, False)):
-        train = gear_set(planet_bearing=bearing)
+        train = planetary_stage(planet_bearing=bearing)
         model = drivetrain_model(train, turning=turning)
         lumped = planar_of(train, train.planetary[0])
         lumped = replace(
@@ -185,7 +173,7 @@ def test_turning_directions_against_the_carrier_frame():
     planets' pins turn.
     """
     speed = 40.0
-    train = gear_set()
+    train = planetary_stage()
     model = drivetrain_model(train, harmonics=0)
     lumped = planar_of(train, train.planetary[0])
     lumped = replace(
@@ -302,8 +290,8 @@ def test_tilted_and_helical_mesh_by_virtual_work():
     ("make", "code"),
     [
         (lambda: drivetrain_model(replace(TRAIN, shafts=TRAIN.shafts[1:])), "E-DRIVETRAIN"),
-        (lambda: drivetrain_model(gear_set(planet_angles=(0.0, 2.0, 4.0))), "E-TURNING"),
-        (lambda: drivetrain_model(gear_set(planet_bearing=1e8)), "E-TURNING"),
+        (lambda: drivetrain_model(planetary_stage(planet_angles=(0.0, 2.0, 4.0))), "E-TURNING"),
+        (lambda: drivetrain_model(planetary_stage(planet_bearing=1e8)), "E-TURNING"),
         (lambda: drivetrain_model(replace(TRAIN, shafts=(*TRAIN.shafts, SHORT_CUT))), "E-DRIVETRAIN"),
         (lambda: march_drivetrain(drivetrain_model(TRAIN), (), duration=1.0, step=2.0, speed=0.6), "E-RANGE"),
     ],

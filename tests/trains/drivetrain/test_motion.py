@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drivetrain_references import mesh_force
+from drivetrain_references import mesh_force, planetary_stage
 from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import FourierSeries, distinct_lines
-from femgear.trains.drivetrain.data import BearingSection, Drivetrain, TorqueHistory, constant_torques
+from femgear.trains.drivetrain.data import TorqueHistory, constant_torques
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
@@ -22,18 +22,6 @@ from femgear.trains.drivetrain.stages import averaged_spectrum, order_spectrum
 from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
-
-
-def gear_set(**changes):
-    """One planetary stage alone, in bearings."""
-    stage = TRAIN.planetary[0].changed(**changes)
-    bodies = tuple(b for b in TRAIN.bodies if b.name in ("carrier", "sun"))
-    bodies = tuple(b.changed(tilts=False) for b in bodies)
-    bearings = (
-        BearingSection.in_si(body="carrier", radial=2e8),
-        BearingSection.in_si(body="sun", radial=3e7),
-    )
-    return Drivetrain(bodies, planetary=(stage,), bearings=bearings, gravity=0.0)
 
 
 def test_momentum_energy_and_drift():
@@ -95,7 +83,7 @@ def settled_forces(model, torques, speed, times):
 
 def test_integration_against_harmonic_balance():
     """The general solver samples both bases; the run begins on its motion and stays there."""
-    model = drivetrain_model(replace(gear_set(), damping_ratio=0.05, gravity=9.81), harmonics=2)
+    model = drivetrain_model(replace(planetary_stage(), damping_ratio=0.05, gravity=9.81), harmonics=2)
     torques, speed, step = balanced_torque(model, "carrier", 15000.0, "sun"), 1.0, 2e-5
     times = 5 * step * np.arange(4001)
     force, start = settled_forces(model, torques, speed, times)
@@ -113,7 +101,7 @@ def test_integration_against_harmonic_balance():
 
 def test_bending_alone_gives_side_bands_of_the_turn():
     """Weight displaces carrier and sun in the fixed frame, where the planets pass: only then f_p +- turn."""
-    train = replace(gear_set(), damping_ratio=0.05, gravity=9.81)
+    train = replace(planetary_stage(), damping_ratio=0.05, gravity=9.81)
     # the mesh has 184 periods in a turn
     teeth, seen, times = train.planetary[0].ring_teeth, {}, 2.0 * np.pi * np.arange(32 * 184) / (32 * 184)
     for text, model in (

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drivetrain_references import PAIR_INERTIAS, PAIR_RADII, held_pair
 from scipy.integrate import solve_ivp
 
 from femgear.trains.drivetrain.checks import (
@@ -16,15 +17,9 @@ from femgear.trains.drivetrain.checks import (
     speed_range,
 )
 from femgear.trains.drivetrain.data import (
-    BearingSection,
-    BodySection,
-    Drivetrain,
-    MeshSection,
-    ParallelSection,
     TorqueHistory,
     constant_torques,
 )
-from femgear.trains.drivetrain.model import drivetrain_model
 from femgear.trains.drivetrain.time import march_drivetrain
 from femgear.trains.reading import read_case
 
@@ -108,32 +103,10 @@ def test_records_keep_the_third_harmonic(rate, highest):
         assert keeps == enough or (enough and every == 1.0)
 
 
-def held_pair(stiffness=2e8):
-    """Two wheels on held axes, one mesh, one elastic coordinate of known frequency."""
-    train = Drivetrain(
-        (
-            BodySection.in_si(name="a", mass=10.0, inertia=0.2, tilts=False),
-            BodySection.in_si(name="b", mass=20.0, inertia=0.9, tilts=False),
-        ),
-        parallel=(
-            ParallelSection.in_si(
-                between=("a", "b"),
-                teeth=(20, 20),
-                radii=(0.05, 0.1),
-                mesh=MeshSection.in_si(stiffness=stiffness, contact_ratio=1.5),
-            ),
-        ),
-        bearings=(
-            BearingSection.in_si(body="a", radial=np.inf),
-            BearingSection.in_si(body="b", radial=np.inf),
-        ),
-    )
-    base = np.array([0.05, 0.1]) * np.cos(np.radians(20.0))
-    return drivetrain_model(train), np.sqrt(stiffness * np.sum(base**2 / [0.2, 0.9])) / (2.0 * np.pi)
-
-
 def test_mode_that_the_mesh_drives(model):
-    pair, hertz = held_pair()
+    """The elastic coordinate of two wheels on held axes, and nothing of the shafts of a chain."""
+    pair, base = held_pair(stiffness=2e8), np.array(PAIR_RADII) * np.cos(np.radians(20.0))
+    hertz = np.sqrt(2e8 * np.sum(base**2 / PAIR_INERTIAS)) / (2.0 * np.pi)
     assert mesh_mode(pair, 1.01 * hertz) == pytest.approx(hertz, rel=1e-9)
     assert mesh_mode(pair, 0.99 * hertz) == 0.0
     # the elastic coupling between motor and pinion has modes without any share of the mesh

@@ -5,18 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drivetrain_references import mesh_force
+from drivetrain_references import held_pair, mesh_force
 from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
 from femgear.errors import CaseError
 from femgear.solvers.time.transient import solve_transient
 from femgear.trains.drivetrain import scheme
 from femgear.trains.drivetrain.data import (
-    BearingSection,
-    BodySection,
-    Drivetrain,
-    MeshSection,
-    ParallelSection,
     TorqueHistory,
     constant_torques,
 )
@@ -30,33 +25,6 @@ from femgear.trains.drivetrain.scheme import solve_overlaps
 from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 K, BACKLASH = 2e8, 1e-4
-
-
-def pair(*, damping=0.0, backlash=math.inf, harmonics=0):
-    """Two wheels on held axes: one mesh, one elastic coordinate."""
-    train = Drivetrain(
-        (
-            BodySection.in_si(name="a", mass=10.0, inertia=0.2, tilts=False),
-            BodySection.in_si(name="b", mass=20.0, inertia=0.9, tilts=False),
-        ),
-        parallel=(
-            ParallelSection.in_si(
-                between=("a", "b"),
-                teeth=(20, 20),
-                radii=(0.05, 0.1),
-                mesh=MeshSection.in_si(
-                    stiffness=K, contact_ratio=1.5, low_share=0.8, phase=0.0, backlash=backlash
-                ),
-            ),
-        ),
-        bearings=(
-            BearingSection.in_si(body="a", radial=math.inf),
-            BearingSection.in_si(body="b", radial=math.inf),
-        ),
-        gravity=0.0,
-        damping_ratio=damping,
-    )
-    return drivetrain_model(train, harmonics=harmonics)
 
 
 def approach_of(model):
@@ -83,7 +51,7 @@ def bounce(times, speed, load, k, mass):
 
 
 def test_flight_and_impact_in_closed_form():
-    model, speed, load = pair(), 0.1, 5000.0
+    model, speed, load = held_pair(), 0.1, 5000.0
     _, mass = approach_of(model)
     radius = 0.05 * math.cos(math.radians(20.0))
     torques = constant_torques(balanced_torque(model, "a", load * radius, "b"))
@@ -110,7 +78,7 @@ def test_flight_and_impact_in_closed_form():
 
 def test_back_flanks_in_closed_form():
     """Without load: half sines at both flanks, the backlash crossed at constant speed."""
-    model, speed = pair(backlash=BACKLASH), 0.05
+    model, speed = held_pair(backlash=BACKLASH), 0.05
     mass = approach_of(model)[1]
     w = math.sqrt(K / mass)
     half, cross = math.pi / w, BACKLASH / speed
@@ -139,7 +107,7 @@ def test_back_flanks_in_closed_form():
 
 def test_free_motion_keeps_its_energy_to_the_square_of_the_step():
     """The balance is exact; energy is lost or won only where a step crosses a border of the contact."""
-    model, speed, found = pair(backlash=BACKLASH), 0.05, []
+    model, speed, found = held_pair(backlash=BACKLASH), 0.05, []
     w, mass = approach_of(model)
     for steps in (50, 200, 800):
         h = 2.0 * math.pi / math.sqrt(K / mass) / steps
@@ -294,7 +262,7 @@ def test_static_start_with_meshes_that_part():
 def test_static_start_on_back_flanks():
     load = 5000.0
     for backlash in (BACKLASH, math.inf):
-        model = pair(backlash=backlash)
+        model = held_pair(backlash=backlash)
         radius = 0.05 * math.cos(math.radians(20.0))
         torques = constant_torques(balanced_torque(model, "a", -load * radius, "b"))
         options = {"duration": 0.01, "step": 1e-5, "speed": 10.0, "contact_loss": True}
@@ -322,7 +290,7 @@ def test_energy_balances_through_torque_reversals():
 
 def test_growth_of_separating_meshes_is_that_of_their_tangents():
     """Two motions that start side by side come together, impacts included, as the exponent says."""
-    model = pair(damping=0.01, backlash=BACKLASH, harmonics=1)
+    model = held_pair(damping=0.01, backlash=BACKLASH, harmonics=1)
     w = math.sqrt(K / approach_of(model)[1])
     radius = 0.05 * math.cos(math.radians(20.0))
     torques = constant_torques(balanced_torque(model, "a", 2000.0 * radius, "b"))

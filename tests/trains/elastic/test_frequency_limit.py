@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femgear.case.dependencies import Steps
 from femgear.errors import CaseError
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_lines
@@ -38,8 +39,20 @@ def static(case):
 
 
 @pytest.fixture(scope="module")
-def modes(case, static):
-    return solve_modes(case, static)
+def steps():
+    """Loaded state and ring models, which cases with other frequency limits share."""
+    return Steps()
+
+
+@pytest.fixture(scope="module")
+def modes(case, static, steps):
+    return solve_modes(case, static, steps=steps)
+
+
+@pytest.fixture(scope="module")
+def reference(case, static, modes):
+    """Response and level of the case as it stands."""
+    return levels(case, static, modes)
 
 
 def levels(case, static, modes):
@@ -47,25 +60,27 @@ def levels(case, static, modes):
     return dynamics, order_level(solve_housing(case, dynamics).lines)
 
 
-def test_default_reaches_the_modes_of_the_meshes_and_the_level_has_converged(case, static, modes):
+def test_default_reaches_the_modes_of_the_meshes_and_the_level_has_converged(
+    case, static, modes, reference, steps
+):
     """Also by hand: the level with a limit of twice the frequency that is found."""
-    dynamics, found = levels(case, static, modes)
+    dynamics, found = reference
     meshes = modes.modes.frequency[modes.modes.frequency < 16e3].max()
     assert 14e3 < meshes < dynamics.excitation_limit.min() <= dynamics.excitation_limit.max() <= modes.reach
     assert np.abs(dynamics.level_change).max() < 1.0 and dynamics.warnings == ()
     twice = with_value(case, "dynamics.up_to", f"{2 * modes.reach} Hz")
-    _, wider = levels(twice, static, solve_modes(twice, static))
+    _, wider = levels(twice, static, solve_modes(twice, static, steps=steps))
     # the basis of the second run reaches further, too
     change = 20 * np.log10(wider / found)
     assert np.abs(change).max() < 1.0
     assert change == pytest.approx(dynamics.level_change, abs=0.05)
 
 
-def test_six_harmonics_are_warned_of_with_what_is_missing(case, static, modes):
+def test_six_harmonics_are_warned_of_with_what_is_missing(case, static, modes, reference):
     six = with_value(case, "dynamics.mesh_harmonics", 6)
     dynamics, found = levels(six, static, modes)
     assert dynamics.excitation_limit == pytest.approx([540.0, 6696.0])
-    _, full = levels(case, static, modes)
+    _, full = reference
     missing = 20 * np.log10(full / found)
     assert missing[0] > 40.0 and missing[1] > 2.0
     # compared with the default reach, or with twice the harmonics where that is more
@@ -76,9 +91,9 @@ def test_six_harmonics_are_warned_of_with_what_is_missing(case, static, modes):
     assert "W-EXCITATION" in dynamics.dataset().attrs["warnings"]
 
 
-def test_a_limit_below_the_modes_of_the_meshes_is_warned_of(case, static, modes):
+def test_a_limit_below_the_modes_of_the_meshes_is_warned_of(case, static, modes, steps):
     low = with_value(case, "dynamics.up_to", "8 kHz")
-    basis = solve_modes(low, static)
+    basis = solve_modes(low, static, steps=steps)
     dynamics = solve_dynamics(low, static, basis)
     # what a study takes is what a run computes
     assert np.array_equal(solve_response(low, basis).deflection, dynamics.response.deflection)
@@ -140,9 +155,11 @@ def test_only_a_noticeable_change_is_told():
     assert "at 200 rpm" in text and "-3.0 dB" in text and "1 of the 2 speeds" in text
 
 
-def test_results_of_another_case_are_refused_with_the_entries_that_differ(case, static, modes):
+def test_results_of_another_case_are_refused_with_the_entries_that_differ(
+    case, static, modes, reference, steps
+):
     """Every stage; entries on which a result does not depend may change."""
-    dynamics = solve_dynamics(case, static, modes)
+    dynamics, _ = reference
     for changes, stage, named in (
         ({"planet.bore_radius": "16 mm"}, lambda c: solve_modes(c, static), "planet.bore_radius (0.018)"),
         ({"operation.torque": "60 N m"}, lambda c: solve_modes(c, static), "operation.torque"),
@@ -162,7 +179,7 @@ def test_results_of_another_case_are_refused_with_the_entries_that_differ(case, 
     held = with_values(
         case, {"planet.bearing_stiffness": "1e8 N/m", "sun.mass": "0.3 kg", "housing.sensor_angle": "9 deg"}
     )
-    solve_dynamics(held, static, solve_modes(held, static))
+    solve_dynamics(held, static, solve_modes(held, static, steps=steps))
     solve_housing(with_value(case, "housing.sensor_angle", "9 deg"), dynamics)
 
 

@@ -8,6 +8,7 @@ from validation.cases import reference_case
 from validation.reference.sensor_in_time import symmetry_leakage
 
 from femgear.case import text as case_text
+from femgear.case.dependencies import Steps
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum
 from femgear.system.fourier import harmonics_of, sample
@@ -26,13 +27,24 @@ def case():
 
 
 @pytest.fixture(scope="module")
-def static(case):
-    return solve_static(case)
+def steps():
+    """Grids, compliances and ring models, which the cases of this file share."""
+    return Steps()
 
 
 @pytest.fixture(scope="module")
-def dynamics(case, static):
-    return solve_dynamics(case, static, solve_modes(case, static))
+def static(case, steps):
+    return solve_static(case, steps=steps)
+
+
+@pytest.fixture(scope="module")
+def modes(case, static, steps):
+    return solve_modes(case, static, steps=steps)
+
+
+@pytest.fixture(scope="module")
+def dynamics(case, static, modes):
+    return solve_dynamics(case, static, modes)
 
 
 def test_the_validation_tables_take_the_case_of_the_repository():
@@ -50,11 +62,11 @@ def test_the_paper_and_the_reference_set_are_one_set_with_another_excitation_and
 
 
 @pytest.mark.parametrize("torque", ["100 N m", "-60 N m"])
-def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_supports(case, torque):
+def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_supports(case, torque, steps):
     """0.01 rpm, whatever static.members shows: mean and fluctuation of all meshes, and the forces."""
     case = with_value(with_value(case, "operation.speeds", ["0.01 rpm"]), "operation.torque", torque)
-    static = solve_static(case)
-    modes = solve_modes(case, static)
+    static = solve_static(case, steps=steps)
+    modes = solve_modes(case, static, steps=steps)
     result = solve_dynamics(case, static, modes)
     # the kinks of the static curve have harmonics beyond the 512 of the excitation
     ste = sample(harmonics_of(modes.state.resampled("deflection", 8192), 512), 2048)
@@ -63,7 +75,7 @@ def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_
     assert dte.mean(axis=1) == pytest.approx(ste.mean(axis=1), rel=1e-4)
     # gears that are held deflect by less than those on their supports
     assert static.cycle.deflection[3:].mean() < 0.5 * ste[3:].mean()
-    moving = solve_static(with_value(case, "static.members", "elastic")).cycle.deflection
+    moving = solve_static(with_value(case, "static.members", "elastic"), steps=steps).cycle.deflection
     assert modes.state.resampled("deflection", 32) == pytest.approx(moving, rel=1e-7)
     force = sample(result.response.force[0], 2048)
     assert force == pytest.approx(abs(static.sun_torque) / static.planetary_set.sun.base_radius / 3, rel=1e-3)
@@ -118,41 +130,39 @@ def test_mesh_harmonics_of_the_force_balance_the_torque(dynamics, static):
     assert np.all(np.abs(dynamics.stability.multiplier) < 1)
 
 
-def test_negative_torque_runs_the_cycle_backwards(case, static):
+def test_negative_torque_runs_the_cycle_backwards(case, static, modes, steps):
     """The back flanks of a symmetric set are its mirror image."""
     back_case = with_value(case, "operation.torque", "-100 N m")
-    back = solve_static(back_case)
+    back = solve_static(back_case, steps=steps)
     turned = -np.arange(32) % 32
     assert back.cycle.deflection == pytest.approx(static.cycle.deflection[:, turned], abs=1e-11)
-    modes = solve_modes(back_case, back)
-    assert modes.modes.frequency == pytest.approx(
-        solve_modes(case, static).modes.frequency, rel=1e-6, abs=1e-3
-    )
-    assert np.isfinite(solve_dynamics(back_case, back, modes).dte).all()
+    turned_modes = solve_modes(back_case, back, steps=steps)
+    assert turned_modes.modes.frequency == pytest.approx(modes.modes.frequency, rel=1e-6, abs=1e-3)
+    assert np.isfinite(solve_dynamics(back_case, back, turned_modes).dte).all()
 
 
-def test_modes_need_a_fixed_ring(case):
+def test_modes_need_a_fixed_ring(case, steps):
     freed = with_value(case, "operation.fixed", "carrier")
     freed = with_value(freed, "static.positions", 13)
-    static = solve_static(freed)
+    static = solve_static(freed, steps=steps)
     with pytest.raises(CaseError, match="fixed ring") as caught:
         solve_modes(freed, static)
     assert caught.value.code == "E-FIXED-MEMBER" and "[planar]" in caught.value.remedy
 
 
-def test_without_torque_static_is_defined_and_modes_are_refused(case):
+def test_without_torque_static_is_defined_and_modes_are_refused(case, steps):
     empty = with_value(with_value(case, "operation.torque", "0 N m"), "static.positions", 13)
-    static = solve_static(empty)
+    static = solve_static(empty, steps=steps)
     assert not static.cycle.force.any()
     with pytest.raises(CaseError) as caught:
         solve_modes(empty, static)
     assert caught.value.code == "E-NO-LOAD"
 
 
-def test_progress_counts_the_positions(case):
+def test_progress_counts_the_positions(case, steps):
     seen = []
     short = with_value(case, "static.positions", 13)
-    solve_static(short, progress=lambda *step: seen.append(step))
+    solve_static(short, progress=lambda *step: seen.append(step), steps=steps)
     assert seen[-1] == ("contact", 13, 13)
 
 
@@ -187,20 +197,21 @@ def test_what_the_dynamics_cannot_represent_is_refused_before_computing(case):
     check_dynamic_case(case, planetary_set(case))
 
 
-def test_slow_sets_keep_their_modes(case, static):
-    slow = solve_modes(with_value(case, "operation.speeds", ["0.1 rpm"]), static)
+def test_slow_sets_keep_their_modes(case, static, steps):
+    slow = solve_modes(with_value(case, "operation.speeds", ["0.1 rpm"]), static, steps=steps)
     assert len(slow.modes.frequency) > 15
 
 
-def test_overload_is_said(case):
+def test_overload_is_said(case, steps):
     overload = solve_static(
-        with_value(with_value(case, "operation.torque", "20000 N m"), "static.positions", 16)
+        with_value(with_value(case, "operation.torque", "20000 N m"), "static.positions", 16),
+        steps=steps,
     )
     words = " ".join(map(str, overload.warnings))
     assert "W-PRESSURE" in words and "W-DEFLECTION] the teeth deflect by" in words
 
 
-def test_motion_of_the_ring_on_its_foundation_is_not_called_deflection_of_teeth(case):
+def test_motion_of_the_ring_on_its_foundation_is_not_called_deflection_of_teeth(case, steps):
     """The foundation of 4e9 N/m^3 yields by more than 5 % of the module, the meshes of the sun do not."""
     soft = with_values(
         case,
@@ -211,7 +222,7 @@ def test_motion_of_the_ring_on_its_foundation_is_not_called_deflection_of_teeth(
             "ring.foundation_tangential": "1e9 N/m^3",
         },
     )
-    static = solve_static(soft)
+    static = solve_static(soft, steps=steps)
     (words,) = [str(one) for one in static.warnings if one.code == "W-DEFLECTION"]
     sun, ring = (np.abs(half).max() * 1e6 for half in np.split(static.cycle.deflection, 2))
     assert sun < 20.0 and ring > 75.0
@@ -219,29 +230,29 @@ def test_motion_of_the_ring_on_its_foundation_is_not_called_deflection_of_teeth(
     assert "teeth deflect" not in words and "ring on its foundation" in words
 
 
-def test_motions_beyond_small_displacements_are_refused(case):
+def test_motions_beyond_small_displacements_are_refused(case, steps):
     from femgear.errors import ContactError
 
     coarse = with_value(case, "static.positions", 16)
     with pytest.raises(ContactError, match="E-MOTION"):
-        solve_static(with_value(coarse, "operation.torque", "1e6 N m"))
+        solve_static(with_value(coarse, "operation.torque", "1e6 N m"), steps=steps)
     soft = with_value(coarse, "static.members", "elastic")
     with pytest.raises(ContactError, match="E-MOTION"):
-        solve_static(with_value(soft, "planet.bearing_stiffness", "1 N/m"))
-    loose = solve_static(with_value(soft, "planet.bearing_clearance", "0.5 mm"))
+        solve_static(with_value(soft, "planet.bearing_stiffness", "1 N/m"), steps=steps)
+    loose = solve_static(with_value(soft, "planet.bearing_clearance", "0.5 mm"), steps=steps)
     assert "W-MOTION" in [one.code for one in loose.warnings]
 
 
-def test_thick_teeth_wedge_without_any_other_error(case):
+def test_thick_teeth_wedge_without_any_other_error(case, steps):
     """Teeth thicker than the play allow load both flanks: errors of thickness alone reach the contact."""
     coarse = with_value(with_value(case, "static.positions", 16), "static.back_flanks", True)
     thick = with_value(coarse, "sun.errors", {"thickness_reduction": "-300 um"})
-    found = solve_static(thick)
+    found = solve_static(thick, steps=steps)
     assert found.cycle.wedged[:3].all()
-    assert found.cycle.force[:3].min() > 2 * solve_static(coarse).cycle.force.max()
+    assert found.cycle.force[:3].min() > 2 * solve_static(coarse, steps=steps).cycle.force.max()
 
 
-def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_errors(case):
+def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_errors(case, steps):
     """Unequal loads, every spring of the dynamic model in the static one: forces agree at 1 rpm."""
     for key, value in {
         "static.positions": 16,
@@ -251,8 +262,8 @@ def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_error
         "set.pin_errors": [{"planet": 1, "tangential": "12 um"}, {"planet": 2, "radial": "6 um"}],
     }.items():
         case = with_value(case, key, value)
-    static = solve_static(case)
-    result = solve_dynamics(case, static, solve_modes(case, static))
+    static = solve_static(case, steps=steps)
+    result = solve_dynamics(case, static, solve_modes(case, static, steps=steps))
     assert np.ptp(static.cycle.load_share.mean(axis=1)) > 0.02
     mean = static.cycle.force.mean(axis=1)
     assert result.response.force[0, :, 0].real == pytest.approx(mean, rel=1e-4)

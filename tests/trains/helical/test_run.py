@@ -1,7 +1,6 @@
 """Runs of helical cases: stages, files, figures, report, and numbers against other ways to them."""
 
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -307,24 +306,6 @@ def test_a_run_computes_all_stages_and_shows_them(results):
         assert words in page
     assert cli.main(["report", str(results.folder)]) == 0
     assert (results.folder / "report.html").read_text(encoding="utf-8") == page
-
-
-def test_results_page_names_every_variable(results):
-    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
-    sections = [
-        text.split(f"## {name}")[1].split("\n## ")[0] for name in ("modes.nc", "dynamics.nc", "Helical cases")
-    ]
-    table = {}
-    for section in sections:
-        rows = re.findall(r"^\|([^|]*)\|([^|]*)\|([^|]*)\|", section, flags=re.MULTILINE)[2:]
-        table |= {v: (d.strip(), u.strip()) for cell, d, u in rows for v in re.findall(r"`(\w+)`", cell)}
-    for data in (results.modes, results.dynamics):
-        assert set(data.data_vars) <= table.keys()
-        for variable in data.data_vars:
-            dims, unit = table[variable]
-            assert dims == ", ".join(data[variable].dims), variable
-            assert (unit or "1") == data[variable].attrs["units"], variable
-            assert data[variable].attrs["long_name"]
 
 
 def test_stages_of_helical_cases(coarse, given, tmp_path, capsys):

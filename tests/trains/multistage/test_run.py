@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from page_examples import check_documented, undocumented_keys
+from page_examples import undocumented_keys
 from published.multistage_example import CASES, four_stage_case
 
 from femgear import cli, open_results
@@ -68,18 +68,6 @@ def test_harmonic_balance_is_near_the_modal_summation(results):
     near = results.response["total_force"].interp(speed=found["speed"])
     ratio = found["total_force"].values / near.values
     assert np.all((ratio > 0.5) & (ratio < 2.0))
-
-
-@pytest.mark.parametrize(
-    ("heading", "stage"),
-    [
-        ("### Modes of stages in series", "modes"),
-        ("### Response of stages in series: response.nc", "response"),
-        ("### Harmonic balance of stages in series: balance.nc", "balance"),
-    ],
-)
-def test_results_page_names_every_variable(results, heading, stage):
-    check_documented(results.stage(stage), heading)
 
 
 def test_case_page_names_every_key():
