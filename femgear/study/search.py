@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.optimize import differential_evolution, linprog, minimize
 
 from femgear.case.case import set_deviations
 from femgear.case.dependencies import FLANK_ENTRIES
@@ -277,6 +276,8 @@ def _descents(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple
 
 def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple[bool, str]:
     """Differential evolution, then the simplex."""
+    from scipy.optimize import differential_evolution
+
     problem, count = run.problem, options.sample_count(run.problem)
     integral = np.array([variable.integer for variable in problem.variables])
     population = np.vstack([x0, samples_of(problem, max(count, 5) - 2, options.seed)])
@@ -339,7 +340,7 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
 
 
 def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
-    """Middle of the bounds, and a Latin hypercube of ``count`` points."""
+    """Middle of the bounds, and a Latin hypercube of ``count`` points, (1 + count, n)."""
     from scipy.stats.qmc import LatinHypercube
 
     low, high = problem.bounds.T
@@ -355,9 +356,11 @@ def polish(
     The simplex may collapse before it reaches a minimum (K. I. M. McKinnon, SIAM J. Optim. 9, 1998,
     148-158): it begins again, half as large, from where it ended.
 
-    ``size`` is that of the first simplex over the ranges, ``rounds`` the number of simplexes one after the
-    other. The other method is Powell's.
+    ``cost`` and start ``x0`` (n,) are in the units of the variables, ``size`` is that of the first simplex
+    over the ranges, ``rounds`` the number of simplexes one after the other. The other method is Powell's.
     """
+    from scipy.optimize import minimize
+
     low, high = run.problem.bounds.T
     width, n = high - low, len(low)
     unit = [(0.0, 1.0)] * n
@@ -447,6 +450,8 @@ def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) ->
 
 def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndarray, float]:
     """Step within the box, and the largest peak to peak that the linearisation promises there."""
+    from scipy.optimize import linprog
+
     n, (K, P) = len(x), value.shape
     width = high - low
     # unknowns: n moves over their ranges, K highs, K lows, t
@@ -491,13 +496,15 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     variant = evaluations.designs.variant(problem.point(x))
     case, objective = variant.case, problem.objective
     static = variant.static(objective.torque)
-    linear = linearise(
-        DesignBasis(static.planetary_set, static.bodies, static_supports(case), set_deviations(case)),
-        sun_torque=static.sun_torque,
-        positions=case.static.positions,
-        periods=static.cycle.periods,
-        contact=case.static.contact,
+    basis = DesignBasis(
+        static.planetary_set,
+        static.bodies,
+        static_supports(case),
+        set_deviations(case),
+        case.static.positions,
+        case.static.contact,
     )
+    linear = linearise(basis, sun_torque=static.sun_torque, periods=static.cycle.periods)
     n, signal = static.planetary_set.n_planets, objective.signal
     assert signal is not None, "see has_derivatives"
     value = signal(linear.sun_arc, linear.deflection, n)

@@ -6,7 +6,7 @@ from small_trains import example_pair, level_crossings
 
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, constant
 from femgear.trains.gear_pair.model import (
     STATE_NAMES,
