@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from femgear.errors import CaseError, checked_numbers
 
@@ -97,13 +98,16 @@ def product_matrix(factor: np.ndarray, count: int) -> np.ndarray:
     half = pad(factor, 2 * count) * 0.5
     half[..., 0] *= 2.0
     two_sided = np.concatenate([np.conj(half[..., :0:-1]), half], axis=-1)
-    h = np.arange(size)
-    toeplitz = two_sided[..., 2 * count + h[:, None] - h[None, :]]
-    hankel = two_sided[..., 2 * count + h[:, None] + h[None, :]]
-    columns = np.stack([toeplitz + hankel, 1j * (toeplitz - hankel)], axis=-1)
-    columns[..., 0, :, :] *= 0.5
-    rows = np.stack([columns.real, columns.imag], axis=-3)
-    return rows.reshape(*factor.shape[:-1], 2 * size, 2 * size)
+    # rows that start one later each; of the Toeplitz part, turned round
+    rows = sliding_window_view(two_sided, size, axis=-1)
+    toeplitz, hankel = rows[..., count : 2 * count + 1, ::-1], rows[..., 2 * count : 3 * count + 1, :]
+    out = np.empty((*factor.shape[:-1], size, 2, size, 2))
+    np.add(toeplitz.real, hankel.real, out=out[..., 0, :, 0])
+    np.add(toeplitz.imag, hankel.imag, out=out[..., 1, :, 0])
+    np.subtract(hankel.imag, toeplitz.imag, out=out[..., 0, :, 1])
+    np.subtract(toeplitz.real, hankel.real, out=out[..., 1, :, 1])
+    out[..., 0, :, :, :] *= 0.5
+    return out.reshape(*factor.shape[:-1], 2 * size, 2 * size)
 
 
 def multiply(matrix: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
