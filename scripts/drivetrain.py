@@ -51,9 +51,9 @@ def main(
     sensitivity
         Whether to vary the assumed inputs of the published set.
     """
+    from femgear.trains.drivetrain.case_file import need_drivetrain
     from femgear.trains.drivetrain.checks import case_model, check_spectrum
     from femgear.trains.drivetrain.results import describe_drivetrain, describe_spectrum, describe_transient
-    from femgear.trains.drivetrain.section import need_drivetrain
     from femgear.trains.reading import read_case, with_value
 
     data, paper = need_drivetrain(read_case(case)), read_case(PAPER)

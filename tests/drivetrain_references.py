@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from femgear.system.elements import positive_part
-from femgear.trains.drivetrain.data import Drivetrain
+from femgear.trains.drivetrain.parts import Drivetrain
 
 
 def torsional_matrices(train: Drivetrain) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:

@@ -30,7 +30,7 @@ AXES = ("x", "y", "tilt x", "tilt y", "rotation")
 
 
 @dataclass(frozen=True)
-class ShaftSection:
+class RoundSection:
     """Round section and material.
 
     Parameters
@@ -115,14 +115,14 @@ class JointSprings:
     shear: float = math.inf
 
 
-def joint_springs(section: ShaftSection, length: float) -> JointSprings:
+def joint_springs(section: RoundSection, length: float) -> JointSprings:
     """Springs of the joint of two links that have the static stiffness matrix of a Timoshenko shaft.
 
     ``E I / l`` in bending, ``G J / l`` in torsion, and a joint that shears with ``12 E I / ((1 + Phi) l^3)``.
 
     Parameters
     ----------
-    section : ShaftSection
+    section : RoundSection
     length : float
         [m]
     """
@@ -145,7 +145,7 @@ def joint_deflections(length: float) -> np.ndarray:
     return np.hstack([-first, second])
 
 
-def beam_element(section: ShaftSection, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def beam_element(section: RoundSection, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass, stiffness and gyroscopic matrix (10, 10) of an element between two stations.
 
     Returns

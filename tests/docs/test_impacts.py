@@ -12,7 +12,7 @@ PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (
     "published.transmission_errors", "femgear.system.fourier", "femgear.trains.gear_pair.model",
     "femgear.trains.gear_pair.model",
-    "femgear.trains.gear_pair.section",
+    "femgear.trains.gear_pair.case_file",
     "femgear.trains.gear_pair.figures", "femgear.solvers.linear.modal", "femgear.solvers.stability.lyapunov",
     "femgear.solvers.continuation.branches", "femgear.solvers.time.stroboscopic",
 )  # fmt: skip

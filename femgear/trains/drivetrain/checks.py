@@ -21,10 +21,7 @@ from femgear.case.quantities import FREQUENCY, RPM, SPEED, TIME
 from femgear.errors import CaseError, Finding
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import Drivetrain, TorqueHistory
-from femgear.trains.drivetrain.geometry import speed_ratios, springs_of
-from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model, torsional_model
-from femgear.trains.drivetrain.section import (
+from femgear.trains.drivetrain.case_file import (
     FASTEST_RATE,
     DrivetrainCase,
     drivetrain_of,
@@ -32,7 +29,10 @@ from femgear.trains.drivetrain.section import (
     settle_time,
     torque_histories,
 )
-from femgear.trains.drivetrain.time import PASS_BAND, static_deviations
+from femgear.trains.drivetrain.kinematics import speed_ratios, springs_of
+from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model, torsional_model
+from femgear.trains.drivetrain.parts import Drivetrain, TorqueHistory
+from femgear.trains.drivetrain.simulation import PASS_BAND, static_deviations
 
 BENDING, TORSIONAL = "with bending", "torsional"
 # Slower instants, over the mean speed, would need records of endless length over a turn.

@@ -17,11 +17,11 @@ from femgear.report.response import campbell
 from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.checks import case_model
-from femgear.trains.drivetrain.data import numbered
+from femgear.trains.drivetrain.mode_pictures import write_mode_pictures
 from femgear.trains.drivetrain.model import DrivetrainModel
-from femgear.trains.drivetrain.pictures import mode_pictures
+from femgear.trains.drivetrain.parts import numbered
 from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
-from femgear.trains.drivetrain.time import PASS_BAND
+from femgear.trains.drivetrain.simulation import PASS_BAND
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
@@ -394,7 +394,7 @@ def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
 
 def _write_modes(drawn: Drawn, folder: Path) -> list[str]:
     count = drawn.case.simulation.modes
-    return mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
+    return write_mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
 
 
 FIGURES = {

@@ -2,10 +2,10 @@
 
 The coordinates are small deviations, in the fixed frame, from a large common rotation: body b turns by
 ``ratio_b phi(t)`` with the spin phi of the first body. The spin itself is a rigid motion without stiffness,
-see `rigid` of the model; time integration keeps it apart (`femgear.trains.drivetrain.time`).
+see `rigid` of the model; time integration keeps it apart (`femgear.trains.drivetrain.simulation`).
 
 Meshes have a rectangular stiffness by the number of tooth pairs in contact; their directions are those of
-`femgear.trains.drivetrain.geometry`.
+`femgear.trains.drivetrain.kinematics`.
 
 The purely torsional counterpart, `torsional_model`, has one rotation a body and a planet: A. Kahraman,
 J. Sound Vib. 173, 1994, 125-130, for the planetary stage; W. Shi, C.-W. Chung and others, Int. J. Precis.
@@ -26,8 +26,7 @@ from femgear.solvers.linear.modal import modal_damping
 from femgear.system.elements import positive_part
 from femgear.system.fourier import FourierSeries, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
-from femgear.trains.drivetrain.data import BearingSection, Drivetrain, MeshSection, numbered
-from femgear.trains.drivetrain.geometry import (
+from femgear.trains.drivetrain.kinematics import (
     Coordinates,
     FlankContacts,
     MeshGeometry,
@@ -39,6 +38,7 @@ from femgear.trains.drivetrain.geometry import (
     rigid_rotation,
     springs_of,
 )
+from femgear.trains.drivetrain.parts import BearingSection, Drivetrain, MeshSection, numbered
 
 # Terms of the mesh stiffness: as many as the paper takes.
 HARMONICS = 15

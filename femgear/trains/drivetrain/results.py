@@ -18,11 +18,11 @@ from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.storage.results import dataset
+from femgear.trains.drivetrain.case_file import DrivetrainCase, torque_histories
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
-from femgear.trains.drivetrain.data import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
-from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
-from femgear.trains.drivetrain.time import BALANCE, PASS_BAND, DrivetrainRun
+from femgear.trains.drivetrain.parts import PlanetarySection, TorqueHistory, numbered
+from femgear.trains.drivetrain.simulation import BALANCE, PASS_BAND, DrivetrainRun
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -21,6 +21,14 @@ from scipy.interpolate import CubicSpline
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import campbell_data
+from femgear.trains.drivetrain.case_file import (
+    DrivetrainCase,
+    check_entries_together,
+    drivetrain_notices,
+    embed_torques,
+    settle_time,
+    torque_histories,
+)
 from femgear.trains.drivetrain.checks import (
     BENDING,
     TORSIONAL,
@@ -46,15 +54,7 @@ from femgear.trains.drivetrain.results import (
     describe_transient,
     transient_warnings,
 )
-from femgear.trains.drivetrain.section import (
-    DrivetrainCase,
-    check_entries_together,
-    drivetrain_notices,
-    embed_torques,
-    settle_time,
-    torque_histories,
-)
-from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
+from femgear.trains.drivetrain.simulation import PASS_BAND, DrivetrainRun, Records, march_drivetrain
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import modes_verdict
 

@@ -20,6 +20,7 @@ from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.stability.lyapunov import LyapunovExponents, lyapunov_exponents
 from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
 from femgear.storage.results import FOURIER, complex_entries, dataset
+from femgear.trains.gear_pair.case_file import GearPairCase, cross_check, pair_of, scales_of
 from femgear.trains.gear_pair.figures import FIGURES
 from femgear.trains.gear_pair.model import (
     BACK,
@@ -31,7 +32,6 @@ from femgear.trains.gear_pair.model import (
     solution_states,
     state_regions,
 )
-from femgear.trains.gear_pair.section import GearPairCase, cross_check, pair_of, scales_of
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:

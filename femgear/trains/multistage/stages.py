@@ -21,6 +21,14 @@ from femgear.system.elements import GearMeshes, TurningSprings, turning_wave
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample, tooth_lines
 from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
+from femgear.trains.multistage.case_file import (
+    MultistageCase,
+    OperationSection,
+    ResponseSection,
+    cross_check,
+    multistage_of,
+    stage_gears,
+)
 from femgear.trains.multistage.figures import FIGURES
 from femgear.trains.multistage.model import (
     MultistageSet,
@@ -42,14 +50,6 @@ from femgear.trains.multistage.results import (
     describe_multistage,
     describe_stage_modes,
     multistage_warnings,
-)
-from femgear.trains.multistage.section import (
-    MultistageCase,
-    OperationSection,
-    ResponseSection,
-    cross_check,
-    multistage_of,
-    stage_gears,
 )
 from femgear.trains.protocol import OwnFile, Progress, Train, one_blas_thread
 from femgear.trains.protocol import Stage as RunStage

@@ -10,7 +10,13 @@ import pytest
 
 from femgear.report.style import png_bytes
 from femgear.trains.drivetrain.figures import band, over_time, spectra, spectrum_figures, transient_figures
-from femgear.trains.drivetrain.pictures import Layout, ModeView, Wheel, drivetrain_pictures, mode_pictures
+from femgear.trains.drivetrain.mode_pictures import (
+    Layout,
+    ModeView,
+    Wheel,
+    drivetrain_pictures,
+    write_mode_pictures,
+)
 from femgear.trains.drivetrain.stages import remarks
 from femgear.trains.reading import read_case, with_value
 
@@ -195,16 +201,19 @@ def test_picture_of_a_mode(tmp_path):
 def test_modes_have_the_numbers_of_the_table(tmp_path, monkeypatch):
     import xarray as xr
 
-    from femgear.trains.drivetrain import pictures
+    from femgear.trains.drivetrain import mode_pictures
     from femgear.trains.drivetrain.checks import case_model
 
     model, drawn = case_model(read_case(CASE)), []
-    monkeypatch.setattr(pictures, "drivetrain_pictures", lambda views, _: drawn.extend(views))
+    monkeypatch.setattr(mode_pictures, "drivetrain_pictures", lambda views, _: drawn.extend(views))
     kinds, hertz = ["rigid", "bending", "torsional"], [0.0, 5.0, 7.0]
     shapes = np.eye(len(model.rigid))[:, :3]
     data = {"kind": ("mode", kinds), "frequency": ("mode", hertz), "shape": (("dof", "mode"), shapes)}
     modes = xr.Dataset(data)
-    assert mode_pictures(tmp_path, model, modes, 2) == ["drivetrain_mode_2.png", "drivetrain_mode_3.png"]
+    assert write_mode_pictures(tmp_path, model, modes, 2) == [
+        "drivetrain_mode_2.png",
+        "drivetrain_mode_3.png",
+    ]
     assert [view.title for view in drawn] == ["mode 2: 5.00 Hz, bending", "mode 3: 7.00 Hz, torsional"]
     assert [len(view.shafts) for view in drawn] == [2, 2]
 

@@ -11,8 +11,15 @@ from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivet
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
+from femgear.trains.drivetrain.case_file import drivetrain_of
 from femgear.trains.drivetrain.checks import BENDING, TORSIONAL, case_model, mean_torque, with_drivers
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.kinematics import speed_ratios
+from femgear.trains.drivetrain.model import (
+    balanced_torque,
+    drivetrain_model,
+    torsional_model,
+)
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
@@ -21,14 +28,7 @@ from femgear.trains.drivetrain.data import (
     TorqueHistory,
     constant_torques,
 )
-from femgear.trains.drivetrain.geometry import speed_ratios
-from femgear.trains.drivetrain.model import (
-    balanced_torque,
-    drivetrain_model,
-    torsional_model,
-)
-from femgear.trains.drivetrain.section import drivetrain_of
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.simulation import march_drivetrain
 from femgear.trains.reading import read_case, with_value
 
 TRAIN = wind_turbine_drivetrain()

@@ -15,7 +15,8 @@ from femgear.trains.drivetrain.checks import (
     shift_rate,
     speed_range,
 )
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.model import drivetrain_model
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
@@ -24,8 +25,7 @@ from femgear.trains.drivetrain.data import (
     TorqueHistory,
     constant_torques,
 )
-from femgear.trains.drivetrain.model import drivetrain_model
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.simulation import march_drivetrain
 from femgear.trains.reading import read_case
 
 CASES = Path(__file__).parents[3] / "cases"

@@ -14,8 +14,8 @@ from femgear.solvers.time.stroboscopic import sweep_response
 from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries, SummedSeries, constant, harmonic_lines
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from femgear.trains.gear_pair.case_file import scales_of
 from femgear.trains.gear_pair.model import ImpactPair, PairBearings, range_states, separation_ratios
-from femgear.trains.gear_pair.section import scales_of
 from femgear.trains.reading import read_case, with_values
 
 

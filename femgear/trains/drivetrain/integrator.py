@@ -7,7 +7,7 @@ so that only small matrices, made for many instants at once, change from step to
 integrated apart: it takes the mean acceleration, turns the mesh phases, and cannot drift into the deviations.
 
 Meshes that separate add the search for the flanks that touch. Drive and back flanks are contacts of their own
-(`femgear.trains.drivetrain.geometry`) with the force ``k max(u, 0)`` of their overlap u, the approach less
+(`femgear.trains.drivetrain.kinematics`) with the force ``k max(u, 0)`` of their overlap u, the approach less
 the gap. With the contacts known that touch, the overlaps at the end of a step obey a small linear system. The
 forces do not fall with the overlap and the flexibility takes no energy back, so that there is one solution.
 Changing the wrong contacts and solving again mostly ends after one round; where it does not, only the first
@@ -25,8 +25,8 @@ from scipy import linalg
 from femgear.errors import ConvergenceError
 from femgear.solvers.time.steps import AVERAGE_ACCELERATION
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import TorqueHistory
 from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.parts import TorqueHistory
 
 # Points of the table of a mesh period, between which the stiffness is linear.
 _TABLE = 8192

@@ -4,7 +4,7 @@ All axes are parallel to z; rotations are positive about z. The tables of a case
 themselves. A file gives numbers as texts with units, within the windows that stand beside the entries; in
 Python `Part.in_si` takes SI numbers, radians and names, and `Part.changed` other ones. What follows from the
 entries, such as pitch radii and springs, are properties. Contradictions between entries are refused where a
-file is read (`femgear.trains.drivetrain.section`).
+file is read (`femgear.trains.drivetrain.case_file`).
 """
 
 from __future__ import annotations
@@ -142,10 +142,10 @@ class ShaftSection(Part):
     """Timoshenko elements of the section; 0 takes two rigid links and a joint of springs, without mass."""
 
     @property
-    def section(self) -> shafts.ShaftSection:
+    def section(self) -> shafts.RoundSection:
         """Round section, of a shaft that has one."""
         assert self.outer_diameter is not None
-        return shafts.ShaftSection(
+        return shafts.RoundSection(
             self.outer_diameter, self.inner_diameter, self.youngs_modulus, self.poisson_ratio, self.density
         )
 

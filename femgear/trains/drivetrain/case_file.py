@@ -33,7 +33,7 @@ from femgear.case.quantities import (
 from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError, Finding
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
@@ -408,7 +408,7 @@ def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
     ----------
     case : DrivetrainCase
     record : float
-        Records a second [Hz]: as given, or what `femgear.trains.drivetrain.time` takes for it.
+        Records a second [Hz]: as given, or what `femgear.trains.drivetrain.simulation` takes for it.
     """
     s, ratio = case.simulation, case.simulation.rate / record
     if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:

@@ -33,7 +33,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError, FemgearError
-from femgear.fe.shaft import ShaftSection, joint_springs
+from femgear.fe.shaft import RoundSection, joint_springs
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
@@ -280,7 +280,7 @@ def _coupling(one: CouplingSection) -> StageCoupling:
     springs = {}
     if one.diameter is not None and one.length is not None:
         # ends that do not tilt: Timoshenko's beam (Przemieniecki, Theory of Matrix Structural Analysis, 5.6)
-        shaft, length = ShaftSection(one.diameter), one.length
+        shaft, length = RoundSection(one.diameter), one.length
         bending = 12.0 * shaft.young * shaft.second_moment / (length**3 * (1.0 + shaft.shear_ratio(length)))
         springs = {"torsional": joint_springs(shaft, length).torsion, "lateral": bending}
     first, second = (_member_of(text) for text in one.between)

@@ -20,7 +20,7 @@ from femgear.errors import CaseError
 from femgear.fe.shaft import AXES, joint_deflections, joint_springs
 from femgear.system.assembler import mesh_directions, pin_directions
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.parts import (
     Drivetrain,
     ParallelSection,
     PlanetarySection,

@@ -1,7 +1,7 @@
 """Newmark's method for a drivetrain through time, with meshes that are linear or separate.
 
-`march_drivetrain` takes the steps of `femgear.trains.drivetrain.scheme`. What else it works with stands below
-it: the start, the free motion, the balances of energy and momentum, and the records.
+`march_drivetrain` takes the steps of `femgear.trains.drivetrain.integrator`. What else it works with stands
+below it: the start, the free motion, the balances of energy and momentum, and the records.
 
 Beside the motion goes the free one without loads, whose growth tells a parametric resonance. It takes the
 same steps, with the tangents of the meshes, and is brought back to size one every few steps; the slope of the
@@ -19,10 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.trains.drivetrain.data import TorqueHistory
-from femgear.trains.drivetrain.geometry import FlankContacts
-from femgear.trains.drivetrain.model import DrivetrainModel, contact_model
-from femgear.trains.drivetrain.scheme import (
+from femgear.trains.drivetrain.integrator import (
     Block,
     MeshBlock,
     Scheme,
@@ -31,6 +28,9 @@ from femgear.trains.drivetrain.scheme import (
     march_closed,
     solve_overlaps,
 )
+from femgear.trains.drivetrain.kinematics import FlankContacts
+from femgear.trains.drivetrain.model import DrivetrainModel, contact_model
+from femgear.trains.drivetrain.parts import TorqueHistory
 
 # Errors of the balances, relative, beyond which a run is refused.
 BALANCE = 1e-6

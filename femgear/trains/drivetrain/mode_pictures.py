@@ -20,8 +20,8 @@ from scipy.spatial.transform import Rotation
 from femgear.report.scene import add_coloured, load_pyvista
 from femgear.report.style import VERMILION
 from femgear.storage.files import replace_file
-from femgear.trains.drivetrain.data import Drivetrain
 from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.parts import Drivetrain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -394,7 +394,7 @@ def _polylines(pv, lines):
     return pv.PolyData(np.vstack(lines), lines=np.concatenate(cells)) if lines else pv.PolyData()
 
 
-def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
+def write_mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
     """The lowest elastic modes as PNG files; returns their names.
 
     Modes have the numbers of the table: the free spin, which is not drawn, is the first.
