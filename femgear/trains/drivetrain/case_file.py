@@ -43,7 +43,6 @@ from femgear.trains.drivetrain.parts import (
     TorqueHistory,
 )
 
-MODEL = "drivetrain"
 FASTEST_RATE = 1e7
 _MOST_PARTS = 200
 _MOST_POINTS = 20_000
@@ -138,20 +137,6 @@ class DrivetrainCase(Section, ReadCase):
     gravity: GravitySection | None = None
     operation: OperationSection
     simulation: SimulationSection
-
-
-def need_drivetrain(case: object) -> DrivetrainCase:
-    """Return the case, refused where it is no drivetrain (E-MODEL)."""
-    if not isinstance(case, DrivetrainCase):
-        raise CaseError(
-            "this is no drivetrain",
-            code="E-MODEL",
-            key="model",
-            limit=f'model = "{MODEL}"',
-            remedy="name a case file of a drivetrain",
-            file=getattr(case, "name", None) or None,
-        )
-    return case
 
 
 def drivetrain_of(case: DrivetrainCase) -> Drivetrain:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,12 +28,11 @@ from femgear.trains.drivetrain.case_file import (
     settle_time,
     torque_histories,
 )
-from femgear.trains.drivetrain.kinematics import speed_ratios, springs_of
-from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model, torsional_model
+from femgear.trains.drivetrain.kinematics import springs_of
+from femgear.trains.drivetrain.model import DrivetrainModel, case_model, drivetrain_model, refusals_located
 from femgear.trains.drivetrain.parts import Drivetrain, TorqueHistory
-from femgear.trains.drivetrain.simulation import PASS_BAND, static_deviations
+from femgear.trains.drivetrain.simulation import PASS_BAND
 
-BENDING, TORSIONAL = "with bending", "torsional"
 # Slower instants, over the mean speed, would need records of endless length over a turn.
 SLOWEST = 0.05
 
@@ -59,100 +57,6 @@ _MOVED, _NAMED = 1e-3, 6
 
 # Records that spectra take at least.
 LEAST_RECORDS = 64
-
-# Force of a mesh, over the sum of what the single torques would give, that is rounding.
-_NO_FORCE = 1e-6
-
-
-def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
-    """Model of a case, its loaded flanks those that the mean torques press together.
-
-    Raises
-    ------
-    CaseError
-        Stages that leave no single spin (E-DRIVETRAIN), mesh directions that cannot turn (E-TURNING).
-    """
-    build = drivetrain_model if variant == BENDING else torsional_model
-    options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
-    with _located(case):
-        train = drivetrain_of(case)
-        torques = torque_histories(case, speed_ratios(train))
-        return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
-
-
-@contextmanager
-def _located(case: DrivetrainCase) -> Iterator[None]:
-    """Let the refusals of a model name the entries of the case file and their lines."""
-    try:
-        yield
-    except CaseError as error:
-        if error.code == "E-TURNING":
-            error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
-        error.file = case.location(error.key or "")
-        raise
-
-
-def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
-    """The drivetrain with the driver of every stage that the torques make drive.
-
-    The torques, as means over the run, and the inertia forces of the acceleration of the free spin that they
-    give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so that
-    the load of parallel paths follows their stiffness. Weight does not count.
-
-    Parameters
-    ----------
-    train : Drivetrain
-        Stages whose driver is given keep it.
-    torques : sequence of TorqueHistory
-    duration : float
-        Of the run [s].
-
-    Returns
-    -------
-    Drivetrain
-        A stage without load on its flanks, and one that its first body (the carrier) drives, stay as they
-        are.
-
-    Raises
-    ------
-    CaseError
-        A torque on no body, stages that leave no single spin (E-DRIVETRAIN).
-    """
-    stages = train.stages
-    if not torques or all(one.driver is not None for one in stages):
-        return train
-    force = _stage_forces(train, torques, duration)
-    found: list = [
-        one.changed(driver=one.ends[1]) if one.driver is None and value < 0.0 else one
-        for one, value in zip(stages, force)
-    ]
-    planets = len(train.planetary)
-    return replace(train, planetary=tuple(found[:planets]), parallel=tuple(found[planets:]))
-
-
-def mean_torque(history: TorqueHistory, duration: float) -> float:
-    """Mean of a torque from 0 to `duration` [N m], exact."""
-    inside = history.times[(history.times > 0.0) & (history.times < duration)]
-    times = np.concatenate([[0.0], inside, [duration]])
-    return float(np.trapezoid(history.at(times), times) / duration)
-
-
-def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration: float) -> np.ndarray:
-    """Sum of the mean mesh forces of every stage [N]; zero where they are rounding."""
-    model = torsional_model(replace(train, damping_ratio=0.0), harmonics=0, turning=False)
-    W, k, carried = model.system.W, model.mean_stiffness, model.system.M @ model.rigid
-    force = np.zeros((len(k), len(torques)))
-    for column, one in enumerate(torques):
-        load = np.zeros(len(carried))
-        load[model.index(f"{one.body}: rotation")] = mean_torque(one, duration)
-        load -= carried * (model.rigid @ load) / model.inertia
-        force[:, column] = k * (W.T @ static_deviations(model, W, k, load))
-    sums = np.zeros((len(train.stages), len(torques)))
-    np.add.at(sums, model.geometry.stage, force)
-    total = sums.sum(axis=1)
-    # the model's flanks are those of the drivers that are given
-    default = [one.flank for one in train.stages]
-    return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)
 
 
 @dataclass(frozen=True)
@@ -298,7 +202,7 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
         natural frequencies too far apart for double precision (E-STIFFNESS); steps that cannot follow the
         meshes (E-RATE); records that are too many (E-RANGE).
     """
-    with _located(case):
+    with refusals_located(case):
         train = drivetrain_of(case)
         count, names = loose_motions(train, turning=case.simulation.turning)
         if count:
@@ -328,7 +232,7 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
         Records that are too few, a resolution that they do not have (E-RANGE); a first body that nearly stops
         or turns back in the part that the spectra take (E-SPECTRUM).
     """
-    with _located(case):
+    with refusals_located(case):
         _check_records(case, record_rate(case, model))
         late = case_speeds(case, model, start=settle_time(case))
         check_turning(late.lowest, late.mean)

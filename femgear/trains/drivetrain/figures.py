@@ -16,9 +16,8 @@ from femgear.case.quantities import RPM
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.checks import case_model
 from femgear.trains.drivetrain.mode_pictures import write_mode_pictures
-from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.model import DrivetrainModel, case_model
 from femgear.trains.drivetrain.parts import numbered
 from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
 from femgear.trains.drivetrain.simulation import PASS_BAND

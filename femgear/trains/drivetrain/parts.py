@@ -396,6 +396,12 @@ class TorqueHistory:
         """Torque [N m] at any instants [s]."""
         return np.interp(times, self.times, self.values)
 
+    def mean(self, duration: float) -> float:
+        """Mean torque from 0 to `duration` [s], exact [N m]."""
+        inside = self.times[(self.times > 0.0) & (self.times < duration)]
+        times = np.concatenate([[0.0], inside, [duration]])
+        return float(np.trapezoid(self.at(times), times) / duration)
+
 
 def constant_torques(torques: dict[str, float]) -> tuple[TorqueHistory, ...]:
     """Make histories of constant torques on bodies [N m]."""

@@ -29,7 +29,7 @@ from femgear.trains.drivetrain.integrator import (
     solve_overlaps,
 )
 from femgear.trains.drivetrain.kinematics import FlankContacts
-from femgear.trains.drivetrain.model import DrivetrainModel, contact_model
+from femgear.trains.drivetrain.model import DrivetrainModel, contact_model, static_flexibility
 from femgear.trains.drivetrain.parts import TorqueHistory
 
 # Errors of the balances, relative, beyond which a run is refused.
@@ -248,7 +248,7 @@ def _start_state(
         if start == "static":
             load = spin.directions @ block.loads[0]
             load = load - spin.carried * (model.rigid @ load) / spin.inertia
-            q = static_deviations(model, U @ S, k, load, contacts=contacts)
+            q = _static_deviations(model, U @ S, k, load, contacts)
     else:
         q, v = (np.asarray(one, float) for one in start)
     approach = (U @ S).T @ q
@@ -256,17 +256,14 @@ def _start_state(
     return np.concatenate([q, v, S @ force])
 
 
-def static_deviations(model: DrivetrainModel, W, k, load, *, contacts: FlankContacts | None = None):
+def _static_deviations(model: DrivetrainModel, W, k, load, contacts: FlankContacts | None) -> np.ndarray:
     """Deviations (n,) under a load that does not drive the spin, meshes or contacts W (n, c) at one instant.
 
     Drive flanks that part, and back flanks that touch, are found as corrections of drive flanks that all
     touch.
     """
     meshes = len(model.meshes)
-    drive, stiffness = W[:, :meshes], k[:meshes]
-    carried, total = model.system.M @ model.rigid, model.system.K + (drive * stiffness) @ drive.T
-    size = (np.abs(total).max() or 1.0) / np.abs(carried).max() ** 2
-    flexible = np.linalg.inv(total + size * np.outer(carried, carried))
+    stiffness, flexible = k[:meshes], static_flexibility(model, W[:, :meshes], k[:meshes])
     q = flexible @ load
     if contacts is None:
         return q

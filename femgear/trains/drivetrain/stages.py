@@ -30,9 +30,6 @@ from femgear.trains.drivetrain.case_file import (
     torque_histories,
 )
 from femgear.trains.drivetrain.checks import (
-    BENDING,
-    TORSIONAL,
-    case_model,
     check_drivetrain,
     check_spectrum,
     check_turning,
@@ -41,7 +38,7 @@ from femgear.trains.drivetrain.checks import (
     record_rate,
 )
 from femgear.trains.drivetrain.figures import FIGURES
-from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.model import BENDING, TORSIONAL, DrivetrainModel, case_model
 from femgear.trains.drivetrain.results import (
     AveragedSpectrum,
     DrivetrainModesResult,

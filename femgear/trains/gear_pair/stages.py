@@ -29,7 +29,6 @@ from femgear.trains.gear_pair.model import (
     impact_borders,
     range_states,
     separation_ratios,
-    solution_states,
     state_regions,
 )
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
@@ -69,7 +68,7 @@ class ResponseResult:
             "point",
             stable=(branch.stable, "whether the motion is known to be stable"),
             multiplier=(branch.largest_multiplier, "largest Floquet multiplier"),
-            **{name: (share, _SHARES[name.partition("_")[0]]) for name, share in self.shares.items()},
+            **{f"{name}_share": (share, _SHARES[name]) for name, share in self.shares.items()},
         )
         variables |= _numbers("limit_point", fold=(branch.folds, "number of the point, from 0"))
         words = "frequency ratio from which {} flanks {}"
@@ -170,7 +169,7 @@ def _motions(dims: str, lowest, highest, mean) -> dict[str, tuple]:
         lowest=(lowest, f"smallest deflection {_LENGTH}"),
         highest=(highest, f"largest deflection {_LENGTH}"),
         state=(
-            np.array(STATE_NAMES)[range_states(lowest, highest, drive=DRIVE, back=BACK)],
+            np.array(STATE_NAMES)[range_states(lowest, highest)],
             "contact state",
         ),
     )
@@ -204,8 +203,9 @@ def solve_response(case: GearPairCase) -> ResponseResult:
     )  # fmt: skip
     phase = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
     x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
-    states = [solution_states(pair.mesh(), one, samples=_INSTANTS) for one in branch.solutions]
-    shares = {f"{name}_share": np.array([getattr(one, name)[0] for one in states]) for name in _SHARES}
+    drive, back = (x > DRIVE).mean(axis=1), (x < BACK).mean(axis=1)
+    free = ((x <= DRIVE) & (x >= BACK)).mean(axis=1)
+    shares = {"drive": drive, "free": free, "back": back}
     borders = {level: np.sort(impact_borders(pair, branch, level)) for level in (DRIVE, BACK)}
     return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), shares, borders)
 

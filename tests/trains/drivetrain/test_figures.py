@@ -202,7 +202,7 @@ def test_modes_have_the_numbers_of_the_table(tmp_path, monkeypatch):
     import xarray as xr
 
     from femgear.trains.drivetrain import mode_pictures
-    from femgear.trains.drivetrain.checks import case_model
+    from femgear.trains.drivetrain.model import case_model
 
     model, drawn = case_model(read_case(CASE)), []
     monkeypatch.setattr(mode_pictures, "drivetrain_pictures", lambda views, _: drawn.extend(views))

@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.trains.drivetrain.checks import (
-    case_model,
     default_record_rate,
     frequency_shift,
     highest_mesh,
@@ -15,7 +14,7 @@ from femgear.trains.drivetrain.checks import (
     shift_rate,
     speed_range,
 )
-from femgear.trains.drivetrain.model import drivetrain_model
+from femgear.trains.drivetrain.model import case_model, drivetrain_model
 from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,

@@ -17,9 +17,15 @@ from femgear.run import report_again, run_case
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.storage.results import run_folder
 from femgear.trains.drivetrain.case_file import DrivetrainCase
-from femgear.trains.drivetrain.checks import BENDING, TORSIONAL, case_model, check_spectrum
+from femgear.trains.drivetrain.checks import check_spectrum
 from femgear.trains.drivetrain.figures import spectrum_figures
-from femgear.trains.drivetrain.model import balanced_torque, drivetrain_problem
+from femgear.trains.drivetrain.model import (
+    BENDING,
+    TORSIONAL,
+    balanced_torque,
+    case_model,
+    drivetrain_problem,
+)
 from femgear.trains.drivetrain.results import MeshLine, describe_drivetrain, describe_transient
 from femgear.trains.drivetrain.simulation import Decimator
 from femgear.trains.drivetrain.stages import (
