@@ -1,8 +1,6 @@
 """The case file with ``model = "drivetrain"``: its chain, operation and simulation, and what it refuses.
 
-A torque series in a CSV file that the case names is read once and kept inside the case. What no entry shows
-alone is refused: names, chain, teeth and radii, places of the planets, torques, times; what is allowed but
-deserves a look is a notice. `drivetrain_of` and `torque_histories` are the chain and the torques of a case.
+A torque series in a CSV file that the case names is read once and kept inside the case.
 """
 
 from __future__ import annotations
@@ -154,10 +152,6 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
     case : DrivetrainCase
     ratio : mapping of str to float
         Speeds of the bodies over that of the first one.
-
-    Returns
-    -------
-    tuple of TorqueHistory
     """
     found = [
         TorqueHistory(one.body, np.array(one.times or [0.0]), np.array(one.torques or [one.torque]))
@@ -387,14 +381,7 @@ def _simulation(case: DrivetrainCase) -> Iterator[CaseError]:
 
 
 def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
-    """What the records of a run cannot hold.
-
-    Parameters
-    ----------
-    case : DrivetrainCase
-    record : float
-        Records a second [Hz]: as given, or what `femgear.trains.drivetrain.simulation` takes for it.
-    """
+    """What so many records a second [Hz], as given or chosen for the run, cannot hold."""
     s, ratio = case.simulation, case.simulation.rate / record
     if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
         yield CaseError(

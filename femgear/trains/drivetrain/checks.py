@@ -1,10 +1,6 @@
-"""Model of a drivetrain case, its loaded flanks, and checks of what a run can represent.
+"""What a run of a drivetrain case can represent: speeds, steps and records, loose motions; its warnings.
 
-The driver of every gear stage, and with it the loaded flanks, follows from statics under the mean torques. A
-motion that nothing holds is found whatever the sizes of springs and inertias; natural frequencies may not lie
-further apart than double precision resolves beside the free spin. Runs are refused, by stage, whose steps,
-records or spectra cannot follow the speeds at which the rigid chain turns under its torques; what is allowed
-but deserves a look is a warning.
+Refusals come by stage, before anything is computed; what is allowed but deserves a look is a warning.
 """
 
 from __future__ import annotations
@@ -41,7 +37,7 @@ SLOWEST = 0.05
 # Not enough where modes lie far above the mesh lines: see `mesh_mode`.
 LEAST_STEPS, GOOD_STEPS = 4, 30
 # Records that nobody chose keep this multiple of the highest mesh frequency, and come this often [Hz].
-KEPT_HARMONIC, LEAST_RECORD_RATE = 3, 1000.0
+_KEPT_HARMONIC, _LEAST_RECORD_RATE = 3, 1000.0
 # Share of its strain energy that a mode has in the meshes where they drive it noticeably.
 MESH_SHARE = 0.1
 
@@ -93,16 +89,10 @@ def speed_range(
     ----------
     model : DrivetrainModel
     torques : sequence of TorqueHistory
-    duration : float
-        [s]
+    duration, start : float
+        End and begin of the range [s].
     speed : float
         Of the first body at time zero [rad/s].
-    start : float
-        The range is that from here to the end [s].
-
-    Returns
-    -------
-    SpeedRange
     """
     instants = np.concatenate([[0.0, start, duration], *(one.times for one in torques)])
     times = np.unique(np.clip(instants, 0.0, duration))
@@ -129,10 +119,9 @@ def case_speeds(case: DrivetrainCase, model: DrivetrainModel, *, start: float = 
 def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
     """Steps a record: as given, or what the highest mesh frequency of the run asks for."""
     s = case.simulation
-    record = s.record
-    if record is None:
-        record = default_record_rate(s.rate, highest_mesh(model, case_speeds(case, model).fastest)[1])
-    return max(1, round(s.rate / record))
+    if s.record is not None:
+        return max(1, round(s.rate / s.record))
+    return default_record_every(s.rate, highest_mesh(model, case_speeds(case, model).fastest)[1])
 
 
 def record_rate(case: DrivetrainCase, model: DrivetrainModel) -> float:
@@ -181,15 +170,15 @@ def shift_rate(hertz: float, share: float) -> float:
     return math.pi * hertz / math.sqrt(3.0 * share)
 
 
-def default_record_rate(rate: float, highest: float) -> float:
-    """Records a second where none are given: few, but with the third harmonic of the highest mesh.
+def default_record_every(rate: float, highest: float) -> int:
+    """Steps a record where no rate of records is given; so many steps a second, highest mesh line [Hz].
 
-    The steps a second `rate` [Hz] over the largest whole number for which the pass band of the records holds
-    that harmonic of the frequency `highest` [Hz] and there are 1000 a second; at most the rate.
+    The largest number for which the pass band of the records holds the third harmonic of that line and there
+    are 1000 records a second.
     """
     # a hair more, so that rounding of the speed does not push the harmonic out
-    needed = max(LEAST_RECORD_RATE, 2.0 * KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
-    return rate / max(1, math.floor(rate / needed * (1.0 + 1e-12)))
+    needed = max(_LEAST_RECORD_RATE, 2.0 * _KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
+    return max(1, math.floor(rate / needed * (1.0 + 1e-12)))
 
 
 def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
@@ -275,8 +264,6 @@ def check_turning(lowest: float, mean: float) -> None:
 
 def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
     """Refuse meshes whose cut series turns negative: no real mesh pushes the other way."""
-    if not len(model.meshes):
-        return
     phase = 2.0 * math.pi * np.arange(4096)[:, None] / 4096
     least = np.array(FourierSeries(model.stiffness).at(phase)).min(axis=0)
     wrong = np.flatnonzero(least <= 0.0)
@@ -314,13 +301,7 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
 
 
 def drivetrain_warnings(case: DrivetrainCase) -> tuple[Finding, ...]:
-    """What is allowed but deserves a look.
-
-    Raises
-    ------
-    CaseError
-        As `check_drivetrain`.
-    """
+    """What is allowed but deserves a look; refuses what `check_drivetrain` does."""
     model = check_drivetrain(case)
     speeds = case_speeds(case, model)
     return (
@@ -430,7 +411,7 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     -------
     count : int
     names : tuple of str
-        Coordinates of those motions, the largest first, rotations last.
+        Coordinates that move most, rotations last; at most six.
     """
     model = drivetrain_model(replace(train, damping_ratio=0.0), harmonics=0, turning=turning)
     lengths = [one.length for one in train.shafts]

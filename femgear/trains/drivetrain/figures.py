@@ -1,8 +1,4 @@
-"""Figures of a drivetrain case from modes.nc, transient.nc and spectrum.nc.
-
-`over_time` and `spectra` take plain curves, those after them read the files. `FIGURES` at the end ties the
-pictures of the report to their captions.
-"""
+"""Figures of a drivetrain case from modes.nc, transient.nc and spectrum.nc."""
 
 from __future__ import annotations
 
@@ -176,12 +172,7 @@ def _thickness(index: int) -> dict[str, float]:
 
 
 def band(time, values, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Least and largest of values (n,) in `count` pieces of the time, which share their ends.
-
-    Returns
-    -------
-    middle, low, high : (count,) arrays
-    """
+    """Middle, least and largest value (count,) of values (n,) in pieces of the time that share their ends."""
     time, values = np.asarray(time), np.asarray(values)
     first = np.linspace(0, len(time) - 1, count + 1).astype(int)
     low, high = (one.reduceat(values, first[:-1]) for one in (np.minimum, np.maximum))

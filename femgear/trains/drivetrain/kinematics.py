@@ -53,28 +53,20 @@ class Coordinates:
 
 def coordinates_of(train: Drivetrain) -> Coordinates:
     """Five coordinates a body and a station of a shaft, three a planet; planets follow their carrier."""
-    names, body, planets, inner = [], {}, {}, {}
+    names, body, planets, inner = [], {}, {}, []
     for one in train.bodies:
         body[one.name] = len(names)
         names += [f"{one.name}: {axis}" for axis in AXES]
         for number, stage in enumerate(train.planetary):
             if stage.carrier == one.name:
-                prefix = "planet" if len(train.planetary) == 1 else f"planet of {one.name}"
-                n = len(stage.angles)
-                planets[number] = len(names) + np.arange(3 * n).reshape(n, 3)
-                names += [
-                    f"{prefix} {p + 1}: {axis}"
-                    for p in range(n)
-                    for axis in ("radial", "tangential", "rotation")
-                ]
-    for number, shaft in enumerate(train.shafts):
-        inner[number] = tuple(len(names) + 5 * i for i in range(max(shaft.elements - 1, 0)))
-        for i in range(len(inner[number])):
-            names += [f"shaft {'-'.join(shaft.between)} {i + 1}: {axis}" for axis in AXES]
-    return Coordinates(
-        tuple(names), body, tuple(planets[n] for n in range(len(planets))),
-        tuple(inner[n] for n in range(len(inner))),
-    )  # fmt: skip
+                planets[number] = len(names) + np.arange(3 * len(stage.angles)).reshape(-1, 3)
+                axes = ("radial", "tangential", "rotation")
+                names += [f"{name}: {axis}" for name in train.planet_names(stage) for axis in axes]
+    for shaft in train.shafts:
+        stations = range(1, max(shaft.elements, 1))
+        inner.append(tuple(len(names) + 5 * i for i in range(len(stations))))
+        names += [f"shaft {'-'.join(shaft.between)} {i}: {axis}" for i in stations for axis in AXES]
+    return Coordinates(tuple(names), body, tuple(planets[n] for n in range(len(planets))), tuple(inner))
 
 
 @dataclass(frozen=True)

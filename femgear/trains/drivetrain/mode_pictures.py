@@ -1,8 +1,4 @@
-"""Pictures of the lowest elastic modes of a drivetrain: discs on shafts, at rest and moved.
-
-`drivetrain_layout` places the bodies in space, `layout_motion` and `shaft_lines` move them, and
-`drivetrain_pictures` draws them.
-"""
+"""Pictures of the lowest elastic modes of a drivetrain: discs on shafts, at rest and moved."""
 
 from __future__ import annotations
 
@@ -93,12 +89,11 @@ def drivetrain_layout(train: Drivetrain) -> Layout:
     centre = [places[name] for name in names]
     wheels = _wheels(train, places, size)
     for stage in train.planetary:
-        prefix = "planet" if len(train.planetary) == 1 else f"planet of {stage.carrier}"
         for p, angle in enumerate(stage.angles, start=1):
             arm = stage.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
             centre.append(places[stage.carrier] + arm)
-            wheels.append(Wheel(f"planet {p}", centre[-1], stage.pitch_radii[1], 0.2 * size, len(names)))
-            names.append(f"{prefix} {p}")
+            wheels.append(Wheel(f"planet {p}", centre[-1], stage.pitch_radii[1], 0.2 * size, len(centre) - 1))
+        names += train.planet_names(stage)
     shafts = tuple((names.index(s.between[0]), names.index(s.between[1])) for s in train.shafts)
     return Layout(tuple(names), np.array(centre), tuple(wheels), shafts)
 
@@ -263,7 +258,7 @@ def drivetrain_pictures(views: Iterable[ModeView], layout: Layout, *, size: int 
     Raises
     ------
     FemgearError
-        See `load_pyvista`.
+        See `femgear.report.scene.load_pyvista`.
     StorageError
         When a file cannot be written.
     """

@@ -366,6 +366,11 @@ class Drivetrain:
             found.append(Mesh(one.name, len(self.planetary) + i, f"parallel[{i}].mesh", one.mesh))
         return tuple(found)
 
+    def planet_names(self, stage: PlanetarySection) -> list[str]:
+        """Of all planets of a stage: ``planet 1``, or ``planet of carrier 1`` beside other stages."""
+        prefix = "planet" if len(self.planetary) == 1 else f"planet of {stage.carrier}"
+        return [f"{prefix} {number}" for number in range(1, len(stage.angles) + 1)]
+
     def body(self, name: str) -> BodySection:
         """The body of that name."""
         return next(one for one in self.bodies if one.name == name)

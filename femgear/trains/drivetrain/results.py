@@ -1,7 +1,6 @@
 """Results of a drivetrain case: modes.nc, transient.nc, spectrum.nc, their tables and warnings.
 
-Every variable of a file carries its units. `transient_warnings` tells what the motion says against itself;
-`describe_drivetrain` is about the chain of the case, the other tables about the numbers of a run.
+Every variable of a file carries its units.
 """
 
 from __future__ import annotations
@@ -365,20 +364,9 @@ def _shown_factor(power: float) -> str:
 
 
 def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
-    """Tabulate bodies, shafts, gear stages and operation of a drivetrain case.
-
-    Raises
-    ------
-    CaseError
-        As `femgear.trains.drivetrain.checks.check_drivetrain`.
-    """
+    """Tabulate bodies, shafts, gear stages and operation of a case; refuses what `check_drivetrain` does."""
     model = check_drivetrain(case)
-    return (
-        _bodies(case, model),
-        _shafts(model),
-        _stages(case, model),
-        _operation(case, model),
-    )
+    return _bodies(case, model), _shafts(model), _stages(case, model), _operation(case, model)
 
 
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:

@@ -3,9 +3,6 @@
 Spectra of mesh forces are windowed and averaged, over frequency and over orders of the first body. Lines are
 named for what makes them: mesh harmonics, side bands of the turning carriers, sums and differences of two
 meshes.
-
-`DRIVETRAIN` at the end is the train: the table of its stages, with what the report says and draws of each,
-and the case file of its own.
 """
 
 from __future__ import annotations
@@ -159,10 +156,7 @@ def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
 def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> SpectrumResult:
     """Spectra of the mesh forces after the start, over frequency and over orders of the first body.
 
-    Raises
-    ------
-    CaseError
-        As `femgear.trains.drivetrain.checks.check_spectrum`.
+    Refuses what `check_spectrum` does.
     """
     check_spectrum(case, transient.models[BENDING])
     first, settle = next(iter(transient.runs.values())), settle_time(case)

@@ -1,4 +1,4 @@
-"""The sections of a case file with ``model = "gear_pair"``: two gears, their mesh, and what is computed."""
+"""The case file with ``model = "gear_pair"``: two gears, their mesh, and what is computed."""
 
 from __future__ import annotations
 

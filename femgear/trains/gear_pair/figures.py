@@ -37,7 +37,7 @@ _SPARSE = 80
 def amplitude_and_mean(
     curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, x: str = "frequency ratio [1]",
     unit: str = "half backlash", title: str = "",
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Amplitude and mean of a deflection over frequency, dashed where it is not known to be stable.
 
     Parameters
@@ -46,10 +46,6 @@ def amplitude_and_mean(
     sweeps : sequence of (text, ratio (f,), amplitude (f,), mean (f,))
         Drawn as markers.
     x, unit, title : str
-
-    Returns
-    -------
-    Figure
     """
     figure, (top, bottom) = new_figure(rows=2, width=8.5, height=7.0, sharex=True)
     for number, (text, ratio, amplitude, mean, stable) in enumerate(curves):

@@ -1,7 +1,7 @@
 """The pipeline of a gear pair: response by harmonic balance, sweep and chaos by integration in time.
 
-The stages know nothing of one another. Lengths count in half backlashes and times in 1 / omega_n, as in
-`femgear.trains.gear_pair.model`; every file tells these units. `GEAR_PAIR` at the end is the train.
+Lengths count in half backlashes and times in 1 / omega_n, as in `femgear.trains.gear_pair.model`; every file
+tells these units.
 """
 
 from __future__ import annotations

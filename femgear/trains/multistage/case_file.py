@@ -1,8 +1,4 @@
-"""The sections of a case file with ``model = "multistage"``: planetary stages, shafts, operation, response.
-
-`multistage_of` makes the train of a case, `stage_gears` the gears of a stage that has a module. `cross_check`
-refuses entries that contradict one another, and trains that cannot turn.
-"""
+"""The case file with ``model = "multistage"``: planetary stages, shafts, operation, response."""
 
 from __future__ import annotations
 
@@ -41,7 +37,6 @@ from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, planar_from_set
 from femgear.trains.multistage.model import (
-    STIFFEST,
     Member,
     MultistageSet,
     Stage,
@@ -74,6 +69,8 @@ def _member(value: object) -> str:
     return value
 
 
+# beyond, rounding hides the other springs [N m/rad, N/m]
+_STIFFEST_TORSION, _STIFFEST_LATERAL = 1e12, 1e15
 MemberName = Annotated[str, BeforeValidator(_member)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
@@ -147,8 +144,8 @@ class CouplingSection(Section):
     between: Annotated[tuple[MemberName, ...], PAIR]
     diameter: Length | None = None
     length: Length | None = None
-    torsional: Annotated[float, StiffnessOrRigid(TORSION, 1e-3, STIFFEST["torsional"])] | None = None
-    lateral: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, STIFFEST["lateral"])] | None = None
+    torsional: Annotated[float, StiffnessOrRigid(TORSION, 1e-3, _STIFFEST_TORSION)] | None = None
+    lateral: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, _STIFFEST_LATERAL)] | None = None
 
 
 class OperationSection(Section):
@@ -232,15 +229,7 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
 
 
 def multistage_of(case: MultistageCase) -> MultistageSet:
-    """The train of a case.
-
-    Without couplings each carrier turns the next sun, joined rigidly.
-
-    Raises
-    ------
-    CaseError
-        With the keys of the file.
-    """
+    """The train of a case; without couplings each carrier turns the next sun, joined rigidly."""
     stages = [_named(_stage, f"stage[{n}]", one) for n, one in enumerate(case.stage)]
     couplings = [_named(_coupling, f"coupling[{n}]", one) for n, one in enumerate(case.coupling)]
     operation = case.operation

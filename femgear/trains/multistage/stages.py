@@ -1,8 +1,7 @@
 """The pipeline of a multistage case: modes -> response, and balance.
 
 Modes come with their kinds and the stage in which each one lives; the response is that to transmission errors
-of every stage, by modal summation; harmonic balance has the stiffnesses k(t) of all meshes. `MULTISTAGE` at
-the end is the train: the table of its stages, with what the report says and draws of each.
+of every stage, by modal summation; harmonic balance has the stiffnesses k(t) of all meshes.
 """
 
 from __future__ import annotations
@@ -157,11 +156,6 @@ def error_response(
     -------
     dict of int to MeshErrorResponse
         By the stage that excites; deflection and force of all meshes of the train.
-
-    Raises
-    ------
-    CaseError
-        As `train_speeds`.
     """
     speed = np.atleast_1d(np.asarray(speed, float))
     system, k = multistage_system(data), mean_mesh_stiffness(data)
