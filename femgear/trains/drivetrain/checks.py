@@ -264,6 +264,8 @@ def check_turning(lowest: float, mean: float) -> None:
 
 def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
     """Refuse meshes whose cut series turns negative: no real mesh pushes the other way."""
+    if not len(model.meshes):
+        return
     phase = 2.0 * math.pi * np.arange(4096)[:, None] / 4096
     least = np.array(FourierSeries(model.stiffness).at(phase)).min(axis=0)
     wrong = np.flatnonzero(least <= 0.0)

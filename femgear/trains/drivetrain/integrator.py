@@ -43,7 +43,7 @@ class Block:
     """Loads and meshes at the instants (t,) of a block of steps, its start included.
 
     ``loads`` (t, d): one for the weight, then the torques [N m]; ``selection`` (t, m, n_meshes): ``S`` of
-    `MeshGeometry`; ``stiffness`` (t, n_meshes) [N/m]; of the spin ``angle`` [rad], ``speed`` [rad/s],
+    the model's geometry; ``stiffness`` (t, n_meshes) [N/m]; of the spin ``angle`` [rad], ``speed`` [rad/s],
     ``torque`` and, without regard to signs, ``effort`` [N m].
     """
 
@@ -257,7 +257,7 @@ class Separating:
         self._take(self.drive)
 
     def _take(self, closed) -> None:
-        """Keep the contacts that touch, and the overlaps from `least` to `most` that fit them."""
+        """Keep the contacts that touch, and the overlaps from ``least`` to ``most`` that fit them."""
         self.closed, self.drives = closed, np.array_equal(closed, self.drive)
         self.touching = np.flatnonzero(closed)
         self.play = self.gap[self.touching]

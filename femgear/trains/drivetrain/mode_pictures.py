@@ -161,10 +161,8 @@ def shaft_lines(
     """
     place, full = model.place, model.free @ shape
     found = []
-    for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
-        one, two = (place.body[name] for name in shaft.between)
-        first = np.array([one, *inner, two])
-        stations = full[first[:, None] + np.arange(5)]
+    for shaft, first, ends in zip(model.train.shafts, place.stations, layout.shafts):
+        stations = full[np.array(first)[:, None] + np.arange(5)]
         share, across = _beam_line(shaft, stations, points if shaft.elements else 3 * points)
         one, two = layout.centre[list(ends)]
         rest = one + share[:, None] * (two - one)

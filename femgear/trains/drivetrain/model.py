@@ -2,7 +2,7 @@
 
 The coordinates are small deviations, in the fixed frame, from a large common rotation: body b turns by
 ``ratio_b phi(t)`` with the spin phi of the first body. The spin itself is a rigid motion without stiffness,
-see `rigid` of the model; time integration keeps it apart (`femgear.trains.drivetrain.simulation`).
+see `DrivetrainModel.rigid`; time integration keeps it apart (`femgear.trains.drivetrain.simulation`).
 
 Meshes have a rectangular stiffness by the number of tooth pairs in contact; their directions are those of
 `femgear.trains.drivetrain.kinematics`.
@@ -313,14 +313,13 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
         mass, gyroscopic = disc_matrices(body.mass, body.inertia, body.transverse_inertia)
         M[first : first + 5, first : first + 5] += mass
         G[first : first + 5, first : first + 5] += gyroscopic * spin[first + 4]
-    for shaft, inner in zip(train.shafts, place.inner):
+    for shaft, stations in zip(train.shafts, place.stations):
         if shaft.elements:
             mass, _, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
-            ends = (place.body[shaft.between[0]], *inner, place.body[shaft.between[1]])
-            for one, two in itertools.pairwise(ends):
+            for one, two in itertools.pairwise(stations):
                 at = np.r_[one : one + 5, two : two + 5]
                 M[np.ix_(at, at)] += mass
-                G[np.ix_(at, at)] += gyroscopic * spin[ends[0] + 4]
+                G[np.ix_(at, at)] += gyroscopic * spin[stations[0] + 4]
     for group in springs_of(train, place):
         finite = np.where(np.isinf(group.stiffness), 0.0, group.stiffness)
         K[np.ix_(group.places, group.places)] += (group.rows.T * finite) @ group.rows

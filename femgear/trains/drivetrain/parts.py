@@ -107,7 +107,7 @@ class Part(Section):
         return cls.model_construct(**values)
 
     def changed(self, **values: Any) -> Self:
-        """Copy the part with other values, as of `in_si`."""
+        """Copy the part with other values, as of `Part.in_si`."""
         return self.model_copy(update=values)
 
 

@@ -33,6 +33,8 @@ _LOW_PASS = "linear-phase low pass, 0.8 to 1.0 of half the record rate, 80 dB"
 
 # Panels of a figure.
 MOST_PANELS = 6
+# Of the segments of spectra.
+WINDOW = "hann"
 
 _PLANET = re.compile(r"(?:^|-)planet (\d+)(?: \d+)?(?:-ring of |$)")
 
@@ -192,7 +194,6 @@ class AveragedSpectrum:
         Distance of lines.
     bandwidth : float
         Equivalent noise bandwidth.
-    window : str
     segments : int
         Averaged.
     """
@@ -201,7 +202,6 @@ class AveragedSpectrum:
     amplitude: np.ndarray
     resolution: float
     bandwidth: float
-    window: str
     segments: int
 
 
@@ -256,7 +256,7 @@ class SpectrumResult:
         }
         attrs = {
             "title": "spectra of the mesh forces",
-            "window": some.window,
+            "window": WINDOW,
             "segments": some.segments,
             "overlap": 0.5,
             "resolution": some.resolution,

@@ -2,11 +2,11 @@
 
 Beside the motion goes the free one without loads, whose growth tells a parametric resonance. It takes the
 same steps (`femgear.trains.drivetrain.integrator`), with the tangents of the meshes, and is brought back to
-size one every few steps; the slope of the logarithm of its size is the largest Lyapunov exponent (G. Benettin,
-L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15, 1980, 9-30). The weights exp(-1 / (s (1 - s))) over
-the run take the oscillation of the size out of the mean (S. Das, Y. Saiki, E. Sander and J. A. Yorke,
-Nonlinearity 30, 2017, 4111-4140).
-With linear meshes at a constant speed it is the largest Floquet exponent, at any load.
+size one every few steps; the slope of the logarithm of its size is the largest Lyapunov exponent
+(G. Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15, 1980, 9-30). The weights
+exp(-1 / (s (1 - s))) over the run take the oscillation of the size out of the mean (S. Das, Y. Saiki,
+E. Sander and J. A. Yorke, Nonlinearity 30, 2017, 4111-4140). With linear meshes at a constant speed it is
+the largest Floquet exponent, at any load.
 """
 
 from __future__ import annotations

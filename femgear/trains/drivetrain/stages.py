@@ -37,6 +37,7 @@ from femgear.trains.drivetrain.checks import (
 from femgear.trains.drivetrain.figures import FIGURES
 from femgear.trains.drivetrain.model import BENDING, TORSIONAL, DrivetrainModel, case_model
 from femgear.trains.drivetrain.results import (
+    WINDOW,
     AveragedSpectrum,
     DrivetrainModesResult,
     MeshLine,
@@ -61,8 +62,8 @@ _SPEEDS, _FASTEST, _HIGHEST, _MOST_BRANCHES = 21, 10.0 / 3.0, 2.5, 40
 _ORDERS = 0.25
 # Mesh harmonics and side bands of the carrier's turn that have names.
 _HARMONICS, _SIDE_BANDS = 3, 3
-# Of the spectra, and half the width of its main lobe in lines (F. J. Harris, Proc. IEEE 66, 1978, 51-83).
-_WINDOW, _LOBE = "hann", 2.0
+# Half the main lobe of Hann's window in lines (F. J. Harris, Proc. IEEE 66, 1978, 51-83).
+_LOBE = 2.0
 # Growth of the free motion from which linear meshes are asked whether the motion means anything, and the
 # vibration of a body over its own speed that means nothing.
 _GROWN, _WILD = 1e3, 100.0
@@ -269,16 +270,14 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     signal = np.asarray(signal, float)
     length = round(1.0 / (resolution * step))
     hop = max(1, round(0.5 * length))
-    weight = np.asarray(windows.get_window(_WINDOW, length))
+    weight = np.asarray(windows.get_window(WINDOW, length))
     options = {"window": weight, "noverlap": length - hop, "detrend": "constant", "scaling": "spectrum"}
     frequency, power = welch(signal, 1.0 / step, nperseg=length, axis=0, return_onesided=False, **options)
     kept = length // 2 + 1
     amplitude = 2.0 * np.sqrt(np.moveaxis(power[:kept], 0, -1))
     bandwidth = float(np.sum(weight**2) / weight.sum() ** 2 / step)
     segments = (len(signal) - length) // hop + 1
-    return AveragedSpectrum(
-        np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, _WINDOW, segments
-    )
+    return AveragedSpectrum(np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, segments)
 
 
 def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> AveragedSpectrum:

@@ -107,8 +107,9 @@ class ImpactPair:
     def problem(self, ratio: float, *, divided: int = 1) -> NonlinearSystem:
         """The pair at the frequency ratio Omega, tooth frequency over omega_n, in the scaled time.
 
-        Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `frequency`; for motions that
-        repeat after several tooth periods ``divided`` counts these, and the first base is 1 / divided.
+        Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `ImpactPair.frequency`; for
+        motions that repeat after several tooth periods ``divided`` counts these, and the first base is
+        1 / divided.
         """
         M, C, K, along = self._matrices()
         system = MechanicalSystem(
@@ -119,7 +120,7 @@ class ImpactPair:
         return NonlinearSystem(system, (self.mesh(divided),), forces)
 
     def mesh(self, divided: int = 1) -> GearMeshes:
-        """The mesh with its play on the one column, see `problem`."""
+        """The mesh with its play on the one column, see `ImpactPair.problem`."""
         orders = _orders(0, divided, len(self.frequency))
         k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders)
         return GearMeshes(np.array([0]), k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)

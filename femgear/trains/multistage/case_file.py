@@ -39,7 +39,7 @@ from femgear.system.rigid_bodies import PlanarBody, PlanarSet, planar_from_set
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
-    Stage,
+    PlanetaryStage,
     StageCoupling,
     check_turns,
     in_series,
@@ -268,10 +268,9 @@ def _coupling(one: CouplingSection) -> StageCoupling:
     given = {name: getattr(one, name) for name in ("torsional", "lateral") if getattr(one, name) is not None}
     springs = {}
     if one.diameter is not None and one.length is not None:
-        # ends that do not tilt: Timoshenko's beam (Przemieniecki, Theory of Matrix Structural Analysis, 5.6)
-        shaft, length = RoundSection(one.diameter), one.length
-        bending = 12.0 * shaft.young * shaft.second_moment / (length**3 * (1.0 + shaft.shear_ratio(length)))
-        springs = {"torsional": joint_springs(shaft, length).torsion, "lateral": bending}
+        # ends that do not tilt
+        joint = joint_springs(RoundSection(one.diameter), one.length)
+        springs = {"torsional": joint.torsion, "lateral": joint.shear}
     first, second = (_member_of(text) for text in one.between)
     return StageCoupling(first, second, **springs | given)
 
@@ -296,7 +295,7 @@ def stage_gears(stage: StageSection) -> PlanetarySet:
     return closed
 
 
-def _stage(stage: StageSection) -> Stage:
+def _stage(stage: StageSection) -> PlanetaryStage:
     members = (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
     lumped: dict[str, Any] = {
         name: PlanarBody(one.mass, one.inertia, one.support_stiffness, one.torsional_stiffness)
@@ -312,14 +311,16 @@ def _stage(stage: StageSection) -> Stage:
     if isinstance(size, GearsSection):
         gears = stage_gears(stage)
         data = planar_from_set(gears, **_iso_stiffness(size, gears) | lumped)
-        return Stage(data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle)
+        return PlanetaryStage(
+            data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle
+        )
     alpha = size.pressure_angle
     data = PlanarSet(
         **lumped, sun_radius=size.sun, planet_radius=size.planet, ring_radius=size.sun + 2.0 * size.planet,
         centre_distance=(size.sun + size.planet) / math.cos(alpha), planet_angles=stage.angles,
         pressure_angle_sun_planet=alpha, pressure_angle_planet_ring=alpha,
     )  # fmt: skip
-    return Stage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
+    return PlanetaryStage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
 
 
 def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, Any]:

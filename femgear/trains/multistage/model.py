@@ -65,7 +65,7 @@ class Member:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stage:
+class PlanetaryStage:
     """One planetary set of the train.
 
     Parameters
@@ -76,7 +76,7 @@ class Stage:
     fixed : {"carrier", "ring", "sun"}, optional
         Member that the housing holds; None where all three turn.
     phases : (2N,) array, optional
-        Mesh phases as fractions of the mesh period, as in `PlanetarySet.mesh_phases`.
+        Mesh phases as fractions of the mesh period, as in `femgear.gears.planetary.PlanetarySet.mesh_phases`.
     angle : float
         Angle of the stage's x axis against the common frame at time zero [rad]; lateral couplings see it.
 
@@ -152,7 +152,7 @@ class MultistageSet:
 
     Parameters
     ----------
-    stages : tuple of Stage
+    stages : tuple of PlanetaryStage
     couplings : tuple of StageCoupling
         `in_series` makes those of a plain train. None: stages side by side.
     input, output : Member
@@ -164,7 +164,7 @@ class MultistageSet:
         One member for input and output, or one that is fixed (E-MECHANISM).
     """
 
-    stages: tuple[Stage, ...]
+    stages: tuple[PlanetaryStage, ...]
     couplings: tuple[StageCoupling, ...]
     input: Member
     output: Member
@@ -183,12 +183,14 @@ class MultistageSet:
         return sum(2 * stage.data.n_planets for stage in self.stages)
 
 
-def in_series(stages: Sequence[Stage], *, torsional: float = math.inf, lateral: float = 0.0) -> MultistageSet:
+def in_series(
+    stages: Sequence[PlanetaryStage], *, torsional: float = math.inf, lateral: float = 0.0
+) -> MultistageSet:
     """Join stages one after the other: each carrier turns the next sun.
 
     Parameters
     ----------
-    stages : sequence of Stage
+    stages : sequence of PlanetaryStage
     torsional, lateral : float
         Of every coupling, see `StageCoupling`.
     """

@@ -50,8 +50,7 @@ from femgear.trains.multistage.results import (
     describe_stage_modes,
     multistage_warnings,
 )
-from femgear.trains.protocol import OwnFile, Progress, Train, one_blas_thread
-from femgear.trains.protocol import Stage as RunStage
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 
 # relative distance of frequencies that count as one
 _MULTIPLE = 1e-7
@@ -382,14 +381,14 @@ MULTISTAGE = Train(
     own_file=OwnFile(),
     cross_check=cross_check,
     stages=(
-        RunStage(
+        Stage(
             name="modes",
             title="Modes",
             solve=solve_multistage_modes,
             verdict=lambda result: {"modes": len(result.modes.frequency)},
             describe=lambda results: describe_stage_modes(results.modes),
         ),
-        RunStage(
+        Stage(
             name="response",
             title="Response",
             solve=solve_response,
@@ -399,7 +398,7 @@ MULTISTAGE = Train(
             unavailable=_no_response,
             needs=lambda case: ("modes",),
         ),
-        RunStage(
+        Stage(
             name="balance",
             title="Harmonic balance",
             solve=solve_balance,
