@@ -10,7 +10,7 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.report.response import campbell
-from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure
+from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure, show_changes
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.mode_pictures import write_mode_pictures
 from femgear.trains.drivetrain.model import DrivetrainModel, case_model
@@ -73,7 +73,7 @@ def over_time(
         if zero:
             ax.axhline(0.0, color=GREY, linewidth=0.8)
         else:
-            _show_changes(ax)
+            show_changes(ax, _LEAST)
     legend_below(figure)
     return figure
 
@@ -156,15 +156,6 @@ def _draw_spectrum(ax, frequency, curves: Sequence[tuple]) -> None:
         ax.set_yscale("log")
         ax.yaxis.set_minor_locator(NullLocator())
         ax.set_ylim(1e-5 * top, 2.0 * top)
-
-
-def _show_changes(ax) -> None:
-    """Ordinate that does not reach zero, with whole numbers at its ticks, and does not blow up rounding."""
-    low, high = ax.get_ylim()
-    least = 0.5 * _LEAST * max(abs(low), abs(high))
-    middle, half = 0.5 * low + 0.5 * high, max(0.5 * high - 0.5 * low, least)
-    ax.set_ylim(middle - half, middle + half)
-    ax.ticklabel_format(axis="y", useOffset=False)
 
 
 def _thickness(index: int) -> dict[str, float]:

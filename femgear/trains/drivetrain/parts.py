@@ -33,6 +33,7 @@ from femgear.case.quantities import (
     Section,
     StiffnessOrRigid,
 )
+from femgear.case.sections import Angle, PressureAngle
 from femgear.case.text import described
 from femgear.errors import CaseError
 from femgear.fe import shaft as shafts
@@ -87,8 +88,6 @@ Radius = Annotated[float, Quantity(LENGTH, 1e-4, 100.0)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 1e3)]
 Offset = Annotated[float, Quantity(LENGTH, -100.0, 100.0)]
 Module = Annotated[float, Quantity(LENGTH, 5e-5, 0.5)]
-Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
-PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
 Teeth = Annotated[int, Count(4, 5000)]
 Joint = Annotated[float, StiffnessOrRigid(TORSION, 1e-3, 1e15)]
 BOTH = BeforeValidator(_two)

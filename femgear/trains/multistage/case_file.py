@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from femgear.case.quantities import (
-    ANGLE,
     LENGTH,
     PAIR,
     RPM,
@@ -26,7 +25,7 @@ from femgear.case.quantities import (
     StiffnessOrRigid,
     Title,
 )
-from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
+from femgear.case.sections import FORMAT, Angle, Inertia, Mass, MeshStiffnessSection, PressureAngle, Radius
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import RoundSection, joint_springs
@@ -74,8 +73,6 @@ _STIFFEST_TORSION, _STIFFEST_LATERAL = 1e12, 1e15
 MemberName = Annotated[str, BeforeValidator(_member)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
-Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
-PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
 Teeth = Annotated[int, Count(4, 5000)]
 
 
@@ -268,9 +265,10 @@ def _coupling(one: CouplingSection) -> StageCoupling:
     given = {name: getattr(one, name) for name in ("torsional", "lateral") if getattr(one, name) is not None}
     springs = {}
     if one.diameter is not None and one.length is not None:
-        # ends that do not tilt
-        joint = joint_springs(RoundSection(one.diameter), one.length)
-        springs = {"torsional": joint.torsion, "lateral": joint.shear}
+        # ends that do not tilt: Timoshenko's beam (Przemieniecki, Theory of Matrix Structural Analysis, 5.6)
+        shaft, length = RoundSection(one.diameter), one.length
+        bending = 12.0 * shaft.young * shaft.second_moment / (length**3 * (1.0 + shaft.shear_ratio(length)))
+        springs = {"torsional": joint_springs(shaft, length).torsion, "lateral": bending}
     first, second = (_member_of(text) for text in one.between)
     return StageCoupling(first, second, **springs | given)
 

@@ -392,22 +392,23 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     turning = turning_couplings(data, speed)
     carrier = train_speeds(data, speed).carrier if speed else np.zeros(len(data.stages))
     parts = [gear_set_system(one.data, carrier_speed=w) for one, w in zip(data.stages, carrier.tolist())]
-    T, Z = _stage_motions(data), joined_motions(data)
+    motions, Z = _member_motions(data), joined_motions(data)
     K = block_diag(*(part.K for part in parts)) + _centrifugal_stiffness(data, carrier)
     for number, coupling in enumerate(data.couplings):
-        columns, stiffness = _springs(data, T, coupling, lateral=number not in turning)
+        columns, stiffness = _springs(data, motions, coupling, lateral=number not in turning)
         K += (columns * stiffness) @ columns.T
     meshes = [free_motions(one.data).T @ mesh_directions(one.data, sign)
               for one, sign in zip(data.stages, _stage_flanks(data, torque))]  # fmt: skip
-    ends = [_ends(data, T, data.couplings[number]) for number in turning]
-    load = np.concatenate([part.load for part in parts]) + _torque_load(data, T, torque)
+    turned = [member for n in turning for member in (data.couplings[n].first, data.couplings[n].second)]
+    ends = [motions[member][:2].T for member in turned]
+    load = np.concatenate([part.load for part in parts]) + _torque_load(data, motions, torque)
     return MechanicalSystem(
         M=Z.T @ block_diag(*(part.M for part in parts)) @ Z,
         C=np.zeros((Z.shape[1], Z.shape[1])),
         K=Z.T @ K @ Z,
         W=Z.T @ np.hstack([np.asarray(block_diag(*meshes)), *ends]),
         load=Z.T @ load,
-        dofs=_names(data, T, Z),
+        dofs=_names(data, Z),
         gyroscopic=Z.T @ _gyroscopic(parts, carrier / speed) @ Z if speed else None,
     )
 
@@ -474,11 +475,11 @@ def joined_motions(data: MultistageSet) -> np.ndarray:
     The rows are those of the `gear_set_system` of every stage, one after the other. Of two joined coordinates
     that of the earlier place stays.
     """
-    T = _stage_motions(data)
-    Z = np.eye(T.shape[1])
+    motions = _member_motions(data)
+    Z = np.eye(motions[data.input].shape[1])
     for coupling in data.couplings:
-        rows = [_twist(data, T, coupling)] if math.isinf(coupling.torsional) else []
-        rows += list(_shift(data, T, coupling).T) if math.isinf(coupling.lateral) else []
+        rows = [_twist(motions, coupling)] if math.isinf(coupling.torsional) else []
+        rows += list(_shift(data, motions, coupling).T) if math.isinf(coupling.lateral) else []
         for row in rows:
             row = row @ Z
             moved = np.flatnonzero(np.abs(row) > _ROUNDING * np.abs(row).max(initial=0.0))
@@ -524,55 +525,50 @@ def _gyroscopic(parts: list[MechanicalSystem], ratio: np.ndarray) -> np.ndarray:
     return np.asarray(block_diag(*(one * matrix for one, matrix in zip(ratio, still))))
 
 
-def _axis(data: MultistageSet, T: np.ndarray, member: Member, axis: int) -> np.ndarray:
-    """Row of `_stage_motions` of x, y or u of a member; zero where it is held."""
-    first = sum(3 * (stage.data.n_planets + 3) for stage in data.stages[: member.stage - 1])
-    return T[first + 3 * CENTRAL.index(member.name) + axis]
+def _member_motions(data: MultistageSet) -> dict[Member, np.ndarray]:
+    """x, y and rotation [rad] (3, n) of every member per coordinate of `_stage_motions`; zero where held."""
+    T, found, first = _stage_motions(data), {}, 0
+    for number, stage in enumerate(data.stages, 1):
+        for name in CENTRAL:
+            found[Member(number, name)] = T[first : first + 3].copy()
+            found[Member(number, name)][2] /= member_radius(stage.data, name)
+            first += 3
+        first += 3 * stage.data.n_planets
+    return found
 
 
-def _rotation(data: MultistageSet, T: np.ndarray, member: Member) -> np.ndarray:
-    """Rotation of a member [rad] per coordinate."""
-    return _axis(data, T, member, 2) / member_radius(data.stages[member.stage - 1].data, member.name)
-
-
-def _twist(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
+def _twist(motions: dict[Member, np.ndarray], coupling: StageCoupling) -> np.ndarray:
     """Rotation of the first member less that of the second, per coordinate."""
-    return _rotation(data, T, coupling.first) - _rotation(data, T, coupling.second)
+    return motions[coupling.first][2] - motions[coupling.second][2]
 
 
-def _shift(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
+def _shift(data: MultistageSet, motions: dict[Member, np.ndarray], coupling: StageCoupling) -> np.ndarray:
     """x and y (n, 2) of the first centre less the second, in the first frame, both as they stand."""
     turn = data.stages[coupling.second.stage - 1].angle - data.stages[coupling.first.stage - 1].angle
-    ends, c, s = _ends(data, T, coupling), math.cos(turn), math.sin(turn)
-    return ends[:, :2] - ends[:, 2:] @ np.array([[c, s], [-s, c]])
+    c, s = math.cos(turn), math.sin(turn)
+    return motions[coupling.first][:2].T - motions[coupling.second][:2].T @ np.array([[c, s], [-s, c]])
 
 
-def _ends(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
-    """x and y of the first and of the second member (n, 4)."""
-    members = (coupling.first, coupling.second)
-    return np.stack([_axis(data, T, member, k) for member in members for k in (0, 1)], axis=1)
-
-
-def _springs(data: MultistageSet, T: np.ndarray, coupling: StageCoupling, *, lateral: bool):
-    """Columns (n, g) and stiffnesses (g,) of what is elastic in a coupling."""
-    columns, stiffness = [np.empty((T.shape[1], 0))], []
+def _springs(data: MultistageSet, motions: dict[Member, np.ndarray], coupling: StageCoupling, *, lateral):
+    """Columns (n, g) and stiffnesses (g,) of what is elastic in a coupling, `lateral` among it or not."""
+    columns, stiffness = [np.empty((motions[coupling.first].shape[1], 0))], []
     if math.isfinite(coupling.torsional):
-        columns.append(_twist(data, T, coupling)[:, None])
+        columns.append(_twist(motions, coupling)[:, None])
         stiffness.append(coupling.torsional)
     if lateral and coupling.lateral and math.isfinite(coupling.lateral):
-        columns.append(_shift(data, T, coupling))
+        columns.append(_shift(data, motions, coupling))
         stiffness += [coupling.lateral] * 2
     return np.hstack(columns), np.array(stiffness)
 
 
-def _torque_load(data: MultistageSet, T: np.ndarray, torque: float) -> np.ndarray:
+def _torque_load(data: MultistageSet, motions: dict[Member, np.ndarray], torque: float) -> np.ndarray:
     """Forces on ``u`` of input and output."""
-    load = np.zeros(T.shape[1])
+    load = np.zeros(motions[data.input].shape[1])
     if not torque:
         return load
     output = train_torques(data, torque, radii=True).output
     for member, value in ((data.input, torque), (data.output, output)):
-        rotation = _rotation(data, T, member)
+        rotation = motions[member][2]
         if not np.any(rotation):
             raise CaseError(
                 f"the torque acts on the {member}, which is held", code="E-MECHANISM",
@@ -582,8 +578,8 @@ def _torque_load(data: MultistageSet, T: np.ndarray, torque: float) -> np.ndarra
     return load
 
 
-def _names(data: MultistageSet, T: np.ndarray, Z: np.ndarray) -> tuple[str, ...]:
+def _names(data: MultistageSet, Z: np.ndarray) -> tuple[str, ...]:
     """Name of every coordinate that is left: its own row of ``Z`` is a unit row."""
     names = [f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in dof_names(one.data)]
-    own = np.argmax(T == 1.0, axis=0)
+    own = np.argmax(_stage_motions(data) == 1.0, axis=0)
     return tuple(names[own[row]] for row in np.argmax(Z == 1.0, axis=0))
