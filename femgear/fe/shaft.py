@@ -114,7 +114,7 @@ def joint_springs(section: RoundSection, length: float) -> JointSprings:
 
 
 def joint_deflections(length: float) -> np.ndarray:
-    """Rows (5, 10) of the joint's deflections: shear along x and y, bend about x and y, twist.
+    """Rows (5, 10) of the deflections of a joint in a length [m]: shear along x, y, bend about x, y, twist.
 
     Each link moves with the station at its end; a tilt about y moves the joint along x, one about x along
     -y.
@@ -127,7 +127,7 @@ def joint_deflections(length: float) -> np.ndarray:
 
 
 def beam_element(section: RoundSection, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass, stiffness and gyroscopic matrix (10, 10) of an element between two stations.
+    """Mass, stiffness and gyroscopic matrix (10, 10) of an element of a length [m] between two stations.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def _mass_terms(l: float, phi: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_matrices(mass: float, polar: float, transverse: float) -> tuple[np.ndarray, np.ndarray]:
-    """Mass (5, 5) and gyroscopic matrix (5, 5) of a rigid disc on its station.
+    """Mass and gyroscopic matrix (5, 5) of a rigid disc: mass [kg], polar and transverse inertia [kg m^2].
 
     ``I_t tilt_x'' + I_p Omega tilt_y' = moment``, ``I_t tilt_y'' - I_p Omega tilt_x' = moment``.
     """

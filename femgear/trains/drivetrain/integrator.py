@@ -106,7 +106,8 @@ class Scheme:
     """One step, mesh forces g on the simple motions at its end left open.
 
     Rows ``z = (q, v without g, g)`` go on by ``(q, v without g, x without g) = z advance + loads``; the state
-    is ``(q, v) = z[:2n] - drawn g``, and ``x = U^T q`` becomes ``x without g - flexibility g``.
+    is ``(q, v) = z[:2n] - drawn g``, and ``x = U^T q`` becomes ``x without g - flexibility g``. There are
+    n coordinates, m simple motions ``basic`` (n, m), and loads (d, 2 n + m) at both ends of the step.
     """
 
     advance: np.ndarray

@@ -72,9 +72,9 @@ def coordinates_of(train: Drivetrain) -> Coordinates:
 
 @dataclass(frozen=True)
 class Springs:
-    """Springs of a part: places (m,) that they join, deflections (k, m), stiffness (k,) [N/m, N m/rad].
+    """Springs of a part: places (m,) that they join, ``rows`` (k, m) of deflections, stiffness (k,).
 
-    ``turns`` (k,): whether a spring acts against a rotation.
+    ``turns`` (k,): whether a spring acts against a rotation [N m/rad], else [N/m].
     """
 
     places: np.ndarray
@@ -262,7 +262,7 @@ class MeshGeometry:
 
 
 def mesh_geometry(train: Drivetrain, place: Coordinates, spin: np.ndarray) -> MeshGeometry:
-    """Directions of the drive flanks of all meshes among all coordinates."""
+    """Directions of the drive flanks of all meshes among all coordinates; spin (n,) of `rigid_rotation`."""
     stages = np.array([mesh.stage for mesh in train.meshes], int)
     total, planar = _flank_directions(train, place, spin), _planar_places(train, place)
     # simple motions: the part of every mesh that does not turn, then x and y of carriers and suns
@@ -325,7 +325,7 @@ def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
 
 
 def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.ndarray:
-    """Coordinates of the lumped set (3 (N + 3), n) per unit of those of the chain, carrier at angle zero."""
+    """Coordinates (3 (N + 3), n) of the planetary stage `number` per unit of the chain's, at angle zero."""
     own, cosine = place.planets[number], math.cos(stage.pressure_angle)
     B = np.zeros((9 + 3 * len(own), place.count))
     for row, name, radius in (

@@ -196,7 +196,7 @@ def _joint_shear_ratio(shaft) -> float:
 
 
 def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
-    """Deflection (k, 4) of a Timoshenko element per unit of (w, slope) at its first and second end.
+    """Deflection (k, 4) of a Timoshenko element per unit of (w, slope) at its ends; length [m].
 
     Exact for an element without load; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
     These are the functions behind the consistent mass of `femgear.fe.shaft.beam_element`
@@ -346,7 +346,7 @@ def _polylines(pv, lines):
 
 
 def write_mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
-    """The lowest elastic modes as PNG files; returns their names.
+    """As many of the lowest elastic modes as PNG files; returns their names.
 
     Modes have the numbers of the table: the free spin, which is not drawn, is the first.
     """

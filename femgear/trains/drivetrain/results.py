@@ -51,7 +51,10 @@ _NOTHING = 1e-6
 
 @dataclass(frozen=True)
 class DrivetrainModesResult:
-    """Modes at standstill with mean mesh stiffnesses, and over the speed with gyroscopic terms."""
+    """Modes at standstill with mean mesh stiffnesses, and over the speed with gyroscopic terms.
+
+    ``speed`` is that of the first body in operation [rad/s].
+    """
 
     model: DrivetrainModel
     modes: Modes
@@ -98,7 +101,7 @@ class DrivetrainModesResult:
 
 @dataclass(frozen=True)
 class TransientResult:
-    """Motion in time, by variant: with bending, and torsional where it is asked for."""
+    """Motion in time, by variant: with bending, and torsional where it is asked for; external torques."""
 
     models: dict[str, DrivetrainModel]
     runs: dict[str, DrivetrainRun]
@@ -207,7 +210,11 @@ class AveragedSpectrum:
 
 @dataclass(frozen=True)
 class SpectrumResult:
-    """Spectra of the mesh forces by variant, over frequency and order, and the named lines."""
+    """Spectra of the mesh forces by variant, over frequency and order, and the named lines.
+
+    After ``settle`` [s], at the mean ``speed`` of the first body [rad/s]; ``amplitudes`` (L, n_meshes) [N] of
+    the lines, and whether the ``order_distance`` of the record parts them, ``resolved`` (L,).
+    """
 
     transient: TransientResult
     settle: float

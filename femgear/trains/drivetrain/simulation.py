@@ -344,7 +344,7 @@ class FreeMotion:
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Energies [J] of a run: what was there at the ends, and the work in between."""
+    """Energies [J] of a run at its ends, and the work of loads, damping and meshes in between."""
 
     before: float
     after: float

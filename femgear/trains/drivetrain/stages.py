@@ -215,7 +215,7 @@ def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
 
 
 def resolved_lines(model: DrivetrainModel, lines, distance: float) -> np.ndarray:
-    """Whether (L,) Hann's window parts a line from others and mesh harmonics; distance of orders."""
+    """Whether Hann's window parts lines (L,) from one another and mesh harmonics; distance of orders."""
     order = np.array([line.order for line in lines])
     harmonics = np.outer(np.arange(1, 11), model.base_ratio[np.unique(model.mesh_base)]).ravel()
     apart = np.abs(order[:, None] - np.concatenate([order, harmonics]))

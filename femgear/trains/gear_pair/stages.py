@@ -51,7 +51,11 @@ _LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
 
 @dataclass(frozen=True, eq=False)
 class ResponseResult:
-    """Periodic motions along the branch, extremes and shares (p,), and ratios where flanks part or hit."""
+    """Periodic motions along the branch, and ratios (b,) where flanks part or hit, by level.
+
+    Of every motion the extremes (p,) in half backlashes, and shares (p,) of the time with the drive flanks,
+    none or the back flanks in contact.
+    """
 
     case: GearPairCase
     branch: Branch
@@ -117,7 +121,7 @@ class SweepResult:
 
 @dataclass(frozen=True, eq=False)
 class ChaosResult:
-    """Exponents and sections over the ratio, and long sections at some of the ratios."""
+    """Exponents and sections over the ratio (r,), and long sections at some of the ratios."""
 
     case: GearPairCase
     ratio: np.ndarray

@@ -201,6 +201,11 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
         if (stage.gears is None) == (stage.radii is None):
             key, limit = f"stage[{n}].gears", "one of the tables gears and radii"
             yield CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=limit)
+        if case.operation is not None and stage.radii is not None and stage.radii.teeth is None:
+            yield CaseError(
+                f"no tooth numbers in stage {n + 1}", code="E-TEETH", key=f"stage[{n}].radii.teeth",
+                limit="given where there is an operation", remedy="give the teeth of sun, planet and ring",
+            )  # fmt: skip
     named = [(f"coupling[{n}].between", one) for n, c in enumerate(case.coupling) for one in c.between]
     if case.operation is not None:
         named += [(f"operation.{key}", getattr(case.operation, key)) for key in ("input", "output")]

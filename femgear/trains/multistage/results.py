@@ -142,7 +142,8 @@ class ResponseResult:
 class BalanceResult:
     """Mesh forces (F, meshes, lines) by harmonic balance with k(t) of all meshes.
 
-    ``orders`` (lines, S) are the multiples of the mesh frequencies; the first line is the mean.
+    ``orders`` (lines, S) are the multiples of the mesh frequencies; the first line is the mean. At the
+    speeds (F,) of the input [rad/s]; ``converged`` (F,).
     """
 
     data: MultistageSet

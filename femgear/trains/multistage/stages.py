@@ -176,7 +176,7 @@ def error_response(
 
 
 def base_frequencies(data: MultistageSet, speed: float) -> np.ndarray:
-    """Base frequencies of `multistage_problem` [rad/s]: meshes of every stage, frames that turn apart."""
+    """Base frequencies of `multistage_problem` at a speed of the input [rad/s]: meshes, then frames."""
     mesh = 2.0 * np.pi * train_speeds(data, speed).mesh_frequency
     return np.concatenate([mesh, np.abs(list(turning_couplings(data, speed).values()))])
 
