@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from femgear.contact.flank_pairs import loaded_image, mirrored_set
     from femgear.contact.loaded_period import LoadedPeriod, loaded_period
     from femgear.contact.root_stress import RootStresses, root_ranges, root_stress_cycle
-    from femgear.contact.solve import ContactState, mesh_tangent_matrix, solve_contact, tangent_stiffness
+    from femgear.contact.solve import ContactState, solve_contact
     from femgear.contact.supports import RIGID, Supports, moving_members
     from femgear.contact.tooth_loads import deformed_set, load_spectrum, loaded_teeth
 
@@ -43,14 +43,12 @@ __all__ = [
     "loaded_teeth",
     "make_bodies",
     "make_sectors",
-    "mesh_tangent_matrix",
     "mesh_windows",
     "mirrored_set",
     "moving_members",
     "root_ranges",
     "root_stress_cycle",
     "solve_contact",
-    "tangent_stiffness",
     "walk_mesh_cycle",
 ]
 

@@ -122,17 +122,17 @@ class MeshWindows(Windows):
         gap[: self.n_planets] += np.asarray(planet_gaps, float)[:, None, None, None]
         return replace(self, gap=gap)
 
-    def missed(self, position: int, deflection) -> float:
+    def missed(self, positions, deflection) -> np.ndarray:
         """Separation from the nearest pair within which no omitted pair penetrates [m]; zero if none does.
 
-        ``deflection`` (2N,) is the approach of the drive flanks of every mesh [m].
+        ``deflection`` (2N, P) is the approach of the drive flanks of every mesh [m] at `positions` (P,).
         """
-        gap = self.smallest_gap[:, position]
+        gap = self.smallest_gap[:, positions]
         # a back flank approaches when its drive flank parts
         approach = np.concatenate([deflection, -np.asarray(deflection)])[: len(gap)]
-        penetrates = ~self.near[:, position] & (gap < approach[:, None])
-        relative = approach - gap.min(axis=1)
-        return float(relative[penetrates.any(axis=1)].max(initial=0.0))
+        penetrates = ~self.near[:, positions] & (gap < approach[..., None])
+        relative = approach - gap.min(axis=-1)
+        return np.where(penetrates.any(axis=-1), relative, 0.0).max(axis=0, initial=0.0)
 
 
 @dataclass(frozen=True)
@@ -185,16 +185,105 @@ class ContactProblem:
         last = setup.cells - 1
         return bool(np.any(active & (((self.cell == 0) & ~low) | ((self.cell == last) & ~high))))
 
-    def at_flank_end(self, active: np.ndarray, setup: MeshWindows) -> np.ndarray:
-        """Whether each candidate belongs to a contact that reaches the end of a flank, shape (n,)."""
-        low, high = setup.at_edge[:, self.mesh, self.position, self.pair]
-        window = self.mesh * setup.near.shape[2] + self.pair
-        last = np.zeros(int(window.max()) + 1, int)
-        np.maximum.at(last, window, self.cell)
-        ends = active & (((self.cell == 0) & low) | ((self.cell == last[window]) & high))
-        reached = np.zeros(len(last), bool)
-        reached[window[ends]] = True
-        return reached[window]
+
+@dataclass(frozen=True)
+class Candidates:
+    """All candidates at P positions in W windows of C cells: separations, and compliance in two parts.
+
+    The compliance is ``H = L + Pi S Pi^T`` and that of the supports: ``L`` is block-diagonal, half plane and
+    tip corners within a window, and ``S`` what the bodies yield between the three nodes of every window,
+    smooth along the flanks. Every mesh has the same number of windows, some of which may be empty.
+
+    Parameters
+    ----------
+    setup, bodies : MeshWindows, Bodies
+    position : (P,) int array
+        Indices of the positions in `setup`.
+    mesh : (W,) int array
+        Ascending.
+    pair : (P, W) int array
+        Tooth pair of every window.
+    gap : (P, W, C) array
+        Separations [m], zero where `candidate` is false.
+    candidate : (P, W, C) bool array
+        Whether the cell is on both flanks and its pair near enough.
+    polynomials : (P, W, C, 3) array
+        ``Pi``: values of the windows' quadratic polynomials in the cells; they add up to one.
+    local : (P, W, C, C) array
+        ``L`` [m/N].
+    smooth : (P, W, 3, W, 3) array
+        ``S`` [m/N].
+    approach, supports : (meshes, m) and (meshes, meshes) arrays
+        Approach of the flanks of every mesh per unit motion, and compliance of sprung members between the
+        meshes [m/N].
+    """
+
+    setup: MeshWindows
+    bodies: Bodies
+    position: np.ndarray
+    mesh: np.ndarray
+    pair: np.ndarray
+    gap: np.ndarray
+    candidate: np.ndarray
+    polynomials: np.ndarray
+    local: np.ndarray
+    smooth: np.ndarray
+    approach: np.ndarray
+    supports: np.ndarray
+
+    @property
+    def layout(self) -> np.ndarray:
+        """How every window is divided into cells, (P, W)."""
+        return self.setup.layout[self.mesh, self.position[:, None], self.pair]
+
+    @property
+    def at_edge(self) -> np.ndarray:
+        """Whether the low and the high end of every window are ends of a flank, (2, P, W)."""
+        return self.setup.at_edge[:, self.mesh, self.position[:, None], self.pair]
+
+    def by_pairs(self, values: np.ndarray) -> np.ndarray:
+        """Values (P, W, ...) of the windows as (meshes, pairs, ..., P), zero where there is no window."""
+        P, (meshes, _, pairs) = len(self.position), self.setup.near.shape
+        found = np.zeros((P, meshes, pairs, *values.shape[2:]), values.dtype)
+        found[np.arange(P)[:, None], self.mesh, self.pair] = values
+        return np.moveaxis(found, 0, -1)
+
+    def smooth_of(self, bodies: Bodies) -> np.ndarray:
+        """``S`` of other bodies with the same flanks, (P, W, 3, W, 3) [m/N]."""
+        return _smooth_part(self.setup, bodies, self.position, self.mesh, self.pair)
+
+    def touches_window_end(self, active: np.ndarray) -> bool:
+        """Whether a contact (P, W, C) ends where its window ends, other than at an end of a flank."""
+        return bool((active[..., [0, -1]] & ~np.moveaxis(self.at_edge, 0, -1)).any())
+
+    def at_flank_end(self, active: np.ndarray) -> np.ndarray:
+        """Whether the contact (P, W, C) in every window reaches an end of a flank, (P, W)."""
+        last = self.candidate.shape[-1] - 1 - self.candidate[..., ::-1].argmax(axis=-1)
+        at_last = np.take_along_axis(active, last[..., None], axis=-1)[..., 0]
+        return (active[..., 0] & self.at_edge[0]) | (at_last & self.at_edge[1])
+
+    def problem(self, at: int) -> ContactProblem:
+        """The contact problem at one of the positions."""
+        window, cell = np.nonzero(self.candidate[at])
+        filled = np.flatnonzero(self.candidate[at].any(axis=1))
+        values = self.polynomials[at, filled]
+        smooth = self.smooth[at, filled][:, :, filled].transpose(0, 2, 1, 3)
+        H = values[:, None] @ smooth @ values.transpose(0, 2, 1)
+        H[range(len(filled)), range(len(filled))] += self.local[at, filled]
+        keep, size = self.candidate[at, filled].ravel(), len(filled) * self.setup.cells
+        mesh, pair = self.mesh[window], self.pair[at, window]
+        return ContactProblem(
+            n_planets=self.setup.n_planets,
+            H=H.transpose(0, 2, 1, 3).reshape(size, size)[np.ix_(keep, keep)],
+            gap=self.gap[at, window, cell],
+            G=self.approach[mesh],
+            supports=self.supports,
+            mesh=mesh,
+            pair=pair,
+            cell=cell,
+            area=self.setup.cell_area[mesh, self.layout[at, window], cell],
+            position=int(self.position[at]),
+        )
 
 
 def mesh_windows(
@@ -383,10 +472,10 @@ def equal_cells(cells: int) -> np.ndarray:
     return np.maximum(overlap, 0.0) / (high - low)
 
 
-def assemble_contact(
-    setup: MeshWindows, bodies: Bodies, position: int, members: MovingMembers | None = None
-) -> ContactProblem:
-    """Assemble the complementarity problem of all meshes at one position.
+def contact_candidates(
+    setup: MeshWindows, bodies: Bodies, positions, members: MovingMembers | None = None
+) -> Candidates:
+    """Assemble separations and compliance of all candidates at some positions.
 
     The motions are those of the planets and of the sun, as arcs on their base circles [m], positive in the
     direction in which the sun drives, and then the free motions of `members` [m].
@@ -394,43 +483,72 @@ def assemble_contact(
     Parameters
     ----------
     setup, bodies : MeshWindows, Bodies
-    position : int
-        Index of the position in `setup`.
+    positions : (P,) int array
+        Indices of the positions in `setup`.
     members : MovingMembers, optional
         Without them all axes are fixed.
     """
-    N = setup.n_planets
-    mesh, pair = np.nonzero(setup.near[:, position])
-    cells = setup.cells
-    H = _regular_part(setup, bodies, position, mesh, pair)
-    layout, n = setup.layout[mesh, position, pair], len(mesh)
-    polynomials = _window_polynomials(cells)[layout]
-    H = polynomials[:, None] @ H.transpose(0, 2, 1, 3) @ polynomials.transpose(0, 2, 1)
-    H[np.arange(n), np.arange(n)] += setup.local[mesh // N % 2, layout]
-    H[np.arange(n), np.arange(n)] += _corner_part(setup, bodies, position, mesh, pair, polynomials)
-    H = H.transpose(0, 2, 1, 3)
-    gap = setup.gap[mesh, position, pair].ravel()
-    keep = np.isfinite(gap)
-    H = H.reshape(n * cells, n * cells)[np.ix_(keep, keep)]
-    of_cell = np.repeat(mesh, cells)[keep]
-    sides = setup.near.shape[0] // (2 * N)
-    approach = np.vstack([rotation_approach(N), -rotation_approach(N)])[: 2 * N * sides]
-    supports = np.zeros((len(approach), len(approach)))
+    positions = np.asarray(positions)
+    N, near = setup.n_planets, np.moveaxis(setup.near[:, positions], 1, 0)
+    meshes, slots = near.shape[1], max(int(near.sum(axis=-1).max(initial=0)), 1)
+    pair = np.argsort(~near, axis=-1, kind="stable")[..., :slots].reshape(len(positions), -1)
+    mesh = np.repeat(np.arange(meshes), slots)
+    place = mesh, positions[:, None], pair
+    layout, gap = setup.layout[place], setup.gap[place]
+    candidate = np.isfinite(gap) & setup.near[place][..., None]
+    filled = np.nonzero(candidate.any(axis=-1))
+    at = mesh[filled[1]], positions[filled[0]], pair[filled]
+    polynomials = _window_polynomials(setup.cells)[layout]
+    local = np.zeros((*layout.shape, setup.cells, setup.cells))
+    local[filled] = setup.local[at[0] // N % 2, layout[filled]]
+    local[filled] += _corner_part(setup, bodies, *at, polynomials[filled])
+    approach = np.vstack([rotation_approach(N), -rotation_approach(N)])[:meshes]
+    supports = np.zeros((meshes, meshes))
     if members is not None:
         approach = np.hstack([approach, members.approach[:, members.free]])
         supports = members.compliance
-    return ContactProblem(
-        n_planets=N,
-        H=H,
-        gap=gap[keep],
-        G=approach[of_cell],
+    return Candidates(
+        setup=setup,
+        bodies=bodies,
+        position=positions,
+        mesh=mesh,
+        pair=pair,
+        gap=np.where(candidate, gap, 0.0),
+        candidate=candidate,
+        polynomials=polynomials,
+        local=local,
+        smooth=_smooth_part(setup, bodies, positions, mesh, pair),
+        approach=approach,
         supports=supports,
-        mesh=of_cell,
-        pair=np.repeat(pair, cells)[keep],
-        cell=np.tile(np.arange(cells), n)[keep],
-        area=setup.cell_area[mesh, layout].ravel()[keep],
-        position=position,
     )
+
+
+def assemble_contact(
+    setup: MeshWindows, bodies: Bodies, position: int, members: MovingMembers | None = None
+) -> ContactProblem:
+    """Assemble the complementarity problem of all meshes at one position; see `contact_candidates`."""
+    return contact_candidates(setup, bodies, [position], members).problem(0)
+
+
+def _smooth_part(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> np.ndarray:
+    """Regular compliance between the nodes of all windows of `Candidates`, (P, W, 3, W, 3) [m/N]."""
+    N, (P, W) = setup.n_planets, pair.shape
+    smooth = np.zeros((P, W, 3, W, 3))
+    # on the back side every gear carries on its other flank
+    back = mesh >= 2 * N
+    sun_side = mesh % (2 * N) < N
+    left, right = np.where(back, RIGHT, LEFT), np.where(back, LEFT, RIGHT)
+    everything, ones = np.arange(W), np.ones(W, int)
+    on_bodies = [(bodies.sun, everything[sun_side], 0 * ones, left)]
+    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
+    gear, side = np.where(sun_side, 1, 0), np.where(sun_side, left, right)
+    on_bodies += [(bodies.planet, everything[mesh % N == planet], gear, side) for planet in range(N)]
+    on_bodies.append((bodies.ring, everything[~sun_side], ones, left))
+    for body, members, gear, side in on_bodies:
+        own, j, i = gear[members], mesh[members], pair[:, members]
+        roll = setup.roll[own, j, positions[:, None], i]
+        _add_body(smooth, body, members, roll, setup.tooth[own, j, i], side[members])
+    return smooth
 
 
 def _tooth_pairs(planetary_set, pairs, phase, direction, passed) -> tuple[np.ndarray, np.ndarray]:
@@ -495,57 +613,40 @@ def _gathered(found: list[Windows], tooth, turns, bodies: Bodies, cells: int) ->
     )
 
 
-def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> np.ndarray:
-    """Regular compliance between the window nodes, shape (windows, 3, windows, 3) [m/N]."""
-    N = setup.n_planets
-    n = len(mesh)
-    S = np.zeros((n, 3, n, 3))
-    # on the back side every gear carries on its other flank
-    back = mesh >= 2 * N
-    sun_side = mesh % (2 * N) < N
-    left, right = np.where(back, RIGHT, LEFT), np.where(back, LEFT, RIGHT)
-    everything = np.arange(n)
-    on_bodies = [(bodies.sun, everything[sun_side], 0, left)]
-    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-    gear, side = np.where(sun_side, 1, 0), np.where(sun_side, left, right)
-    on_bodies += [(bodies.planet, everything[mesh % N == planet], gear, side) for planet in range(N)]
-    on_bodies.append((bodies.ring, everything[~sun_side], 1, left))
-    for body, members, gear, side in on_bodies:
-        own = np.broadcast_to(gear, mesh.shape)[members]
-        _add_body(S, body, setup, position, mesh, pair, members, own, side[members])
-    return S
+def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):
+    """Add the compliance of one body between its windows `members` (w,).
 
-
-def _add_body(S, body: FlankCompliance, setup: MeshWindows, position, mesh, pair, members, gear, side):
-    """Add the compliance of one body between the windows `members` that lie on it."""
-    if not len(members):
-        return
-    j, i = mesh[members], pair[members]
-    tooth = setup.tooth[gear, j, i]
-    index, weight = station_weights(setup.roll[gear, j, position, i], body.roll)
+    From roll lengths of their nodes (P, w, 3) [m], tooth numbers (P, w) and flanks (w,).
+    """
+    count, stations = body.regular.shape[:2]
+    index, weight = station_weights(roll, body.roll)
     index = index + side[:, None, None] * len(body.roll)
-    lag = (tooth[:, None] - tooth[None, :]) % len(body.regular)
-    values = body.regular[
-        lag[:, None, None, :, None, None],
-        index[:, :, :, None, None, None],
-        index[None, None, None, :, :, :],
-    ]
-    block = np.einsum("wapvbq,wap,vbq->wavb", values, weight, weight, optimize=True)
-    S[np.ix_(members, range(3), members, range(3))] += block
+    one, two = np.triu_indices(len(members))
+    lag = (tooth[:, one] - tooth[:, two]) % count
+    row = (lag[..., None, None] * stations + index[:, one]) * stations
+    values = body.regular.reshape(-1)[row[..., None, None] + index[:, two][:, :, None, None]]
+    half = (weight[:, one][..., None, :] @ values.reshape(*row.shape, 12)).reshape(*row.shape[:3], 3, 4)
+    block = np.einsum("pwabq,pwbq->pwab", half, weight[:, two])
+    smooth[:, members[one], :, members[two]] += np.moveaxis(block, 1, 0)
+    other = one != two
+    smooth[:, members[two[other]], :, members[one[other]]] += block[:, other].transpose(1, 0, 3, 2)
 
 
-def _corner_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair, polynomials) -> np.ndarray:
+def _corner_part(setup: MeshWindows, bodies: Bodies, mesh, position, pair, polynomials) -> np.ndarray:
     """What tip corners of both flanks add within each window, shape (windows, cells, cells) [m/N]."""
     total = np.zeros((len(mesh), polynomials.shape[1], polynomials.shape[1]))
     sun_side = mesh // setup.n_planets % 2 == 0
     of_gear = ((bodies.sun, bodies.planet), (bodies.planet, bodies.ring))
     for rows, flanks in zip((sun_side, ~sun_side), of_gear, strict=True):
-        for gear, flank in enumerate(flanks):
-            arc = setup.roll[gear, mesh[rows], position, pair[rows]] ** 2 / (2 * flank.base_radius)
-            away = np.einsum("wcn,wn->wc", polynomials[rows], np.abs(arc - flank.corner.arc))
+        place, values = (mesh[rows], position[rows], pair[rows]), polynomials[rows]
+        parts = []
+        for roll, flank in zip(setup.roll, flanks, strict=True):
+            arc = roll[place] ** 2 / (2 * flank.base_radius)
+            away = (values @ np.abs(arc - flank.corner.arc)[..., None])[..., 0]
             # cells beyond the end of a flank are no candidates
             away = np.maximum(away, 1e-12)
-            total[rows] += flank.corner.surface(away[:, :, None], away[:, None, :])
+            parts.append(flank.corner.surface(away[:, :, None], away[:, None, :]))
+        total[rows] = parts[0] + parts[1]
     return total / bodies.face_width
 
 

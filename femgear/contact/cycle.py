@@ -12,20 +12,21 @@ from typing import Any
 
 import numpy as np
 
+from femgear.contact.active_set import factor
 from femgear.contact.assembly import (
     ROUGH_STIFFNESS,
-    ContactProblem,
+    Candidates,
     MeshWindows,
-    assemble_contact,
+    contact_candidates,
     cycle_positions,
     enlarged,
     equal_cells,
     in_windows,
     mesh_windows,
 )
+from femgear.contact.batch import BatchState, ContactTangents, solve_batch
 from femgear.contact.bodies import Bodies
 from femgear.contact.flank_pairs import loaded_image
-from femgear.contact.solve import ContactState, mesh_tangent_matrix, tangent_stiffness
 from femgear.contact.supports import (
     RIGID,
     BearingSprings,
@@ -34,7 +35,6 @@ from femgear.contact.supports import (
     bearing_springs,
     moving_members,
     pin_forces,
-    solve_position,
 )
 from femgear.errors import ContactError
 from femgear.gears.deviations import SetDeviations
@@ -43,6 +43,8 @@ from femgear.gears.planetary import PlanetarySet
 
 LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""
+_TOGETHER = 64
+"""Positions that are solved at once."""
 
 
 @dataclass(frozen=True)
@@ -362,34 +364,83 @@ class _Walk:
             setup = setup.with_planet_gaps(options.planet_gaps)
         load = np.zeros(N + 1 + int(self.members.free.sum()))
         load[N] = self.sun_torque / self.planetary_set.sun.base_radius
-        found, previous, overflow, unknowns = [], None, False, 0
-        for p in range(len(empty.position)):
-            problem = assemble_contact(setup, self.bodies, p, self.members)
-            start = None if previous is None else problem.warm_start(*previous)
-            H, gap, G = problem.compliance, problem.gap, problem.G
-            state, active = solve_position(H, gap, G, load, self.springs, start=start)
-            previous = problem, active
-            found.append(_at_position(problem, state, setup, self.members, options.pressures))
-            missed = setup.missed(p, found[-1]["deflection"]) if empty.contact == "profile" else 0.0
-            if missed > nearest:
-                return None, share, 1.2 * missed
-            if options.held_bodies is not None:
-                held = assemble_contact(setup, options.held_bodies, p)
-                found[-1] |= _with_held_bodies(held, state, setup, found[-1]["force"])
-            unknowns = max(unknowns, len(problem.gap))
-            overflow |= problem.touches_window_end(state.active, setup)
+        found, overflow, unknowns, P = [], False, 0, len(empty.position)
+        for first in range(0, P, _TOGETHER):
+            some = np.arange(first, min(first + _TOGETHER, P))
+            candidates = contact_candidates(setup, self.bodies, some, self.members)
+            if first == 0:
+                # bodies that are no elastic bodies are refused before anything rests on them
+                factor(candidates.problem(0).H)
+            state = solve_batch(candidates, load, self.springs)
+            found.append(self._at_positions(candidates, state))
+            missed = setup.missed(some, found[-1]["deflection"])
+            if empty.contact == "profile" and (missed > nearest).any():
+                return None, share, 1.2 * missed[missed > nearest][0]
+            unknowns = max(unknowns, int(candidates.candidate.sum(axis=(1, 2)).max()))
+            overflow |= candidates.touches_window_end(state.active)
             if options.progress is not None:
-                options.progress(p + 1, len(empty.position))
+                options.progress(int(some[-1]) + 1, P)
         record = self._record(found, setup, unknowns)
         if overflow:
             share = enlarged(share, max(record.force.max(), record.back_force.max()))
         return record, share, nearest
 
+    def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
+        """What `MeshCycle` keeps of some positions, by the names of its fields."""
+        if not (state.residual <= LARGEST_RESIDUAL).all():
+            worst = int(np.argmax(~(state.residual <= LARGEST_RESIDUAL)))
+            raise ContactError(
+                f"the contact solution at position {found.position[worst]} violates its conditions by "
+                f"{state.residual[worst]:.2g}",
+                code="E-CONTACT",
+                limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
+                remedy="look for stiffnesses, clearances or separations of very different size",
+            )
+        N, P, members, options = found.setup.n_planets, len(found.position), self.members, self.options
+        tooth_load = found.by_pairs(state.loads.sum(axis=-1))
+        force = np.zeros((4 * N, P))
+        force[: len(tooth_load)] = tooth_load.sum(axis=1)
+        # sprung members yield under the mesh forces, free ones are unknowns of the problem
+        motion, sprung = np.zeros((len(members.names), P)), ~members.free
+        motion[members.free] = state.motions.T[N + 1 :]
+        pulled = members.approach[:, sprung].T @ force[: len(members.approach)]
+        motion[sprung] = -pulled / members.stiffness[sprung, None]
+        at_edge = found.at_flank_end(state.active)
+        pressure = _equal_cell_pressure(found, state.loads)
+        inner = np.where(at_edge, 0.0, pressure.max(axis=2))
+        tangents = ContactTangents(found, state)
+        values = {
+            "deflection": rotation_approach(N) @ state.motions.T[: N + 1]
+            + members.approach[: 2 * N] @ motion,
+            "sun_arc": state.motions[:, N],
+            "force": force[: 2 * N],
+            "back_force": force[2 * N :],
+            "stiffness": _both_flanks(tangents, found.smooth, N),
+            "tooth_load": tooth_load[: 2 * N],
+            "member_motion": motion,
+            "edge_contact": found.by_pairs(at_edge)[: 2 * N].any(axis=1),
+            "max_pressure": found.by_pairs(inner).max(axis=1)[: 2 * N],
+            "residual": state.residual,
+            "iterations": state.iterations,
+        }
+        looked = options.both_flanks
+        values["back_tooth_load"] = tooth_load[2 * N :] if looked else np.zeros(tooth_load.shape)
+        if options.pressures:
+            values["pressure"] = found.by_pairs(pressure)[: 2 * N]
+        if options.held_bodies is not None:
+            held = found.smooth_of(options.held_bodies)
+            values["held_stiffness"] = _both_flanks(tangents, held, N)
+            loaded = (values["force"] > 0).all(axis=0)
+            coupling = np.zeros((P, 2 * N, 2 * N))
+            coupling[loaded] = np.linalg.inv(tangents.between_meshes(held, 2 * N)[loaded])
+            values["held_compliance"] = np.moveaxis(coupling, 0, -1)
+        return values
+
     def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
         """The record from what was found at its positions: with places of the tooth pairs, pins, message."""
         N, cells = setup.n_planets, setup.cells
         drive, back = slice(0, 2 * N), slice(2 * N, 4 * N)
-        values = {name: np.stack([one[name] for one in found], axis=-1) for name in found[0]}
+        values = {name: np.concatenate([some[name] for some in found], axis=-1) for name in found[0]}
         path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
         values |= {"path": path[drive], "tooth": tooth[:, drive]}
         looked = self.options.both_flanks
@@ -419,74 +470,20 @@ class _Walk:
         )
 
 
-def _at_position(
-    problem: ContactProblem, state: ContactState, setup: MeshWindows, members: MovingMembers, pressures: bool
-) -> dict[str, Any]:
-    """What `MeshCycle` keeps of one position, by the names of its fields, less their last axis."""
-    N, p = problem.n_planets, problem.position
-    if not state.residual <= LARGEST_RESIDUAL:
-        raise ContactError(
-            f"the contact solution at position {p} violates its conditions by {state.residual:.2g}",
-            code="E-CONTACT",
-            limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
-            remedy="look for stiffnesses, clearances or separations of very different size",
-        )
-    tooth_load = np.zeros((4 * N, setup.near.shape[2]))
-    np.add.at(tooth_load, (problem.mesh, problem.pair), state.loads)
-    force = np.bincount(problem.mesh, weights=state.loads, minlength=4 * N)
-    # sprung members yield under the mesh forces, free ones are unknowns of the problem
-    motion, sprung = np.zeros(len(members.names)), ~members.free
-    motion[members.free] = state.motions[N + 1 :]
-    pulled = members.approach[:, sprung].T @ force[: len(members.approach)]
-    motion[sprung] = -pulled / members.stiffness[sprung]
-    at_edge = problem.at_flank_end(state.active, setup)
-    inside = np.ones(setup.near.shape[::2], bool)
-    inside[problem.mesh[at_edge], problem.pair[at_edge]] = False
-    pressure = _equal_cell_pressure(problem, state.loads, setup)
-    found = {
-        "deflection": rotation_approach(N) @ state.motions[: N + 1] + members.approach[: 2 * N] @ motion,
-        "sun_arc": state.motions[N],
-        "force": force[: 2 * N],
-        "back_force": force[2 * N :],
-        "stiffness": _tangents(problem, state, setup),
-        "tooth_load": tooth_load[: 2 * N],
-        "back_tooth_load": tooth_load[2 * N :],
-        "member_motion": motion,
-        "edge_contact": ~inside[: 2 * N].all(axis=1),
-        "max_pressure": np.where(inside, pressure.max(axis=2), 0.0).max(axis=1)[: 2 * N],
-        "residual": state.residual,
-        "iterations": state.iterations,
-    }
-    return found | {"pressure": pressure[: 2 * N]} if pressures else found
+def _equal_cell_pressure(found: Candidates, loads) -> np.ndarray:
+    """Mean pressures of equal cells, however the windows are divided, (P, W, cells) [Pa]."""
+    setup, pressure = found.setup, np.zeros(loads.shape)
+    area = setup.cell_area[found.mesh].mean(axis=(1, 2))
+    for layout, of_cells in enumerate(equal_cells(setup.cells)):
+        rows = found.layout == layout
+        pressure[rows] = loads[rows] @ of_cells.T
+    return pressure / area[:, None]
 
 
-def _equal_cell_pressure(problem: ContactProblem, loads, setup: MeshWindows) -> np.ndarray:
-    """Mean pressures of equal cells, however the windows are divided, (meshes, pairs, cells) [Pa]."""
-    carries = np.flatnonzero(loads)
-    mesh, pair, cell = problem.mesh[carries], problem.pair[carries], problem.cell[carries]
-    pressure = np.zeros((setup.near.shape[0], setup.near.shape[2], setup.cells))
-    shares = equal_cells(setup.cells)[setup.layout[mesh, problem.position, pair], :, cell]
-    area = setup.cell_area[mesh].mean(axis=(1, 2))
-    np.add.at(pressure, (mesh, pair), shares * (loads[carries] / area)[:, None])
-    return pressure
-
-
-def _tangents(problem: ContactProblem, state: ContactState, setup: MeshWindows) -> np.ndarray:
-    """Tangent stiffness of every mesh (2N,), both flanks together [N/m]."""
-    meshes, _, pairs = setup.near.shape
-    window = problem.mesh * pairs + problem.pair
-    found = tangent_stiffness(problem.H, state, problem.mesh, window, problem.cell, meshes)
-    return found.reshape(-1, 2 * problem.n_planets).sum(axis=0)
-
-
-def _with_held_bodies(problem: ContactProblem, state: ContactState, setup: MeshWindows, force) -> dict:
-    """Stiffness of the meshes and compliance between them in the same contact with held bodies."""
-    meshes = 2 * problem.n_planets
-    coupling = np.zeros((meshes, meshes))
-    if (force > 0).all():
-        drive = state.active & (problem.mesh < meshes)
-        coupling = np.linalg.inv(mesh_tangent_matrix(problem.H, drive, problem.mesh, meshes))
-    return {"held_stiffness": _tangents(problem, state, setup), "held_compliance": coupling}
+def _both_flanks(tangents: ContactTangents, smooth, n_planets: int) -> np.ndarray:
+    """Tangent stiffness of every mesh (2N, P), both flanks together [N/m]."""
+    found = tangents.of_meshes(smooth)
+    return found.reshape(len(found), -1, 2 * n_planets).sum(axis=1).T
 
 
 def _seen_from_front(cycle: MeshCycle, planetary_set: PlanetarySet, order) -> MeshCycle:

@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.contact.solve import ContactState, solve_contact
 from femgear.errors import ContactError
 from femgear.gears.kinematics import MEMBERS, member_approach, mesh_normals, unheld_members
 from femgear.gears.planetary import PlanetarySet
@@ -105,6 +104,15 @@ class BearingSprings:
     compliance: float
     arms: np.ndarray
 
+    def joined(self, H, gap, G) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Compliance, separations and arms of pressure cells, as of `solve_contact`, and all springs."""
+        cells, count = len(gap), len(self.arms)
+        whole = np.zeros((cells + count, cells + count))
+        whole[:cells, :cells] = H
+        whole[range(cells, len(whole)), range(cells, len(whole))] = self.compliance
+        arms = np.pad(self.arms, ((0, 0), (G.shape[1] - self.arms.shape[1], 0)))
+        return whole, np.append(gap, np.full(count, self.clearance)), np.vstack([G, arms])
+
 
 def moving_members(
     planetary_set: PlanetarySet, supports: Supports, *, both_flanks: bool = False
@@ -152,51 +160,6 @@ def bearing_springs(
     return BearingSprings(supports.planet_clearance, compliance, arms.reshape(N * n, -1))
 
 
-def solve_position(
-    H, gap, G, load, springs: BearingSprings | None = None, *, start=None
-) -> tuple[ContactState, np.ndarray]:
-    """Solve the contact of all meshes and bearings at one position.
-
-    Parameters
-    ----------
-    H, gap, G, load
-        Of the pressure cells and all motions, as for `solve_contact`.
-    springs : BearingSprings, optional
-        Of the bearings; their motions are the last columns of ``G``.
-    start : bool array, optional
-        Candidates thought to touch: cells, then springs.
-
-    Returns
-    -------
-    state : ContactState
-        Of the pressure cells alone, with all motions.
-    active : bool array
-        Cells and springs that carry load, the ``start`` of the next position.
-
-    Raises
-    ------
-    ContactError
-        As `solve_contact`.
-    """
-    if springs is None:
-        state = solve_contact(H, gap, G, load, start=start)
-        return state, state.active
-    cells = len(gap)
-    near = np.ones(len(springs.arms), bool) if start is None else _beside(start[cells:])
-    while True:
-        guess = None if start is None else np.concatenate([start[:cells], start[cells:][near]])
-        state = solve_contact(*_with_springs(H, gap, G, springs, near), load, start=guess)
-        moved = springs.arms @ state.motions[-springs.arms.shape[1] :]
-        # those left out must be open; where one is not, all are asked
-        if near.all() or (moved[~near] <= springs.clearance).all():
-            break
-        near = np.ones(len(near), bool)
-    active = np.concatenate([state.active[:cells], np.zeros(len(near), bool)])
-    active[cells:][near] = state.active[cells:]
-    meshes = {name: getattr(state, name)[:cells] for name in ("loads", "gaps", "active")}
-    return replace(state, **meshes), active
-
-
 def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
     """Compute the force of every pin on its planet [N], shape (N, 2, P), in the frame of the carrier.
 
@@ -226,24 +189,4 @@ def _one_side(planetary_set: PlanetarySet, supports: Supports, back: bool) -> Mo
         names=tuple(f"{name}: {axis}" for name, _, _ in found for axis in "xy"),
         approach=np.hstack([np.zeros((2 * N, 0)), *(effect for _, _, effect in found)]),
         stiffness=np.array([value for _, value, _ in found for _ in "xy"], float),
-    )
-
-
-def _beside(active: np.ndarray) -> np.ndarray:
-    """Springs that carried and three on either side of them, around every pin."""
-    around = active.reshape(-1, SPRINGS)
-    return np.logical_or.reduce([np.roll(around, k, axis=1) for k in range(-3, 4)]).ravel()
-
-
-def _with_springs(H, gap, G, springs: BearingSprings, near: np.ndarray):
-    """Compliance, gaps and arms of the cells and then of the springs `near`."""
-    cells, arms = len(gap), springs.arms[near]
-    whole = np.zeros((cells + len(arms), cells + len(arms)))
-    whole[:cells, :cells] = H
-    whole[range(cells, len(whole)), range(cells, len(whole))] = springs.compliance
-    others = np.zeros((len(arms), G.shape[1] - arms.shape[1]))
-    return (
-        whole,
-        np.append(gap, np.full(len(arms), springs.clearance)),
-        np.vstack([G, np.hstack([others, arms])]),
     )

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cho_solve
 
+from femgear.contact.active_set import factor
 from femgear.contact.assembly import (
     ROUGH_STIFFNESS,
     assemble_contact,
@@ -35,7 +36,6 @@ from femgear.contact.assembly import (
     mesh_windows,
 )
 from femgear.contact.flank_pairs import mesh_pairs, separation
-from femgear.contact.pivoting import factor
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
 from femgear.errors import CaseError

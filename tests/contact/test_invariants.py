@@ -12,7 +12,8 @@ from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.flank_pairs import mirrored_set
-from femgear.contact.supports import Supports, bearing_springs, moving_members, solve_position
+from femgear.contact.solve import solve_contact
+from femgear.contact.supports import Supports, bearing_springs, moving_members
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import mirrored_deviations, no_deviations
 
@@ -158,8 +159,9 @@ def solved(gears, bodies, values, held, position, torque, gaps):
     problem = assemble_contact(setup, bodies, position, members)
     springs, load = bearing_springs(gears, held, members), np.zeros(problem.G.shape[1])
     load[3] = torque / gears.sun.base_radius
-    state, active = solve_position(problem.compliance, problem.gap, problem.G, load, springs)
-    return np.concatenate([state.loads, 1e9 * state.motions]), active
+    arrays = problem.compliance, problem.gap, problem.G
+    state = solve_contact(*(arrays if springs is None else springs.joined(*arrays)), load)
+    return np.concatenate([state.loads[: len(problem.gap)], 1e9 * state.motions]), state.active
 
 
 @few

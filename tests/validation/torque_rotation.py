@@ -23,13 +23,14 @@ from femgear.contact.bodies import (
     make_bodies,
     make_sectors,
 )
-from femgear.contact.solve import solve_contact, tangent_stiffness
+from femgear.contact.solve import solve_contact
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.trains.protocol import one_blas_thread
 from validation.planetary import reference_set
+from validation.reference.tangent import tangent_stiffness
 from validation.reference.torque_rotation import GearPair, TorqueRotation, torque_rotation
 from validation.rows import Row, at_most, information, within
 

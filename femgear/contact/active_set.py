@@ -22,7 +22,7 @@ from femgear.errors import ContactError
 
 PATIENCE = 3  # block steps without progress before single pivots
 ROUNDING = 1e-13  # gaps and loads below this share of their terms are rounding
-_RIGID = 1e-6  # elastic displacements below this share of the gaps are those of rigid bodies
+RIGID = 1e-6  # elastic displacements below this share of the gaps are those of rigid bodies
 NULL = 1e-10  # relative eigenvalue below which a motion is not restrained
 
 dpotrf, dtrtrs = get_lapack_funcs(("potrf", "trtrs"), dtype=np.float64)
@@ -186,7 +186,7 @@ def _residual(problem: Problem, active, loads, gaps) -> float:
     """Largest relative violation of the conditions; see `ContactState`."""
     elastic, gap = (np.abs(values).max(initial=0.0) for values in (problem.H @ loads, problem.gap))
     # the separations of nearly rigid bodies are differences of far larger numbers
-    length = max(elastic, _RIGID * gap) or 1.0
+    length = max(elastic, RIGID * gap) or 1.0
     force = max(np.abs(loads).max(initial=0.0), np.abs(problem.load).max(initial=0.0)) or 1.0
     imbalance = np.abs(problem.G.T @ loads - problem.load).max(initial=0.0)
     touching = np.abs(gaps[active]).max(initial=0.0)

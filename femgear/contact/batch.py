@@ -1,0 +1,369 @@
+"""The contact problem at many positions at once, by the parts of the compliance.
+
+For a set of touching cells A the conditions of `femgear.contact.solve` are linear. With ``H = L + Pi S Pi^T``
+(`femgear.contact.assembly.Candidates`), ``y = L_AA^-1 gap`` and ``Y = L_AA^-1 Pi`` window by window, and for
+the moments ``z = Pi^T p`` of the loads of every window (Sherman, Morrison and Woodbury; the polynomials add
+up to one, so that a motion q approaches the cells of all windows by ``Pi e G q``)
+
+    (I + Q S) z - Q e G q = -Pi^T y,    (e G)^T z = load,    Q = Pi^T Y,    p = -y - Y (S z - e G q)
+
+has three unknowns a window instead of its cells. All cells that pull or penetrate change sides at once, until
+there are none. Positions where that does not end, motions that nothing restrains, and loads that may be
+rounding are left to `femgear.contact.solve.solve_contact`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.contact.active_set import NULL, RIGID, ROUNDING
+from femgear.contact.assembly import ROUGH_STIFFNESS, Candidates
+from femgear.contact.solve import solve_contact
+from femgear.contact.supports import BearingSprings
+
+_MOST_STEPS = 30
+"""Linear solutions before a position is left to the single solver."""
+_IDLE = 1e-9
+"""Share of the largest load below which a touching cell may be no contact at all."""
+_RESIDUAL = 1e-12
+"""Violation above which a position is solved again by itself."""
+
+
+@dataclass(frozen=True)
+class BatchState:
+    """Solution at P positions in W windows of C cells, as `femgear.contact.solve.ContactState` has it.
+
+    Parameters
+    ----------
+    loads, gaps : (P, W, C) arrays
+        [N], [m].
+    active : (P, W, C) bool array
+    motions : (P, m) array
+        [m].
+    iterations, residual : (P,) arrays
+    """
+
+    loads: np.ndarray
+    gaps: np.ndarray
+    active: np.ndarray
+    motions: np.ndarray
+    iterations: np.ndarray
+    residual: np.ndarray
+
+
+def solve_batch(found: Candidates, load, springs: BearingSprings | None = None) -> BatchState:
+    """Solve the contact of all meshes and bearings at all positions.
+
+    Parameters
+    ----------
+    found : Candidates
+    load : (m,) array
+        External load on the motions, the same at all positions [N].
+    springs : BearingSprings, optional
+        Of planet bearings with clearance.
+
+    Raises
+    ------
+    ContactError
+        As `femgear.contact.solve.solve_contact`.
+    """
+    batch = _ActiveSets(found, np.asarray(load, float), springs)
+    batch.solve()
+    state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
+    return BatchState(*state)
+
+
+class ContactTangents:
+    """What the touching cells answer to small motions, at P positions in W windows.
+
+    With the columns ``1`` and those of the ends of contacts, ``H_AA^-1 = L_AA^-1 - Y M Y^T`` and
+    ``M = S (I + Q S)^-1``.
+    """
+
+    def __init__(self, found: Candidates, state: BatchState):
+        active, cells = state.active, state.active.shape[-1]
+        loaded = np.asarray(active.any(axis=-1))
+        # of every window the first and the last touching cell, and the open candidates beside them, (P, W, 2)
+        ends = np.stack([active.argmax(axis=-1), cells - 1 - active[..., ::-1].argmax(axis=-1)], axis=-1)
+        beside = np.clip(ends + np.array([-1, 1]), 0, cells - 1)
+
+        def at(values, cell):
+            return np.take_along_axis(values, cell, axis=2)
+
+        rows, self.mesh = np.nonzero(loaded), found.mesh
+        self.open = at(found.candidate, beside) & loaded[..., None]
+        self.open &= beside != ends
+        self.alone = np.repeat(ends[..., :1] == ends[..., 1:], 2, axis=-1)
+        self.load, self.gap = at(state.loads, ends), at(state.gaps, beside)
+        right, columns = np.zeros((2, *active.shape, 7))
+        right[..., :3] = found.polynomials
+        np.put_along_axis(right[..., 3:5], ends[:, :, None], 1.0, axis=2)
+        right[..., 5:] = np.take_along_axis(found.local, beside[:, :, None], axis=3)
+        right *= active[..., None]
+        columns[rows] = _local_solution(found.local[rows], active[rows], right[rows])
+        moments = found.polynomials.swapaxes(-1, -2) @ columns
+        self.Q, self.unit, self.reach = np.split(moments, [3, 5], axis=-1)
+        # products of unit loads on the last cells, and of the columns of L beside them, within the window
+        self.unit_2, self.reach_2 = np.split((right * columns).sum(axis=2)[..., 3:], 2, axis=-1)
+        self.beside = at(found.polynomials, beside[..., None]).swapaxes(-1, -2)
+        self.own = at(np.diagonal(found.local, axis1=2, axis2=3), beside)
+
+    def of_meshes(self, smooth: np.ndarray) -> np.ndarray:
+        """Tangent stiffness of every mesh (P, meshes) at constant loads of the other meshes [N/m].
+
+        ``K_A = 1^T (H_jj,AA)^-1 1`` over the loaded candidates A of mesh j, which all approach by the same
+        small amount. The load over approach of cells is piecewise linear: ``K_A`` jumps by about a per cent
+        whenever a cell is added at an end of a contact. Between the load at which the last cell ``a`` of an
+        end began to carry and that at which the next one, ``b``, will, the slope goes from the mean of
+        ``K_A-a`` and ``K_A`` to the mean of ``K_A`` and ``K_A+b``, in proportion to how far the load has
+        come. The first cell of a tooth pair comes all at once.
+
+        ``smooth`` (P, W, 3, W, 3) [m/N] is that of the candidates or of other bodies with the same flanks.
+        """
+        P, meshes = len(self.Q), int(self.mesh[-1]) + 1
+        pairs, every = len(self.mesh) // meshes, np.arange(meshes)
+        n, window = 3 * pairs, np.arange(pairs)
+        S = smooth.reshape(P, meshes, n, meshes, n)[:, every, :, every].swapaxes(0, 1)
+
+        def of_mesh(values):
+            """Columns (P, meshes, n, k) of the windows' three rows (P, W, 3, k / pairs)."""
+            spread = np.zeros((P, meshes, pairs, 3, pairs, values.shape[-1]))
+            each = values.reshape(P, meshes, pairs, 3, -1)
+            spread[:, :, window, :, window] = each.transpose(2, 0, 1, 3, 4)
+            return spread.reshape(P, meshes, n, -1)
+
+        def product(one, other):
+            return (one * other).sum(axis=-2)
+
+        Q, unit, reach, beside = (of_mesh(a) for a in (self.Q, self.unit, self.reach, self.beside))
+        ends = (a.reshape(P, meshes, -1) for a in (self.unit_2, self.reach_2, self.own, self.load, self.gap))
+        unit_2, reach_2, own, load, gap = ends
+        M = S @ np.linalg.inv(np.eye(n) + Q @ S)
+        total, through = Q.sum(axis=-1, keepdims=True), S @ beside
+        one, moments = 1.0 - M @ total, reach + Q @ through
+        rate, closing = product(unit, one), 1.0 - product(moments, one)
+        # what the slope loses without the last cell, and gains with the next one
+        unit_2 = unit_2 - product(unit, M @ unit)
+        reach_2 = reach_2 + product(through, reach + moments) - product(moments, M @ moments)
+        come, left = load * closing, gap * rate
+        usable = self.open.reshape(rate.shape) & (closing > 0) & (rate > 0) & (come + left > 0)
+        alone = self.alone.reshape(rate.shape)
+
+        def over(above, below, where):
+            return np.divide(above, below, out=np.zeros(rate.shape), where=where)
+
+        lost = over(rate**2, unit_2, usable & ~alone)
+        gained = over(closing**2, own + product(beside, through) - reach_2, usable)
+        share = over(come, come + left, usable)
+        change = 0.5 * (share * gained - (1.0 - share) * lost)
+        return product(total, one)[..., 0] + change.sum(axis=-1)
+
+    def between_meshes(self, smooth: np.ndarray, meshes: int) -> np.ndarray:
+        """Tangent stiffness of the first meshes together, (P, meshes, meshes) [N/m].
+
+        The increments of the mesh forces per unit approach of each mesh while the others hold theirs; the
+        argument is that of `of_meshes`.
+        """
+        W = int((self.mesh < meshes).sum())
+        Q, S = self.Q[:, :W], smooth[:, :W, :, :W].reshape(-1, W, 3, 3 * W)
+        of_mesh = (self.mesh[:W, None] == np.arange(meshes)).astype(float)
+        right = Q.sum(axis=-1)[..., None] * of_mesh[:, None]
+        matrix = (Q @ S).reshape(-1, 3 * W, 3 * W) + np.eye(3 * W)
+        return np.repeat(of_mesh, 3, axis=0).T @ np.linalg.solve(matrix, right.reshape(-1, 3 * W, meshes))
+
+
+class _ActiveSets:
+    """Active sets of all positions on their way to the solution; motions over their largest arms."""
+
+    def __init__(self, found: Candidates, load: np.ndarray, springs: BearingSprings | None):
+        P, W, C = found.gap.shape
+        self.found, self.bearings, self.given = found, springs, load
+        G, arms = found.approach[found.mesh], np.zeros((0, len(load)))
+        if springs is not None:
+            arms = np.pad(springs.arms, ((0, 0), (len(load) - springs.arms.shape[1], 0)))
+        self.arm = np.abs(np.vstack([G, arms])).max(axis=0)
+        self.G, self.arms, self.load = G / self.arm, arms / self.arm, load / self.arm
+        self.clearance, self.softness = (springs.clearance, springs.compliance) if springs else (0.0, 1.0)
+        self.S = found.smooth + found.supports[np.ix_(found.mesh, found.mesh)][:, None, :, None]
+        # L^-1 of the separations and of the polynomials
+        self.offset, self.columns = np.zeros((P, W, C)), np.zeros((P, W, C, 3))
+        self.loads, self.gaps = np.zeros((2, P, W, C))
+        self.motions, self.imbalance = np.zeros((2, P, len(load)))
+        self.iterations, self.residual = np.zeros(P, int), np.zeros(P)
+        self.active, self.springs = self._first()
+
+    def _first(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cells (P, W, C) and springs (P, n) that equal mesh forces, shared by the near pairs, would press.
+
+        Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
+        """
+        found, N = self.found, self.found.setup.n_planets
+        width, material = found.bodies.face_width, found.bodies.material
+        modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
+        share = self.given.sum() / N
+        gap = np.where(found.candidate, found.gap, np.inf)
+        smallest = gap.min(axis=-1).reshape(
+            len(gap), -1, found.candidate.shape[1] // (int(found.mesh[-1]) + 1)
+        )
+        reached = smallest < smallest.min(axis=-1, keepdims=True) + share / (ROUGH_STIFFNESS * width)
+        # back flanks carry nothing unless the solution says so
+        reached[:, 2 * N :] = False
+        force = share / np.maximum(reached.sum(axis=-1, keepdims=True), 1)
+        edge = np.where(reached, smallest + 2 * force / (np.pi * modulus * width), -np.inf if share else 0.0)
+        pushed = -self.arms @ (found.approach[: 2 * N] / self.arm).sum(axis=0)
+        springs = pushed > 0.8 * pushed.max(initial=0.0)
+        return gap <= edge.reshape(*gap.shape[:2], 1), np.tile(springs, (len(gap), 1))
+
+    def solve(self) -> None:
+        """Solve all positions: together, and those that are left one by one."""
+        found, first = self.found, (self.active.copy(), self.springs.copy())
+        todo, solved = np.arange(len(found.position)), np.zeros(len(found.position), bool)
+        changed = self.active.any(axis=-1)
+        for _ in range(_MOST_STEPS):
+            rows, window = np.nonzero(changed)
+            place = todo[rows], window
+            right = np.dstack([found.gap[place], found.polynomials[place]])
+            columns = _local_solution(found.local[place], self.active[place], right)
+            self.offset[place], self.columns[place] = columns[..., 0], columns[..., 1:]
+            loads, motions, restrained = self._linear(todo, self.offset[todo], self.load, self.clearance)
+            flips, spring_flips = self._conditions(todo, loads, motions)
+            wrong = flips.any(axis=(1, 2)) | spring_flips.any(axis=1)
+            solved[todo[restrained & ~wrong]] = True
+            more = restrained & wrong
+            todo, flips = todo[more], flips[more]
+            if not len(todo):
+                break
+            self.active[todo] ^= flips
+            self.springs[todo] ^= spring_flips[more]
+            changed = flips.any(axis=-1)
+        # what is left may have lost all contact on its way
+        self.active[~solved], self.springs[~solved] = (start[~solved] for start in first)
+        if solved.any():
+            solved[solved] = self._refined(np.flatnonzero(solved))
+        for at in np.flatnonzero(~solved):
+            self._alone(at)
+
+    def _linear(self, todo, offset, load, clearance):
+        """Loads and motions when exactly the active cells touch, and whether the motions are restrained.
+
+        From ``L^-1 gap`` (t, W, C), the load (t, m) or (m,) and the clearance of the bearings. The motion of
+        a planet that touches nothing is zero.
+        """
+        S, columns = self.S[todo], self.columns[todo]
+        T, n, planet = len(todo), 3 * S.shape[1], np.arange(self.found.setup.n_planets)
+        onto, G = self.found.polynomials[todo].swapaxes(-1, -2), np.repeat(self.G, 3, axis=0)
+        Q, moments = onto @ columns, onto @ offset[..., None]
+        matrix = (Q @ S.reshape(T, -1, 3, n)).reshape(T, n, n) + np.eye(n)
+        right = np.concatenate([Q.sum(axis=-1)[..., None] * self.G[:, None], moments], axis=-1)
+        solved = np.linalg.solve(matrix, right.reshape(T, n, -1))
+        springs = self.springs[todo] / self.softness
+        stiffness = G.T @ solved[..., :-1] + np.swapaxes(self.arms * springs[..., None], -1, -2) @ self.arms
+        balance = load + solved[..., -1] @ G + clearance * (springs @ self.arms)
+        stiffness[:, planet, planet] += self._idle(todo) * stiffness.max(axis=(1, 2))[:, None]
+        held, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.swapaxes(-1, -2)))
+        restrained = held[:, 0] > NULL * held[:, -1]
+        held = np.where(restrained[:, None], held, 1.0)[..., None]
+        motions = vectors @ (vectors.swapaxes(-1, -2) @ balance[..., None] / held)
+        moved = S.reshape(T, n, n) @ (solved[..., :-1] @ motions - solved[..., -1:]) - G @ motions
+        loads = -offset - (columns @ moved.reshape(T, -1, 3, 1))[..., 0]
+        return loads, motions[..., 0], restrained
+
+    def _idle(self, todo) -> np.ndarray:
+        """Planets that touch nothing and whose bearings hold their axes in place, (t, N)."""
+        N = self.found.setup.n_planets
+        on_planet = self.found.mesh % N == np.arange(N)[:, None]
+        touching = np.asarray(self.active[todo].any(axis=-1))[:, None] & on_planet
+        return ~touching.any(axis=-1) & (self.bearings is None)
+
+    def _conditions(self, todo, loads, motions):
+        """Keep a linear solution; find the cells and springs that violate the other conditions."""
+        found, active, springs = self.found, self.active[todo], self.springs[todo]
+        candidate, values, gap = found.candidate[todo], found.polynomials[todo], found.gap[todo]
+        T, n = len(todo), 3 * values.shape[1]
+        moments = (values.swapaxes(-1, -2) @ loads[..., None]).reshape(T, n, 1)
+        bodies = (self.S[todo].reshape(T, n, n) @ moments).reshape(T, -1, 3, 1)
+        elastic = np.where(candidate, (found.local[todo] @ loads[..., None] + values @ bodies)[..., 0], 0.0)
+        separation = np.where(candidate, gap + elastic, np.inf)
+        motions, forced = self._turned(todo, separation - (motions @ self.G.T)[..., None], motions)
+        approach = (motions @ self.G.T)[..., None]
+        gaps = separation - approach
+        closed = motions @ self.arms.T - self.clearance
+        carried = np.where(springs, closed / self.softness, 0.0)
+        moved, largest = np.abs(elastic).max(axis=(1, 2)), np.abs(loads).max(axis=(1, 2))
+        largest = np.maximum(largest, np.abs(carried).max(axis=1, initial=0.0))[:, None, None]
+        rounding = ROUNDING * (np.abs(gap) + moved[:, None, None] + np.abs(approach))
+        flips = np.where(active, loads < -10 * ROUNDING * largest, gaps < -rounding) | forced
+        imbalance = self.load - loads.sum(axis=-1) @ self.G - carried @ self.arms
+        length = np.maximum(moved, RIGID * np.abs(gap).max(axis=(1, 2)))
+        apart = np.where(active, np.abs(gaps), -gaps).max(axis=(1, 2)) / np.where(length > 0, length, 1.0)
+        pull = np.maximum(-loads.min(axis=(1, 2)), np.abs(imbalance).max(axis=1))
+        force = np.maximum(largest[:, 0, 0], np.abs(self.load).max())
+        self.residual[todo] = np.maximum(apart, pull / np.where(force > 0, force, 1.0))
+        self.loads[todo], self.motions[todo], self.imbalance[todo] = loads, motions, imbalance
+        self.gaps[todo] = np.where(candidate, gaps, 0.0)
+        self.iterations[todo] += 1
+        rounding = ROUNDING * (self.clearance + np.abs(closed))
+        return flips, np.where(springs, closed < -rounding, closed > rounding)
+
+    def _turned(self, todo, gaps, motions):
+        """Turn planets that touch nothing as little as they must; tell which cells (t, W, C) must touch."""
+        forced, motions = np.zeros(gaps.shape, bool), motions.copy()
+        for at, planet in zip(*np.nonzero(self._idle(todo)), strict=True):
+            arms, turn = self.G[:, planet, None], motions[at, planet]
+            highest = np.where(arms > 0, turn + gaps[at], np.inf)
+            lowest = np.where(arms < 0, turn - gaps[at], -np.inf)
+            if lowest.max() <= highest.min():
+                motions[at, planet] = np.clip(0.0, lowest.max(), highest.min())
+            else:
+                forced[at].ravel()[[lowest.argmax(), highest.argmin()]] = True
+        return motions, forced
+
+    def _refined(self, done) -> np.ndarray:
+        """Take what rounding left out of solved positions; tell which of them need no second look."""
+        active = self.active[done]
+        rows = np.nonzero(active.any(axis=-1))
+        at, offset = (done[rows[0]], rows[1]), np.zeros(active.shape)
+        offset[rows] = _local_solution(self.found.local[at], active[rows], self.gaps[at][..., None])[..., 0]
+        loads, motions, _ = self._linear(done, offset, self.imbalance[done], 0.0)
+        conditions = self._conditions(done, self.loads[done] + loads, self.motions[done] + motions)
+        loads = self.loads[done]
+        largest = loads.max(axis=(1, 2), keepdims=True)
+        doubtful = (active & (loads <= _IDLE * largest)) | conditions[0]
+        carries = active & (loads > 10 * ROUNDING * largest)
+        self.active[done], self.motions[done] = carries, self.motions[done] / self.arm
+        self.loads[done] = np.where(carries, loads, 0.0)
+        self.gaps[done] = np.where(carries, 0.0, np.maximum(self.gaps[done], 0.0))
+        sure = ~(doubtful.any(axis=(1, 2)) | conditions[1].any(axis=1))
+        return sure & (self.residual[done] < _RESIDUAL)
+
+    def _alone(self, at) -> None:
+        """Solve one position by itself."""
+        problem, candidate = self.found.problem(at), self.found.candidate[at]
+        arrays = problem.compliance, problem.gap, problem.G
+        if self.bearings is not None:
+            arrays = self.bearings.joined(*arrays)
+        start = np.concatenate([self.active[at][candidate], self.springs[at]])
+        state = solve_contact(*arrays, self.given, start=start)
+        for name in ("loads", "gaps", "active"):
+            values = getattr(self, name)
+            values[at] = 0
+            values[at][candidate] = getattr(state, name)[: len(problem.gap)]
+        self.motions[at], self.residual[at] = state.motions, state.residual
+        self.iterations[at] += state.iterations
+
+
+def _local_solution(local, active, right) -> np.ndarray:
+    """Solve ``L_AA Y = right_A`` in many windows: (w, C, C), (w, C), (w, C, k); zero outside A."""
+    columns, count = np.zeros(right.shape), active.sum(axis=-1)
+    # windows of about the same number of cells together, their active cells first
+    order, size = np.argsort(~active, axis=-1, kind="stable"), -(-count // 4) * 4
+    for most in np.unique(size[size > 0]):
+        rows = np.flatnonzero(size == most)[:, None]
+        cells = order[rows[:, 0], :most]
+        real = np.arange(cells.shape[1]) < count[rows]
+        matrix = local[rows[..., None], cells[:, :, None], cells[:, None, :]]
+        matrix = np.where(real[:, :, None] & real[:, None, :], matrix, np.eye(cells.shape[1]))
+        columns[rows, cells] = np.linalg.solve(matrix, np.where(real[..., None], right[rows, cells], 0.0))
+    return columns

@@ -1,0 +1,127 @@
+"""All positions at once against one position at a time: loads, motions and stiffness of random sets."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_sets import random_set
+from validation.planetary import reference_set
+from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
+
+from femgear.case.case import material_of, planetary_set
+from femgear.contact.assembly import contact_candidates, mesh_windows
+from femgear.contact.batch import ContactTangents, solve_batch
+from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.flank_pairs import loaded_image
+from femgear.contact.solve import solve_contact
+from femgear.contact.supports import Supports, bearing_springs, moving_members
+from femgear.fe.elasticity import Material
+from femgear.gears.deviations import no_deviations
+
+STEEL = Material(206e9, 0.3, 7850.0)
+SPRUNG = Supports(sun=5e7, carrier=2e8, planet=3e8)
+LOOSE = Supports(sun=5e7, planet=3e8, planet_clearance=15e-6)
+# three, four and five planets: in phase, out of phase and unequally spaced
+SEEDS = (3, 4, 5, 6, 7, 8, 9, 10, 11)
+_solved = {}
+
+
+def random_bodies(seed):
+    """A random set with its bodies, and the torque on a sun whose teeth are pressed as usual."""
+    if seed not in _solved:
+        case = random_set(seed).case
+        gears, material = planetary_set(case), material_of(case)
+        bodies = make_bodies(make_sectors(gears, material, flank_elements=8), material)
+        # force per face width and module [N/m^2]
+        force = 3e7 * bodies.face_width * gears.sun.module * material.youngs_modulus / 206e9
+        _solved[seed] = gears, bodies, force * gears.n_planets * gears.sun.base_radius
+    return _solved[seed]
+
+
+def both_ways(gears, bodies, torque, *, supports, pins=0.0, both_flanks=False, gap=0.0):
+    """Loads, motions and stiffness (own, coupled) by the batch and by the single positions.
+
+    Pins are off their places by up to `pins` deflections of a mesh under its share of the torque.
+    """
+    rng = np.random.default_rng(5)
+    share = abs(torque) / gears.sun.base_radius / gears.n_planets
+    approach = share / (10e9 * bodies.face_width)
+    places = pins * approach * rng.uniform(-1.0, 1.0, (gears.n_planets, 2))
+    errors = replace(no_deviations(gears), pin_errors=places)
+    solved, _, errors = loaded_image(gears, torque, errors)
+    members = moving_members(solved, supports, both_flanks=both_flanks)
+    setup = mesh_windows(
+        solved,
+        bodies,
+        share=3 * share,
+        nearest=4 * approach,
+        positions=5,
+        deviations=errors,
+        both_flanks=both_flanks,
+    ).with_planet_gaps(np.full(gears.n_planets, gap * approach))
+    springs = bearing_springs(solved, supports, members)
+    found = contact_candidates(setup, bodies, np.arange(5), members)
+    load = np.zeros(found.approach.shape[1])
+    load[gears.n_planets] = abs(torque) / gears.sun.base_radius
+    state = solve_batch(found, load, springs)
+    tangents, meshes = ContactTangents(found, state), len(setup.near)
+    batch = [], state.motions, tangents.of_meshes(found.smooth), tangents.between_meshes(found.smooth, meshes)
+    single = [], [], [], []
+    for at in range(5):
+        problem, candidate = found.problem(at), found.candidate[at]
+        arrays, cells = (problem.compliance, problem.gap, problem.G), len(problem.gap)
+        if springs is not None:
+            arrays = springs.joined(*arrays)
+        one = solve_contact(*arrays, load)
+        one = replace(one, loads=one.loads[:cells], gaps=one.gaps[:cells], active=one.active[:cells])
+        assert np.array_equal(one.active, state.active[at][candidate])
+        window = problem.mesh * 1000 + problem.pair
+        own = tangent_stiffness(problem.H, one, problem.mesh, window, problem.cell, meshes)
+        coupled = mesh_tangent_matrix(problem.H, one.active, problem.mesh, meshes)
+        batch[0].append(state.loads[at][candidate])
+        for values, value in zip(single, (one.loads, one.motions, own, coupled), strict=True):
+            values.append(value)
+    assert state.residual.max() < 1e-11
+    return zip(batch, single, strict=True)
+
+
+def compare(pairs):
+    for several, singles in pairs:
+        for one, expected in zip(several, singles, strict=True):
+            assert one == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_random_sets(seed, sign, monkeypatch):
+    # no position is left to the other route
+    monkeypatch.delattr("femgear.contact.batch.solve_contact")
+    gears, bodies, torque = random_bodies(seed)
+    compare(both_ways(gears, bodies, sign * torque, supports=SPRUNG, pins=0.3))
+
+
+@pytest.mark.parametrize("seed", SEEDS[::4])
+def test_light_torque_under_which_planets_open(seed):
+    gears, bodies, torque = random_bodies(seed)
+    results = list(both_ways(gears, bodies, 0.02 * torque, supports=Supports(), pins=30.0))
+    stiffness = np.array(results[2][1])
+    assert (stiffness == 0).any() and (stiffness > 0).any()
+    compare(results)
+
+
+@pytest.mark.parametrize(
+    "supports", [Supports(), Supports(sun=0.0), LOOSE], ids=["fixed", "floating", "loose"]
+)
+def test_supports(supports):
+    gears = reference_set()
+    bodies = make_bodies(make_sectors(gears, STEEL, flank_elements=8), STEEL)
+    for torque in (100.0, -3.0):
+        compare(both_ways(gears, bodies, torque, supports=supports, pins=0.5))
+
+
+def test_teeth_wedged_between_both_flanks():
+    gears = reference_set()
+    bodies = make_bodies(make_sectors(gears, STEEL, flank_elements=8), STEEL)
+    results = list(both_ways(gears, bodies, 5.0, supports=Supports(), both_flanks=True, gap=-400.0))
+    assert (np.array(results[2][1])[:, 6:] > 0).any()
+    compare(results)
