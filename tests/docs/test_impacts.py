@@ -49,7 +49,7 @@ def test_named_functions_exist():
     for module in MODULES:
         known |= set(vars(importlib.import_module(module)))
     named = set(re.findall(r"`([A-Za-z_]\w+)`", prose))
-    assert {"ImpactPair", "with_errors", "lyapunov_exponents", "contact_states"} <= named
+    assert {"ImpactPair", "with_errors", "lyapunov_exponents", "range_states"} <= named
     # fields of the result, which are no functions
     fields = {"chaotic", "verdict", "error", "scatter", "step_error"}
     assert fields <= set(dir(LyapunovExponents)) | set(LyapunovExponents.__dataclass_fields__)

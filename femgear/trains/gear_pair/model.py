@@ -223,6 +223,19 @@ def range_states(lowest, highest) -> np.ndarray:
     return np.where(np.isfinite(lowest) & np.isfinite(highest), state, UNKNOWN)
 
 
+def contact_shares(x) -> dict[str, np.ndarray]:
+    """Shares (...) of the instants with the drive flanks, none or the back flanks in contact.
+
+    Parameters
+    ----------
+    x : (..., T) array
+        Relative deflections over a period, in half backlashes.
+    """
+    drive, back = np.asarray(x) > DRIVE, np.asarray(x) < BACK
+    touching = {"drive": drive, "free": ~drive & ~back, "back": back}
+    return {name: closed.mean(axis=-1) for name, closed in touching.items()}
+
+
 def state_regions(parameter, state) -> list[tuple[int, float, float]]:
     """Runs of equal states (n,) along a curve or sweep: state, first and last value of the parameter (n,).
 

@@ -26,6 +26,7 @@ from femgear.trains.gear_pair.model import (
     BACK,
     DRIVE,
     STATE_NAMES,
+    contact_shares,
     impact_borders,
     range_states,
     separation_ratios,
@@ -207,11 +208,8 @@ def solve_response(case: GearPairCase) -> ResponseResult:
     )  # fmt: skip
     phase = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
     x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
-    drive, back = (x > DRIVE).mean(axis=1), (x < BACK).mean(axis=1)
-    free = ((x <= DRIVE) & (x >= BACK)).mean(axis=1)
-    shares = {"drive": drive, "free": free, "back": back}
     borders = {level: np.sort(impact_borders(pair, branch, level)) for level in (DRIVE, BACK)}
-    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), shares, borders)
+    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), contact_shares(x), borders)
 
 
 @one_blas_thread()

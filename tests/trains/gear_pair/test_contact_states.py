@@ -5,7 +5,7 @@ import pytest
 from small_trains import example_pair, level_crossings
 
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.trains.gear_pair.model import STATE_NAMES, UNKNOWN, range_states, state_regions
+from femgear.trains.gear_pair.model import STATE_NAMES, UNKNOWN, contact_shares, range_states, state_regions
 
 
 @pytest.mark.parametrize(("ratio", "state"), [(0.5, 0), (1.2, 1), (0.85, 2)])
@@ -19,7 +19,10 @@ def test_the_range_of_a_solution_tells_what_its_forces_do(ratio, state):
     assert range_states(x.min(), x.max()) == state
     assert (drive.any() and back.any()) == (state == 2)
     assert (drive.all() or back.all()) == (state == 0)
-    assert drive.mean() == pytest.approx(np.mean(x > 1.0), abs=5e-3)
+    shares = contact_shares(x[:, 0])
+    assert sum(shares.values()) == pytest.approx(1.0)
+    for name, closed in (("drive", drive), ("free", ~drive & ~back), ("back", back)):
+        assert shares[name] == pytest.approx(closed.mean(), abs=1e-12)
 
 
 def test_regions_and_levels():
