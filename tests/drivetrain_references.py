@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from femgear.system.elements import positive_part
+from femgear.system.force_laws import positive_part
 from femgear.trains.drivetrain.parts import Drivetrain
 
 

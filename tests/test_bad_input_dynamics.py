@@ -12,7 +12,7 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, MeshExcitation, NonlinearSystem
 from femgear.trains.elastic.checks import check_rim_speed

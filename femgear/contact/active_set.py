@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
-from scipy.optimize import nnls
 
 from femgear.errors import ContactError
 
@@ -227,6 +226,8 @@ def _least_motion(arms, gaps):
     Least distance programming by non-negative least squares (Lawson and Hanson, chapter 23): when there
     is no solution, the positive multipliers combine the constraints to ``0 <= negative``.
     """
+    from scipy.optimize import nnls
+
     k = arms.shape[1]
     deepest = -gaps.min(initial=0.0)
     if deepest <= 0:

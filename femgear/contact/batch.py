@@ -25,7 +25,7 @@ from femgear.contact.supports import BearingSprings
 
 _MOST_STEPS = 30
 """Linear solutions before a position is left to the single solver."""
-_IDLE = 1e-9
+_FAINT = 1e-9
 """Share of the largest load below which a touching cell may be no contact at all."""
 _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
@@ -122,7 +122,7 @@ class ContactTangents:
 
         ``smooth`` (P, W, 3, W, 3) [m/N] is that of the candidates or of other bodies with the same flanks.
         """
-        P, meshes = len(self.Q), int(self.mesh[-1]) + 1
+        P, meshes = len(self.Q), int(self.mesh[-1] + 1)
         pairs, every = len(self.mesh) // meshes, np.arange(meshes)
         n, window = 3 * pairs, np.arange(pairs)
         S = smooth.reshape(P, meshes, n, meshes, n)[:, every, :, every].swapaxes(0, 1)
@@ -204,9 +204,7 @@ class _ActiveSets:
         modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
         share = self.given.sum() / N
         gap = np.where(found.candidate, found.gap, np.inf)
-        smallest = gap.min(axis=-1).reshape(
-            len(gap), -1, found.candidate.shape[1] // (int(found.mesh[-1]) + 1)
-        )
+        smallest = gap.min(axis=-1).reshape(len(gap), len(found.approach), -1)
         reached = smallest < smallest.min(axis=-1, keepdims=True) + share / (ROUGH_STIFFNESS * width)
         # back flanks carry nothing unless the solution says so
         reached[:, 2 * N :] = False
@@ -261,7 +259,7 @@ class _ActiveSets:
         springs = self.springs[todo] / self.softness
         stiffness = G.T @ solved[..., :-1] + np.swapaxes(self.arms * springs[..., None], -1, -2) @ self.arms
         balance = load + solved[..., -1] @ G + clearance * (springs @ self.arms)
-        stiffness[:, planet, planet] += self._idle(todo) * stiffness.max(axis=(1, 2))[:, None]
+        stiffness[:, planet, planet] += self._unloaded(todo) * stiffness.max(axis=(1, 2))[:, None]
         held, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.swapaxes(-1, -2)))
         restrained = held[:, 0] > NULL * held[:, -1]
         held = np.where(restrained[:, None], held, 1.0)[..., None]
@@ -270,7 +268,7 @@ class _ActiveSets:
         loads = -offset - (columns @ moved.reshape(T, -1, 3, 1))[..., 0]
         return loads, motions[..., 0], restrained
 
-    def _idle(self, todo) -> np.ndarray:
+    def _unloaded(self, todo) -> np.ndarray:
         """Planets that touch nothing and whose bearings hold their axes in place, (t, N)."""
         N = self.found.setup.n_planets
         on_planet = self.found.mesh % N == np.arange(N)[:, None]
@@ -310,7 +308,7 @@ class _ActiveSets:
     def _turned(self, todo, gaps, motions):
         """Turn planets that touch nothing as little as they must; tell which cells (t, W, C) must touch."""
         forced, motions = np.zeros(gaps.shape, bool), motions.copy()
-        for at, planet in zip(*np.nonzero(self._idle(todo)), strict=True):
+        for at, planet in zip(*np.nonzero(self._unloaded(todo)), strict=True):
             arms, turn = self.G[:, planet, None], motions[at, planet]
             highest = np.where(arms > 0, turn + gaps[at], np.inf)
             lowest = np.where(arms < 0, turn - gaps[at], -np.inf)
@@ -330,7 +328,7 @@ class _ActiveSets:
         conditions = self._conditions(done, self.loads[done] + loads, self.motions[done] + motions)
         loads = self.loads[done]
         largest = loads.max(axis=(1, 2), keepdims=True)
-        doubtful = (active & (loads <= _IDLE * largest)) | conditions[0]
+        doubtful = (active & (loads <= _FAINT * largest)) | conditions[0]
         carries = active & (loads > 10 * ROUNDING * largest)
         self.active[done], self.motions[done] = carries, self.motions[done] / self.arm
         self.loads[done] = np.where(carries, loads, 0.0)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from math import gcd
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator
 
 from femgear.contact.bodies import Bodies
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
@@ -62,6 +61,8 @@ class LoadedPeriod:
         Between jumps by cubics (Akima's, modified): straight lines would make harmonics of their own, images
         of the low ones beside the number of positions.
         """
+        from scipy.interpolate import Akima1DInterpolator
+
         at, values, tau = np.arange(count) / count, getattr(self, name), self.position
         found = np.array([np.interp(at, tau, row, period=1.0) for row in values])
         for piece, place in self._smooth_pieces():

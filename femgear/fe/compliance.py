@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
-from scipy.spatial import KDTree
 
 from femgear.errors import GridError
 from femgear.fe.grid import Grid, shape_functions
@@ -83,6 +82,8 @@ def boundary_nodes(grid: Grid, name: str) -> np.ndarray:
 
 def mirror_nodes(grid: Grid) -> np.ndarray:
     """Permutation that maps every node of a symmetric grid to its mirror image in the x axis, shape (n,)."""
+    from scipy.spatial import KDTree
+
     return np.asarray(KDTree(grid.points).query(grid.points * np.array([1.0, -1.0]))[1])
 
 

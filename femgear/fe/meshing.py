@@ -18,7 +18,6 @@ from importlib import metadata
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from femgear.errors import GridError, StorageError
 from femgear.fe.grid import Grid, check_grid, read_grid, write_grid
@@ -150,6 +149,8 @@ def _join(curves, inner, size):
 
 def _check_distinct(points, size):
     """Refuse corners that coincide."""
+    from scipy.spatial import KDTree
+
     pairs = KDTree(points).query_pairs(CLOSE * size, output_type="ndarray")
     if len(pairs):
         a, b = points[pairs[0]]

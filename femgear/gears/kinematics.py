@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import nnls
 
 from femgear.errors import GeometryError
 from femgear.gears.planetary import PlanetarySet
@@ -202,6 +201,8 @@ def unheld_members(
 
 def _held(s: PlanetarySet, floating: tuple[str, ...], both_flanks: bool) -> bool:
     """Whether forces of the flanks keep the members in equilibrium, and a single one from sliding."""
+    from scipy.optimize import nnls
+
     turns = rotation_approach(s.n_planets)
     approach = []
     for back in (False, True)[: 1 + both_flanks]:

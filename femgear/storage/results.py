@@ -44,7 +44,10 @@ FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
 
 
 def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
-    """Make a dataset of entries ``(dims, values, units, long_name)``; dims as names or one text."""
+    """Make a dataset of entries ``(dims, values, units, long_name)``; dims as names or one text.
+
+    ``variables`` and ``coords`` map names to entries, ``attrs`` are those of the dataset.
+    """
     import xarray as xr
 
     def made(entries):

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize
 
 from femgear.case.case import planetary_set, set_deviations
 from femgear.contact.cycle import walk_mesh_cycle
@@ -431,6 +430,8 @@ def _frame(grid: ReliefGrid, t: int):
 
 def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]):
     """Simplex and neighbours in turn: the best point, its value, the values of its neighbours by place."""
+    from scipy.optimize import minimize
+
     point, size = start, np.maximum(sizes, step)
     while True:
         # the simplex has to lie within the bounds

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.optimize import differential_evolution, linprog, minimize
 
 from femgear.case.case import set_deviations
 from femgear.case.dependencies import FLANK_ENTRIES
@@ -277,6 +276,8 @@ def _descents(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple
 
 def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple[bool, str]:
     """Differential evolution, then the simplex."""
+    from scipy.optimize import differential_evolution
+
     problem, count = run.problem, options.sample_count(run.problem)
     integral = np.array([variable.integer for variable in problem.variables])
     population = np.vstack([x0, samples_of(problem, max(count, 5) - 2, options.seed)])
@@ -358,6 +359,8 @@ def polish(
     ``size`` is that of the first simplex over the ranges, ``rounds`` the number of simplexes one after the
     other. The other method is Powell's.
     """
+    from scipy.optimize import minimize
+
     low, high = run.problem.bounds.T
     width, n = high - low, len(low)
     unit = [(0.0, 1.0)] * n
@@ -447,6 +450,8 @@ def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) ->
 
 def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndarray, float]:
     """Step within the box, and the largest peak to peak that the linearisation promises there."""
+    from scipy.optimize import linprog
+
     n, (K, P) = len(x), value.shape
     width = high - low
     # unknowns: n moves over their ranges, K highs, K lows, t

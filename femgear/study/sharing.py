@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from femgear.contact.assembly import ROUGH_STIFFNESS, assemble_contact, in_windows, mesh_windows
 from femgear.contact.cycle import walk_mesh_cycle
@@ -295,6 +294,8 @@ class _Curves:
 
     @classmethod
     def of(cls, model: SharingModel) -> _Curves:
+        from scipy.interpolate import PchipInterpolator
+
         if not np.all(np.diff(model.deflection, axis=1) > 0):
             raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
         found = [PchipInterpolator(model.force, row) for row in model.deflection]

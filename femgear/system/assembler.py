@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import Series, constant
 from femgear.system.rigid_bodies import (
     CENTRAL,
@@ -203,7 +203,7 @@ def mesh_elements(
         Play along the line of action [m]. None takes that of the static record; without one, or where it
         is zero there, the meshes have no back side.
     separates, smoothing
-        See `femgear.system.elements.GearMeshes`.
+        See `femgear.system.force_laws.GearMeshes`.
 
     Raises
     ------

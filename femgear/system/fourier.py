@@ -68,7 +68,7 @@ def sample(amplitudes, positions: int) -> np.ndarray:
 
 
 def pad(amplitudes: np.ndarray, count: int) -> np.ndarray:
-    """The (..., h + 1) harmonics filled up with zeros, or cut, to (..., count + 1)."""
+    """The harmonics ``amplitudes`` (..., h + 1) filled up with zeros, or cut, to (..., count + 1)."""
     out = np.zeros((*amplitudes.shape[:-1], count + 1), dtype=complex)
     kept = min(count + 1, amplitudes.shape[-1])
     out[..., :kept] = amplitudes[..., :kept]
@@ -403,6 +403,7 @@ def checked_lines(orders) -> np.ndarray:
 def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _ROUNDING) -> float:
     """Share of the fluctuating amplitude in the upper half of the lines (root of the energy ratio).
 
+    ``amplitudes`` (n, L) complex, ``orders`` (L, n_bases).
     A line is in the upper half when ``sum_b |orders_b| / max |orders_b|`` is above half its largest value.
     With a single line the share is one: nothing is known about the truncation. A fluctuation below
     ``rounding`` of the mean is none, and its share is zero.

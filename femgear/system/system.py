@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from femgear.errors import CaseError, checked_numbers
-from femgear.system.elements import Element, GearMeshes, coefficients_of, tabulated_element
+from femgear.system.force_laws import Element, GearMeshes, coefficients_of, tabulated_element
 from femgear.system.fourier import harmonics_of, phase_of, series_of
 
 Law = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -213,6 +213,8 @@ def gear_meshes(
         Mesh harmonics kept.
     columns : (g,) int array, optional
         Columns of ``W``; the first ones when not given.
+    separates, smoothing
+        Of `GearMeshes`.
     orders : tuple of int
         Orders of the mesh frequency; the record's own period counts ``periods`` mesh periods, so with
         ``periods`` above one the base frequency must be the mesh frequency over ``periods``.
@@ -324,9 +326,7 @@ class NonlinearSystem:
     @property
     def damping(self) -> np.ndarray:
         """``C + speed G`` (n, n)."""
-        if self.system.gyroscopic is None or not self.speed:
-            return self.system.C
-        return self.system.C + self.speed * self.system.gyroscopic
+        return damping_matrix(self.system, self.speed)
 
     @property
     def reference(self) -> np.ndarray:
@@ -348,6 +348,13 @@ class NonlinearSystem:
         for element in self.elements:
             orders += [series.orders for series in coefficients_of(element).values()]
         return max([len(o) for o in orders if any(o)], default=1)
+
+
+def damping_matrix(system: MechanicalSystem, speed: float) -> np.ndarray:
+    """``C + speed G`` (n, n) at a speed of rotation [rad/s]."""
+    if system.gyroscopic is None or not speed:
+        return system.C
+    return system.C + speed * system.gyroscopic
 
 
 def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
@@ -513,15 +520,10 @@ def check_matrices(
 
 def _coupled_law(problem: NonlinearSystem, theta) -> Law:
     """Elements on groups of columns, evaluated as they are."""
-    reference = np.diag(problem.reference)
+    reference, springs = problem.reference, np.diag(problem.reference)
 
     def law(i, x):
-        total, tangent = -reference @ x, -reference
-        for element in problem.elements:
-            force, slope = element.evaluate(x[element.columns], theta[i])
-            for columns, f, t in zip(element.columns, force, slope):
-                total[columns] += f
-                tangent[columns[:, None], columns] += t
-        return total, tangent
+        force, tangent = element_forces(problem, x, theta[i])
+        return force - reference * x, tangent - springs
 
     return law

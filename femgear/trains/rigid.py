@@ -30,7 +30,7 @@ from femgear.system.assembler import (
     mesh_directions,
     mesh_elements,
 )
-from femgear.system.elements import GearMeshes, RadialBearings
+from femgear.system.force_laws import GearMeshes, RadialBearings
 from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of, tooth_lines
 from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis
 from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, RigidSet, flank_sign

@@ -29,7 +29,7 @@ from femgear.system.assembler import (
     stiffness_matrix,
     support_diagonal,
 )
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, StepSeries, SummedSeries, distinct_lines
 from femgear.system.rigid_bodies import CENTRAL, PlanarSet, body_masses
 from femgear.system.system import HarmonicForce, NonlinearSystem

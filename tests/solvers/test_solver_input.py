@@ -16,7 +16,7 @@ from femgear.solvers.time.stroboscopic import (
     sweep_response,
 )
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import PolynomialSprings
+from femgear.system.force_laws import PolynomialSprings
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 STARTS = (([np.nan], [0.0]), ([0.0, 0.0], [0.0]), ([0.0],), (0.0, 0.0), "ab")

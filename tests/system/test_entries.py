@@ -24,7 +24,7 @@ from femgear.solvers.time.stroboscopic import (
     sweep_up_and_down,
 )
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, StepSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 

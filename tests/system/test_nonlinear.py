@@ -6,7 +6,7 @@ import pytest
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.periodic.solution import PeriodicSolution
-from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import (
     HarmonicForce,

@@ -5,7 +5,7 @@ import pytest
 from published.transmission_errors import series_spectrum
 
 from femgear.errors import CaseError
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, SummedSeries, constant
 
 ONE = FourierSeries([[1.0, 2.0 - 1j, 0.5]], (1,))

@@ -11,7 +11,7 @@ from femgear.solvers.continuation.branches import parameter_curve
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.stability.lyapunov import lyapunov_exponents
 from femgear.solvers.time.stroboscopic import sweep_response
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
 from femgear.trains.gear_pair.model import (
     BACK,

@@ -9,7 +9,7 @@ import numpy as np
 
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, harmonic_lines
 from femgear.system.system import HarmonicForce
 from validation.nonlinear import duffing, first, oscillator

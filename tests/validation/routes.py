@@ -18,7 +18,7 @@ from femgear.solvers.periodic.shooting import ShootingSolution, solve_shooting
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import mesh_elements
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, harmonics_of
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.system.system import NonlinearSystem

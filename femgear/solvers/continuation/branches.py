@@ -251,7 +251,8 @@ class ContinuationProblem:
 
     ``balance`` has them at the start. Of the base frequencies ``frequency`` [rad/s] the one numbered ``base``
     is the parameter, unless there is a ``family``: parameter -> NonlinearSystem, whose harmonic equations
-    take ``samples``.
+    take ``samples``. ``limits`` are the lowest and the highest parameter; with ``radius`` the solutions get
+    the spectral radius of their fixed point.
     """
 
     balance: HarmonicBalance
@@ -311,7 +312,7 @@ class ContinuationProblem:
         balance = self.balance_at(parameter)
         lines = balance.lines(y)
         value = balance.receptance(self.frequency_at(parameter))[0]
-        return balance.unknowns(balance.residual(lines, balance.forces(lines), value))
+        return balance.unknowns(balance.residual(lines, balance.forces(lines)[0], value))
 
     def first(self, parameter: float, start) -> PeriodicSolution:
         """Solution at the start of the curve, near a given one."""

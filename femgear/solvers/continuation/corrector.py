@@ -16,7 +16,6 @@ from itertools import pairwise
 
 import numpy as np
 from scipy import linalg
-from scipy.optimize import root_scalar
 
 from femgear.errors import CaseError, FemgearError
 
@@ -248,7 +247,7 @@ def _factored(matrix: np.ndarray):
 def step_effort(
     options: StepOptions, point: CurvePoint, new: CurvePoint, *, corner: bool, sharp: bool
 ) -> float:
-    """How far a step was from the angle and the contraction that the options aim at: 1 on target.
+    """How far a step between two points was from the angle and the contraction aimed at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
     a jump from curve to curve turns the chord but not the tangents. A step may be so short that the curve may
@@ -494,10 +493,11 @@ def _on_both(segment: Segment, h: float) -> CurvePoint:
 
 
 def bracketed_root(function: Callable[[float], float], known: dict[float, float], *, xtol: float) -> float:
-    """Zero of a function between two places with ``known`` values of different sign, by Brent's method.
+    """Zero of a function, to ``xtol``, between two places with ``known`` values of different sign (Brent).
 
     ``known`` collects all values.
     """
+    from scipy.optimize import root_scalar
 
     def value(h: float) -> float:
         if h not in known:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.system.system import MechanicalSystem, Modes, Response, check_matrices, freeze
+from femgear.system.system import MechanicalSystem, Modes, Response, check_matrices, damping_matrix, freeze
 
 # Eigenvalues of two modes closer than this (relative) are one multiple eigenvalue: never cut through it.
 _MULTIPLE = 1e-6
@@ -134,6 +134,11 @@ def solve_modes(
     Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
     """
     stiffness = total_stiffness(system, mesh_stiffness)
+    if system.gyroscopic is not None and np.any(system.gyroscopic):
+        raise CaseError(
+            "real modes cannot carry gyroscopic terms", code="E-CHOICE", key="gyroscopic",
+            remedy="leave them out of the system that is reduced to modes",
+        )  # fmt: skip
     values, shape, rigid = _eigen(system.M, stiffness, count, max_frequency)
     if np.any(rigid):
         shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
@@ -234,7 +239,7 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     Raises
     ------
     CaseError
-        Matrices that do not fit, are not symmetric or not finite.
+        Matrices that do not fit, are not symmetric or not finite; a speed that is not finite (E-SPEED).
     ConvergenceError
         A mass that is not positive definite, or poles that share one vector (E-SOLVE).
 
@@ -244,7 +249,9 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     1997, sections 4.4 and 4.9); the left vectors are the rows of the inverse of the right ones, so that both
     are biorthonormal within multiple poles as well.
     """
-    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
+    if not np.isfinite(speed):
+        raise CaseError("the speed is not finite", code="E-SPEED", value=speed)
+    stiffness = total_stiffness(system, mesh_stiffness)
     try:
         square, real = linalg.eigh(stiffness, system.M)
     except linalg.LinAlgError as error:
@@ -323,27 +330,6 @@ def state_matrix(stiffness: np.ndarray, damping: np.ndarray, scale: float) -> np
     return state
 
 
-def damping_matrix(system: MechanicalSystem, speed: float = 0.0) -> np.ndarray:
-    """``C + speed G`` (n, n).
-
-    Raises
-    ------
-    CaseError
-        A speed that is not finite (E-SPEED), a gyroscopic matrix that is not skew-symmetric (E-SYMMETRY).
-    """
-    if not np.isfinite(speed):
-        raise CaseError("the speed is not finite", code="E-SPEED", value=speed)
-    if system.gyroscopic is None or not speed:
-        return np.asarray(system.C)
-    G = system.gyroscopic
-    if G.shape != system.M.shape or np.abs(G + G.T).max() > 1e-9 * np.abs(G).max(initial=0.0):
-        raise CaseError(
-            "the gyroscopic matrix is not skew-symmetric", code="E-SYMMETRY", key="gyroscopic",
-            remedy="put damping into C and springs into K",
-        )  # fmt: skip
-    return system.C + speed * G
-
-
 def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray:
     """Make viscous damping ``M Phi diag(2 zeta omega) Phi^T M`` (n, n) of modal damping ratios.
 
@@ -356,7 +342,11 @@ def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray
 
 
 def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
-    """``C`` as given, or of modal ratios."""
+    """Make the viscous damping (n, n) of a system at rest: its own ``C``, a matrix, or modal ratios.
+
+    ``reference`` (n_columns,) are the stiffnesses of the columns in the modes [N/m]; ``damping`` is None, a
+    ratio, one ratio a mode or a matrix (n, n) [N s/m, ...].
+    """
     if damping is None:
         return still.C
     array = np.asarray(damping, float)
@@ -371,18 +361,16 @@ def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> 
 
 
 def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
-    """``K + W diag(mesh_stiffness) W^T`` (n, n) [N/m], with the flexibility between the meshes, checked."""
+    """``K + W diag(mesh_stiffness) W^T`` (n, n) [N/m], with the flexibility between the meshes, checked.
+
+    ``mesh_stiffness`` (n_meshes,) [N/m].
+    """
     meshes = np.asarray(mesh_stiffness, dtype=float)
     check_matrices(system, symmetric=("M", "K"), columns=len(meshes))
     if not np.all(np.isfinite(meshes)) or np.any(meshes < 0.0):
         raise CaseError(
             "mesh stiffnesses must be finite and not negative",
             code="E-STIFFNESS", value=meshes.tolist(), limit=">= 0 N/m",
-        )  # fmt: skip
-    if system.gyroscopic is not None and np.any(system.gyroscopic):
-        raise CaseError(
-            "real modes cannot carry gyroscopic terms", code="E-CHOICE", key="gyroscopic",
-            remedy="leave them out of the system that is reduced to modes",
         )  # fmt: skip
     carried = np.diag(meshes)
     if system.flexibility is not None:
@@ -409,6 +397,7 @@ def rigid_basis(system: MechanicalSystem, modes: Modes):
 def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
     """``K^+ loads``: elastic displacement, mass-orthogonal to the rigid modes, of self-equilibrated loads.
 
+    Mass and stiffness (n, n), mass-normalised rigid modes (n, r), loads and displacements (n, n_loads).
     ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
     """
     carried = mass @ rigid

@@ -12,13 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import (
-    pseudo_solve,
-    residual_output,
-    rigid_basis,
-    solve_modes,
-    state_matrix,
-)
+from femgear.solvers.linear.modal import pseudo_solve, rigid_basis, solve_modes, state_matrix
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 
 # Distance to an undamped pole, relative to it, below which the response is infinite.
@@ -52,9 +46,7 @@ class MeshErrorResponse:
     force: np.ndarray
 
 
-def modal_response(
-    system: MechanicalSystem, modes: Modes, frequency, inputs, outputs, *, residual: bool = True
-) -> np.ndarray:
+def modal_response(system: MechanicalSystem, modes: Modes, frequency, inputs, outputs) -> np.ndarray:
     """``L (K' + i omega C - omega^2 M)^-1 B`` as a sum over real modes and the static rest.
 
     ``sum (L phi) (phi^T B) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega) + R``, R = ``L K^+ B`` less the
@@ -72,8 +64,6 @@ def modal_response(
         ``B``, one column a force.
     outputs : (n_outputs, n) array
         ``L``.
-    residual : bool
-        False leaves R out.
 
     Returns
     -------
@@ -94,7 +84,7 @@ def modal_response(
     gain = _gain(below, np.maximum(natural**2, w**2), modes)
     left, right = outputs @ modes.shape, modes.shape.T @ inputs
     result = (gain @ _pairs(left, right)).reshape(len(below), len(left), -1)
-    if residual and len(natural) < len(system.M):
+    if len(natural) < len(system.M):
         elastic = natural > 0.0
         static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
         result += static - (left[:, elastic] / natural[elastic] ** 2) @ right[elastic]
@@ -167,7 +157,7 @@ def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None)
 
 @dataclass(frozen=True)
 class Reduction:
-    """``[W^T; L] Z^-1 [W, loads]`` as ``sum_k left_k right_k h_k(omega) + residual``.
+    """``[W^T; L] Z^-1 [W, loads]`` as ``sum_k left_k right_k h_k(omega)`` over all modes.
 
     Real modes have ``h = 1 / (omega_k^2 - omega^2 + i omega d_k)``; complex ones, of the state form,
     ``h = 1 / (i omega - lambda_k)``. Both are ``1 / (constant + i omega linear - square omega^2)``.
@@ -184,12 +174,10 @@ class Reduction:
         ``right_k``.
     pairs : (m or p, n_columns (n_columns + n_loads)) array
         ``left_k right_k`` of the columns.
-    static, residual : (n_columns, n_columns + n_loads) arrays
-        Flexibility of all modes and of those left out [m/N].
-    system : MechanicalSystem
-        Its ``W`` holds columns and loads.
+    static : (n_columns, n_columns + n_loads) array
+        Flexibility without the rigid motions [m/N].
     modes : Modes
-        Undamped modes of that system.
+        Undamped, of the system whose ``W`` holds columns and loads.
     shape : (n, m or p) array
         Displacements of the poles; rigid motions of complex modes are in `drift`.
     drift : (n, p) array or None
@@ -203,8 +191,6 @@ class Reduction:
     inputs: np.ndarray
     pairs: np.ndarray
     static: np.ndarray
-    residual: np.ndarray
-    system: MechanicalSystem
     modes: Modes
     shape: np.ndarray
     drift: np.ndarray | None = None
@@ -239,23 +225,16 @@ class Reduction:
         omega = np.asarray(omega, float)
         gain, change = self.gain(omega)
         shape = (*omega.shape, *self.static.shape)
-        value = _times(gain, self.pairs).reshape(shape) + self.residual
+        value = _times(gain, self.pairs).reshape(shape)
         slope = _times(change, self.pairs).reshape(shape)
         return np.where((omega == 0.0)[..., None, None], self.static, value), slope
 
 
-def reduce_problem(
-    problem: NonlinearSystem,
-    *,
-    reference=None,
-    count: int | None = None,
-    max_frequency: float | None = None,
-) -> Reduction:
-    """Modes of the linear part, with the elements replaced by springs.
+def reduce_problem(problem: NonlinearSystem, *, reference=None) -> Reduction:
+    """All modes of the linear part, with the elements replaced by springs.
 
     Damping that the real modes make diagonal keeps them; any other damping and gyroscopic terms give complex
-    modes of the state form of the kept real modes (Ewins, Modal Testing, 2nd ed., sections 2.7 and 2.8). The
-    modes left out keep their static flexibility (Geradin and Rixen, Mechanical Vibrations, 3rd ed., 2.9).
+    modes of the state form of the real modes (Ewins, Modal Testing, 2nd ed., sections 2.7 and 2.8).
 
     Parameters
     ----------
@@ -265,8 +244,6 @@ def reduce_problem(
     reference : (n_columns,) array, optional
         Spring of every column [N/m], any that are not negative; the size of the elements' own reference
         when not given. It moves nothing but the convergence of iterations.
-    count, max_frequency : int, float, optional
-        Real modes to keep, see `solve_modes`; all when neither is given.
 
     Raises
     ------
@@ -276,13 +253,9 @@ def reduce_problem(
         A rigid motion that strains a column, negative stiffness, a defective state matrix.
     """
     reference = np.abs(problem.reference) if reference is None else np.asarray(reference, float)
-    system, modes = _modes_with_loads(problem, reference, count, max_frequency)
+    modes = _modes_with_loads(problem, reference)
     columns, rows = len(reference), modes.mesh_deflection
-    residual = _residual(system, modes, problem.system.W.T)
-    static = _static(modes, problem.system.W.T) + residual
-    common = {
-        "reference": reference, "static": static, "residual": residual, "system": system, "modes": modes,
-    }  # fmt: skip
+    common = {"reference": reference, "static": _static(modes, problem.system.W.T), "modes": modes}
     modal = modes.shape.T @ problem.damping @ modes.shape
     off = np.abs(modal - np.diag(np.diag(modal))).max(initial=0.0)
     if off > _COUPLED * np.abs(modal).max(initial=0.0):
@@ -293,15 +266,15 @@ def reduce_problem(
     )  # fmt: skip
 
 
-def _modes_with_loads(problem, reference, count, max_frequency) -> tuple[MechanicalSystem, Modes]:
-    """The undamped system and its modes, with the loads as further columns of ``W``."""
-    steady = [force.force.real for force in problem.forces if not any(force.orders)]
+def _modes_with_loads(problem: NonlinearSystem, reference: np.ndarray) -> Modes:
+    """Modes of the undamped system, with the loads as further columns of ``W``."""
+    steady = [np.real(force.force) for force in problem.forces if not any(force.orders)]
     bare = replace(
         problem.system, C=np.zeros_like(problem.system.C), gyroscopic=None,
         load=problem.system.load + sum(steady),
     )  # fmt: skip
     try:
-        modes = solve_modes(bare, reference, damping_ratio=0.0, count=count, max_frequency=max_frequency)
+        modes = solve_modes(bare, reference, damping_ratio=0.0)
     except ConvergenceError as error:
         if error.code != "E-STIFFNESS" or problem.system.gyroscopic is None:
             raise
@@ -312,13 +285,12 @@ def _modes_with_loads(problem, reference, count, max_frequency) -> tuple[Mechani
         ) from error  # fmt: skip
     loads = [bare.load]
     for force in problem.forces:
-        loads += [force.force.real, force.force.imag]
-    system = replace(bare, W=np.column_stack([bare.W, *loads]))
-    rows = system.W.T @ modes.shape
+        loads += [np.real(force.force), np.imag(force.force)]
+    rows = np.column_stack([bare.W, *loads]).T @ modes.shape
     # columns and constant load leave rigid motions alone, solve_modes has made sure
     rows[: len(reference) + 1, modes.frequency == 0.0] = 0.0
     stiffness = np.concatenate([reference, np.zeros(len(loads))])
-    return system, replace(modes, mesh_stiffness=stiffness, mesh_deflection=rows)
+    return replace(modes, mesh_stiffness=stiffness, mesh_deflection=rows)
 
 
 def respond(reduction: Reduction, outputs, omega, inputs) -> np.ndarray:
@@ -335,20 +307,13 @@ def respond(reduction: Reduction, outputs, omega, inputs) -> np.ndarray:
         still = omega == 0.0
         out += (outputs @ reduction.drift) @ (coordinates / np.where(still, np.inf, 1j * omega))
         out[:, still] = _static(reduction.modes, outputs) @ inputs[:, still]
-    return out + _residual(reduction.system, reduction.modes, outputs) @ inputs
+    return out
 
 
 def _static(modes: Modes, outputs) -> np.ndarray:
     """Static flexibility of the modes from columns and loads to the outputs; rigid motions stay out."""
     square = np.where(modes.frequency > 0.0, 2.0 * np.pi * modes.frequency, np.inf) ** 2
     return ((outputs @ modes.shape) / square) @ modes.mesh_deflection.T
-
-
-def _residual(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
-    """Static flexibility of the modes left out; zero when all are there."""
-    if len(modes.frequency) == len(system.M):
-        return np.zeros((len(outputs), system.W.shape[1]))
-    return residual_output(system, modes, outputs)
 
 
 def _pairs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -383,7 +348,7 @@ def _check_poles(reduction: Reduction, modal, natural, omega: float) -> None:
     rows = reduction.modes.mesh_deflection
     stiffness = np.diag(natural**2 - omega**2) + 1j * omega * modal
     direct = rows[: len(reduction.reference)] @ np.linalg.solve(stiffness, rows.T.astype(complex))
-    error = np.abs(reduction.at(omega)[0] - reduction.residual - direct).max()
+    error = np.abs(reduction.at(omega)[0] - direct).max()
     if not error <= _POLES * np.abs(direct).max(initial=np.finfo(float).tiny):
         raise ConvergenceError(
             f"the complex modes give a receptance that is wrong by {error:.2e} of {np.abs(direct).max():.2e}",

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 from scipy.linalg import polar
-from scipy.optimize import linear_sum_assignment
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import ComplexModes, complex_modes, whirl
@@ -281,6 +279,8 @@ def _solved(family, value: float, root: np.ndarray) -> _Point:
 
 def _assigned(old: _Point, new: _Point) -> tuple[_Point, np.ndarray]:
     """The new modes in the order of the old branches, and their agreement (m,)."""
+    from scipy.optimize import linear_sum_assignment
+
     m, value = len(old.eigenvalue), new.eigenvalue
     if len(value) < m:
         raise ConvergenceError(
@@ -357,6 +357,8 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _critical(tracked: TrackedModes, orders) -> tuple[CriticalSpeed, ...]:
+    from scipy.interpolate import PchipInterpolator
+
     rising = np.argsort(tracked.value)
     speed, angular = tracked.value[rising], tracked.eigenvalue.imag[rising]
     found = []

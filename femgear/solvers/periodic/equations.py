@@ -22,7 +22,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, gmres
 
 from femgear.errors import CaseError, ConvergenceError, checked_count
@@ -36,7 +36,7 @@ from femgear.solvers.periodic.phase_grid import (
     sample_counts,
 )
 from femgear.solvers.periodic.solution import PeriodicSolution
-from femgear.system.elements import Element
+from femgear.system.force_laws import Element
 from femgear.system.fourier import checked_lines, harmonic_lines, line_tail
 from femgear.system.system import NonlinearSystem
 
@@ -54,8 +54,6 @@ MANY = 600
 _NO_STIFFNESS = 1e-9
 # Relative accuracy of a Newton step, and products after which the matrix is taken instead.
 _ACCURACY, _PRODUCTS = 1e-3, 60
-# No derivatives are kept with the forces.
-_NONE = np.empty((0, 0, 0))
 
 
 @dataclass(frozen=True)
@@ -110,12 +108,15 @@ class HarmonicBalance:
         out[:, 0], out[:, 1:] = table[:, 0], table[:, 1::2] + 1j * table[:, 2::2]
         return out
 
-    def forces(self, lines) -> LineForces:
-        """What the elements do beyond their reference springs, at lines (n_columns, L)."""
+    def forces(self, lines) -> tuple[np.ndarray, np.ndarray]:
+        """What the elements do beyond their reference springs, at lines (n_columns, L): lines of the forces
+        (n_columns, L) [N], and for every coupled pair their derivative (n_pairs, L, 2 L - 1) [N/m] by the
+        unknowns of one column.
+        """
         # one transform for forces and tangents; columns without elements keep their reference spring
         both = self.grid.transform(np.hstack(self.beyond_reference(lines)))
         n = len(self.reduction.reference)
-        return LineForces(self.grid.amplitudes(both[:n]), self.grid.products(both[n:]))
+        return self.grid.amplitudes(both[:n]), self.grid.products(both[n:])
 
     def beyond_reference(self, lines) -> tuple[np.ndarray, np.ndarray]:
         """Forces (N, n_columns) and tangents (N, n_pairs) less the reference springs, on the grid."""
@@ -130,16 +131,16 @@ class HarmonicBalance:
         frequency = np.atleast_1d(np.asarray(frequency, float))
         return self.reduction.at(self.orders @ frequency)
 
-    def residual(self, lines, forces, receptance) -> np.ndarray:
+    def residual(self, lines, force, receptance) -> np.ndarray:
         """``X + T (F - reference X) - T_load S`` (n_columns, L) [m]."""
-        return lines + self._respond(receptance, forces.lines)
+        return lines + self._respond(receptance, force)
 
-    def jacobian(self, forces, receptance) -> np.ndarray:
+    def jacobian(self, products, receptance) -> np.ndarray:
         """Derivative (n_y, n_y) of the residual by the unknowns."""
         n, width = len(self.reduction.reference), 2 * len(self.orders) - 1
         columns = np.zeros((n, len(self.orders), n, width), np.complex128)
         transfer = receptance[:, :, :n].transpose(1, 0, 2)
-        for (row, column), block in zip(self.pairs, forces.products):
+        for (row, column), block in zip(self.pairs, products):
             columns[:, :, column] += transfer[:, :, row, None] * block
         out = np.empty((n, width, n, width))
         out[:, 0], out[:, 1::2] = np.real(columns[:, 0]), np.real(columns[:, 1:])
@@ -153,14 +154,14 @@ class HarmonicBalance:
         base frequencies [rad/s].
         """
         lines = self.lines(y)
-        forces = self.forces(lines)
+        force, products = self.forces(lines)
         value, change = self.receptance(frequency)
-        moved = self._respond(change, forces.lines)
+        moved = self._respond(change, force)
         slope = np.stack([self.unknowns(moved * order) for order in self.orders.T], axis=1)
-        residual = self.unknowns(self.residual(lines, forces, value))
-        return residual, self.jacobian(forces, value), slope
+        residual = self.unknowns(self.residual(lines, force, value))
+        return residual, self.jacobian(products, value), slope
 
-    def spectral_radius(self, y, frequency, forces: LineForces | None = None) -> float:
+    def spectral_radius(self, y, frequency, products: np.ndarray | None = None) -> float:
         """Spectral radius of the fixed point ``X <- T_load S - T (F - reference X)`` at the unknowns y.
 
         Largest modulus of the eigenvalues of ``T d(F - reference X)/dX``, the Jacobian of the residual less
@@ -171,7 +172,8 @@ class HarmonicBalance:
             found = krylov_radius(linearised(self, receptance, np.asarray(y, float))[1])
             if found is not None:
                 return found
-        matrix = self.jacobian(forces or self.forces(self.lines(y)), receptance)
+        products = self.forces(self.lines(y))[1] if products is None else products
+        matrix = self.jacobian(products, receptance)
         matrix[np.diag_indices(self.size)] -= 1.0
         return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
 
@@ -181,7 +183,7 @@ class HarmonicBalance:
         static = -self._respond(value, np.zeros((len(self.reduction.reference), len(self.orders))))
         mean = np.zeros_like(static)
         mean[:, 0] = static[:, 0]
-        return self.unknowns(-self._respond(value, self.forces(mean).lines))
+        return self.unknowns(-self._respond(value, self.forces(mean)[0]))
 
     def solution(self, y, frequency, *, radius: bool = False, **what_happened) -> PeriodicSolution:
         """The unknowns as a solution; keywords are the fields of `PeriodicSolution` that say how it came.
@@ -190,23 +192,23 @@ class HarmonicBalance:
         """
         frequency = np.atleast_1d(np.asarray(frequency, float))
         lines = self.lines(y)
-        forces = self.forces(lines)
+        beyond, products = self.forces(lines)
         if "residual" not in what_happened:
-            error = self.unknowns(self.residual(lines, forces, self.receptance(frequency)[0]))
+            error = self.unknowns(self.residual(lines, beyond, self.receptance(frequency)[0]))
             what_happened["residual"] = relative_residual(self, error, y)
         if radius:
-            what_happened["spectral_radius"] = self.spectral_radius(y, frequency, forces)
+            what_happened["spectral_radius"] = self.spectral_radius(y, frequency, products)
         told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
         if note := _uncarried_note(
             self,
             lines,
-            lambda: self.residual(lines, forces, self.receptance(frequency)[0]),
+            lambda: self.residual(lines, beyond, self.receptance(frequency)[0]),
             told["converged"],
         ):
             # the whole mean load is out of balance, whatever its ratio to a deflection that runs away
             told |= {"converged": False, "message": f"Not converged: {note}."}
             told["residual"] = max(told["residual"], 1.0)
-        force = forces.lines + self.reduction.reference[:, None] * lines
+        force = beyond + self.reduction.reference[:, None] * lines
         return PeriodicSolution(
             frequency, self.orders, lines, force, tail=line_tail(lines, self.orders), **told
         )
@@ -215,18 +217,6 @@ class HarmonicBalance:
         """``T force - T_load S`` (n_columns, L)."""
         table = np.concatenate([force, -self.source]).T
         return (receptance @ table[..., None])[..., 0].T
-
-
-@dataclass(frozen=True)
-class LineForces:
-    """Lines (n_columns, L) [N] of what the elements do beyond their reference springs.
-
-    ``products`` (n_pairs, L, 2 L - 1) [N/m]: their derivative by the unknowns of one column, for every
-    coupled pair.
-    """
-
-    lines: np.ndarray
-    products: np.ndarray
 
 
 def harmonic_balance(
@@ -330,7 +320,8 @@ def _element_name(problem: NonlinearSystem, column: int) -> str:
 class LineTangent:
     """``dR/dX`` of the harmonic equations at one deflection, without a matrix of its size.
 
-    ``stiffness`` (N, n_pairs) [N/m]: tangents of the coupled pairs less the reference springs, on the grid.
+    ``receptance`` (L, n_columns, n_columns + n_loads) [m/N] of the lines; ``stiffness`` (N, n_pairs) [N/m]:
+    tangents of the coupled pairs less the reference springs, on the grid.
     """
 
     balance: HarmonicBalance
@@ -357,11 +348,14 @@ class LineTangent:
 
 
 def linearised(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineTangent]:
-    """Residual (n_y,) [m] of the harmonic equations at the unknowns y, and its derivative."""
+    """Residual (n_y,) [m] of the harmonic equations at the unknowns y (n_y,) [m], and its derivative.
+
+    ``receptance`` as `LineTangent` has it.
+    """
     lines = balance.lines(y)
     force, stiffness = balance.beyond_reference(lines)
-    forces = balance.grid.amplitudes(balance.grid.transform(force))
-    error = balance.unknowns(balance.residual(lines, LineForces(forces, _NONE), receptance))
+    beyond = balance.grid.amplitudes(balance.grid.transform(force))
+    error = balance.unknowns(balance.residual(lines, beyond, receptance))
     return error, LineTangent(balance, receptance, stiffness)
 
 
@@ -439,6 +433,8 @@ def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] |
     None where some forces within the reach of all elements balance the load on the free motions: a linear
     programme that minimises what is left over. Of several columns the least forces are the wanted ones.
     """
+    from scipy.optimize import linprog
+
     strain, load = _free_balance(balance)
     columns = np.flatnonzero(np.abs(strain).max(axis=0, initial=0.0) > _UNSTRAINED)
     if not len(columns) or not np.any(load):
@@ -449,7 +445,7 @@ def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] |
     rows, eye = strain[:, columns], np.eye(len(load))
     bounds = np.clip(reach / size, -_FAR, _FAR).tolist() + [(0.0, None)] * (2 * len(load))
     cost = np.concatenate([np.zeros(len(columns)), np.ones(2 * len(load))])
-    left = optimize.linprog(cost, A_eq=np.hstack([rows, eye, -eye]), b_eq=load / size, bounds=bounds)
+    left = linprog(cost, A_eq=np.hstack([rows, eye, -eye]), b_eq=load / size, bounds=bounds)
     if not left.success or left.fun <= _BEYOND * np.abs(load / size).max():
         return None
     worst = int(np.argmax(np.maximum(reach[:, 0] - wanted, wanted - reach[:, 1])))
@@ -478,7 +474,7 @@ def _reach(balance: HarmonicBalance, column: int) -> tuple[float, float]:
     for sign in (-1.0, 1.0):
         lines = np.zeros((len(balance.reduction.reference), len(balance.orders)), complex)
         lines[column, 0] = sign * far(balance)
-        beyond = balance.forces(lines).lines[column, 0].real
+        beyond = balance.forces(lines)[0][column, 0].real
         values.append(float(beyond + balance.reduction.reference[column] * lines[column, 0].real))
     low, high = sorted(values)
     # what is left of two large numbers is their rounding

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.errors import CaseError, checked_count, checked_numbers, checked_tolerance
+from femgear.errors import CaseError, ConvergenceError, checked_count, checked_numbers, checked_tolerance
+from femgear.solvers.continuation.arclength import continue_curve
+from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.equations import (
     MANY,
     HarmonicBalance,
-    LineForces,
     LineTangent,
     harmonic_balance,
     linearised,
@@ -42,6 +43,7 @@ def solve_harmonic_balance(
     tolerance: float = 1e-10,
     max_iterations: int = 50,
     stability: bool = True,
+    stability_tolerance: float = 1e-7,
     radius: bool | None = None,
     **equations,
 ) -> PeriodicSolution:
@@ -62,6 +64,8 @@ def solve_harmonic_balance(
     stability : bool
         Floquet verdict and spectral radius of the fixed point. With several base frequencies or the frequency
         zero the verdict says "not covered". Loops that need neither are quicker without.
+    stability_tolerance : float
+        Relative error of the monodromy matrix.
     radius : bool, optional
         The radius alone, with or without the verdict; it takes all eigenvalues of one matrix of the size of
         the unknowns.
@@ -92,7 +96,7 @@ def solve_harmonic_balance(
         found = replace(found, message=found.message + note)
     if stability if radius is None else radius:
         found = with_radius(balance, found)
-    return judged(problem, [found])[0] if stability else found
+    return judged(problem, [found], tolerance=stability_tolerance)[0] if stability else found
 
 
 def displacements(
@@ -141,37 +145,10 @@ class PeriodicResponse:
     spectral_radius = of_solution("spectral_radius", "Of the fixed point; it says nothing on stability.")
 
 
-def periodic_response(
-    problem: NonlinearSystem,
-    frequency,
-    *,
-    method: str = "monodromy",
-    stability_tolerance: float = 1e-7,
-    **options,
-) -> PeriodicResponse:
-    """`solve_harmonic_balance` with a choice of the method of the verdict; refuses the frequency zero.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    frequency : float or (n_bases,) array
-        Base frequencies [rad/s]; a single one must be positive.
-    method, stability_tolerance
-        Method and tolerance of `floquet_verdicts`.
-    options
-        Those of `solve_harmonic_balance`; harmonics or orders must be given.
-
-    Raises
-    ------
-    CaseError
-        Input that cannot be used, a single base frequency of zero (E-RANGE).
-    ConvergenceError
-        An undamped resonance of the system with reference springs at a line.
-    """
+def periodic_response(problem: NonlinearSystem, frequency, **options) -> PeriodicResponse:
+    """`solve_harmonic_balance` with the verdict at hand; refuses the single base frequency zero (E-RANGE)."""
     require_period(frequency)
-    options = {"radius": True, **options}
-    solution = solve_harmonic_balance(problem, frequency, stability=False, **options)
-    return PeriodicResponse(judged(problem, [solution], method=method, tolerance=stability_tolerance)[0])
+    return PeriodicResponse(solve_harmonic_balance(problem, frequency, **options))
 
 
 def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int) -> PeriodicSolution:
@@ -222,17 +199,39 @@ def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterati
 def _embed(
     balance: HarmonicBalance, frequency, failed: PeriodicSolution, tolerance: float, max_iterations: int
 ) -> PeriodicSolution:
-    """Solution found by Newton's method from the end of an `_Embedding`; ``failed`` where it has no end."""
-    curve = _Embedding(balance, balance.receptance(frequency)[0])
-    y, steps = curve.follow()
-    work = failed.factorisations + curve.factorisations
-    if y is None:
-        note = f" The embedding of the reference springs was lost after {steps} steps."
-        return replace(failed, factorisations=work, message=failed.message + note)
-    found = newton(balance, frequency, y, tolerance, max_iterations)
-    note = f" Newton's method alone failed; started from {steps} steps of embedding."
+    """Solution found by Newton's method from the end of an embedding; ``failed`` where it has no end.
+
+    The arc of ``X + t T (F - reference X) = T_load S`` from t = 0, where it is linear, to t = 1: reference
+    springs turn gradually into the elements, through limit points if there are any (Allgower and Georg,
+    Introduction to Numerical Continuation Methods, 2003, chapters 2 and 6).
+    """
+    receptance = balance.receptance(frequency)[0]
+    nothing = np.zeros((len(balance.reduction.reference), len(balance.orders)), complex)
+    linear = -balance.unknowns(balance.residual(nothing, nothing, receptance))
+
+    def evaluate(y, t):
+        full, products = _with_matrix(balance, receptance, y)
+        change = full - (y - linear)
+        jacobian = t * balance.jacobian(products, receptance)
+        jacobian[np.diag_indices(len(y))] += 1.0 - t
+        return y - linear + t * change, jacobian, change
+
+    scale = max(float(np.linalg.norm(linear)), balance.scale)
+    options = StepOptions(
+        first=_FIRST, smallest=_LEAST, largest=_LONGEST, angle=0.3, contraction=0.25, max_points=_STEPS,
+    )  # fmt: skip
+    try:
+        curve = continue_curve(evaluate, linear, 0.0, limits=(0.0, 1.0), scale=scale, options=options)
+    except ConvergenceError:
+        curve = None
+    if curve is None or curve.parameter[-1] != 1.0:
+        note = " The embedding of the reference springs was lost."
+        return replace(failed, message=failed.message + note)
+    found = newton(balance, frequency, curve.points[-1], tolerance, max_iterations)
+    note = f" Newton's method alone failed; started from {len(curve.points) - 1} steps of embedding."
+    work = failed.factorisations + int(curve.iterations.sum()) + found.factorisations
     return replace(
-        found, factorisations=work + found.factorisations, iterations=failed.iterations + found.iterations,
+        found, factorisations=work, iterations=failed.iterations + found.iterations,
         message=found.message + note,
     )  # fmt: skip
 
@@ -245,79 +244,11 @@ def with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSo
     return replace(found, spectral_radius=value)
 
 
-class _Embedding:
-    """The arc of ``X + t T (F - reference X) = T_load S`` from t = 0, where it is linear, to t = 1.
-
-    Reference springs turn gradually into the elements, through limit points if there are any (Allgower and
-    Georg, Introduction to Numerical Continuation Methods, 2003, chapters 2 and 6). Unknowns are scaled by the
-    linear solution.
-    """
-
-    def __init__(self, balance: HarmonicBalance, receptance):
-        self.balance, self.receptance = balance, receptance
-        forces = balance.forces(np.zeros((len(balance.reduction.reference), len(balance.orders))))
-        nothing = np.zeros_like(forces.lines)
-        self.linear = -balance.unknowns(balance.residual(nothing, replace(forces, lines=nothing), receptance))
-        self.scale = max(np.linalg.norm(self.linear), balance.scale)
-        self.factorisations = 0
-
-    def follow(self) -> tuple[np.ndarray | None, int]:
-        """Unknowns near t = 1, or none, and the number of steps."""
-        point = np.append(self.linear / self.scale, 0.0)
-        length, tangent = _FIRST, self._tangent(point, np.append(np.zeros(len(self.linear)), 1.0))
-        for number in range(_STEPS):
-            new, rounds = self._correct(point + length * tangent, tangent)
-            if new is None:
-                length *= 0.5
-                if length < _LEAST:
-                    return None, number
-                continue
-            if new[-1] >= 1.0:
-                share = (1.0 - point[-1]) / (new[-1] - point[-1])
-                end = point + share * (new - point)
-                return self.scale * end[:-1], number + 1
-            point, tangent = new, self._tangent(new, tangent)
-            length = min(_LONGEST, 1.5 * length) if rounds <= 3 else length
-        return None, _STEPS
-
-    def _system(self, point):
-        """Residual and its derivative (n_y, n_y + 1) by the scaled unknowns and t."""
-        y, t = self.scale * point[:-1], point[-1]
-        full, forces = _with_matrix(self.balance, self.receptance, y)
-        change = full - (y - self.linear)
-        jacobian = t * self.balance.jacobian(forces, self.receptance)
-        jacobian[np.diag_indices(len(y))] += 1.0 - t
-        return y - self.linear + t * change, np.column_stack([self.scale * jacobian, change])
-
-    def _solve(self, matrix, row, right):
-        self.factorisations += 1
-        return np.linalg.solve(np.vstack([matrix / self.scale, row]), right)
-
-    def _tangent(self, point, before):
-        right = np.append(np.zeros(len(point) - 1), 1.0)
-        tangent = self._solve(self._system(point)[1], before, right)
-        return tangent / np.linalg.norm(tangent)
-
-    def _correct(self, guess, tangent):
-        """Point of the arc in the plane through the guess, normal to the tangent, and the rounds it took."""
-        point = guess
-        for rounds in range(1, 9):
-            error, matrix = self._system(point)
-            right = np.append(-error / self.scale, tangent @ (guess - point))
-            if np.abs(right).max() < 1e-8:
-                return point, rounds
-            try:
-                point = point + self._solve(matrix, tangent, right)
-            except np.linalg.LinAlgError:
-                return None, rounds
-        return None, rounds
-
-
-def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineForces]:
-    """Residual (n_y,) at the unknowns y, and what its derivative is made of."""
+def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, np.ndarray]:
+    """Residual (n_y,) [m] at the unknowns y, and the products of which its derivative is made."""
     lines = balance.lines(y)
-    forces = balance.forces(lines)
-    return balance.unknowns(balance.residual(lines, forces, receptance)), forces
+    force, products = balance.forces(lines)
+    return balance.unknowns(balance.residual(lines, force, receptance)), products
 
 
 def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.ndarray:
@@ -326,7 +257,7 @@ def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.
         step = tangent.solve(error)
         if step is not None:
             return step
-        tangent = balance.forces(balance.lines(y))
+        tangent = balance.forces(balance.lines(y))[1]
     return np.linalg.solve(balance.jacobian(tangent, receptance), error)
 
 

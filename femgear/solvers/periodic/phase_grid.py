@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfftn, next_fast_len, rfftn
 
 from femgear.errors import CaseError
-from femgear.system.elements import Element, coefficients_of, with_coefficients
+from femgear.system.force_laws import Element, coefficients_of, with_coefficients
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import NonlinearSystem
 
@@ -67,6 +66,8 @@ class PhaseGrid:
 
     def values(self, lines: np.ndarray) -> np.ndarray:
         """Signals (N, n) of one-sided lines (n, L)."""
+        from scipy.fft import irfftn
+
         shape = (*self.samples[:-1], self.samples[-1] // 2 + 1)
         spectrum = np.zeros((len(lines), int(np.prod(shape))), complex)
         place, mirrored = self.lines
@@ -80,6 +81,8 @@ class PhaseGrid:
 
     def transform(self, signals: np.ndarray) -> np.ndarray:
         """Two-sided coefficients (n, M) of signals (N, n), the last base half."""
+        from scipy.fft import rfftn
+
         grid = np.ascontiguousarray(signals.T).reshape(-1, *self.samples)
         axes = tuple(range(1, grid.ndim))
         return np.asarray(rfftn(grid, axes=axes)).reshape(len(grid), -1) / len(self.theta)
@@ -93,7 +96,7 @@ class PhaseGrid:
     def products(self, coefficients: np.ndarray) -> np.ndarray:
         """Matrices (n, L, 2 L - 1) that give the lines of a product from ``Re X_0, Re X_1, Im X_1, ...``.
 
-        Toeplitz and Hankel parts as in `series.product_matrix`; they are the exact derivatives of the
+        Toeplitz and Hankel parts as in `fourier.product_matrix`; they are the exact derivatives of the
         sampled transform, aliasing included.
         """
         toeplitz, hankel = _pick(coefficients, self.differences), _pick(coefficients, self.sums)
@@ -131,13 +134,15 @@ def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
 
 
 def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ...]:
-    """Samples along every base that keep aliasing out of the lines.
+    """Samples along every base that keep aliasing out of the lines ``orders`` (L, n_bases).
 
     Products of the lines with polynomials of degree p and with Fourier series of n harmonics are exact with
     ``(p + 1) H + 2 n + 1`` samples, H the highest order along the base. Where contact opens and closes, or a
     coefficient jumps, the error falls with the square of the spacing (with the spacing for a jump): 128 H and
     at least 2048 samples for one base, 8 H and at least 64 along each of several.
     """
+    from scipy.fft import next_fast_len
+
     top = np.abs(orders).max(axis=0)
     counts = np.ones(orders.shape[1], int)
     for element in problem.elements:
@@ -172,7 +177,10 @@ def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:
 
 
 def forces_on_grid(elements, pairs, x, theta) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (N, n_columns) and tangents (N, n_pairs) of coupled pairs at deflections x (N, n_columns)."""
+    """Forces (N, n_columns) [N] and tangents (N, n_pairs) [N/m] of the coupled pairs (n_pairs, 2).
+
+    At deflections x (N, n_columns) [m] and phases theta (N, n_bases) [rad].
+    """
     force, tangent = np.zeros_like(x), np.zeros((len(x), len(pairs)))
     place = {tuple(pair): number for number, pair in enumerate(pairs.tolist())}
     for element in elements:

@@ -113,10 +113,10 @@ class FloquetVerdict:
         ``""`` when stable; how the largest multiplier leaves the unit circle: ``"fold"`` (through +1: limit
         point, pitchfork, transcritical), ``"flip"`` (through -1) or ``"Neimark-Sacker"`` (complex pair).
     method : str
-        ``"exact exponentials"``, ``"splitting"``, ``"Hill"`` or ``""``.
+        ``"exact exponentials"``, ``"splitting"``, ``"shooting"`` or ``""``.
     message : str
     error : float
-        Estimated relative error of the monodromy matrix; of Hill's method it is not known (nan).
+        Estimated relative error of the monodromy matrix.
     """
 
     multipliers: np.ndarray

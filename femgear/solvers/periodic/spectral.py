@@ -103,7 +103,7 @@ class HarmonicProblem:
     """``E_h + T_h (g E)_h = S_h`` for every harmonic h, mesh and speed.
 
     Receptance T (n, n, n_speeds, H + 1) [m/N]; product (n, 2 (H + 1), 2 (H + 1)), multiplication by the
-    stiffness fluctuation of each mesh, see `series.product_matrix` [N/m]; source S (n, n_speeds, H + 1) [m].
+    stiffness fluctuation of each mesh, see `fourier.product_matrix` [N/m]; source S (n, n_speeds, H + 1) [m].
     """
 
     receptance: np.ndarray

@@ -1,4 +1,4 @@
-"""Stability of periodic motions: Floquet multipliers from the monodromy matrix or by Hill's method.
+"""Stability of periodic motions: Floquet multipliers from the monodromy matrix.
 
 Periodic solutions of nonlinear problems are judged one by one or many of one problem (`floquet_verdicts`).
 Small motions about a periodic state are followed through one period in modes with the tangents of the
@@ -25,7 +25,7 @@ from femgear.solvers.periodic.solution import (
     open_verdict,
     verdict_of,
 )
-from femgear.system.elements import tangent_jumps
+from femgear.system.force_laws import tangent_jumps
 from femgear.system.system import Modes, NonlinearSystem, element_forces
 
 # Angle [rad] that the fastest mode turns in a step of the first sequence, and sequences of halved steps.
@@ -74,7 +74,9 @@ def monodromy(matrices, durations) -> np.ndarray:
 
 
 def stiffness_in_series(change: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
-    """Put a static flexibility (n_c, n_c) in series with stiffnesses (..., n_c, n_c), ``k (1 + T k)^-1``.
+    """Put a flexibility T (n_c, n_c) [m/N] in series with stiffnesses k (..., n_c, n_c) [N/m].
+
+    ``k (1 + T k)^-1`` (..., n_c, n_c) [N/m].
 
     Raises
     ------
@@ -217,6 +219,7 @@ def passage(
 
     Parameters
     ----------
+    frame : Frame
     period : (p,) array
         [s]
     tangents : callable
@@ -361,12 +364,13 @@ def floquet_verdicts(
     problem: NonlinearSystem,
     solutions: Sequence[PeriodicSolution],
     *,
-    method: str = "monodromy",
     tolerance: float = 1e-7,
-    harmonics: int | None = None,
     modes: int = 100,
 ) -> tuple[FloquetVerdict, ...]:
     """Judge the stability of periodic solutions of one problem by their Floquet multipliers.
+
+    By exact exponentials where the tangents are constant in pieces, otherwise by a splitting, with steps that
+    end where contacts open or close.
 
     Parameters
     ----------
@@ -374,20 +378,15 @@ def floquet_verdicts(
     solutions : sequence of PeriodicSolution
         All with the same lines. With two base frequencies or the frequency zero the verdict is "not
         covered"; "not determined" where the fastest mode would need more than 20000 steps in a period.
-    method : str
-        ``"monodromy"``: exact exponentials where the tangents are constant in pieces, otherwise a splitting,
-        with steps that end where contacts open or close. ``"hill"``: eigenvalues of the harmonic operator.
     tolerance : float
         Relative error of the monodromy matrix.
-    harmonics : int, optional
-        Of Hill's method; by default twice those of the solution.
     modes : int
         Largest number of modes followed; the others count as static flexibility.
 
     Raises
     ------
     CaseError
-        An unknown method, a tolerance that is not between 0 and 1 (E-RANGE).
+        A tolerance that is not between 0 and 1 (E-RANGE).
     ConvergenceError
         Modes left out that are too flexible.
 
@@ -396,10 +395,6 @@ def floquet_verdicts(
     The position of a free motion (rotation of a free train) has the multiplier one and is left out; so is
     its velocity where no damping feels it. Where one does, its multiplier ``exp(-c period)`` counts.
     """
-    if method not in ("monodromy", "hill"):
-        raise CaseError(
-            f"stability by {method!r}", code="E-CHOICE", key="method", limit='"monodromy" or "hill"'
-        )
     tolerance = checked_tolerance(tolerance)
     frame = frame_of(problem, modes=modes)
     early = {i: _not_covered(one) or _too_long(frame, one) for i, one in enumerate(solutions)}
@@ -407,12 +402,7 @@ def floquet_verdicts(
     covered = [i for i in early if i not in out]
     for first in range(0, len(covered), _STATES_TOGETHER):
         part = covered[first : first + _STATES_TOGETHER]
-        chosen = [solutions[i] for i in part]
-        if method == "hill":
-            found = [_by_hill(frame, problem, solution, harmonics) for solution in chosen]
-        else:
-            found = _by_monodromy(frame, problem, chosen, tolerance)
-        out |= zip(part, found)
+        out |= zip(part, _by_monodromy(frame, problem, [solutions[i] for i in part], tolerance))
     return tuple(out[i] for i in range(len(solutions)))
 
 
@@ -459,31 +449,6 @@ def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution])
         return element_forces(problem, x, phase[..., None])[1]
 
     return tangents
-
-
-def _hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
-    """Floquet exponents (2 n,) [1/s] from the stiffness changes kappa (samples, n_c, n_c) [N/m].
-
-    ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
-    block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
-    those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
-    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
-    """
-    n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
-    lines = np.fft.fft(kappa, axis=0) / len(kappa)
-    both = np.concatenate([np.ones(n), np.full(n, omega)])
-    change = np.zeros((4 * harmonics + 1, 2 * n, 2 * n), complex)
-    for number in range(-2 * harmonics, 2 * harmonics + 1):
-        change[number, n:, :n] = -frame.rows.T @ lines[number] @ frame.rows
-    change[0] += frame.state_matrices(np.zeros_like(lines[0].real))
-    change *= both / both[:, None]
-    size = 2 * n * len(orders)
-    matrix = change[orders[:, None] - orders].swapaxes(1, 2).reshape(size, size)
-    matrix[range(size), range(size)] -= 1j * omega * np.repeat(orders, 2 * n)
-    values, vectors = np.linalg.eig(matrix)
-    weight = (np.abs(vectors.reshape(len(orders), 2 * n, -1)) ** 2).sum(axis=1)
-    centre = np.abs(orders @ weight) / weight.sum(axis=0)
-    return _one_copy_each(values[np.argsort(centre, kind="stable")], omega, 2 * n)
 
 
 def _not_covered(solution: PeriodicSolution) -> FloquetVerdict | None:
@@ -557,29 +522,3 @@ def _exact_verdict(frame: Frame, period: float, inner, pieces) -> FloquetVerdict
     durations = np.diff(np.concatenate([[0.0], inner, [1.0]])) * period
     multipliers = np.linalg.eigvals(frame.exact_monodromy(pieces, durations))
     return frame.verdict(multipliers, period, "exact exponentials", 0.0, np.inf)
-
-
-def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int | None) -> FloquetVerdict:
-    count = 2 * int(np.abs(solution.orders).max()) if harmonics is None else int(harmonics)
-    if count < 1:
-        raise CaseError("Hill's method needs a harmonic", code="E-HARMONICS", value=count, limit=">= 1")
-    omega = abs(float(solution.frequency[0]))
-    samples = max(512, 16 * count)
-    fraction = np.arange(samples)[None] / samples
-    kappa = frame.kappa(tangents_of(problem, [solution])(fraction, np.array([0]))[0])
-    exponents = _hill_exponents(frame, kappa, omega, harmonics=count)
-    period = 2.0 * np.pi / omega
-    return frame.verdict(np.exp(exponents * period), period, "Hill", np.nan, np.inf)
-
-
-def _one_copy_each(values: np.ndarray, omega: float, count: int) -> np.ndarray:
-    """The first ``count`` values of which none is another one shifted by a multiple of ``i omega``."""
-    chosen: list[complex] = []
-    for value in values:
-        shift = (value - np.array(chosen)) / (1j * omega)
-        turns = np.round(shift.real)
-        if not np.any((np.abs(shift - turns) < 1e-4) & (turns != 0)):
-            chosen.append(value)
-        if len(chosen) == count:
-            break
-    return np.array(chosen)

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.periodic.solution import CIRCLE, loss_of
 from femgear.solvers.stability.floquet import Frame, frame_of, frame_of_modes, passage, stiffness_in_series
-from femgear.system.elements import tangent_jumps
+from femgear.system.force_laws import tangent_jumps
 from femgear.system.fourier import FourierSeries, StepSeries, sample, series_of
 from femgear.system.system import MeshExcitation, Modes, NonlinearSystem, mesh_harmonics
 

@@ -15,12 +15,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import integrate, linalg
-from scipy.optimize import root_scalar
+from scipy import linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error, state_matrix
-from femgear.system.elements import Element, coefficients_of, has_corners, with_coefficients
+from femgear.system.force_laws import Element, coefficients_of, has_corners, with_coefficients
 from femgear.system.fourier import StepSeries, constant, phase_of
 from femgear.system.system import NonlinearSystem
 
@@ -52,6 +51,8 @@ class Flow:
         ``M^-1`` of the constant load and the harmonic forces, over rate.
     phases : (n_forces,) array
         Angular frequencies of the harmonic forces [rad/s].
+    rows : (n_c, n) array
+        ``W^T``.
     variational : bool
         Carry the derivatives of the state by the state at the start along.
     """
@@ -89,29 +90,19 @@ class Flow:
 
     def derivative(self, law: Contacts):
         """``dy/dt`` as a function of time and state, with the contact state of ``law``."""
-        n, frequency = self.size, self.frequency
-        matrix, columns, rows, loads = self.matrix, self.columns, self.rows, self.loads
-        constant, harmonic, phases = loads[0].real, loads[1:], self.phases
+        n, constant, harmonic = self.size, self.loads[0].real, self.loads[1:]
 
         def motion(t, y):
-            force, _ = law.forces(rows @ y[:n], t * frequency)
-            out = matrix @ y
-            out[n:] += constant - columns @ force
-            if len(phases):
-                out[n:] += (np.exp(1j * phases * t) @ harmonic).real
-            return out
-
-        def both(t, y):
             table = y.reshape(2 * n, -1)
-            force, tangent = law.forces(rows @ table[:n, 0], t * frequency)
-            out = matrix @ table
-            out[n:, 0] += constant - columns @ force
-            if len(phases):
-                out[n:, 0] += (np.exp(1j * phases * t) @ harmonic).real
-            out[n:, 1:] -= columns @ (tangent @ (rows @ table[:n, 1:]))
+            force, tangent = law.forces(self.rows @ table[:n, 0], t * self.frequency)
+            out = self.matrix @ table
+            out[n:, 0] += constant - self.columns @ force
+            if len(self.phases):
+                out[n:, 0] += (np.exp(1j * self.phases * t) @ harmonic).real
+            out[n:, 1:] -= self.columns @ (tangent @ (self.rows @ table[:n, 1:]))
             return out.ravel()
 
-        return both if self.variational else motion
+        return motion
 
     def jacobian(self, law: Contacts):
         """Derivative of the motion by the state, (2n, 2n)."""
@@ -127,7 +118,7 @@ class Flow:
 
 
 def flow(problem: NonlinearSystem, frequency, *, variational=False) -> Flow:
-    """First-order form of a problem; M is factorised once."""
+    """First-order form of a problem at base frequencies (n_bases,) [rad/s]; M is factorised once."""
     system, n = problem.system, len(problem.system.M)
     frequency = np.atleast_1d(np.asarray(frequency, float))
     loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
@@ -155,12 +146,17 @@ def trajectory(
 
     Parameters
     ----------
+    start : array
+        State, of ``Flow.state``.
+    begin, end : float
+        [s].
     method : str
         One of `METHODS`; with tangents only "DOP853".
     tolerance : float
         Relative local error, and absolute of ``scale``, the size of the motion [m].
     events : bool
         Stop at every contact change and at every break of a step series.
+    max_steps : int
 
     Raises
     ------
@@ -200,7 +196,8 @@ def trajectory(
 def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
     """States (n_times, size) of an adaptive integration at ascending instants, and the number of its steps.
 
-    ``pieces`` comes from `trajectory`; instants before its first step have the state ``start``.
+    ``times`` (n_times,) [s]; ``pieces`` comes from `trajectory`; instants before its first step have the
+    state ``start``.
     """
     found, filled, steps = np.empty((len(times), len(start))), 0, 0
     for begin, end, dense in pieces:
@@ -297,6 +294,8 @@ def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, toler
 
 
 def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
+    from scipy import integrate
+
     if method not in METHODS or (motion.variational and method != "DOP853"):
         raise CaseError(f"no integrator {method}", code="E-CHOICE", limit=", ".join(METHODS))
     options = {"rtol": max(tolerance, 3e-14), "atol": atol}
@@ -309,6 +308,8 @@ def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
 
 def _first_change(motion: Flow, law: Contacts, dense, t0, t1, small):
     """Instant of the first contact change in a step and the switches that change, or the end and None."""
+    from scipy.optimize import root_scalar
+
     times = np.linspace(t0, t1, _SAMPLES + 1)
     gaps = _gaps(motion, law, dense, times)
     wrong = gaps[1:] < 0.0
@@ -346,7 +347,8 @@ def _switches(element: Element, x, theta) -> np.ndarray:
 class Contacts:
     """Elements of a problem with the contact state between two changes.
 
-    ``closed``: one bool array an element; none where the elements are evaluated as they are.
+    ``columns``: number of columns of ``W``. ``closed``: one bool array an element; none where the
+    elements are evaluated as they are.
     """
 
     elements: tuple[Element, ...]

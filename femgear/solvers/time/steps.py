@@ -326,7 +326,7 @@ def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.n
 
 
 def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
-    """Largest undamped natural frequency [rad/s] with the given stiffnesses of the columns."""
+    """Largest undamped natural frequency [rad/s] with stiffnesses (n_columns,) [N/m] of the columns."""
     system, n = problem.system, len(problem.system.M)
     total = system.K + (system.W * mesh_stiffness) @ system.W.T
     try:
@@ -425,7 +425,11 @@ def march(
 def march_times(
     problem: NonlinearSystem, scheme: Scheme, frequency, state, g, *, begin, step, count, **options
 ) -> Iterator[tuple[int, Marched, np.ndarray]]:
-    """March in blocks that fit in memory, from ``begin`` [s] on: yields (first step, Marched, phases)."""
+    """March ``count`` steps of length ``step`` [s] from ``begin`` [s] on, in blocks that fit in memory.
+
+    From a state and its column forces g (n_c,) of ``scheme.start``, at base frequencies (n_bases,) [rad/s];
+    options are those of `march`. Yields (first step, Marched, phases (n + 1, n_bases)).
+    """
     frequency = np.atleast_1d(np.asarray(frequency, float))
     block_length = int(np.clip(_BLOCK_NUMBERS // state.size, 64, 8192))
     done, size = 0, 0.0

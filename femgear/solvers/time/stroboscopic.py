@@ -29,8 +29,8 @@ _MOST_STEPS = 100_000
 class StroboscopicMap:
     """The map of one period [s] of a problem, all tables of its steps made once.
 
-    ``law`` and ``loads`` belong to the instants of one period, see `march`, with the phases ``theta`` (steps
-    + 1, n_bases).
+    ``frequency`` (n_bases,) [rad/s]; ``law`` and ``loads`` belong to the instants of one period, see `march`,
+    with the phases ``theta`` (steps + 1, n_bases).
     """
 
     problem: NonlinearSystem

@@ -193,7 +193,7 @@ def step_scheme(
 
 
 def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
-    """Largest stiffness (n_columns,) of every column over the phases, for the stability of steps [N/m].
+    """Largest stiffness (n_columns,) [N/m] of every column over the phases of the base frequencies.
 
     Elements count with what they call steepest, meshes with the top of k(t), others as their reference.
     """

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from femgear.report.scene import add_coloured, load_pyvista, new_plotter, write_png
 from femgear.report.style import VERMILION
@@ -320,6 +319,8 @@ def _frame(plotter, points) -> None:
 
 def _moved(points, centre, shift, turn) -> np.ndarray:
     """Points turned by a rotation vector about a centre, and shifted: rigid, however large the angle."""
+    from scipy.spatial.transform import Rotation
+
     return centre + Rotation.from_rotvec(turn).apply(points - centre) + shift
 
 

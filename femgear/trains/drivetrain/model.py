@@ -25,7 +25,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.fe.shaft import beam_element, disc_matrices
 from femgear.solvers.linear.modal import modal_damping
-from femgear.system.elements import positive_part
+from femgear.system.force_laws import positive_part
 from femgear.system.fourier import FourierSeries, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, torque_histories

@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
@@ -296,6 +295,8 @@ def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> Averag
     per_turn : int
         Samples a turn, more than twice the highest order; orders above a half of it alias.
     """
+    from scipy.interpolate import CubicSpline
+
     angle = np.asarray(angle, float)
     count = int((angle[-1] - angle[0]) / (2.0 * np.pi) * per_turn)
     even = angle[0] + 2.0 * np.pi / per_turn * np.arange(count)

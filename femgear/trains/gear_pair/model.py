@@ -29,11 +29,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
 from femgear.solvers.continuation.branches import Branch
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
@@ -174,6 +173,8 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
     level : float
         `DRIVE` for the first impacts, `BACK` for impacts on both flanks.
     """
+    from scipy.optimize import brentq
+
     away = np.array([_lowest_deflection(one) for one in branch.solutions]) - level
     borders = []
     for i in np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:])):

@@ -5,7 +5,7 @@ between members are springs or rigid. One rotation is the same in all frames, so
 exact at any speed. The centres of two members meet in the fixed frame: with ``z = x + i y`` in frames at the
 angles psi the lateral spring sees ``z_1 exp(i psi_1) - z_2 exp(i psi_2)``. It is a constant spring where both
 frames turn at one speed, or stand; otherwise its columns stay in ``W`` for the periodic element
-`femgear.system.elements.TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16)
+`femgear.system.force_laws.TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16)
 couple stages with the same springs.
 
 Speeds and torques follow from Willis' equation of every stage in one linear system: with the speeds ``w`` of

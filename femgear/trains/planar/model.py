@@ -21,7 +21,7 @@ from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.assembler import free_motions, mesh_elements, pin_directions
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import (
     constant,
     line_tail,

@@ -16,7 +16,7 @@ from femgear.solvers.continuation.branches import (
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 

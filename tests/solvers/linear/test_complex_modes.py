@@ -8,9 +8,9 @@ from published.planetary_sets import lin_parker_set
 from validation.reference.mode_energy import motion_planes
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import complex_modes, damping_matrix, solve_modes, whirl
+from femgear.solvers.linear.modal import complex_modes, solve_modes, whirl
 from femgear.system.assembler import gear_set_system
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import MechanicalSystem, damping_matrix
 
 NO_MESH = np.zeros(0)
 

@@ -7,7 +7,7 @@ from femgear.errors import CaseError
 from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 

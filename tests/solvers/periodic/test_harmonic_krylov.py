@@ -7,7 +7,7 @@ from femgear.solvers.periodic import equations
 from femgear.solvers.periodic import harmonic_balance as solvers_periodic_harmonic_balance
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.system.elements import GearMeshes, RadialBearings
+from femgear.system.force_laws import GearMeshes, RadialBearings
 from femgear.system.fourier import FourierSeries, side_bands
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 

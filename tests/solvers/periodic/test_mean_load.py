@@ -10,7 +10,7 @@ from femgear.solvers.periodic.harmonic_balance import (
     periodic_response,
     solve_harmonic_balance,
 )
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 

@@ -15,7 +15,7 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import monodromy
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 

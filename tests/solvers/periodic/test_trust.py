@@ -26,7 +26,7 @@ from femgear.solvers.stability import floquet
 from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.solvers.stability.parametric import stability
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import (
     FourierSeries,
     StepSeries,

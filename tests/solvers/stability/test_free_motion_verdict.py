@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from small_trains import gear_pair
+from validation.reference.hill import hill_verdict
 
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
-from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
@@ -26,8 +26,7 @@ def two_masses(damping):
 
 def verdicts(problem):
     found = solve_harmonic_balance(problem, OMEGA, harmonics=9)
-    hill = floquet_verdict(problem, found, method="hill")
-    return found.verdict, hill, solve_shooting(problem, OMEGA).verdict
+    return found.verdict, hill_verdict(problem, found), solve_shooting(problem, OMEGA).verdict
 
 
 @pytest.mark.parametrize("rate", [-0.1, -1e-4, 5e-8, 0.003, 0.1])

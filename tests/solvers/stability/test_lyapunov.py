@@ -9,7 +9,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.stability.lyapunov import lyapunov_exponents
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 

@@ -5,7 +5,7 @@ import pytest
 from validation.reference.sections import bifurcation_diagram, stroboscopic_section
 
 from femgear.errors import CaseError
-from femgear.system.elements import PolynomialSprings
+from femgear.system.force_laws import PolynomialSprings
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 

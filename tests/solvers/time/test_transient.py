@@ -18,7 +18,7 @@ from femgear.solvers.time.steps import (
     stability_limit,
 )
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import (
     HarmonicForce,

@@ -6,7 +6,7 @@ import pytest
 from femgear.errors import CaseError
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.time.stroboscopic import sweep_response, sweep_up_and_down
-from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 

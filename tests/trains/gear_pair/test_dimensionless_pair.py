@@ -11,7 +11,7 @@ from small_trains import example_pair, level_crossings
 from femgear.solvers.continuation.branches import parameter_curve
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.stroboscopic import sweep_response
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, SummedSeries, constant, harmonic_lines
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 from femgear.trains.gear_pair.case_file import scales_of

@@ -7,7 +7,7 @@ from small_trains import equivalent_mass, gear_pair
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
-from femgear.system.elements import GearMeshes
+from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.elements import RadialBearings, _columns, _numbers, _positive, positive_part
+from femgear.system.force_laws import RadialBearings, _columns, _numbers, _positive, positive_part
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.modal import ComplexModes, damping_matrix, modal_damping, total_stiffness
+from femgear.solvers.linear.modal import ComplexModes, modal_damping, total_stiffness
 from femgear.solvers.linear.receptance import MeshErrorResponse, _checked, _resonance
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import MechanicalSystem, damping_matrix
 
 # Bytes of dynamic stiffness that are solved in one batch.
 _BATCH = 2**26
@@ -105,7 +105,7 @@ def direct_response(
         An undamped resonance, or rigid motions at frequency zero (E-RESONANCE).
     """
     omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
-    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
+    stiffness = total_stiffness(system, mesh_stiffness)
     damping = damping_matrix(system, speed)
     if damping_ratio is not None:
         bare = replace(system, gyroscopic=None, C=np.zeros_like(system.C))

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from validation.reference.cornered_springs import BearingSprings, PiecewiseSprings
 
 from femgear.errors import CaseError
-from femgear.system.elements import (
+from femgear.system.force_laws import (
     GearMeshes,
     PolynomialSprings,
     RadialBearings,

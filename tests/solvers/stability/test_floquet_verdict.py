@@ -6,8 +6,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from validation.parametric import RATIO, SOFT, mathieu_monodromy, rectangular_monodromy
+from validation.reference.hill import hill_verdict
 
-from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.solution import loss_of
@@ -17,7 +17,7 @@ from femgear.solvers.stability.floquet import (
     tangents_of,
 )
 from femgear.solvers.stability.parametric import stability
-from femgear.system.elements import GearMeshes, PolynomialSprings, tangent_jumps
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, tangent_jumps
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 
@@ -81,8 +81,7 @@ def test_mathieu_by_splitting_and_by_hill(a, q, damping):
     mesh = GearMeshes(np.array([0]), FourierSeries([[a, -2.0 * q]]), separates=False)
     problem, solution = pair(oscillator(damping, (mesh,), load=1.0), 2.0)
     expected = np.linalg.eigvals(mathieu_monodromy(a, q, damping))
-    for method in ("monodromy", "hill"):
-        verdict = floquet_verdict(problem, solution, method=method, tolerance=1e-12)
+    for verdict in (floquet_verdict(problem, solution, tolerance=1e-12), hill_verdict(problem, solution)):
         away = np.abs(verdict.multipliers[:, None] - expected)
         assert max(away.min(axis=0).max(), away.min(axis=1).max()) < 2e-9
         assert np.prod(verdict.multipliers).real == pytest.approx(np.exp(-damping * np.pi), rel=1e-10)
@@ -115,7 +114,7 @@ def test_three_solutions_of_duffing(duffing, amplitude, phase, multiplier, loss)
         assert verdict.multipliers[0] == pytest.approx(multiplier, abs=1e-8)
     # the determinant is the dissipation of one period
     assert np.prod(verdict.multipliers).real == pytest.approx(0.7696654125, abs=1e-10)
-    hill = floquet_verdict(problem, solution, method="hill")
+    hill = hill_verdict(problem, solution)
     np.testing.assert_allclose(hill.exponents.real, verdict.exponents.real, atol=1e-10)
 
 
@@ -182,7 +181,7 @@ def test_gyroscopic_terms_equal_time_integration():
     verdict = floquet_verdict(problem, solution, tolerance=1e-11)
     expected = integrated(problem, solution)
     np.testing.assert_allclose(np.sort(np.abs(verdict.multipliers)), np.sort(np.abs(expected)), atol=1e-9)
-    hill = floquet_verdict(problem, solution, method="hill", harmonics=16)
+    hill = hill_verdict(problem, solution, harmonics=16)
     np.testing.assert_allclose(np.abs(hill.multipliers), np.abs(verdict.multipliers), atol=1e-9)
 
 
@@ -209,11 +208,8 @@ def test_no_verdict_is_never_stable(duffing):
     assert verdict.stable is None and "not covered" in verdict.message and not len(verdict.multipliers)
 
 
-def test_kinds_of_loss_and_refusals(duffing):
+def test_kinds_of_loss():
     assert [loss_of(v) for v in (1.2 + 0j, -1.2 + 0j, 0.9 + 0.8j)] == ["fold", "flip", "Neimark-Sacker"]
-    problem, solution = pair(duffing, 1.2, 5)
-    with pytest.raises(CaseError, match="E-CHOICE"):
-        floquet_verdict(problem, solution, method="guess")
     constant_spring = oscillator(
         0.1, (GearMeshes(np.array([0]), constant([1.0]), separates=False),), load=1.0
     )

@@ -478,28 +478,12 @@ def tabulated_element(element: Element, theta: np.ndarray) -> Callable:
     """
     if type(element) is GearMeshes:
         return _mesh_law(element, theta)
-    if type(element) is PolynomialSprings:
-        return _polynomial_law(element)
 
     def general(i, x):
         force, slope = element.evaluate(x[:, None], theta[i])
         return force[:, 0], slope[:, 0, 0]
 
     return general
-
-
-def _polynomial_law(element: PolynomialSprings) -> Callable:
-    """``PolynomialSprings.evaluate`` with the coefficients of force and slope ready for Horner's rule."""
-    force_terms = list(element.coefficients.T[::-1])
-    slope_terms = [c * (len(force_terms) - d) for d, c in enumerate(force_terms)]
-
-    def law(i, x):
-        force, slope = force_terms[0], slope_terms[0]
-        for f, s in zip(force_terms[1:], slope_terms[1:]):
-            force, slope = force * x + f, slope * x + s
-        return force * x, slope
-
-    return law
 
 
 def _mesh_law(element: GearMeshes, theta) -> Callable:
@@ -535,18 +519,13 @@ def _mesh_law(element: GearMeshes, theta) -> Callable:
 
 
 def _smooth_mesh_law(k, offset, play, smoothing) -> Callable:
-    length = smoothing * k
-    square = length * length
-    finite = np.isfinite(play[0])
+    length, finite = smoothing * k, np.isfinite(play[0])
     gap = np.where(finite, play, 0.0)
 
     def smooth(i, x):
         line = offset[i] + k[i] * x
-        root = np.sqrt(line * line + square[i])
-        force, slope = 0.5 * (line + root), 0.5 * (1.0 + line / root)
-        behind = np.where(finite, -line - gap[i], 0.0)
-        root = np.sqrt(behind * behind + square[i])
-        back, back_slope = 0.5 * (behind + root), 0.5 * (1.0 + behind / root)
+        force, slope = positive_part(line, length[i])
+        back, back_slope = positive_part(-line - gap[i], length[i])
         return force - finite * back, k[i] * (slope + finite * back_slope)
 
     return smooth
