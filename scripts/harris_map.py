@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -78,18 +79,11 @@ def main(
     folder = ready_folder(output)
     with Progress() as progress:
         progress("compliance", 0, 1)
-        basis = design_basis(data, cache=grid_cache())
+        basis = replace(design_basis(data, cache=grid_cache()), positions=positions)
         progress("compliance", 1, 1)
         options = {"length": length, "back": back}
         variants = [with_tip_relief(basis.deviations, gears, amount=a, **options) for a in amounts]
-        found = harris_map(
-            basis,
-            torques=on_sun,
-            deviations=variants,
-            positions=positions,
-            contact=data.static.contact,
-            progress=lambda done, total: progress("contact", done, total),
-        )
+        found = harris_map(basis, torques=on_sun, deviations=variants, progress=progress)
     write_csv(folder / "harris_map.csv", HEADER, _records(amounts, inputs, found))
     names = [f"relief {a * 1e6:g} µm" for a in amounts]
     figure = harris_curves(inputs, found.peak_to_peak, names, design=data.operation.torque)

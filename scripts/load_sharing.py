@@ -81,7 +81,7 @@ def _checked(gap: float, text: str) -> float:
 
 def _solve(case, gaps, planet, progress):
     """What all gaps share, and one mesh cycle for each of them."""
-    from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+    from femgear.contact.cycle import CycleOptions
     from femgear.gears.deviations import common_period
     from femgear.run import grid_cache
     from femgear.study.relief import design_basis, sun_torque
@@ -96,14 +96,8 @@ def _solve(case, gaps, planet, progress):
     for gap in gaps:
         separation = np.zeros(gears.n_planets)
         separation[planet - 1] = gap
-        cycle = walk_mesh_cycle(
-            gears,
-            basis.bodies,
-            sun_torque=sun_torque(case, gears),
-            positions=case.static.positions,
-            contact=case.static.contact,
-            deviations=deviations,
-            supports=basis.supports,
+        cycle = basis.walk(
+            sun_torque(case, gears),
             periods=periods,
             options=CycleOptions(
                 planet_gaps=separation,

@@ -16,6 +16,8 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 from femgear.errors import CaseError
 
 QUANTILES = (0.5, 0.9, 0.99)
+_POSITIONS = 16
+"""Of one mesh period."""
 Length = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 
@@ -78,11 +80,11 @@ def main(
     _check_place(seed, position)
     sigma = [to_si(text, LENGTH) / parts for text in given.values()] * (2 // len(given))
     pins = pin_samples(gears.n_planets, samples=samples, radial=sigma[0], tangential=sigma[1], seed=seed)
-    place = {"position": round(position * 16) % 16, "positions": 16, "contact": data.static.contact}
+    place = round(position * _POSITIONS) % _POSITIONS
     folder = ready_folder(output)
     with Progress() as progress:
         progress("compliance", 0, 1)
-        basis = design_basis(data, cache=grid_cache())
+        basis = replace(design_basis(data, cache=grid_cache()), positions=_POSITIONS)
         progress("compliance", 1, 1)
         results = []
         for kind in dict.fromkeys(support):
@@ -135,7 +137,7 @@ def _solve(data, basis, kind, torque, place, pins):
     from femgear.trains.static.stages import case_supports
 
     supports = {"fixed": RIGID, "floating": Supports(sun=0.0), "case": case_supports(data)}[kind]
-    basis, options = replace(basis, supports=supports), {"sun_torque": torque, **place}
+    basis, options = replace(basis, supports=supports), {"sun_torque": torque, "position": place}
     begin = perf_counter()
     model = sharing_model(basis, **options)
     curves = perf_counter()
@@ -146,8 +148,7 @@ def _solve(data, basis, kind, torque, place, pins):
     chosen = np.unique([0, len(pins) // 3, order[len(pins) // 2], order[-1]])
     whole = walked_shares(basis, pins[chosen], **options)
     difference = np.abs(whole - sharing.share[chosen]).max()
-    walk = {key: value for key, value in options.items() if key != "position"}
-    linear = linearise(basis, only=[place["position"]], **walk)
+    linear = linearise(basis, sun_torque=torque, only=[place])
     facts = {
         "curves": curves - begin,
         "samples": solved - curves,

@@ -33,7 +33,7 @@ def main(results: Path, /, *, output: Path = FOLDER) -> None:
     from PIL import Image
 
     from femgear.errors import StorageError
-    from femgear.storage.files import replace_file
+    from femgear.storage.files import write_bytes
     from femgear.trains.reading import open_results
 
     folder = open_results(results).folder
@@ -45,9 +45,7 @@ def main(results: Path, /, *, output: Path = FOLDER) -> None:
         data = stream.getvalue()
         if len(data) > LARGEST:
             raise StorageError(f"{name} takes {len(data)} bytes", code="E-RANGE", limit=f"{LARGEST} bytes")
-        replace_file(
-            ready_folder(output) / name, lambda path, data=data: path.write_bytes(data), size=len(data)
-        )
+        write_bytes(data, ready_folder(output) / name)
         print(f"{name}: {len(data) / 1e3:.0f} kB")
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from femgear.cli import Progress as Progress
 from femgear.cli import call
+from femgear.storage.files import storage_errors
+from femgear.storage.files import write_csv as write_csv
 
 REFERENCE_CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 
@@ -47,8 +47,6 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
 
 def ready_folder(folder: Path) -> Path:
     """The folder, created where it does not exist."""
-    from femgear.storage.files import storage_errors
-
     with storage_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
     return folder
@@ -70,18 +68,6 @@ def print_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]
         table.add_row(*row)
     console.print(f"\n{title}")
     console.print(table)
-
-
-def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a table as CSV, units in the header; the file is either the old or the new one, whole."""
-    from femgear.storage.files import write_text
-
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
-    write_text(stream.getvalue(), path)
 
 
 def say_files(folder: Path, names: Sequence[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -78,14 +79,13 @@ def main(
     folder = ready_folder(output)
     with Progress() as progress:
         progress("compliance", 0, 1)
-        basis = design_basis(data, cache=grid_cache())
+        basis = replace(design_basis(data, cache=grid_cache()), positions=positions)
         progress("compliance", 1, 1)
         power = 2.0 if shape == "parabolic" else 1.0
-        options = {"power": power, "positions": positions, "contact": data.static.contact}
         target = sun_torque(data, gears, design)
-        top = 2 * _mean_deflection(basis, target, data.static.contact) if top is None else top
+        top = 2 * _mean_deflection(basis, target) if top is None else top
         amounts = top * np.arange(1, points + 1) / points
-        grid, best, fine = _search(basis, amounts, on_sun, target, options, progress)
+        grid, best, fine = _search(basis, amounts, on_sun, target, power, progress)
     snippet = relief_tables(gears, amount=best.amount, length=best.length, power=power, back=target < 0)
     _write(folder, inputs, grid, best, design, snippet)
     _print_summary(inputs, grid, design, best)
@@ -135,15 +135,15 @@ def _checked(amount: float, text: str, module: float) -> float:
     return amount
 
 
-def _mean_deflection(basis, torque: float, contact: str) -> float:
-    """Mean deflection of the sun-planet meshes without relief [m]."""
-    from femgear.contact.cycle import walk_mesh_cycle
+def _mean_deflection(basis, torque: float) -> float:
+    """Mean deflection of the sun-planet meshes of ideal gears on fixed axes [m]."""
+    from femgear.contact.supports import RIGID
 
-    cycle = walk_mesh_cycle(basis.gears, basis.bodies, sun_torque=torque, positions=8, contact=contact)
+    cycle = replace(basis, supports=RIGID, deviations=None, positions=8).walk(torque)
     return float(cycle.deflection[: basis.gears.n_planets].mean())
 
 
-def _search(basis, amounts, on_sun, target, options, progress):
+def _search(basis, amounts, on_sun, target, power, progress):
     """The grid, the optimum at the target torque, and its ratio at twice the positions."""
     from femgear.study.relief import optimise_relief, relief_grid
 
@@ -152,28 +152,26 @@ def _search(basis, amounts, on_sun, target, options, progress):
         amounts=amounts,
         lengths=np.linspace(0.4, 1.2, len(amounts)),
         torques=on_sun,
-        progress=lambda done, total: progress("contact", done, total),
-        **options,
+        power=power,
+        progress=progress,
     )
     progress("optimum", 0, 1)
-    best = optimise_relief(basis, grid, torque=target, **options)
-    fine = _at_more_positions(basis, best, target, options)
+    best = optimise_relief(basis, grid, torque=target, power=power)
+    fine = _at_more_positions(basis, best, target, power)
     progress("optimum", 1, 1)
     return grid, best, fine
 
 
-def _at_more_positions(basis, best, torque: float, options) -> float:
+def _at_more_positions(basis, best, torque: float, power: float) -> float:
     """Peak to peak of the optimum over that without relief, at twice the positions."""
     from femgear.study.relief import harris_map, with_tip_relief
 
     ideal, gears = basis.deviations, basis.gears
-    relief = {"amount": best.amount, "length": best.length, "power": options["power"], "back": torque < 0}
+    relief = {"amount": best.amount, "length": best.length, "power": power, "back": torque < 0}
     found = harris_map(
-        basis,
+        replace(basis, positions=2 * basis.positions),
         torques=[torque],
         deviations=[ideal, with_tip_relief(ideal, gears, **relief)],
-        positions=2 * options["positions"],
-        contact=options["contact"],
     ).peak_to_peak[:, 0, 0]
     return float(found[1] / found[0])
 

@@ -88,7 +88,7 @@ def mirror_nodes(grid: Grid) -> np.ndarray:
 
 
 def mirrored_columns(columns: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """Reflect displacement or load columns (2n, m) in the x axis."""
+    """Reflect displacement or load columns (2n, m) in the x axis; nodes' images (n,) as of `mirror_nodes`."""
     result = np.empty_like(columns)
     result[2 * image] = columns[0::2]
     result[2 * image + 1] = -columns[1::2]
@@ -164,7 +164,10 @@ def directional(weights, directions: np.ndarray) -> np.ndarray:
 
 
 def split_sector(grid: Grid, held: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free interior, right-cut and left-cut degrees of freedom of a sector, cuts ordered by radius."""
+    """Free interior, right-cut and left-cut degrees of freedom of a sector, cuts ordered by radius.
+
+    ``held`` is the boundary that cannot move, if any.
+    """
     fixed = boundary_nodes(grid, held) if held else np.zeros(0, int)
     cuts = []
     for name in ("cut_right", "cut_left"):
@@ -319,14 +322,10 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
 
     Parameters
     ----------
-    grid : Grid
-        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
-    stiffness : (2n, 2n) sparse matrix
-        [N/m].
+    grid, stiffness, held
+        As for `condense_sector`.
     loads : (count, 2n) array
         Nodal forces of each sector in its own frame [N], none on the cuts.
-    held : str or None
-        Boundary that cannot move.
 
     Returns
     -------

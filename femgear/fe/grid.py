@@ -166,7 +166,7 @@ def rotated_copies(grid: Grid, count: int) -> Grid:
 
 
 def shape_functions(b1, b2):
-    """Quadratic shape functions (6, m) of a triangle and their derivatives along both coordinates (m,)."""
+    """Quadratic shape functions (6, m) at reference coordinates (m,), and their derivatives along both."""
     b0 = 1.0 - b1 - b2
     one, zero = np.ones_like(b0), np.zeros_like(b0)
     value = np.stack(

@@ -22,8 +22,8 @@ import numpy as np
 from scipy.sparse import block_array, csc_array
 from scipy.sparse.linalg import splu
 
-from femgear.errors import GeometryError
-from femgear.fe.elasticity import Material, basis, node_of_dof
+from femgear.errors import CaseError, GeometryError
+from femgear.fe.elasticity import basis, node_of_dof
 from femgear.fe.meshing import Outline, mesh_outline
 
 AXES = ("x", "y", "tilt x", "tilt y", "rotation")
@@ -42,6 +42,11 @@ class RoundSection:
     poisson : float
     density : float
         [kg/m^3]; zero for a shaft without mass.
+
+    Raises
+    ------
+    CaseError
+        Diameters that no shaft has (E-SHAFT).
     """
 
     outer_diameter: float
@@ -49,6 +54,10 @@ class RoundSection:
     young: float = 2.06e11
     poisson: float = 0.3
     density: float = 7850.0
+
+    def __post_init__(self):
+        if not 0.0 <= self.inner_diameter < self.outer_diameter < math.inf:
+            raise CaseError(f"a shaft section {self}", code="E-SHAFT", limit="0 <= inner < outer diameter")
 
     @property
     def area(self) -> float:
@@ -73,7 +82,7 @@ class RoundSection:
         return 6.0 * (1.0 + nu) * both / ((7.0 + 6.0 * nu) * both + (20.0 + 12.0 * nu) * m2)
 
     def shear_ratio(self, length: float) -> float:
-        """``Phi = 12 E I / (kappa G A l^2)``: deflection by shear over that by bending."""
+        """``Phi = 12 E I / (kappa G A l^2)`` at a length [m]: deflection by shear over that by bending."""
         shear = self.shear_coefficient * self.shear_modulus * self.area
         return 12.0 * self.young * self.second_moment / (shear * length**2)
 
@@ -114,10 +123,10 @@ def joint_springs(section: RoundSection, length: float) -> JointSprings:
 
 
 def joint_deflections(length: float) -> np.ndarray:
-    """Rows (5, 10) of the deflections of a joint in a length [m]: shear along x, y, bend about x, y, twist.
+    """Rows (5, 10) of the joint's deflections: shear along x and y, bend about x and y, twist.
 
-    Each link moves with the station at its end; a tilt about y moves the joint along x, one about x along
-    -y.
+    Each link, half the length [m] of the shaft, moves with the station at its end; a tilt about y moves the
+    joint along x, one about x along -y.
     """
     half = 0.5 * length
     first, second = np.eye(5), np.eye(5)
@@ -169,8 +178,9 @@ def _mass_terms(l: float, phi: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_matrices(mass: float, polar: float, transverse: float) -> tuple[np.ndarray, np.ndarray]:
-    """Mass and gyroscopic matrix (5, 5) of a rigid disc: mass [kg], polar and transverse inertia [kg m^2].
+    """Mass and gyroscopic matrix (5, 5) of a rigid disc on its station.
 
+    Its mass is in kg, its polar and transverse moments of inertia I_p and I_t are in kg m^2:
     ``I_t tilt_x'' + I_p Omega tilt_y' = moment``, ``I_t tilt_y'' - I_p Omega tilt_x' = moment``.
     """
     G = np.zeros((5, 5))
@@ -207,23 +217,20 @@ class ShaftStep:
             limit = "length > 0, 0 <= inner < outer diameter"
             raise GeometryError(f"a part of a shaft {numbers}", code="E-SHAFT", limit=limit)
 
-    def section(self, material: Material) -> RoundSection:
-        """Of this part, without mass."""
-        elastic = material.youngs_modulus, material.poisson_ratio
-        return RoundSection(self.outer_diameter, self.inner_diameter, *elastic, density=0.0)
 
-
-def timoshenko_flexibility(steps: Sequence[ShaftStep], material: Material) -> np.ndarray:
-    """Deflection and tilt of the free end of a stepped cantilever per unit force and moment, (2, 2).
+def timoshenko_flexibility(steps: Sequence[ShaftStep], material) -> np.ndarray:
+    """Deflection [m] and tilt [rad] of the end of a stepped cantilever per force [N] and moment [N m].
 
     Unit-load integrals of ``M^2/(E I) + Q^2/(kappa G A)`` (S. Timoshenko, Strength of Materials, part I),
-    from the held end to the free one.
+    from the held end to the free one; a (2, 2) array.
     """
     far = sum(step.length for step in steps)
     result = np.zeros((2, 2))
     for step in steps:
         near = far - step.length
-        section = step.section(material)
+        section = RoundSection(
+            step.outer_diameter, step.inner_diameter, material.youngs_modulus, material.poisson_ratio
+        )
         bending = section.young * section.second_moment
         shear = section.shear_coefficient * section.shear_modulus * section.area
         cross = (far**2 - near**2) / (2 * bending)
@@ -235,7 +242,7 @@ def timoshenko_flexibility(steps: Sequence[ShaftStep], material: Material) -> np
     return result
 
 
-def shaft_flexibility(steps: Sequence[ShaftStep], material: Material, *, refine: float = 1.0) -> np.ndarray:
+def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1.0) -> np.ndarray:
     """Compute what `timoshenko_flexibility` does, of the solid body with its end face rigidly coupled.
 
     Parameters
@@ -272,7 +279,7 @@ def shaft_flexibility(steps: Sequence[ShaftStep], material: Material, *, refine:
     return np.linalg.inv(u.T @ (K @ u))
 
 
-def shaft_support_stiffness(steps: Sequence[ShaftStep], material: Material, *, refine: float = 1.0) -> float:
+def shaft_support_stiffness(steps: Sequence[ShaftStep], material, *, refine: float = 1.0) -> float:
     """Radial stiffness K = F/X [N/m] of the coupled end face, which may tilt; see `shaft_flexibility`."""
     return float(1.0 / shaft_flexibility(steps, material, refine=refine)[0, 0])
 

@@ -256,7 +256,9 @@ def _relative_displacements(d: SetDeviations, s: PlanetarySet, position: np.ndar
         _turning(runout, angle - position * s.planet.pitch_angle)
         for runout, angle in zip(d.planet_runout, start.planets, strict=True)
     ]
-    planets = _pins(d, s)[:, None] + np.array(turned)
+    # pin errors and the eccentric pin circle
+    pins = d.pin_errors @ np.array([1.0, 1.0j]) * np.exp(1j * np.asarray(s.planet_angles))
+    planets = (pins + _turning(d.carrier_runout, 0.0))[:, None] + np.array(turned)
     ring_angle = start.ring - position * s.ring.pitch_angle
     ring = _turning(d.ring_runout, ring_angle) + _oval(d.ovality, np.asarray(s.planet_angles), ring_angle)
     return np.concatenate([planets - sun, ring - planets])
@@ -265,14 +267,6 @@ def _relative_displacements(d: SetDeviations, s: PlanetarySet, position: np.ndar
 def _turning(runout: Runout, tooth_zero) -> np.ndarray:
     """Displacement, as x + iy, of a body whose tooth 0 stands at the angles `tooth_zero` (P,)."""
     return runout.amplitude * np.exp(1j * (tooth_zero + runout.phase))
-
-
-def _pins(deviations: SetDeviations, planetary_set: PlanetarySet) -> np.ndarray:
-    """Displacement (N,), as x + iy, of the planet axes: pin errors and the eccentric pin circle."""
-    errors = deviations.pin_errors @ np.array([1.0, 1.0j])
-    return errors * np.exp(1j * np.asarray(planetary_set.planet_angles)) + _turning(
-        deviations.carrier_runout, 0.0
-    )
 
 
 def _oval(ovality: Ovality, psi: np.ndarray, ring_angle: np.ndarray) -> np.ndarray:
@@ -485,6 +479,5 @@ def _wedging(d: SetDeviations, s: PlanetarySet):
             "set.backlash",
             f"pin errors and other deviations may exceed the backlash by {-least * 1e6:.3f} um {where} "
             f"(ideal gears have {nominal * 1e6:.3f} um): loaded and back flanks may touch at once",
-            least,
             "play of 0 um or more",
         )

@@ -34,19 +34,16 @@ PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
 
 @dataclass(frozen=True)
 class GeometryWarning(Finding):
-    """A finding on gears, with the number that drew it.
+    """A finding on gears, with what is usual.
 
     Parameters
     ----------
     code, key, text : str
         As of `femgear.errors.Finding`.
-    value : float
-        The number that drew the warning.
     limit : str
         What would not be warned about.
     """
 
-    value: float
     limit: str
 
     def __str__(self) -> str:
@@ -102,7 +99,10 @@ class Gear:
     name: str = field(default="gear", compare=False)
 
     def __post_init__(self):
-        _check_gear(self)
+        _check_numbers(self)
+        _check_circles(self)
+        _check_tool(self)
+        _check_flank(self)
 
     @property
     def reference_radius(self) -> float:
@@ -155,7 +155,7 @@ class Gear:
 
     @cached_property
     def fillet_end(self) -> float:
-        """Parameter ``theta`` [rad] of the tool's `fillet_point` where fillet and involute meet."""
+        """Direction ``theta`` [rad], see `CutterTip.fillet_point`, where fillet and involute meet."""
         if self.undercut and isinstance(self.tool, RackTip):
             return self.tool.undercut_end(self.base_radius, self.base_half_angle)
         return self.tool.end_angle
@@ -288,14 +288,6 @@ def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
         gap_angle=math.pi / gear.teeth,
         end_angle=0.5 * math.pi - working,
     )
-
-
-def _check_gear(gear: Gear) -> None:
-    """Refuse a gear that cannot be made; see the errors of `Gear`."""
-    _check_numbers(gear)
-    _check_circles(gear)
-    _check_tool(gear)
-    _check_flank(gear)
 
 
 def _check_numbers(gear: Gear) -> None:

@@ -24,24 +24,6 @@ THEORETICAL_CORRECTION = 0.8
 
 
 @dataclass(frozen=True)
-class FlankStress:
-    """Nominal contact stress of a pair and its factors.
-
-    Parameters
-    ----------
-    stress, elasticity : float
-        sigma_H0 [Pa] and Z_E [Pa^0.5].
-    zone, contact_ratio : float
-        Z_H and Z_eps.
-    """
-
-    stress: float
-    zone: float
-    elasticity: float
-    contact_ratio: float
-
-
-@dataclass(frozen=True)
 class NominalRootStress:
     """Nominal root stress of one gear of a pair, its factors and the critical section.
 
@@ -70,12 +52,15 @@ class NominalRootStress:
 
 
 def zone_factor(pressure_angle: float, working_angle: float) -> float:
-    """Z_H = ``sqrt(2 cos(alpha_w) / (cos^2(alpha) sin(alpha_w)))`` of spur gears (ISO 6336-2, section 6)."""
+    """Z_H = ``sqrt(2 cos(alpha_w) / (cos^2(alpha) sin(alpha_w)))`` of spur gears (ISO 6336-2, section 6).
+
+    Pressure angle alpha and working pressure angle alpha_w are in rad.
+    """
     return math.sqrt(2.0 / math.tan(working_angle)) / math.cos(pressure_angle)
 
 
 def elasticity_factor(youngs_modulus: float, poisson_ratio: float) -> float:
-    """Z_E = ``sqrt(E / (2 pi (1 - nu^2)))`` [Pa^0.5] of two gears of one material (ISO 6336-2, section 7)."""
+    """Z_E = ``sqrt(E / (2 pi (1 - nu^2)))`` [Pa^0.5] of one material, E in Pa (ISO 6336-2, section 7)."""
     return math.sqrt(youngs_modulus / (2.0 * math.pi * (1.0 - poisson_ratio**2)))
 
 
@@ -94,8 +79,8 @@ def nominal_contact_stress(
     tangential_force: float,
     youngs_modulus: float,
     poisson_ratio: float,
-) -> FlankStress:
-    """Contact stress sigma_H0 = ``Z_H Z_E Z_eps sqrt(F_t/(d_1 b) (u + 1)/u)`` (ISO 6336-2, section 5).
+) -> float:
+    """Contact stress sigma_H0 [Pa] = ``Z_H Z_E Z_eps sqrt(F_t/(d_1 b) (u + 1)/u)`` (ISO 6336-2, section 5).
 
     Parameters
     ----------
@@ -123,7 +108,7 @@ def nominal_contact_stress(
     u = (-gear_2.teeth if gear_2.internal else gear_2.teeth) / gear_1.teeth
     width = min(gear_1.face_width, gear_2.face_width)
     line = tangential_force / (2.0 * gear_1.reference_radius * width) * (u + 1.0) / u
-    return FlankStress(zone * elasticity * ratio * math.sqrt(line), zone, elasticity, ratio)
+    return zone * elasticity * ratio * math.sqrt(line)
 
 
 def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: float) -> NominalRootStress:

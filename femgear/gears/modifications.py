@@ -240,7 +240,6 @@ def check_flank(flank: str, form: FlankForm, gear: Gear) -> Iterator[GeometryWar
                 "{:.4g} to {:.4g} deg; beyond its ends it is constant".format(
                     flank, *angles[:2], 100 * covered, *angles[2:]
                 ),
-                covered,
                 f"{100 * LEAST_COVERAGE:.0f} % or more",
             )
 

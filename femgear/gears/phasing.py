@@ -31,9 +31,6 @@ from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angl
 
 CONVENTIONS = ("rotation", "printed")
 KINDS = ("in-phase", "counter-phased", "sequentially phased", "unequally phased")
-MEMBERS = ("sun", "ring", "carrier")
-RESULTANTS = ("torque", "lateral force", "thrust", "tilting moment")
-PLANET_RESULTANTS = ("torque", "tangential force", "radial force", "thrust", "tilting moment")
 MODES = ("rotational", "translational", "planet")
 ZERO = 1e-9
 """Share of the mesh forces below which a sum counts as cancelled."""
@@ -101,22 +98,15 @@ class MeshPhasing:
         return self.rotation * sun, self.rotation * self.ring_teeth
 
     @property
-    def ring_lag(self) -> float:
-        """Periods by which the ring mesh of a planet comes after its sun mesh; the sense and the flank count.
-
-        Turning back runs through the same contacts in the opposite order; the other flanks are the drive
-        flanks of the mirror image, which turns the other way.
-        """
-        return self.rotation * self.flank * self.lag
-
-    @property
     def phases(self) -> np.ndarray:
         """gamma_j in [0, 1), (2N,), sun meshes first; zero for "sun-planet 1".
 
-        With the convention "rotation" those of `PlanetarySet.mesh_phases`.
+        With the convention "rotation" those of `PlanetarySet.mesh_phases`. The ring mesh of a planet comes
+        after its sun mesh by the lag: turning back runs through the same contacts in the opposite order, and
+        the other flanks are the drive flanks of the mirror image, which turns the other way.
         """
         steps = np.mod(np.outer(self.turns, self.positions), self.teeth_sum)
-        phase = steps / self.teeth_sum - np.array([[0.0], [self.ring_lag]])
+        phase = steps / self.teeth_sum - np.array([[0.0], [self.rotation * self.flank * self.lag]])
         phase = np.mod(phase.ravel(), 1.0)
         return np.where(phase > 1.0 - 1e-12, 0.0, phase)
 
@@ -253,11 +243,11 @@ class PhasingTable:
     cyclic : (H,) int array
         k = mod(h z_s, N); -1 for unequally spaced planets.
     members : (H, 3, 4) array
-        Resultants on `MEMBERS` by `RESULTANTS` as shares of what they were if all planets acted alike and in
-        the worst direction: 0 cancelled, 1 everything adds up.
+        Torque, lateral force, thrust and tilting moment on sun, ring and carrier as shares of what they were
+        if all planets acted alike and in the worst direction: 0 cancelled, 1 everything adds up.
     planets : (H, N, 5) array
-        Resultants of the two meshes of each planet by `PLANET_RESULTANTS`, 0 to 1, for equal forces in both
-        meshes and equal pressure angles.
+        Torque, tangential and radial force, thrust and tilting moment of the two meshes of each planet, 0 to
+        1, for equal forces in both meshes and equal pressure angles.
     modes : (H, 3) array
         How much of the phase pattern belongs to the kinds of `MODES`, 0 to 1.
     separate : bool

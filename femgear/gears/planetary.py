@@ -217,7 +217,7 @@ def close_set(
 
 
 def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:
-    """Whole tooth numbers next to ``z / cos^3(beta)`` of sun, planet and ring."""
+    """Whole tooth numbers next to ``z / cos^3(beta)`` of sun, planet and ring, helix angle beta in rad."""
     cube = math.cos(helix_angle) ** 3
     return round(gears.sun.teeth / cube), round(gears.planet.teeth / cube), round(gears.ring.teeth / cube)
 
@@ -328,7 +328,7 @@ def zero_backlash_distance(one: Gear, two: Gear) -> float:
 
 
 def zero_backlash_shift(one: Gear, two: Gear, centre_distance: float) -> float:
-    """Sum (external) or difference ``x2 - x1`` (internal) of the shifts that run without play at a distance.
+    """Sum (external) or difference ``x2 - x1`` (internal) of shifts without play at a centre distance [m].
 
     Inverse of `zero_backlash_distance` (ISO 21771, eq. 60).
     """

@@ -97,17 +97,20 @@ def roll(radius, base_radius: float) -> Any:
 
 
 def undercut_shift(teeth: int, pressure_angle: float) -> float:
-    """Least profile shift [modules] without undercut by a rack one module deep, ``1 - z sin^2(alpha)/2``."""
+    """Least profile shift [modules] without undercut by a rack one module deep, ``1 - z sin^2(alpha)/2``.
+
+    The pressure angle alpha is in rad.
+    """
     return 1.0 - 0.5 * teeth * math.sin(pressure_angle) ** 2
 
 
 def transverse_angle(normal_pressure_angle: float, helix_angle: float) -> float:
-    """Transverse pressure angle [rad], ``tan(alpha_t) = tan(alpha_n) / cos(beta)``."""
+    """Transverse pressure angle, ``tan(alpha_t) = tan(alpha_n) / cos(beta)``, all in rad."""
     return math.atan(math.tan(normal_pressure_angle) / math.cos(helix_angle))
 
 
 def transverse_tool(module: float, pressure_angle: float, helix_angle: float) -> tuple[float, float]:
-    """Transverse module [m] and pressure angle [rad] of normal ones.
+    """Transverse module [m] and pressure angle [rad] of normal ones under a helix angle [rad].
 
     ``m_t = m_n / cos(beta)``, ``tan(alpha_t) = tan(alpha_n) / cos(beta)`` (ISO 21771, section 4.2).
     """
@@ -115,12 +118,12 @@ def transverse_tool(module: float, pressure_angle: float, helix_angle: float) ->
 
 
 def base_helix_angle(normal_pressure_angle: float, helix_angle: float) -> float:
-    """Helix angle [rad] on the base cylinder, ``sin(beta_b) = sin(beta) cos(alpha_n)``."""
+    """Helix angle on the base cylinder, ``sin(beta_b) = sin(beta) cos(alpha_n)``, all in rad."""
     return math.asin(math.sin(helix_angle) * math.cos(normal_pressure_angle))
 
 
 def overlap_ratio(face_width: float, normal_module: float, helix_angle: float) -> float:
-    """Overlap ratio ``b sin(beta) / (pi m_n)``."""
+    """Overlap ratio ``b sin(beta) / (pi m_n)`` of face width and normal module [m] and helix angle [rad]."""
     return face_width * math.sin(abs(helix_angle)) / (math.pi * normal_module)
 
 
@@ -155,7 +158,7 @@ class PinionCutter:
 
 
 def transverse_rack(rack: BasicRack, helix_angle: float) -> BasicRack:
-    """Basic rack in transverse modules of one in normal modules: coefficients times cos(beta).
+    """Basic rack in transverse modules of one in normal modules: coefficients times cos(beta), beta in rad.
 
     Heights are the same lengths in both sections (ISO 21771, section 4.2). The tool's tip is an ellipse in
     the transverse section; the circle in its place keeps the radius of the normal section.
@@ -168,8 +171,9 @@ def transverse_rack(rack: BasicRack, helix_angle: float) -> BasicRack:
 class RackTip:
     """Rounded tip of a rack that generates an external gear (lengths in m, angles in rad).
 
-    ``centre_depth`` and ``centre_offset`` place the rounding's centre under the rolling line and beside the
-    centreline of the rack tooth.
+    ``pitch_radius`` is that of the gear, ``gap_angle`` its half pitch. ``centre_depth`` and ``centre_offset``
+    place the rounding's centre under the rolling line and beside the centreline of the rack tooth; the fillet
+    begins at ``end_angle``, see the head of the module.
     """
 
     pitch_radius: float
@@ -230,6 +234,7 @@ class RackTip:
 class CutterTip:
     """Rounded tip of a pinion cutter that generates an internal gear (lengths in m, angles in rad).
 
+    As `RackTip`, with the pitch and base radius of the cutter and its distance from the gear;
     ``centre_radius`` and ``centre_angle`` place the rounding's centre in the frame of the cutter tooth.
     """
 

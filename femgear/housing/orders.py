@@ -61,11 +61,6 @@ class Lobes(ReadOnlyArrays):
     height: np.ndarray
     threshold: float
 
-    @property
-    def per_revolution(self) -> float:
-        """Number of lobes a carrier revolution."""
-        return float(len(self.position))
-
 
 @dataclass(frozen=True)
 class BandAnalysis(ReadOnlyArrays):

@@ -325,7 +325,7 @@ def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure
 
 
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
-    """Complex harmonics of a variable stored as real and imaginary part."""
+    """Complex array of a variable stored as real and imaginary part, in its dimensions and unit."""
     return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
 
 
@@ -356,7 +356,10 @@ def name_kinds(ax, dynamics: xr.Dataset) -> None:
 
 
 def draw_static(ax, at, values, harmonics: int, position, style) -> None:
-    """Draw the static transmission error [m] less its mean: whole record pale, first harmonics thin."""
+    """Draw the static transmission error [m] less its mean: whole record pale, first harmonics thin.
+
+    Of its record ``values`` (P,) at positions ``at`` (P,) of one mesh period; harmonics at ``position`` (Q,).
+    """
     at, whole, part = _fluctuation(at, values, harmonics, position)
     ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
     ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
@@ -393,6 +396,6 @@ def shown_speeds(data: xr.Dataset) -> list[int]:
     return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
 
 
-def some_speeds(count: int, limit: int = 4) -> list[int]:
-    """Choose at most `limit` speeds, spread evenly."""
-    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, limit))})
+def some_speeds(count: int) -> list[int]:
+    """Choose at most four of so many speeds, spread evenly."""
+    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, 4))})

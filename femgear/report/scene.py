@@ -24,7 +24,7 @@ from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
-from femgear.storage.files import replace_file
+from femgear.storage.files import replace_file, write_bytes
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -298,7 +298,10 @@ def add_coloured(
     limits=None,
     colours: int = 256,
 ) -> None:
-    """Add a mesh coloured by its point data `text`, with a colour bar of that title under the scene."""
+    """Add a mesh coloured by its point data `text`, with a colour bar of that title under the scene.
+
+    ``limits`` are those of the colours, in the unit of the data; the picture has ``size`` pixels a side.
+    """
     plotter.add_mesh(
         mesh,
         scalars=text,
@@ -348,7 +351,7 @@ def rounded(value: float) -> str:
 
 
 def look_down(plotter: pv.Plotter, half_height: float) -> None:
-    """Set a parallel view on the plane of the set [m], with room for title and colour bar."""
+    """Set a parallel view on the plane of the set, half as high as given [m] and more for title and bar."""
     view: Any = plotter  # its methods have decorators that hide what they take
     view.set_background("white")
     view.view_xy()
@@ -370,8 +373,7 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
         plotter.close()
     stream = io.BytesIO()
     iio.imwrite(stream, image, extension=".png")
-    data = stream.getvalue()
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+    write_bytes(stream.getvalue(), path)
 
 
 _SECONDS = 6.0

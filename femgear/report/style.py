@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from femgear.storage.files import replace_file
+from femgear.storage.files import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,7 +36,7 @@ def new_figure(
     sharey: bool = False,
     polar: bool = False,
 ):
-    """Make a figure outside pyplot, and its axes as a flat list.
+    """Make a figure outside pyplot, width and height in inches, and its axes as a flat list.
 
     Returns
     -------
@@ -123,8 +123,7 @@ def save_figure(figure: Figure, path: str | os.PathLike) -> None:
     StorageError
         When the file cannot be written.
     """
-    data = png_bytes(figure)
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+    write_bytes(png_bytes(figure), path)
 
 
 def png_bytes(figure: Figure) -> bytes:
@@ -139,8 +138,10 @@ def family(name: str) -> str:
     return "planet-ring" if "ring" in name else "sun-planet"
 
 
-def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = False) -> list[tuple[str, int]]:
+def distinct_lines(names, values, *, partly: bool = False) -> list[tuple[str, int]]:
     """Rows of `values` to draw: one for a family of meshes whose rows agree, each row otherwise.
+
+    Rows agree that differ by less than a millionth of the largest value.
 
     Parameters
     ----------
@@ -148,8 +149,6 @@ def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = Fal
         Mesh labels.
     values : (n, ...) array
         One row a mesh.
-    tolerance : float
-        Largest difference of rows counted as equal, relative to the largest value.
     partly : bool
         Also one for some meshes of a family whose rows agree.
 
@@ -159,7 +158,7 @@ def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = Fal
         Legend text and row number.
     """
     values, names = np.asarray(values), [str(name) for name in names]
-    limit = tolerance * np.abs(values).max(initial=0.0)
+    limit = 1e-6 * np.abs(values).max(initial=0.0)
     lines = []
     for kind in dict.fromkeys(family(name) for name in names):
         rows = [i for i, name in enumerate(names) if family(name) == kind]
@@ -179,7 +178,7 @@ def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = Fal
 
 
 def periodic(position, values):
-    """Append the first sample at the end of a record of whole periods, so that the curve closes."""
+    """Append the first sample to positions (P,) and values (..., P) of whole periods: the curve closes."""
     position, values = np.asarray(position), np.asarray(values)
     length = np.floor(position[-1] - position[0]) + 1.0
     return np.append(position, length + position[0]), np.concatenate([values, values[..., :1]], axis=-1)

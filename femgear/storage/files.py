@@ -6,13 +6,15 @@ Datasets are NetCDF-4 files, written with checksums and read with suspicion.
 from __future__ import annotations
 
 import contextlib
+import csv
 import errno
 import hashlib
+import io
 import os
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -133,10 +135,24 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
             temporary.unlink(missing_ok=True)
 
 
+def write_bytes(data: bytes, path: str | os.PathLike) -> None:
+    """Write bytes so that the file is either the old or the new one, whole."""
+    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+
+
 def write_text(text: str, path: str | os.PathLike) -> None:
     """Write UTF-8 text so that the file is either the old or the new one, whole."""
-    data = text.encode()
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+    write_bytes(text.encode(), path)
+
+
+def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a table as CSV, units in the header, numbers with nine digits; the file is whole."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
+    write_text(stream.getvalue(), path)
 
 
 def checksum(path: str | os.PathLike) -> str:

@@ -14,7 +14,7 @@ import json
 import math
 import os
 import time
-from collections.abc import ItemsView, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -43,25 +43,17 @@ _WRITTEN = {
 }
 
 
-class Journal:
-    """Records by key, in memory and, where `open_designs` made it, on disk."""
+class Journal(dict[str, dict]):
+    """Records by key in their order, in memory and, where `open_designs` made it, on disk."""
 
     def __init__(self, path: Path | None = None, stream: BinaryIO | None = None):
-        self._records: dict[str, dict] = {}
+        super().__init__()
         self._path, self._stream = path, stream
-
-    def get(self, key: str) -> dict | None:
-        """Record of a key, or None."""
-        return self._records.get(key)
-
-    def items(self) -> ItemsView[str, dict]:
-        """Keys and records in the order in which they were first written."""
-        return self._records.items()
 
     def add(self, key: str, record: Mapping[str, object]) -> None:
         """Keep a record; one of the same key is replaced."""
-        self._records[key] = dict(record)
-        self._write({"key": key, "record": self._records[key]})
+        self[key] = dict(record)
+        self._write({"key": key, "record": self[key]})
 
     def _write(self, line: dict) -> None:
         """Append a line and force it out."""
@@ -96,7 +88,7 @@ class Journal:
         for number, line in enumerate(lines[1:], 2):
             if not (isinstance(line.get("key"), str) and isinstance(line.get("record"), dict)):
                 raise _broken(path, number)
-            self._records[line["key"]] = line["record"]
+            self[line["key"]] = line["record"]
         if whole < len(text):
             with storage_errors(path):
                 stream.truncate(whole)
@@ -105,13 +97,12 @@ class Journal:
 
 
 @contextmanager
-def _open_journal(path: str | Path | None, case: str, keys: tuple[str, ...]) -> Iterator[Journal]:
-    """Open the journal of a case, by fingerprint, and its variables; no other process writes into it."""
+def _open_journal(path: str | Path | None, header: dict) -> Iterator[Journal]:
+    """Open the journal with a header; no other process writes into it."""
     if path is None:
         yield Journal()
         return
     path = Path(path)
-    header = {"format": _FORMAT, "femgear": __version__, "case": case, "keys": list(keys)}
     with storage_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     with exclusive_lock(path.with_name(f".{path.name}.lock")):
@@ -291,8 +282,9 @@ def open_designs(
         E-LOCKED: in use.
     """
     fingerprint = hashlib.sha256(to_toml(case).encode()).hexdigest()
-    names = tuple(" = ".join(entries) for entries in keys)
-    with _open_journal(journal, fingerprint, names) as records:
+    names = [" = ".join(entries) for entries in keys]
+    header = {"format": _FORMAT, "femgear": __version__, "case": fingerprint, "keys": names}
+    with _open_journal(journal, header) as records:
         yield Designs(case, tuple(keys), records, cache=cache, progress=progress)
 
 
@@ -301,7 +293,9 @@ class Enough(Exception):
 
 
 class Evaluations:
-    """Costs of designs as a search sees them; use `evaluations`.
+    """Costs of designs as a search sees them; points x are (n,) in the units of the variables.
+
+    Use `evaluations`.
 
     Attributes
     ----------
@@ -423,7 +417,7 @@ class Tolerance:
     more: dict[str, float]
 
     def slope(self, name: str, value: float) -> tuple[float, float]:
-        """Rise of a quantity per unit of the variable towards less and towards more.
+        """Rise of a quantity, from its value [SI], per unit of the variable towards less and towards more.
 
         Both are positive at a corner, where a derivative does not exist.
         """

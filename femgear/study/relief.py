@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations
-from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.flank_pairs import loaded_image, mesh_pairs
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.kinematics import torques
 from femgear.gears.modifications import FlankForm, TipRelief
-from femgear.trains.protocol import one_blas_thread
+from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.static.stages import flank_compliances, static_supports
 
 if TYPE_CHECKING:
@@ -53,12 +53,30 @@ class DesignBasis:
         Members whose axes move; by default all are fixed.
     deviations : SetDeviations, optional
         That the variants add to; None for ideal gears.
+    positions, contact : int, {"profile", "line_of_action"}
+        Equidistant positions of one mesh period and candidates, see `contact.cycle.walk_mesh_cycle`.
     """
 
     gears: PlanetarySet
     bodies: Bodies
     supports: Supports = RIGID
     deviations: SetDeviations | None = None
+    positions: int = 64
+    contact: str = "profile"
+
+    def walk(self, sun_torque: float, *, periods: int = 1, options: CycleOptions | None = None) -> MeshCycle:
+        """Static solution over the mesh cycle [periods] under a torque on the sun [N m]."""
+        return walk_mesh_cycle(
+            self.gears,
+            self.bodies,
+            sun_torque=sun_torque,
+            positions=self.positions,
+            contact=self.contact,
+            deviations=self.deviations,
+            supports=self.supports,
+            periods=periods,
+            options=options,
+        )
 
     def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
         """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,).
@@ -82,13 +100,14 @@ class DesignBasis:
 
 @one_blas_thread()
 def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
-    """Gears, compliances, deviations, and supports as the static problem of a case has them.
+    """Gears, compliances, deviations, supports and positions as the static problem of a case has them.
 
     ``cache`` is the folder of generated grids.
     """
     gears, deviations = planetary_set(case), set_deviations(case)
     bodies = flank_compliances(case, gears, cache=cache)[1]
-    return DesignBasis(gears, bodies, static_supports(case), None if deviations.ideal else deviations)
+    own = None if deviations.ideal else deviations
+    return DesignBasis(gears, bodies, static_supports(case), own, case.static.positions, case.static.contact)
 
 
 def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
@@ -189,9 +208,7 @@ def harris_map(
     *,
     torques,
     deviations: Sequence[SetDeviations | None],
-    positions: int = 32,
-    contact: str = "profile",
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> HarrisMap:
     """Transmission error peak to peak over torque for a list of deviations.
 
@@ -203,10 +220,8 @@ def harris_map(
         On the sun [N m], not zero.
     deviations : sequence of SetDeviations or None
         One a curve; the record spans the common period of each.
-    positions, contact
-        As for `contact.cycle.walk_mesh_cycle`.
     progress : callable, optional
-        Called with (mesh cycles done, mesh cycles).
+        Called with (stage, mesh cycles done, mesh cycles).
 
     Raises
     ------
@@ -223,22 +238,13 @@ def harris_map(
     for v, variant in enumerate(deviations):
         periods = 1 if variant is None else common_period(variant, basis.gears)[0]
         for t, torque in enumerate(torques):
-            cycle = walk_mesh_cycle(
-                basis.gears,
-                basis.bodies,
-                sun_torque=float(torque),
-                positions=positions,
-                contact=contact,
-                deviations=variant,
-                supports=basis.supports,
-                periods=periods,
-            )
+            cycle = replace(basis, deviations=variant).walk(float(torque), periods=periods)
             peak = np.ptp(cycle.deflection, axis=1)
             peaks[v, :, t] = peak[:N].max(), peak[N:].max()
             overall[v, t] = np.ptp(cycle.sun_arc)
             residual = max(residual, float(cycle.residual.max()))
             if progress is not None:
-                progress(v * len(torques) + t + 1, peaks[:, 0].size)
+                progress("contact", v * len(torques) + t + 1, peaks[:, 0].size)
     return HarrisMap(torques, peaks, overall, residual)
 
 
@@ -280,9 +286,7 @@ def relief_grid(
     lengths,
     torques,
     power: float = 1.0,
-    positions: int = 32,
-    contact: str = "profile",
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> ReliefGrid:
     """Transmission error of the sun-planet meshes over amount and length of their tip relief.
 
@@ -292,7 +296,7 @@ def relief_grid(
         The reliefs are added to its deviations.
     amounts, lengths, torques : (A,), (L,), (T,) sequences
         See `ReliefGrid`; torques are of one sign.
-    power, positions, contact, progress
+    power, progress
         As for `with_tip_relief` and `harris_map`.
     """
     amounts, lengths, torques = (np.array(a, float) for a in (amounts, lengths, torques))
@@ -303,8 +307,7 @@ def relief_grid(
         for a in amounts
         for length in lengths
     ]
-    options = {"positions": positions, "contact": contact, "progress": progress}
-    found = harris_map(basis, torques=torques, deviations=variants, **options).peak_to_peak[:, 0]
+    found = harris_map(basis, torques=torques, deviations=variants, progress=progress).peak_to_peak[:, 0]
     peaks = found[1:].T.reshape(len(torques), len(amounts), len(lengths))
     return ReliefGrid(amounts, lengths, torques, peaks, found[0])
 
@@ -365,8 +368,6 @@ def optimise_relief(
     *,
     torque: float,
     power: float = 1.0,
-    positions: int = 32,
-    contact: str = "profile",
     max_evaluations: int = 240,
 ) -> ReliefOptimum:
     """Best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
@@ -381,7 +382,7 @@ def optimise_relief(
 
     Parameters
     ----------
-    basis, power, positions, contact
+    basis, power
         As for `relief_grid`.
     grid : ReliefGrid
         Over the same set, with `torque` (on the sun [N m]) among its torques.
@@ -389,7 +390,6 @@ def optimise_relief(
         Mesh cycles after which the search is not begun again.
     """
     t = int(np.abs(grid.torques - torque).argmin())
-    options = {"torques": [torque], "positions": positions, "contact": contact}
     known: dict[tuple[float, float], float] = {}
 
     def peak(point) -> float:
@@ -397,7 +397,7 @@ def optimise_relief(
         if place not in known:
             relief = {"amount": place[0] * 1e-6, "length": place[1], "power": power, "back": torque < 0}
             variant = with_tip_relief(basis.deviations, basis.gears, **relief)
-            found = harris_map(basis, deviations=[variant], **options)
+            found = harris_map(basis, torques=[torque], deviations=[variant])
             known[place] = float(found.peak_to_peak[0, 0, 0]) * 1e6
         return known[place]
 

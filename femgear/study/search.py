@@ -340,7 +340,7 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
 
 
 def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
-    """Middle of the bounds, and a Latin hypercube of ``count`` points."""
+    """Middle of the bounds, and a Latin hypercube of ``count`` points, (1 + count, n)."""
     from scipy.stats.qmc import LatinHypercube
 
     low, high = problem.bounds.T
@@ -356,8 +356,8 @@ def polish(
     The simplex may collapse before it reaches a minimum (K. I. M. McKinnon, SIAM J. Optim. 9, 1998,
     148-158): it begins again, half as large, from where it ended.
 
-    ``size`` is that of the first simplex over the ranges, ``rounds`` the number of simplexes one after the
-    other. The other method is Powell's.
+    ``cost`` and start ``x0`` (n,) are in the units of the variables, ``size`` is that of the first simplex
+    over the ranges, ``rounds`` the number of simplexes one after the other. The other method is Powell's.
     """
     from scipy.optimize import minimize
 
@@ -496,13 +496,15 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     variant = evaluations.designs.variant(problem.point(x))
     case, objective = variant.case, problem.objective
     static = variant.static(objective.torque)
-    linear = linearise(
-        DesignBasis(static.planetary_set, static.bodies, static_supports(case), set_deviations(case)),
-        sun_torque=static.sun_torque,
-        positions=case.static.positions,
-        periods=static.cycle.periods,
-        contact=case.static.contact,
+    basis = DesignBasis(
+        static.planetary_set,
+        static.bodies,
+        static_supports(case),
+        set_deviations(case),
+        case.static.positions,
+        case.static.contact,
     )
+    linear = linearise(basis, sun_torque=static.sun_torque, periods=static.cycle.periods)
     n, signal = static.planetary_set.n_planets, objective.signal
     assert signal is not None, "see has_derivatives"
     value = signal(linear.sun_arc, linear.deflection, n)

@@ -35,7 +35,7 @@ from femgear.contact.assembly import (
     in_windows,
     mesh_windows,
 )
-from femgear.contact.flank_pairs import mesh_pairs, separation
+from femgear.contact.flank_pairs import mesh_pairs, separation, tooth_steps
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
 from femgear.errors import CaseError
@@ -138,21 +138,13 @@ def _original_rows(order) -> np.ndarray:
 
 
 @one_blas_thread()
-def linearise(
-    basis: DesignBasis,
-    *,
-    sun_torque: float,
-    positions: int = 64,
-    periods: int = 1,
-    only=None,
-    contact: str = "profile",
-) -> LinearContact:
+def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=None) -> LinearContact:
     """Contact of all drive flanks and what it answers to small separations of any cell.
 
     Parameters
     ----------
     basis : DesignBasis
-    sun_torque, positions, periods, contact
+    sun_torque, periods
         As for `contact.cycle.walk_mesh_cycle`; the torque is not zero.
     only : sequence of int, optional
         Numbers of the positions wanted; all of the record when left out.
@@ -165,17 +157,16 @@ def linearise(
         As `contact.cycle.walk_mesh_cycle`.
     """
     solved, order = basis.loaded(sun_torque)
-    record = positions * periods
+    record = basis.positions * periods
     chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
     if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
         raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
-    position, numbers = cycle_positions(positions, periods=periods), chosen
+    position, numbers = cycle_positions(basis.positions, periods=periods), chosen
     if sun_torque < 0:
         # the mirror image turns the other way and ends at position zero
         position, numbers = -position[::-1], len(position) - 1 - chosen
     load = abs(sun_torque) / solved.gears.sun.base_radius
-    options = {"positions": position, "contact": contact, "cells": 36}
-    setup, answers = _solve(solved, load, numbers, options)
+    setup, answers = _solve(solved, load, position, numbers)
     rows = _original_rows(order)
     stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}
     return LinearContact(
@@ -183,7 +174,7 @@ def linearise(
         solved=solved.gears,
         order=order,
         load=load,
-        position=chosen / positions,
+        position=chosen / basis.positions,
         solved_position=position[numbers],
         sun_arc=stacked["sun_arc"],
         deflection=stacked["deflection"].T[rows],
@@ -196,7 +187,7 @@ def linearise(
     )
 
 
-def _solve(solved: DesignBasis, load: float, numbers, options):
+def _solve(solved: DesignBasis, load: float, position: np.ndarray, numbers):
     """Windows wide enough, and the answers of all positions in them."""
     gears, bodies, N = solved.gears, solved.bodies, solved.gears.n_planets
     members = moving_members(gears, solved.supports)
@@ -205,7 +196,14 @@ def _solve(solved: DesignBasis, load: float, numbers, options):
 
     def attempt(share: float, nearest: float):
         setup = mesh_windows(
-            gears, bodies, share=share, nearest=nearest, deviations=solved.deviations, **options
+            gears,
+            bodies,
+            share=share,
+            nearest=nearest,
+            positions=position,
+            contact=solved.contact,
+            cells=36,
+            deviations=solved.deviations,
         )
         answers, overflow, outside, previous = [], False, False, None
         for p in numbers:
@@ -215,8 +213,8 @@ def _solve(solved: DesignBasis, load: float, numbers, options):
             previous = (problem, state.active)
             answers.append(_answer(problem, state, members))
             overflow |= problem.touches_window_end(state.active, setup)
-            penetrates = ~setup.near[:, p] & (setup.smallest_gap[:, p] < answers[-1]["deflection"][:, None])
-            outside |= options["contact"] == "profile" and bool(penetrates.any())
+            missed = setup.missed([p], answers[-1]["deflection"][:, None])
+            outside |= solved.contact == "profile" and bool(missed.any())
         return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
 
     return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * gears.sun.face_width))
@@ -256,9 +254,7 @@ def _touching(solved: PlanetarySet, setup, numbers, cells) -> _TouchingCells:
     mesh, pair, cell, weight = (np.concatenate([c[i] for c in cells]) for i in range(4))
     place = mesh, numbers[at], pair
     turns = setup.turns[numbers[at]]
-    # with every mesh period the sun's teeth move on by one, those of planets and ring back
-    tooth_1 = setup.tooth[0][mesh, pair] + np.where(mesh < N, -1, 1) * turns
-    tooth_2 = setup.tooth[1][mesh, pair] + turns
+    tooth_1, tooth_2 = (setup.tooth[gear][mesh, pair] + tooth_steps(mesh, gear, N) * turns for gear in (0, 1))
     roll_1, roll_2 = np.zeros((2, len(mesh)))
     for kind, contact in enumerate(mesh_pairs(solved)):
         rows = mesh // N == kind

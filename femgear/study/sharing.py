@@ -13,13 +13,13 @@ again with one unknown a planet. What is lost is the change of C with the loads,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.contact.assembly import ROUGH_STIFFNESS, assemble_contact, in_windows, mesh_windows
-from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
 from femgear.errors import CaseError, ContactError
@@ -75,8 +75,6 @@ def sharing_model(
     *,
     sun_torque: float,
     position: int = 0,
-    positions: int = 8,
-    contact: str = "profile",
     loads: int = 40,
 ) -> SharingModel:
     """Load-deflection curves of all planets at one position, from the contact problem at several loads.
@@ -87,9 +85,8 @@ def sharing_model(
         Samples add to the pin errors of its deviations.
     sun_torque : float
         [N m]; the curves reach to where one planet carries all of it.
-    position, positions : int
-        Number of the position among those of one mesh period.
-    contact : {"profile", "line_of_action"}
+    position : int
+        Number of the position among those of the basis.
     loads : int
         Points of a curve.
 
@@ -105,15 +102,16 @@ def sharing_model(
     ContactError
     """
     solved, order = basis.loaded(sun_torque)
-    if not 0 <= position < positions:
-        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {positions - 1}")
+    if not 0 <= position < basis.positions:
+        last = basis.positions - 1
+        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {last}")
     N, load = solved.gears.n_planets, abs(sun_torque) / solved.gears.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
     force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
-    at = (-position if sun_torque < 0 else position) / positions
+    at = (-position if sun_torque < 0 else position) / basis.positions
     deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
     for k, one in enumerate(force):
-        deflection[:, k], coupling[k] = _paths(solved, max(one, 1e-9 * load), at, contact)
+        deflection[:, k], coupling[k] = _paths(solved, max(one, 1e-9 * load), at)
     mean = int(np.abs(force - load / N).argmin())
     between = coupling[mean]
     change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
@@ -134,10 +132,10 @@ def sharing_model(
     )
 
 
-def _paths(solved: DesignBasis, force: float, position: float, contact: str):
+def _paths(solved: DesignBasis, force: float, position: float):
     """Path deflections (N,) and compliance between planets (N, N) with the same force in all meshes."""
     gears, bodies, N = solved.gears, solved.bodies, solved.gears.n_planets
-    place = {"positions": np.array([position]), "contact": contact, "deviations": solved.deviations}
+    place = {"positions": np.array([position]), "contact": solved.contact, "deviations": solved.deviations}
 
     def attempt(share: float, nearest: float):
         setup = mesh_windows(gears, bodies, share=share, cells=36, nearest=nearest, **place)
@@ -145,9 +143,8 @@ def _paths(solved: DesignBasis, force: float, position: float, contact: str):
         problem = assemble_contact(setup, bodies, 0)
         mesh = problem.mesh[:, None] == np.arange(2 * N)
         state = solve_contact(problem.H, problem.gap, mesh.astype(float), np.full(2 * N, force))
-        outside = ~setup.near[:, 0] & (setup.smallest_gap[:, 0] < state.motions[:, None])
         overflow = problem.touches_window_end(state.active, setup)
-        missed = contact == "profile" and outside.any()
+        missed = solved.contact == "profile" and setup.missed([0], state.motions[:, None]).any()
         wider = share * (4.0 if overflow else 1.0), nearest * (2.0 if missed else 1.0)
         return (problem, mesh, state), *wider
 
@@ -213,13 +210,10 @@ class Sharing:
     residual : float
         Largest violation: separation of loaded planets over the largest deflection, imbalance and overlap
         likewise.
-    one_by_one : int
-        Samples that Newton's method left to the general contact solver.
     """
 
     share: np.ndarray
     residual: float
-    one_by_one: int
 
     @property
     def factor(self) -> np.ndarray:
@@ -261,7 +255,7 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
             f"pin errors of shape {pins.shape} or not finite", code="E-RANGE", limit=f"(samples, {N}, 2)"
         )
     separation = (pins * model.pin).sum(axis=2)
-    curves, forces = _Curves.of(model), np.full((len(pins), N), model.load / N)
+    curves, forces = _monotone_curves(model), np.full((len(pins), N), model.load / N)
     motions, active = np.zeros((len(pins), m)), np.ones((len(pins), N), bool)
     left = np.arange(len(pins))
     for _ in range(max_steps):
@@ -281,32 +275,27 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
             code="E-CONTACT",
             limit="1e-6",
         )
-    return Sharing(forces / model.load, residual, len(left))
+    return Sharing(forces / model.load, residual)
 
 
-@dataclass(frozen=True)
-class _Curves:
-    """Monotone piecewise cubics through the curves, straight beyond their ends."""
+def _monotone_curves(model: SharingModel) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Deflections (S, N) and their slopes at forces (S, N): piecewise cubics, straight beyond their ends."""
+    from scipy.interpolate import PchipInterpolator
 
-    value: tuple
-    slope: tuple
-    last: float
+    if not np.all(np.diff(model.deflection, axis=1) > 0):
+        raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
+    values = [PchipInterpolator(model.force, row) for row in model.deflection]
+    slopes = [one.derivative() for one in values]
 
-    @classmethod
-    def of(cls, model: SharingModel) -> _Curves:
-        from scipy.interpolate import PchipInterpolator
-
-        if not np.all(np.diff(model.deflection, axis=1) > 0):
-            raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
-        found = [PchipInterpolator(model.force, row) for row in model.deflection]
-        return cls(tuple(found), tuple(f.derivative() for f in found), float(model.force[-1]))
-
-    def at(self, forces):
-        """Deflections and their slopes at (S, N) forces."""
-        inside = np.clip(forces, 0.0, self.last)
-        slope = np.stack([f(inside[:, n]) for n, f in enumerate(self.slope)], axis=1)
-        value = np.stack([f(inside[:, n]) for n, f in enumerate(self.value)], axis=1)
+    def at(forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        inside = np.clip(forces, 0.0, model.force[-1])
+        value, slope = (
+            np.stack([one(inside[:, n]) for n, one in enumerate(curves)], axis=1)
+            for curves in (values, slopes)
+        )
         return value + slope * (forces - inside), slope
+
+    return at
 
 
 def _newton(model, curves, separation, forces, active):
@@ -314,7 +303,7 @@ def _newton(model, curves, separation, forces, active):
     S, N = forces.shape
     G, m = model.approach, model.approach.shape[1]
     unit = float(model.deflection[:, -1].mean() / model.load)
-    value, slope = curves.at(forces)
+    value, slope = curves(forces)
     matrix = np.zeros((S, N + m, N + m))
     matrix[:, :N, :N] = model.coupling / unit
     matrix[:, np.arange(N), np.arange(N)] += slope / unit
@@ -342,7 +331,7 @@ def _one(model, curves, separation):
     load[0] = model.load
     forces = np.full((1, N), model.load / N)
     for step in range(200):
-        value, slope = curves.at(forces)
+        value, slope = curves(forces)
         gap = (value - slope * forces)[0] + separation
         state = solve_contact(model.coupling + np.diag(slope[0]), gap, model.approach, load)
         change = np.abs(state.loads - forces[0]).max()
@@ -354,7 +343,7 @@ def _one(model, curves, separation):
 
 def _residual(model, curves, separation, forces, motions) -> float:
     """Largest violation of contact and equilibrium over all samples."""
-    value, _ = curves.at(forces)
+    value, _ = curves(forces)
     gap = value + forces @ model.coupling + separation - motions @ model.approach.T
     gap = np.where(forces > 0, np.abs(gap), np.maximum(-gap, 0.0)).max() / model.deflection[:, -1].max()
     load = np.zeros(model.approach.shape[1])
@@ -364,15 +353,7 @@ def _residual(model, curves, separation, forces, motions) -> float:
 
 
 @one_blas_thread()
-def walked_shares(
-    basis: DesignBasis,
-    pins,
-    *,
-    sun_torque: float,
-    position: int = 0,
-    positions: int = 8,
-    contact: str = "profile",
-) -> np.ndarray:
+def walked_shares(basis: DesignBasis, pins, *, sun_torque: float, position: int = 0) -> np.ndarray:
     """Shares (S, N) of a few samples from the whole contact problem, to check `sharing_of_samples`.
 
     Arguments as for `sharing_model`, with the pin errors ``pins`` (S, N, 2) [m].
@@ -380,14 +361,7 @@ def walked_shares(
     base = no_deviations(basis.gears) if basis.deviations is None else basis.deviations
     shares = []
     for errors in np.asarray(pins, float):
-        cycle = walk_mesh_cycle(
-            basis.gears,
-            basis.bodies,
-            sun_torque=sun_torque,
-            positions=positions,
-            contact=contact,
-            supports=basis.supports,
-            deviations=replace(base, pin_errors=base.pin_errors + errors),
-        )
+        moved = replace(base, pin_errors=base.pin_errors + errors)
+        cycle = replace(basis, deviations=moved).walk(sun_torque)
         shares.append(cycle.load_share[:, position])
     return np.array(shares)

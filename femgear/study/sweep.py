@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 import math
 import re
@@ -21,7 +19,7 @@ import numpy as np
 from femgear.case.sections import Case
 from femgear.errors import CaseError, Finding
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
-from femgear.storage.files import storage_errors, write_text
+from femgear.storage.files import storage_errors, write_csv
 from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
@@ -56,8 +54,6 @@ class Sweep:
         Why, one a point; empty where it can.
     computed : int
         Cases computed now; a journal held the others.
-    seconds : float
-        What a case computed now took on average.
     """
 
     keys: tuple[str, ...]
@@ -66,7 +62,6 @@ class Sweep:
     values: np.ndarray
     errors: tuple[str, ...]
     computed: int
-    seconds: float
 
     @property
     def header(self) -> tuple[str, ...]:
@@ -125,8 +120,7 @@ def sweep(
             if count >= _MANY and i < count - 1 and not warned and designs.computed == _TIMED:
                 warned = True
                 _warn_of_time(count - i - 1, designs.seconds / _TIMED)
-        seconds = designs.seconds / max(designs.computed, 1)
-        return Sweep(keys, points, quantities, table, tuple(errors), designs.computed, seconds)
+        return Sweep(keys, points, quantities, table, tuple(errors), designs.computed)
 
 
 def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity]) -> int:
@@ -252,12 +246,7 @@ def sweep_into(
         folder.mkdir(parents=True, exist_ok=True)
     options = {"journal": folder / JOURNAL, "cache": cache, "progress": progress}
     found = sweep(case, values, quantities, **options)
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(found.header)
-    for row in found.records():
-        writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
-    write_text(stream.getvalue(), folder / TABLE)
+    write_csv(folder / TABLE, found.header, found.records())
     names = [TABLE, JOURNAL]
     if np.isfinite(found.values).any():
         _draw(found, [len(one) for one in values.values()], folder / FIGURE)

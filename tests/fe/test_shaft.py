@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import eigh, eigvals
 from validation.timoshenko import Disc, Support, free_bending, shaft_system
 
+from femgear.errors import CaseError
 from femgear.fe.shaft import RoundSection, beam_element, joint_deflections
 
 SECTION = RoundSection(0.1, 0.02)
@@ -132,6 +133,20 @@ def test_joint_does_not_see_rigid_motions():
     turn[[3, 8]], turn[5] = 1.0, 0.7
     assert np.abs(rows @ turn).max() < 1e-15
     assert np.linalg.matrix_rank(rows) == 5
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: RoundSection(0.0),
+        lambda: RoundSection(0.1, 0.1),
+        lambda: RoundSection(math.nan),
+        lambda: shaft(discs=(Disc(25, 1.0, 1.0, 1.0),)),
+    ],
+)
+def test_shafts_that_cannot_be_are_refused(make):
+    with pytest.raises(CaseError, match="E-SHAFT"):
+        make()
 
 
 def test_joint_of_two_halves_stores_the_energy_of_the_beam_under_an_end_load():

@@ -281,9 +281,8 @@ def test_play_left_and_wedging():  # bad input 50
         )
         assert check_deviations(below, PLAY) == ()
         (warning,) = check_deviations(above, PLAY)
-        assert warning.code == "W-WEDGING" and warning.value == pytest.approx(
-            -0.01 * limit * cosines, rel=1e-6
-        )
+        assert warning.code == "W-WEDGING"
+        assert min(least_play(above, PLAY)) == pytest.approx(-0.01 * limit * cosines, rel=1e-6)
         assert "between different planets" in str(warning)
     # a planet pushed towards the sun jams in that mesh
     deep = replace(tight, pin_errors=np.array([[-0.1e-3, 0], [0, 0], [0, 0]]))

@@ -155,7 +155,7 @@ def test_descents_find_the_relief_that_a_scan_finds(relief_problem, grids, tmp_p
     basis = design_basis(relief_problem.case, cache=grids)
     amounts = found.x[0] * 1e-6 + np.linspace(-0.5e-6, 0.5e-6, 3)
     variants = [None, *(with_tip_relief(None, basis.gears, amount=a) for a in amounts)]
-    scan = harris_map(basis, torques=[100.0], deviations=variants, positions=14)
+    scan = harris_map(replace(basis, positions=14), torques=[100.0], deviations=variants)
     peaks, name = scan.peak_to_peak[:, 0, 0], relief_problem.objective.name
     # a relief of no amount still divides the windows of the contact
     assert found.before[name] == pytest.approx(peaks[0], rel=1e-3)

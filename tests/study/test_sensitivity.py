@@ -27,6 +27,10 @@ def basis():
     return design_basis(with_value(read_case(CASE), "static.flank_elements", 8))
 
 
+def linear_contact(basis, *, positions=64, **options):
+    return linearise(replace(basis, positions=positions), **options)
+
+
 def relief_amount(gears, *, length, back=False):
     """Deviations with a tip relief, for its amount [m]."""
     return lambda value: with_tip_relief(None, gears, amount=value, length=length, back=back)
@@ -94,7 +98,7 @@ def test_derivatives_are_those_of_whole_solutions(basis, name, supports, torque)
     gears = basis.gears
     variant, value, step = parameter(name, gears, torque < 0)
     options = {"sun_torque": torque, "positions": 3}
-    linear = linearise(replace(basis, deviations=variant(value), supports=supports), **options)
+    linear = linear_contact(replace(basis, deviations=variant(value), supports=supports), **options)
     found = sensitivity(linear, variant, value, step=step)
     options["supports"] = supports
     arc, deflection, share = differences(gears, basis.bodies, variant, value, step, **options)
@@ -110,11 +114,11 @@ def test_the_linearised_solution_is_that_of_the_walk(basis):
     variant, value, _ = parameter("amount", basis.gears, False)
     options = {"sun_torque": TORQUE, "positions": 8}
     held = {"supports": SPRUNG, "deviations": variant(value)}
-    linear = linearise(replace(basis, **held), **options)
+    linear = linear_contact(replace(basis, **held), **options)
     cycle = walk_mesh_cycle(basis.gears, basis.bodies, **held, **options)
     for name in ("position", "sun_arc", "deflection", "force"):
         np.testing.assert_allclose(getattr(linear, name), getattr(cycle, name), rtol=1e-11)
-    some = linearise(replace(basis, **held), only=[5, 2], **options)
+    some = linear_contact(replace(basis, **held), only=[5, 2], **options)
     np.testing.assert_allclose(some.sun_arc, cycle.sun_arc[[5, 2]], rtol=1e-11)
 
 
@@ -126,7 +130,7 @@ def test_pitch_error_of_one_tooth(basis, gear, torque):
     gears, teeth = basis.gears, {"sun": 27, "planet": 40}[gear]
     variant = tooth_pitch_error(no_deviations(gears), gears, gear=gear, tooth=teeth - 3, planet=2)
     options = {"sun_torque": torque, "positions": 1, "periods": teeth if torque > 0 else teeth - 5}
-    linear = linearise(basis, **options)
+    linear = linear_contact(basis, **options)
     found = sensitivity(linear, variant, 0.0, step=1e-10)
     arc, deflection, _ = differences(gears, basis.bodies, variant, 0.0, 1e-10, **options)
     assert 0 < np.count_nonzero(np.abs(arc) > 1e-6) < teeth / 3
@@ -138,7 +142,7 @@ def test_pitch_error_of_a_tooth_of_the_ring(basis):
     """Planet 1 passes tooth 2 of the ring in the third mesh period, counted against the ring's numbers."""
     gears, options = basis.gears, {"sun_torque": TORQUE, "positions": 1, "periods": 108}
     variant = tooth_pitch_error(no_deviations(gears), gears, gear="ring", tooth=2)
-    linear = linearise(basis, **options)
+    linear = linear_contact(basis, **options)
     found = sensitivity(linear, variant, 0.0, step=1e-10)
     touched = np.flatnonzero(np.abs(found.sun_arc) > 1e-6)
     # three planets pass it a third of a turn apart
@@ -169,7 +173,7 @@ def test_a_pitch_error_is_that_of_the_case_file(basis):
 def test_pins_that_all_move_alike_turn_or_widen_the_set(basis, torque):
     """Willis: the carrier turned by e/a turns the sun by (1 + z_r/z_s) e/a against the fixed ring."""
     gears, sign = basis.gears, math.copysign(1.0, torque)
-    linear = linearise(basis, sun_torque=torque, positions=4)
+    linear = linear_contact(basis, sun_torque=torque, positions=4)
 
     def arc(direction):
         def variant(value):
@@ -197,7 +201,7 @@ def test_material_off_a_whole_flank_turns_the_sun_by_as_much(basis):
     def variant(value):
         return replace(no_deviations(gears), sun=FlankForm((MeasuredProfile(ends, (value, value)),)))
 
-    linear = linearise(replace(basis, deviations=variant(1e-6)), sun_torque=TORQUE, positions=4)
+    linear = linear_contact(replace(basis, deviations=variant(1e-6)), sun_torque=TORQUE, positions=4)
     found = sensitivity(linear, variant, 1e-6, step=1e-7)
     np.testing.assert_allclose(found.sun_arc, 1.0, rtol=1e-9)
     np.testing.assert_allclose(found.deflection[:3], 1.0, rtol=1e-9)
@@ -208,8 +212,8 @@ def test_material_off_a_whole_flank_turns_the_sun_by_as_much(basis):
 def test_a_floating_sun_makes_the_shares_of_three_planets_insensitive_to_pins(basis, torque):
     """Statics: three forces through known lines balance without any elasticity."""
     options = {"sun_torque": torque, "positions": 4, "only": [1]}
-    floating = linearise(replace(basis, supports=Supports(sun=0.0)), **options)
-    fixed = linearise(basis, **options)
+    floating = linear_contact(replace(basis, supports=Supports(sun=0.0)), **options)
+    fixed = linear_contact(basis, **options)
     largest = np.abs(pin_sensitivities(fixed)).max()
     assert np.abs(pin_sensitivities(floating)).max() < 1e-9 * largest
 
@@ -217,11 +221,11 @@ def test_a_floating_sun_makes_the_shares_of_three_planets_insensitive_to_pins(ba
 @pytest.mark.parametrize("supports", [RIGID, SPRUNG], ids=["fixed", "sprung"])
 def test_linear_shares_are_those_of_monte_carlo_for_small_errors(basis, supports):
     """Sample by sample and in their spread; the curves of `sharing_model` are another method."""
-    basis, options = replace(basis, supports=supports), {"sun_torque": TORQUE, "positions": 8}
+    basis = replace(basis, supports=supports, positions=8)
     pins = pin_samples(3, samples=2000, radial=0.05e-6, tangential=0.05e-6, seed=6)
-    model = sharing_model(basis, position=3, loads=24, **options)
+    model = sharing_model(basis, sun_torque=TORQUE, position=3, loads=24)
     sampled = sharing_of_samples(model, pins)
-    linear = linearise(basis, only=[3], **options)
+    linear = linearise(basis, sun_torque=TORQUE, only=[3])
     slopes = pin_sensitivities(linear)[..., 0]
     shares = linear.share[:, 0] + np.einsum("nmw,smw->sn", slopes, pins)
     spread = sampled.share.std(axis=0)
@@ -235,7 +239,7 @@ def test_a_planet_without_load_has_no_derivative_of_its_own(basis):
     base = replace(no_deviations(basis.gears), pin_errors=[[0, 0], [0, 60e-6], [0, 0]])
     variant = pin_error(base, planet=1, direction="tangential")
     options = {"sun_torque": TORQUE, "positions": 4}
-    linear = linearise(replace(basis, deviations=base), **options)
+    linear = linear_contact(replace(basis, deviations=base), **options)
     assert np.all(linear.force[[1, 4]] == 0)
     found = sensitivity(linear, variant, 0.0, step=1e-10)
     arc, _, share = differences(basis.gears, basis.bodies, variant, 0.0, 1e-10, **options)
@@ -259,7 +263,7 @@ def test_slopes_of_the_peak_to_peak_are_those_of_whole_solutions(basis):
     gears, options = basis.gears, {"sun_torque": TORQUE, "positions": 8}
     variant = relief_amount(gears, length=0.9)
     for amount, sign in ((2e-6, -1), (7e-6, 1)):
-        linear = linearise(replace(basis, deviations=variant(amount)), **options)
+        linear = linear_contact(replace(basis, deviations=variant(amount)), **options)
         found = sensitivity(linear, variant, amount, step=1e-9)
         left, right = slopes_of_extremes(linear.deflection[:3], found.deflection[:3], step=1e-10)
         peaks = [
@@ -285,11 +289,11 @@ def test_refusals(basis):
     ideal = no_deviations(basis.gears)
     loose = Supports(planet=1e8, planet_clearance=1e-6)
     with pytest.raises(CaseError, match="without torque"):
-        linearise(basis, sun_torque=0.0)
+        linear_contact(basis, sun_torque=0.0)
     with pytest.raises(CaseError, match="no such position"):
-        linearise(basis, sun_torque=1.0, positions=8, only=[8])
+        linear_contact(basis, sun_torque=1.0, positions=8, only=[8])
     with pytest.raises(CaseError, match="clearance"):
-        linearise(replace(basis, supports=loose), sun_torque=1.0)
-    linear = linearise(basis, sun_torque=-TORQUE, positions=1)
+        linear_contact(replace(basis, supports=loose), sun_torque=1.0)
+    linear = linear_contact(basis, sun_torque=-TORQUE, positions=1)
     with pytest.raises(CaseError, match="needs a step"):
         sensitivity(linear, pin_error(ideal, planet=1, direction="radial"), 0.0, step=0.0)

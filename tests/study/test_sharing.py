@@ -33,7 +33,7 @@ ALPHA = math.radians(24.6)
 def basis():
     from femgear.trains.reading import with_value
 
-    return design_basis(with_value(read_case(CASE), "static.flank_elements", 12))
+    return replace(design_basis(with_value(read_case(CASE), "static.flank_elements", 12)), positions=8)
 
 
 def linear_model(n_planets, load, *, bearing, sun=None, others=math.inf, mesh=5e8):
@@ -174,15 +174,13 @@ def test_relief_starts_at_the_ends_of_single_pair_contact(basis):
 
 @pytest.mark.slow
 def test_the_optimum_is_far_under_the_unmodified_pair_and_the_map_has_its_minimum_there(basis):
-    gears = basis.gears
-    grid = relief_grid(
-        basis, amounts=[3e-6, 4e-6, 5e-6], lengths=[0.8, 0.9, 1.0], torques=[TORQUE], positions=16
-    )
-    best = optimise_relief(basis, grid, torque=TORQUE, positions=16, max_evaluations=25)
+    gears, coarse = basis.gears, replace(basis, positions=16)
+    grid = relief_grid(coarse, amounts=[3e-6, 4e-6, 5e-6], lengths=[0.8, 0.9, 1.0], torques=[TORQUE])
+    best = optimise_relief(coarse, grid, torque=TORQUE, max_evaluations=25)
     assert best.peak_to_peak <= grid.peak_to_peak.min() + 1e-12
     variants = [None, with_tip_relief(None, gears, amount=best.amount, length=best.length)]
     torques = [25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 200.0]
-    found = harris_map(basis, torques=torques, deviations=variants, positions=64)
+    found = harris_map(replace(basis, positions=64), torques=torques, deviations=variants)
     plain, relieved = found.peak_to_peak[:, 0]
     assert relieved[3] < 0.25 * plain[3]
     assert relieved.argmin() == 3
@@ -196,18 +194,18 @@ def test_the_slopes_of_the_optimum_are_those_of_single_mesh_cycles(basis):
     """Same peaks as mesh cycles with the reliefs beside it; a search cut short says it is no minimum."""
     from femgear.study.relief import two_pair_length
 
-    gears = basis.gears
-    grid = relief_grid(basis, amounts=[2.7e-6, 5.3e-6], lengths=[0.8, 1.2], torques=[TORQUE], positions=16)
-    best = optimise_relief(basis, grid, torque=TORQUE, positions=16)
+    gears, basis = basis.gears, replace(basis, positions=16)
+    grid = relief_grid(basis, amounts=[2.7e-6, 5.3e-6], lengths=[0.8, 1.2], torques=[TORQUE])
+    best = optimise_relief(basis, grid, torque=TORQUE)
     assert best.minimum and best.at_end == ()
     assert min(*best.amount_slopes, *best.length_slopes) >= 0
-    short = optimise_relief(basis, grid, torque=TORQUE, positions=16, max_evaluations=3)
+    short = optimise_relief(basis, grid, torque=TORQUE, max_evaluations=3)
     assert not short.minimum and short.peak_to_peak > best.peak_to_peak
     away = 0.05e-3 / two_pair_length(gears)
     places = [(best.amount + d, best.length) for d in (-0.1e-6, 0.1e-6)]
     places += [(best.amount, best.length + d) for d in (-away, away)]
     variants = [with_tip_relief(None, gears, amount=a, length=length) for a, length in places]
-    found = harris_map(basis, torques=[TORQUE], deviations=variants, positions=16)
+    found = harris_map(basis, torques=[TORQUE], deviations=variants)
     rises = found.peak_to_peak[:, 0, 0] - best.peak_to_peak
     np.testing.assert_allclose(rises[:2], 0.1e-6 * np.array(best.amount_slopes), atol=1e-13)
     np.testing.assert_allclose(rises[2:], 0.05e-3 * np.array(best.length_slopes), atol=1e-13)
@@ -232,7 +230,7 @@ def test_a_map_of_negative_torques_is_that_of_positive_ones(basis):
     peaks = []
     for sign in (1, -1):
         variant = with_tip_relief(None, gears, amount=4e-6, length=0.9, back=sign < 0)
-        found = harris_map(basis, torques=[sign * TORQUE], deviations=[variant], positions=8)
+        found = harris_map(basis, torques=[sign * TORQUE], deviations=[variant])
         peaks.append(found.peak_to_peak)
     np.testing.assert_allclose(peaks[0], peaks[1], rtol=1e-9)
 
@@ -301,5 +299,5 @@ def test_newton_agrees_with_the_general_contact_solver(sun):
     model = replace(model, deflection=4e-6 * (model.deflection / model.deflection.max()) ** 0.7)
     pins = pin_samples(5, samples=60, radial=1e-6, tangential=3e-6, seed=9)
     fast, slow = sharing_of_samples(model, pins), sharing_of_samples(model, pins, max_steps=0)
-    assert slow.one_by_one == 60 and fast.open_planets.any()
+    assert fast.open_planets.any()
     np.testing.assert_allclose(fast.share, slow.share, atol=1e-7)

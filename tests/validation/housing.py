@@ -51,7 +51,7 @@ def first_harmonic() -> tuple[Row, ...]:
         rows += [
             counted("paper", PAPER, label + "lower dominating order", 105, low),
             counted("paper", PAPER, label + "upper dominating order", 111, high),
-            counted("paper", PAPER, label + "lobes a carrier revolution", 6, band.lobes.per_revolution),
+            counted("paper", PAPER, label + "lobes a carrier revolution", 6, len(band.lobes.position)),
             information(
                 "paper", "definition", label + "level of the third line [dB]", None, band.lines[2].level
             ),
@@ -62,7 +62,7 @@ def first_harmonic() -> tuple[Row, ...]:
     heard = fixed_sensor_lines(field, dynamics.ring_teeth, carrier, 0.0)
     band = analyse_band(OrderSpectrum(heard.order, heard.displacement), dynamics.ring_teeth, 1)
     label = "250 rpm, 1st mesh harmonic, Hanning window on the planet-ring forces: "
-    rows.append(counted("paper", PAPER, label + "lobes", 3, band.lobes.per_revolution))
+    rows.append(counted("paper", PAPER, label + "lobes", 3, len(band.lobes.position)))
     return tuple(rows)
 
 
@@ -133,7 +133,7 @@ def higher_harmonics() -> tuple[Row, ...]:
     rows = [
         counted("paper", PAPER, label + "lower dominating order", 537, low),
         counted("paper", PAPER, label + "upper dominating order", 543, high),
-        counted("paper", PAPER, label + "lobes a carrier revolution", 6, fifth.lobes.per_revolution),
+        counted("paper", PAPER, label + "lobes a carrier revolution", 6, len(fifth.lobes.position)),
         information(
             "paper", "definition", label + "level of the third line [dB]", None, fifth.lines[2].level
         ),
@@ -150,7 +150,7 @@ def higher_harmonics() -> tuple[Row, ...]:
         information(
             "paper", "definition", label + "line at order 649 over the strongest", None, _level(exact, 649)
         ),
-        information("paper", "definition", label + "lobes", None, sixth.lobes.per_revolution),
+        information("paper", "definition", label + "lobes", None, len(sixth.lobes.position)),
     ]
     return tuple(rows)
 

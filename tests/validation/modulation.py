@@ -125,8 +125,8 @@ def lobes() -> tuple[Row, ...]:
     return (
         counted("lobes", "order h z_ring - n", "ring pattern n = -3, 3: lower line", Z_RING - 3, heard[0]),
         counted("lobes", "order h z_ring - n", "ring pattern n = -3, 3: upper line", Z_RING + 3, heard[-1]),
-        counted("lobes", source, "ring pattern n = -3, 3: lobes", 6, band.lobes.per_revolution),
+        counted("lobes", source, "ring pattern n = -3, 3: lobes", 6, len(band.lobes.position)),
         counted(
-            "lobes", "one window a planet", "Hanning model, 3 planets: lobes", 3, hanning.lobes.per_revolution
+            "lobes", "one window a planet", "Hanning model, 3 planets: lobes", 3, len(hanning.lobes.position)
         ),
     )

@@ -12,7 +12,12 @@ from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
+from femgear.gears.iso6336 import (
+    contact_ratio_factor,
+    nominal_contact_stress,
+    nominal_root_stress,
+    zone_factor,
+)
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import BasicRack
 from femgear.gears.tooth import half_sector
@@ -34,11 +39,14 @@ def nominal_flanks() -> tuple[Row, ...]:
         ("sun_planet", s.sun, s.planet, ("573.40", "2.25", "0.936")),
         ("planet_ring", s.planet, s.ring, ("312.44", "2.85", "0.891")),
     ):
+        working, ratio = (
+            getattr(s, f"{what}_{name}") for what in ("working_pressure_angle", "contact_ratio")
+        )
         ours = nominal_contact_stress(
             one,
             two,
-            working_angle=getattr(s, f"working_pressure_angle_{name}"),
-            contact_ratio=getattr(s, f"contact_ratio_{name}"),
+            working_angle=working,
+            contact_ratio=ratio,
             tangential_force=REPORT_FORCE,
             youngs_modulus=206e9,
             poisson_ratio=0.3,
@@ -46,10 +54,11 @@ def nominal_flanks() -> tuple[Row, ...]:
         words = name.replace("_", "-")
         # the report prints to one unit of the last digit, see `nrel_report`
         quantity = f"nominal contact stress sigma_H0 of {words} [MPa]"
-        rows.append(printed("D6", KISSSOFT, quantity, values[0], ours.stress * 1e-6, digits=2))
-        rows.append(printed("D6", KISSSOFT, f"zone factor Z_H of {words}", values[1], ours.zone))
+        rows.append(printed("D6", KISSSOFT, quantity, values[0], ours * 1e-6, digits=2))
+        zone = zone_factor(one.pressure_angle, working)
+        rows.append(printed("D6", KISSSOFT, f"zone factor Z_H of {words}", values[1], zone))
         quantity = f"contact ratio factor Z_eps of {words}"
-        rows.append(printed("D6", KISSSOFT, quantity, values[2], ours.contact_ratio))
+        rows.append(printed("D6", KISSSOFT, quantity, values[2], contact_ratio_factor(ratio)))
     return tuple(rows)
 
 

@@ -188,7 +188,7 @@ def nominal_stresses(
         load = {"contact_ratio": ratio, "tangential_force": force}
         elastic = {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio}
         try:
-            contact[i] = nominal_contact_stress(small, large, working_angle=angle, **load, **elastic).stress
+            contact[i] = nominal_contact_stress(small, large, working_angle=angle, **load, **elastic)
         except GeometryError as error:
             messages.append(f"{one.name}-{two.name}: {error.message}")
         for j, gear in enumerate((one, two)):
