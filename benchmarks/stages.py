@@ -41,7 +41,7 @@ class Reference:
 
     @cached_property
     def gears(self):
-        from femgear.case.case import planetary_set
+        from femgear.case.gear_set import planetary_set
 
         return planetary_set(self.case)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from femgear.case.case import planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.case.sections import Case
     from femgear.errors import FemgearError
     from femgear.run import solve
@@ -36,7 +36,7 @@ _HOME = {
     "Case": "case.sections",
     "FemgearError": "errors",
     "open_results": "trains.reading",
-    "planetary_set": "case.case",
+    "planetary_set": "case.gear_set",
     "read_case": "trains.reading",
     "solve": "run",
     "solve_dynamics": "trains.elastic.stages",

@@ -271,7 +271,7 @@ def sweep(
     speeds
         First and last speed of the input, for mesh forces and the housing.
     """
-    from femgear.case.case import need_set
+    from femgear.case.gear_set import need_set
     from femgear.run import grid_cache
     from femgear.study.sweep import sweep_into
     from femgear.trains.reading import read_case

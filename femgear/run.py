@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from femgear.report.page import write_pictures, write_report
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, folder_lock, record
-from femgear.trains.protocol import Drawn, Progress, Stage, one_blas_thread
+from femgear.trains.protocol import Drawn, Progress, Stage, one_blas_thread, silent
 from femgear.trains.reading import open_results
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -33,7 +33,7 @@ def solve(
     case: Any,
     only: str | None = None,
     *,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     done: Callable[[Stage, Any, float], None] | None = None,
 ) -> dict[str, Any]:
     """Compute the stages of a case in memory: transmission error, modes, vibration, whatever its train has.
@@ -66,15 +66,13 @@ def solve(
     results, options = {}, {"cache": grid_cache(), "progress": progress}
     with one_blas_thread():
         for stage in stages:
-            if progress is not None:
-                progress(stage.name, 0, 1)
+            progress(stage.name, 0, 1)
             start = time.perf_counter()
             given = {name: options[name] for name in stage.options}
             results[stage.name] = stage.solve(case, *map(results.get, stage.takes), **given)
             if done is not None:
                 done(stage, results[stage.name], time.perf_counter() - start)
-            if progress is not None:
-                progress(stage.name, 1, 1)
+            progress(stage.name, 1, 1)
     return results
 
 
@@ -84,7 +82,7 @@ def run_case(
     *,
     only: str | None = None,
     pictures: bool = True,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> None:
     """Compute a case and write its results.
 
@@ -92,7 +90,7 @@ def run_case(
     ----------
     case : Case
     folder : path
-        From `run_folder`; its manifest says after every stage what is there.
+        From `femgear.storage.results.run_folder`; its manifest says after every stage what is there.
     only : str, optional
         Last stage to compute, whatever the case says of it.
     pictures : bool

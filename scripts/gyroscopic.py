@@ -45,7 +45,7 @@ def main(
     below
         Frequency with its unit; modes that are lower at rest are followed.
     """
-    from femgear.case.case import planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.case.quantities import FREQUENCY, SPEED, to_si
     from femgear.report.style import save_figure
     from femgear.trains.elastic.checks import check_rim_speed

@@ -50,7 +50,7 @@ def main(
     positions
         Positions over one mesh period.
     """
-    from femgear.case.case import need_set, planetary_set
+    from femgear.case.gear_set import need_set, planetary_set
     from femgear.case.quantities import LENGTH, TORQUE, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache

@@ -48,7 +48,7 @@ def main(
     harmonic
         Harmonic of the mesh frequency, 1 upwards.
     """
-    from femgear.case.case import planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.trains.reading import read_case, with_value
 
     data = with_value(read_case(case), "operation.speeds", [speed])

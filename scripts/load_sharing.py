@@ -41,7 +41,7 @@ def main(
     planet
         Number of the planet that has the gap, 1 upwards.
     """
-    from femgear.case.case import planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.case.quantities import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.study.relief import sun_torque

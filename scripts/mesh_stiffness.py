@@ -46,7 +46,7 @@ def main(
     positions
         Positions over one mesh period. Default: as the case says.
     """
-    from femgear.case.case import planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
     from femgear.trains.reading import read_case, with_value

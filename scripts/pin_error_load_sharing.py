@@ -62,7 +62,7 @@ def main(
     position
         In mesh periods, 0 to 1, rounded to a sixteenth.
     """
-    from femgear.case.case import planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.case.quantities import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache

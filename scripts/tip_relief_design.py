@@ -60,7 +60,7 @@ def main(
     positions
         Positions over one mesh period.
     """
-    from femgear.case.case import need_set, planetary_set
+    from femgear.case.gear_set import need_set, planetary_set
     from femgear.case.quantities import LENGTH, TORQUE, to_si
     from femgear.run import grid_cache
     from femgear.study.relief import design_basis, loads_back, sun_torque

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.case.sections import Case
 from femgear.errors import GeometryError
 from femgear.trains.elastic.checks import MOST_WINDING

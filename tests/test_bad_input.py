@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from validation.reference.plane_elasticity import edge_load
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.cli import main
 from femgear.contact.bodies import flank_load_columns, flank_stations
 from femgear.contact.solve import solve_contact

@@ -143,7 +143,7 @@ def heavy_after(code: str) -> set[str]:
     "code",
     [
         "import femgear",
-        "import femgear.case.case",
+        "import femgear.case.gear_set",
         "import femgear.storage.results",
         "from femgear.cli import main; main(['--help'])",
         "from femgear.cli import main; main(['--version'])",

@@ -12,7 +12,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 

@@ -332,18 +332,14 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
     return _Reader(convert, schema)
 
 
-def _one_line(value: object) -> str:
-    """A printable text of at most 200 characters."""
+def printable_line(value: object, *, name: str = "title", most: int = 200) -> str:
+    """A text, checked to be printable and of at most so many characters."""
     if not isinstance(value, str):
         raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
-    if len(value) > 200 or not value.isprintable():
-        raise CaseError(
-            "the title must be one printable line",
-            code="E-RANGE",
-            value=value,
-            limit="200 printable characters",
-        )
+    if len(value) > most or not value.isprintable():
+        limit = f"{most} printable characters"
+        raise CaseError(f"the {name} must be one printable line", code="E-RANGE", value=value, limit=limit)
     return value
 
 
-Title = Annotated[str, BeforeValidator(_one_line)]
+Title = Annotated[str, BeforeValidator(printable_line)]

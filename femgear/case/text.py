@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import re
@@ -260,30 +261,18 @@ def _key(key: str) -> str:
 
 
 def _value(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return '"' + "".join(_escape(character) for character in value) + '"'
-    if isinstance(value, int):
-        if abs(value).bit_length() > 4096:
-            raise CaseError("the integer is too long", code="E-RANGE", value=shown(value), limit="4096 bits")
-        return str(value)
+    if isinstance(value, int) and abs(value).bit_length() > 4096:
+        raise CaseError("the integer is too long", code="E-RANGE", value=shown(value), limit="4096 bits")
     if isinstance(value, float):
         return repr(value)
+    if isinstance(value, str | int):
+        # as in JSON, but that TOML escapes DEL as well
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
     raise CaseError(f"no TOML form for a {type(value).__name__}", code="E-TYPE", value=value)
-
-
-def _escape(character: str) -> str:
-    if character in '"\\':
-        return "\\" + character
-    if character.isprintable():
-        return character
-    code = ord(character)
-    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
 
 class ReadCase(BaseModel):

@@ -6,6 +6,7 @@ They draw datasets of results, of whatever train; helpers for figures over the m
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from femgear.report.style import (
     VERMILION,
     distinct_lines,
     excited_to,
+    family,
     label,
     legend_below,
     line_style,
@@ -210,6 +212,51 @@ def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str
     return figure
 
 
+def transmission_error_period(
+    dynamics: xr.Dataset, static: xr.Dataset | None = None, *, together: bool = False
+) -> Figure:
+    """Draw the fluctuation of the dynamic transmission error over one mesh period, axes for each speed.
+
+    Parameters
+    ----------
+    dynamics : xarray.Dataset
+        With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m]; at most four speeds are drawn.
+    static : xarray.Dataset, optional
+        With ``ste`` (mesh, position) [m], drawn for comparison: thin with the harmonics of the excitation
+        alone, so that their cut does not pass for vibration, and faint as a whole.
+    together : bool
+        Meshes that differ from planet to planet share axes; otherwise each kind has its own.
+    """
+    speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
+    position = _fine_positions(int(h.max()))
+    wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
+    errors = 1e6 * np.real(harmonics_of(dynamics, "dte")[speeds][..., h > 0] @ wave)
+    curves = [*errors] if static is None else [*errors, 1e6 * static["ste"].values]
+    # what is one line at one speed need not be one at another: the lines are those of all speeds
+    lines = distinct_lines(dynamics["mesh"].values, np.hstack(curves), partly=together)
+    kinds = [""] if together or len(lines) < 3 else list(dict.fromkeys(family(text) for text, _ in lines))
+    figure, axes = _panels(len(speeds) * len(kinds), above=1.2 if together else 0.8)
+    for ax, ((s, error), kind) in zip(axes, product(zip(speeds, errors), kinds)):
+        for i, (text, row) in enumerate(lines):
+            if kind not in ("", family(text)):
+                continue
+            style = line_style(i)
+            ax.plot(position, error[row], label=text, linewidth=2.0, **style)
+            if static is not None:
+                cut = _excited_harmonics(dynamics, s)
+                _draw_static(ax, static["position"], static["ste"].values[row], cut, position, style)
+        frequency = float(dynamics["mesh_frequency"].values[s])
+        title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
+        label(ax, "position in the mesh period [1]", title=f"{title}\n{kind} meshes" if kind else title)
+        ax.set_xlim(0.0, 1.0)
+    for ax in axes[::2]:
+        label(ax, y="transmission error less its mean [µm]")
+    if static is not None:
+        _name_kinds(axes[0], dynamics)
+    legend_below(figure, columns=3)
+    return figure
+
+
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     """Draw the amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
 
@@ -220,8 +267,8 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     """
     from matplotlib.ticker import MaxNLocator
 
-    speeds = some_speeds(dynamics.sizes["speed"])
-    figure, axes = panels(len(speeds))
+    speeds = _some_speeds(dynamics.sizes["speed"])
+    figure, axes = _panels(len(speeds))
     h = dynamics["harmonic"].values
     amplitude, h = np.abs(harmonics_of(dynamics, "dte"))[:, :, h > 0] * 1e6, h[h > 0]
     names, largest = dynamics["mesh"].values, amplitude[speeds].max(initial=0.0)
@@ -329,7 +376,7 @@ def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
     return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
 
 
-def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
+def _excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
     """Find the highest harmonic of the mesh frequency that excites, by ``excitation_limit`` [Hz] if known."""
     highest = int(dynamics["harmonic"].values.max())
     if "excitation_limit" not in dynamics:
@@ -339,12 +386,12 @@ def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
     return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
 
 
-def fine_positions(harmonics: int) -> np.ndarray:
+def _fine_positions(harmonics: int) -> np.ndarray:
     """Choose positions of one mesh period, enough for a curve of so many harmonics."""
     return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
 
 
-def name_kinds(ax, dynamics: xr.Dataset) -> None:
+def _name_kinds(ax, dynamics: xr.Dataset) -> None:
     """Add legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
     known = "excitation" if "excitation_limit" in dynamics else "response"
     for text, look in (
@@ -355,7 +402,7 @@ def name_kinds(ax, dynamics: xr.Dataset) -> None:
         ax.plot([], [], color=BLACK, label=text, **look)
 
 
-def draw_static(ax, at, values, harmonics: int, position, style) -> None:
+def _draw_static(ax, at, values, harmonics: int, position, style) -> None:
     """Draw the static transmission error [m] less its mean: whole record pale, first harmonics thin.
 
     Of its record ``values`` (P,) at positions ``at`` (P,) of one mesh period; harmonics at ``position`` (Q,).
@@ -379,7 +426,7 @@ def _fluctuation(at, values, harmonics: int, position):
     return at, value - mean, (line @ np.exp(2j * np.pi * np.outer(h, position))).real
 
 
-def panels(count: int, *, above: float = 0.8):
+def _panels(count: int, *, above: float = 0.8):
     """Make a figure with `count` axes of one vertical scale, two in a row, and room above them [in]."""
     rows, columns = -(-count // 2), min(count, 2)
     figure, axes = new_figure(
@@ -396,6 +443,6 @@ def shown_speeds(data: xr.Dataset) -> list[int]:
     return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
 
 
-def some_speeds(count: int) -> list[int]:
+def _some_speeds(count: int) -> list[int]:
     """Choose at most four of so many speeds, spread evenly."""
     return sorted({round(i) for i in np.linspace(0, count - 1, min(count, 4))})

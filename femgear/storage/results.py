@@ -41,6 +41,20 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
+_COORDINATES = {
+    "axis": ("1", "axis of the frame of the carrier"),
+    "circumferential": ("1", "signed nodal diameter n"),
+    "direction": ("1", "direction at the planet"),
+    "dof": ("1", "degree of freedom"),
+    "harmonic": ("1", "harmonic of the mesh frequency"),
+    "member": ("1", "member"),
+    "mesh": ("1", "gear mesh"),
+    "mode": ("1", "mode"),
+    "planet": ("1", "planet"),
+    "position": ("1", "position in mesh periods"),
+    "speed": ("rpm", "speed of the input"),
+}
+"""Unit and description of what the variables of planetary sets stand over."""
 
 
 def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
@@ -61,6 +75,11 @@ def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
         }
 
     return xr.Dataset(made(variables), coords=made(coords), attrs=attrs)
+
+
+def coordinates(**values: Any) -> dict[str, tuple]:
+    """Entries of `dataset` for coordinates by name: axis, harmonic, mesh, speed [rpm] and others."""
+    return {name: (name, values[name], *_COORDINATES[name]) for name in values}
 
 
 def declared(texts: Mapping[str, tuple[str, str, str]], values: Mapping[str, Any]) -> dict[str, tuple]:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from femgear.case.case import planetary_set
 from femgear.case.checks import LEAST_TORQUE
 from femgear.case.dependencies import Steps, static_entries
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import ACCELERATION, SPEED, TORQUE, Dimension, to_si
 from femgear.case.sections import LARGEST_TORQUE, Case
 from femgear.contact.root_stress import LOADED

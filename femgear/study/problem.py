@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from femgear.case import text as case_text
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import Dimension, to_si
 from femgear.case.sections import Case
 from femgear.errors import CaseError

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.flank_pairs import loaded_image, mesh_pairs
 from femgear.contact.supports import RIGID, Supports

@@ -24,8 +24,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from femgear.case.case import set_deviations
 from femgear.case.dependencies import FLANK_ENTRIES
+from femgear.case.gear_set import set_deviations
 from femgear.case.sections import Case
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
 from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Tolerance, evaluations, tolerances

@@ -25,6 +25,10 @@ Progress = Callable[[str, float, float], None]
 """Called with (stage, done, total)."""
 
 
+def silent(stage: str, done: float, total: float) -> None:
+    """Tell nobody how far a stage has come."""
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """One BLAS thread for a block of code, or as ``@one_blas_thread()`` for a function.

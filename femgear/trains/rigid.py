@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from femgear.case.case import set_deviations
+from femgear.case.gear_set import set_deviations
 from femgear.case.sections import Case, MeshStiffnessSection, RigidCase, output_member
 from femgear.errors import CaseError
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
-from femgear.storage.results import dataset
+from femgear.storage.results import coordinates, dataset
 from femgear.system.assembler import (
     check_mesh_columns,
     free_motions,
@@ -605,11 +605,7 @@ def modes_dataset(
             ("mesh", "mode"), deflection, "kg^-1/2", f"mesh deflection of the mode{along}",
         ),
     }  # fmt: skip
-    coords = {
-        "mode": (mode, np.arange(len(modes.frequency)), "1", "mode"),
-        "dof": (("dof",), dofs, "1", "degree of freedom"),
-        "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
-    }
+    coords = coordinates(mode=np.arange(len(modes.frequency)), dof=dofs, mesh=gears.mesh_names)
     named = {"title": attrs["title"], "unknowns": len(modes.shape)}
     return dataset(variables, coords=coords, attrs=named | attrs)
 

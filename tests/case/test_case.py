@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from femgear.case import text as case_text
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, GeometryError
 from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_value, with_values
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.gears.deviations import Ovality, Runout, body_separation, common_period
 from femgear.gears.modifications import ProfileCrowning, ProfileSlope, RootRelief, TipRelief, form_deviation

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case.case import planetary_set
 from femgear.case.checks import check_floating
+from femgear.case.gear_set import planetary_set
 from femgear.cli import main
 from femgear.errors import GeometryError
 from femgear.trains.reading import parse_case, with_value

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set, set_deviations
-from femgear.case.tables import read_profile
+from femgear.case.csv_columns import read_profile
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.modifications import MeasuredProfile
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value

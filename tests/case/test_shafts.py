@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import shaft_lines
+from femgear.case.gear_set import shaft_lines
 from femgear.errors import CaseError, GeometryError
 from femgear.trains.reading import read_case, with_value
 

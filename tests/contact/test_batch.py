@@ -8,7 +8,7 @@ from random_sets import random_set
 from validation.planetary import reference_set
 from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
-from femgear.case.case import material_of, planetary_set
+from femgear.case.gear_set import material_of, planetary_set
 from femgear.contact.assembly import contact_candidates, mesh_windows
 from femgear.contact.batch import ContactTangents, solve_batch
 from femgear.contact.bodies import make_bodies, make_sectors

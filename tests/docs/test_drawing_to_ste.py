@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.trains.reading import parse_case
 
 ROOT = Path(__file__).resolve().parents[2]

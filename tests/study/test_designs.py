@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set
 from femgear.case.dependencies import Steps, compliance_entries, fingerprint, ring_entries
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import SPEED
 from femgear.errors import CaseError
 from femgear.study.objectives import (

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, ConvergenceError, StorageError
 from femgear.study.designs import Designs, Failure, Journal, evaluations, open_designs
 from femgear.study.front import non_dominated, pareto_front

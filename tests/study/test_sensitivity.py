@@ -151,7 +151,7 @@ def test_pitch_error_of_a_tooth_of_the_ring(basis):
 
 
 def test_a_pitch_error_is_that_of_the_case_file(basis):
-    from femgear.case.case import set_deviations
+    from femgear.case.gear_set import set_deviations
 
     gears = basis.gears
     for gear, teeth, attributes in (

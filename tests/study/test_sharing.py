@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError, ContactError
 from femgear.gears.modifications import form_deviation
@@ -238,7 +238,7 @@ def test_a_map_of_negative_torques_is_that_of_positive_ones(basis):
 def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
     from tip_relief_design import relief_tables
 
-    from femgear.case.case import set_deviations
+    from femgear.case.gear_set import set_deviations
 
     gears = basis.gears
     text = relief_tables(gears, amount=4e-6, length=0.9, power=2.0, back=False)

@@ -75,7 +75,7 @@ class Comparison:
 @cache
 def static_with(*, thin: bool) -> StaticResult:
     """The reference set with elastic members, a pin error and a rim of one module, or its own rim."""
-    from femgear.case.case import planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.trains.reading import with_value
     from femgear.trains.static.stages import solve_static
 

@@ -15,6 +15,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, StrictBool
 
+from femgear.case.csv_columns import Columns, embed_points, read_columns
 from femgear.case.quantities import (
     ACCELERATION,
     FREQUENCY,
@@ -28,7 +29,6 @@ from femgear.case.quantities import (
     Section,
     Title,
 )
-from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError, Finding
 from femgear.trains.drivetrain.parts import (
@@ -552,7 +552,7 @@ def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
 
 
 def embed_torques(data: dict, name: str) -> dict[str, str]:
-    """Put the points of every ``file`` of a torque in its place; see `femgear.case.tables.embed_points`."""
+    """Put the points of every ``file`` of a torque in its place; see `embed_points`."""
 
     def plain(table: dict) -> bool:
         return not table.keys() & {"torque", "times", "torques", "share"}

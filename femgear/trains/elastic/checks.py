@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
 from femgear.case.checks import check_floating
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case, output_member
 from femgear.errors import CaseError, Finding
@@ -131,38 +131,31 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
         )
 
 
-def case_warnings(case: Case) -> tuple[Finding, ...]:
+def case_warnings(case: Case) -> Iterator[Finding]:
     """What is allowed in a set with an elastic ring but deserves a look."""
-    found = list(set_warnings(case))
+    yield from set_warnings(case)
     if case.dynamics.damping_ratio == 0.0 and case.operation.fixed == "ring":
-        found.append(
-            Finding(
-                "W-DAMPING",
-                "dynamics.damping_ratio",
-                "without damping resonances have no limit, and levels depend on how near a line lies to one",
-                remedy="0.02 to 0.05 is usual",
-            )
+        yield Finding(
+            "W-DAMPING",
+            "dynamics.damping_ratio",
+            "without damping resonances have no limit, and levels depend on how near a line lies to one",
+            remedy="0.02 to 0.05 is usual",
         )
-    found += _wound_up(case)
+    yield from _wound_up(case)
     if case.planet.bearing_clearance and case.operation.fixed == "ring":
-        found.append(
-            Finding(
-                "W-BEARING",
-                "planet.bearing_clearance",
-                "the dynamics have linear planet bearings; the clearance "
-                'acts in the static results alone, with static.members = "elastic"',
-            )
+        yield Finding(
+            "W-BEARING",
+            "planet.bearing_clearance",
+            "the dynamics have linear planet bearings; the clearance "
+            'acts in the static results alone, with static.members = "elastic"',
         )
     if case.housing.form == "linear" and case.housing.points <= 2 * MAX_DIAMETER:
-        found.append(
-            Finding(
-                "W-POINTS",
-                "housing.points",
-                f"{case.housing.points} points do not resolve the ring's {MAX_DIAMETER} nodal diameters",
-                remedy=f"use more than {2 * MAX_DIAMETER}",
-            )
+        yield Finding(
+            "W-POINTS",
+            "housing.points",
+            f"{case.housing.points} points do not resolve the ring's {MAX_DIAMETER} nodal diameters",
+            remedy=f"use more than {2 * MAX_DIAMETER}",
         )
-    return tuple(found)
 
 
 def _wound_up(case: Case) -> Iterator[Finding]:

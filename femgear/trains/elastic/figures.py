@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import material_of, planetary_set
+from femgear.case.gear_set import material_of, planetary_set
 from femgear.case.quantities import RPM
-from femgear.contact.bodies import active_flank_load, make_sectors
+from femgear.contact.bodies import active_flank_load
 from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
 from femgear.housing.orders import BandAnalysis, analyse_band
@@ -28,16 +28,11 @@ from femgear.housing.orders import order_spectrum as _spectrum
 from femgear.report.response import (
     MODE_CAPTIONS,
     RESPONSE_CAPTIONS,
-    draw_static,
-    excited_harmonics,
-    fine_positions,
     harmonics_of,
     mode_shapes,
-    name_kinds,
-    panels,
     response_figures,
     shown_speeds,
-    some_speeds,
+    transmission_error_period,
 )
 from femgear.report.scene import (
     animate_operating_deflection,
@@ -54,18 +49,15 @@ from femgear.report.style import (
     SIZE,
     SKY,
     VERMILION,
-    distinct_lines,
     excited_to,
-    family,
     label,
     legend_below,
-    line_style,
     new_figure,
     rpm,
 )
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
-from femgear.trains.static.figures import PICTURE_FLANK_ELEMENTS, PICTURE_REFINE
+from femgear.trains.static.figures import picture_sectors
 from femgear.trains.static.stages import ring_foundation
 
 if TYPE_CHECKING:
@@ -80,18 +72,16 @@ _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 _ROOM = 0.068
 # numbers along an axis, and lines of a spectrum that can be told apart, at most
 _TICKS, _STEMS = 20, 4000
+# between ticks, times powers of ten
+_STEPS = [1, 2, 2.5, 5, 10]
+# lines of a band that are labelled, at most
+_LABELS = 12
 _LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
 _ACCELERATION = "acceleration [m/s²]"
 
 
 def natural_frequencies(modes: xr.Dataset) -> Figure:
-    """Natural frequencies over the nodal diameters of the ring, by kind of mode.
-
-    Parameters
-    ----------
-    modes : xarray.Dataset
-        With ``frequency`` [Hz], ``kind`` and ``nodal_diameter``.
-    """
+    """Draw the natural frequencies of modes.nc over the nodal diameters of the ring, by kind of mode."""
     figure, (ax,) = new_figure(height=5.0)
     kinds = np.array([str(kind) for kind in modes["kind"].values])
     frequency, diameter = modes["frequency"].values, modes["nodal_diameter"].values
@@ -116,63 +106,10 @@ def natural_frequencies(modes: xr.Dataset) -> Figure:
     return figure
 
 
-def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = None) -> Figure:
-    """Fluctuation of the dynamic transmission error over one mesh period, axes for each speed.
-
-    Parameters
-    ----------
-    dynamics : xarray.Dataset
-        With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m]; at most four speeds are drawn.
-    static : xarray.Dataset, optional
-        With ``ste`` (mesh, position) [m], drawn for comparison: thin with the harmonics of the excitation
-        alone, so that their cut does not pass for vibration, and faint as a whole.
-    """
-    speeds = some_speeds(dynamics.sizes["speed"])
-    h = dynamics["harmonic"].values
-    position = fine_positions(int(h.max()))
-    wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
-    names = dynamics["mesh"].values
-    errors = [(harmonics_of(dynamics, "dte")[s][:, h > 0] @ wave).real * 1e6 for s in speeds]
-    drawn = [distinct_lines(names, error) for error in errors]
-    # meshes that differ from planet to planet get axes of their own for each kind
-    split = max(map(len, drawn)) > 2
-    kinds = list(dict.fromkeys(family(str(name)) for name in names)) if split else [""]
-    figure, axes = panels(len(speeds) * len(kinds))
-    for number, (s, error, lines) in enumerate(zip(speeds, errors, drawn)):
-        cut = excited_harmonics(dynamics, s)
-        frequency = float(dynamics["mesh_frequency"].values[s])
-        for i, (text, row) in enumerate(lines):
-            ax = axes[number * len(kinds) + (kinds.index(family(text)) if split else 0)]
-            style = line_style(i)
-            ax.plot(position, error[row], label=text, linewidth=2.0, **style)
-            if static is not None:
-                draw_static(ax, static["position"], static["ste"].values[row], cut, position, style)
-        for k, kind in enumerate(kinds):
-            title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
-            label(
-                axes[number * len(kinds) + k],
-                "position in the mesh period [1]",
-                title=f"{title}\n{kind} meshes" if kind else title,
-            )
-    for ax in axes:
-        ax.set_xlim(0, 1)
-    for ax in axes[::2]:
-        label(ax, y="transmission error less its mean [µm]")
-    if static is not None:
-        name_kinds(axes[0], dynamics)
-    legend_below(figure, columns=3)
-    return figure
-
-
 def ring_mean_deflection(dynamics: xr.Dataset, planetary_set: PlanetarySet) -> Figure:
-    """Mean radial deflection of the ring's outer surface in the carrier frame at the first speed, polar.
+    """Draw the mean radial deflection of the ring (dynamics.nc) over the angle in the carrier frame.
 
-    Parameters
-    ----------
-    dynamics : xarray.Dataset
-        With ``ring_real`` and ``ring_imag`` (speed, harmonic, circumferential) [m].
-    planetary_set : PlanetarySet
-        Angles of the planets, which are marked.
+    That of the outer surface at the first speed, with the angles of the planets marked.
     """
     figure, (ax,) = new_figure(width=6.4, height=6.6, polar=True)
     angle = np.linspace(0.0, 2 * np.pi, 721)
@@ -217,15 +154,10 @@ def _band(housing: xr.Dataset, ring_teeth: int, harmonic: int) -> BandAnalysis:
 
 
 def housing_signal(housing: xr.Dataset, *, ring_teeth: int, harmonics: Sequence[int] | None = None) -> Figure:
-    """Acceleration over one carrier revolution: whole, and around mesh harmonics with its envelope.
+    """Draw the acceleration of housing.nc over one carrier revolution at its first speed.
 
-    Parameters
-    ----------
-    housing : xarray.Dataset
-        With ``acceleration`` (speed, time) [m/s^2]; the first speed is drawn.
-    ring_teeth : int
-    harmonics : sequence of int, optional
-        Mesh harmonics of the bands; the first and the one with the strongest line when omitted.
+    Whole, and around mesh harmonics with its envelope: those given, or the first and that of the strongest
+    line.
     """
     harmonics = _shown_harmonics(housing, ring_teeth) if harmonics is None else harmonics
     speed, count = rpm(housing["speed"].values[0]), 1 + len(harmonics)
@@ -275,17 +207,13 @@ def _band_title(speed: str, found: BandAnalysis) -> str:
 
 
 def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
-    """Order spectrum with the mesh harmonics marked, and the strongest bands with their lines labelled.
+    """Draw the order spectrum of housing.nc at its first speed, mesh harmonics marked.
 
-    A line of harmonic ``h`` and nodal diameter ``n`` stands at order ``h z_ring - n``.
-
-    Parameters
-    ----------
-    housing : xarray.Dataset
-        With ``order_amplitude`` and ``order_amplitude_exact`` (speed, order) [m/s^2]; the first speed is
-        drawn.
-    ring_teeth : int
+    Below are the strongest bands with their lines labelled: one of harmonic ``h`` and nodal diameter ``n``
+    stands at order ``h z_ring - n``.
     """
+    from matplotlib.ticker import MaxNLocator
+
     order = housing["order"].values
     linear, exact = (housing[name].values[0] for name in ("order_amplitude", "order_amplitude_exact"))
     bands = _strongest_bands(order, linear, ring_teeth, 2)
@@ -298,11 +226,9 @@ def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
     # the record may reach further than the excitation at this speed
     end = order[np.maximum(linear, exact) > floor].max(initial=ring_teeth)
     axes[0].set_xlim(0, end + 0.5 * ring_teeth)
-    last = int(end + 0.5 * ring_teeth) // ring_teeth
+    top = axes[0].secondary_xaxis("top", functions=(lambda x: x / ring_teeth, lambda h: h * ring_teeth))
     # at most twenty numbers, that none covers another
-    multiples = np.arange(1, last + 1) if last <= _TICKS else np.arange(0, last + 1, _whole_step(last))[1:]
-    top = axes[0].secondary_xaxis("top")
-    top.set_xticks(multiples * ring_teeth, [str(h) for h in multiples])
+    top.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=_STEPS, integer=True, prune="lower"))
     top.tick_params(labelsize=SIZE - 2)
     top.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
     label(axes[0], "carrier order [1]", _ACCELERATION)
@@ -323,9 +249,9 @@ def _strongest_bands(order, amplitude, ring_teeth, count: int) -> list[int]:
     return sorted(ranked[:count])
 
 
-def _stems(ax, order, amplitude, floor, *, text, colour=BLUE, width=1.0):
+def _stems(ax, order, amplitude, floor, *, text, width=1.0):
     shown = _highest(order, amplitude, amplitude > floor)
-    ax.vlines(order[shown], floor, amplitude[shown], color=colour, linewidth=width, label=text)
+    ax.vlines(order[shown], floor, amplitude[shown], color=BLUE, linewidth=width, label=text)
     ax.set_yscale("log")
 
 
@@ -379,26 +305,22 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     label(ax, "carrier order [1]", _ACCELERATION, f"around mesh harmonic {harmonic} (order {centre})")
 
 
-def _labelled(order, amplitude, candidates, *, spacing, limit=12):
+def _labelled(order, amplitude, candidates, *, spacing):
     """Strongest lines whose labels do not run into each other."""
     chosen = []
     for k in np.flatnonzero(candidates)[np.argsort(-amplitude[candidates], kind="stable")]:
         if all(abs(order[k] - order[other]) >= spacing for other in chosen):
             chosen.append(k)
-        if len(chosen) == limit:
-            break
-    return chosen
+    return chosen[:_LABELS]
 
 
 def modulation_polar(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
-    """Envelope around the shown mesh harmonics over the angle of the carrier, one polar diagram for each.
+    """Draw the envelope of the acceleration of housing.nc over the angle of the carrier at its first speed.
 
-    Parameters
-    ----------
-    housing : xarray.Dataset
-        With ``acceleration`` (speed, time) [m/s^2]; the first speed is drawn.
-    ring_teeth : int
+    One polar diagram for each of the mesh harmonics that `housing_signal` shows.
     """
+    from matplotlib.ticker import MaxNLocator
+
     harmonics = _shown_harmonics(housing, ring_teeth)
     speed = rpm(housing["speed"].values[0])
     figure, axes = new_figure(columns=len(harmonics), width=5.2 * len(harmonics), height=6.2, polar=True)
@@ -410,7 +332,7 @@ def modulation_polar(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
         # a polygon would search the extremes of every one of its sides
         ax.fill_between(angle, 0.0, value, color=COLOURS[i % len(COLOURS)], alpha=0.15, linewidth=0)
         ax.plot(2 * np.pi * lobes.position, lobes.height, "v", color=BLACK, markersize=6, label="lobe")
-        ax.set_yticks(np.arange(1, 5) * _round_step(value.max(initial=0.0) / 4))
+        ax.yaxis.set_major_locator(MaxNLocator(4, steps=_STEPS, prune="lower"))
         ax.set_ylim(0, 1.12 * value.max(initial=0.0) or 1.0)
         for text in ax.get_yticklabels():
             text.set_bbox({"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0})
@@ -433,19 +355,6 @@ def _around(values):
     return uniform_filter1d(values, max(len(values) // 15, 1), mode="wrap")
 
 
-def _whole_step(last: int) -> int:
-    """Whole step of at most `_TICKS` ticks up to `last`."""
-    return max(round(_round_step(last / _TICKS)), 1)
-
-
-def _round_step(step: float) -> float:
-    """The next larger of 1, 2, 2.5, 5, 10 times a power of ten."""
-    if step <= 0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(step))
-    return min(f * power for f in (1.0, 2.0, 2.5, 5.0, 10.0) if f * power >= step * (1 - 1e-12))
-
-
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
     modes = drawn.data["modes"]
     return {
@@ -460,9 +369,7 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     if static is None:
         return []
     gears, material = static.planetary_set, material_of(case)
-    sector = make_sectors(
-        gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=drawn.cache
-    ).ring
+    sector = picture_sectors(drawn, gears).ring
     load = active_flank_load(sector.grid, gears, 1.0)
     basis = sector_basis(
         sector.grid,

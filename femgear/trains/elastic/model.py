@@ -50,6 +50,7 @@ class ElasticSet:
     ring_mode : int array
         Index into the ring's CyclicModes of every ring coordinate.
     planet_angles : (N,) array
+        [rad]
     """
 
     system: MechanicalSystem
@@ -381,6 +382,7 @@ def ring_model(
     load : (2n, 1) array
         Unit force into the ring at the flank that carries.
     max_diameter : int
+        Largest nodal diameter.
     max_frequency : float
         Modes beyond are represented by their static part [Hz].
     side : float

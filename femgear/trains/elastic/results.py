@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
 from femgear.case.dependencies import Entries
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.housing.orders import analyse_band, order_level, order_spectrum
@@ -23,8 +23,8 @@ from femgear.housing.sensor import (
     fixed_sensor_signal,
     hanning_model,
 )
-from femgear.report.tables import Block, chosen
-from femgear.storage.results import FOURIER, complex_entries, dataset, response_entries
+from femgear.report.tables import Block, chosen, tabulate
+from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
 from femgear.system.assembler import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 _FEW = 4
 _FIRST, _STRONGEST = 6, 4
 _HIGHEST = "highest frequency of the excitation"
+_DIRECTIONS = {RADIAL: "radial", TANGENTIAL: "tangential"}
 
 
 @dataclass(frozen=True)
@@ -91,12 +92,10 @@ class ModesResult:
             "supported_stiffness": (record, state.stiffness, "N/m", "tangent mesh stiffness on the supports"),
             "flexibility": ("mesh other_mesh", model.system.flexibility, "m/N", between),
         }
-        coordinates = modes.shape[model.ring_slice].T
+        motions = modes.shape[model.ring_slice].T
         for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
-            field = ring_field(model, self.ring.modes, coordinates, output, n_max)
-            words = (
-                f"outer {'radial' if output == RADIAL else 'tangential'} displacement, component exp(i n phi)"
-            )
+            field = ring_field(model, self.ring.modes, motions, output, n_max)
+            words = f"outer {_DIRECTIONS[output]} displacement, component exp(i n phi)"
             for part in ("real", "imag"):
                 variables[f"{name}_{part}"] = ("mode circumferential", getattr(field, part), "kg^-1/2", words)
         names, diameters = mesh_names(len(modes.mesh_stiffness) // 2), np.arange(-n_max, n_max + 1)
@@ -104,12 +103,10 @@ class ModesResult:
         return dataset(
             variables,
             coords={
-                "mode": ("mode", np.arange(len(modes.frequency)), "1", "mode"),
-                "dof": ("dof", list(modes.dofs), "1", "degree of freedom"),
-                "mesh": ("mesh", names, "1", "gear mesh"),
                 "other_mesh": ("other_mesh", names, "1", "gear mesh"),
                 "supported_position": ("supported_position", state.position, "1", denser),
-                "circumferential": ("circumferential", diameters, "1", "signed nodal diameter n"),
+                **coordinates(mode=np.arange(len(modes.frequency)), dof=modes.dofs, mesh=names),
+                **coordinates(circumferential=diameters),
             },
             attrs={
                 "title": "modal basis with mean mesh stiffnesses",
@@ -122,12 +119,13 @@ class ModesResult:
 
 @dataclass(frozen=True)
 class DynamicsResult:
-    """Periodic response at every speed, its stability, and the field on the ring's outer surface.
+    """Periodic response at every ``input_speed`` (speeds,) [rad/s], stability, and field of the ring.
 
     ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial`` and
-    ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m]. The excitation ends
-    at ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
-    changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at.
+    ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its
+    outer surface. The excitation ends at ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB]
+    is what the level of the housing changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that
+    were not looked at.
     """
 
     input_speed: np.ndarray
@@ -153,20 +151,14 @@ class DynamicsResult:
     def dataset(self) -> xr.Dataset:
         """Contents of dynamics.nc."""
         response, lines, field = self.response, "speed mesh harmonic", "speed harmonic circumferential"
-        n_max, harmonics = self.ring_radial.shape[-1] // 2, np.arange(response.force.shape[-1])
-        diameters = np.arange(-n_max, n_max + 1)
+        words = "outer tangential displacement of the ring"
+        n_max = self.ring_radial.shape[-1] // 2
         entries = (
             ("dte", lines, self.dte, "m", "dynamic transmission error"),
             ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
             ("mesh_deflection", lines, response.deflection, "m", "deflection of the mesh spring"),
             ("ring", field, self.ring_radial, "m", "outer radial displacement of the ring"),
-            (
-                "ring_tangential",
-                field,
-                self.ring_tangential,
-                "m",
-                "outer tangential displacement of the ring",
-            ),
+            ("ring_tangential", field, self.ring_tangential, "m", words),
         )
         change = "change of the housing level with excitation up to the frequency compared_to"
         reach = {
@@ -175,12 +167,12 @@ class DynamicsResult:
         }
         return dataset(
             response_entries(self) | reach | complex_entries(entries),
-            coords={
-                "speed": ("speed", self.input_speed / RPM, "rpm", "speed of the input"),
-                "mesh": ("mesh", mesh_names(self.dte.shape[1] // 2), "1", "gear mesh"),
-                "harmonic": ("harmonic", harmonics, "1", "harmonic of the mesh frequency"),
-                "circumferential": ("circumferential", diameters, "1", "signed nodal diameter n"),
-            },
+            coords=coordinates(
+                speed=self.input_speed / RPM,
+                mesh=mesh_names(self.dte.shape[1] // 2),
+                harmonic=np.arange(response.force.shape[-1]),
+                circumferential=np.arange(-n_max, n_max + 1),
+            ),
             attrs={
                 "title": "periodic response by the spectral method",
                 "message": response.message,
@@ -194,7 +186,7 @@ class DynamicsResult:
 
 @dataclass(frozen=True)
 class HousingResult:
-    """What a fixed sensor on the ring hears.
+    """What a fixed sensor on the ring hears at every ``input_speed`` (speeds,) [rad/s].
 
     ``lines`` are of the case's ``form``, "exact" or "linear" (interpolated over ``points`` points of the
     ring), and ``signal`` is theirs; ``exact`` are the exact ones. The excitation ends at
@@ -231,8 +223,8 @@ class HousingResult:
         }
         return dataset(
             variables,
-            coords={
-                "speed": ("speed", self.input_speed / RPM, "rpm", "speed of the input"),
+            coords=coordinates(speed=self.input_speed / RPM)
+            | {
                 "time": ("time", signal.revolution, "1", "fraction of one carrier revolution"),
                 "order": ("order", lines.order, "1", "carrier order"),
             },
@@ -247,24 +239,24 @@ class HousingResult:
 
 
 def describe_housing(data: xr.Dataset) -> Block:
-    """Level and largest lines at every speed of housing.nc."""
-    rows = []
-    for i in chosen(data.sizes["speed"]):
-        one = data.isel(speed=i)
-        amplitude = one.order_amplitude.values
-        largest = np.argsort(-amplitude, kind="stable")[:5]
-        lines = ", ".join(f"{round(float(one.order[j]))} ({amplitude[j]:.3g})" for j in largest)
-        limit = f"{float(one.excitation_limit) / 1e3:.2f}"
-        rows.append((f"{float(one.speed):.2f}", limit, f"{float(one.level):.4g}", lines))
-    header = (
-        "speed [rpm]",
-        "excited up to [kHz]",
-        "rms [m/s^2]",
-        "largest lines: carrier order (amplitude [m/s^2])",
-    )
+    """Tabulate level and largest lines at every speed of housing.nc."""
+    columns = {
+        "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
+        "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
+        "rms [m/s^2]": lambda one: f"{float(one.level):.4g}",
+        "largest lines: carrier order (amplitude [m/s^2])": _largest_lines,
+    }
     form = data.attrs["form"]
     note = f"form of the signal: {form}" + (f", {data.attrs['points']} points" if form == "linear" else "")
-    return Block("Housing", header, tuple(rows), (note,))
+    speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
+    return tabulate("Housing", speeds, columns, (note,))
+
+
+def _largest_lines(one: xr.Dataset) -> str:
+    """Write the five largest lines of one speed."""
+    amplitude = one.order_amplitude.values
+    largest = np.argsort(-amplitude, kind="stable")[:5]
+    return ", ".join(f"{round(float(one.order[j]))} ({amplitude[j]:.3g})" for j in largest)
 
 
 def mesh_bands(results: Results) -> Block:

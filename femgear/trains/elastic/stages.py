@@ -15,11 +15,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.case.dependencies import (
     Steps,
     check_entries,
@@ -29,6 +29,7 @@ from femgear.case.dependencies import (
     state_entries,
     static_entries,
 )
+from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, active_flank_load, with_ring
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
@@ -83,7 +84,7 @@ from femgear.trains.elastic.results import (
     describe_housing,
     mesh_bands,
 )
-from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
 from femgear.trains.rigid import member_speeds, modes_verdict
 from femgear.trains.static.description import describe_set
 from femgear.trains.static.results import StaticResult
@@ -258,7 +259,7 @@ twice a frequency carry the response there."""
 
 @one_blas_thread()
 def solve_modes(
-    case: Case, static: StaticResult, *, progress: Progress | None = None, steps: Steps | None = None
+    case: Case, static: StaticResult, *, progress: Progress = silent, steps: Steps | None = None
 ) -> ModesResult:
     """Modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
@@ -294,7 +295,7 @@ def solve_modes(
             contact=case.static.contact,
             deviations=None if deviations.ideal else deviations,
             supports=linear_supports(case),
-            progress=None if progress is None else lambda done, total: progress("modes", done, total),
+            progress=partial(progress, "modes"),
         ),
     )
     stiffness = state.resampled("held_stiffness", RECORD).mean(axis=1)
@@ -389,7 +390,7 @@ def _excitation(
 
 @one_blas_thread()
 def solve_dynamics(
-    case: Case, static: StaticResult, modes: ModesResult, *, progress: Progress | None = None
+    case: Case, static: StaticResult, modes: ModesResult, *, progress: Progress = silent
 ) -> DynamicsResult:
     """Periodic response at the case's speeds by the spectral method, with a Floquet verdict at each.
 
@@ -422,16 +423,14 @@ def solve_dynamics(
     if slow.any():
         share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(all_speeds[0].carrier))
         change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
-    if progress is not None:
-        progress("dynamics", 1, 2)
+    progress("dynamics", 1, 2)
     verdict = stability(
         basis,
         modes.excitation,
         response.mesh_frequency,
         excitation_harmonics=decisive_harmonics(basis, modes.excitation, int(limit.excitation.max())),
     )
-    if progress is not None:
-        progress("dynamics", 2, 2)
+    progress("dynamics", 2, 2)
     dte, field = mesh_and_ring_outputs(modes, response)
     return DynamicsResult(
         input_speed=np.array(case.operation.speeds),

@@ -12,19 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.phasing import MeshPhasing, PhasingTable, phase_factors, phasing_of_set, phasing_table
 from femgear.report.response import (
     RESPONSE_CAPTIONS,
-    draw_static,
-    excited_harmonics,
-    fine_positions,
     harmonics_of,
-    name_kinds,
-    panels,
     response_figures,
-    some_speeds,
+    transmission_error_period,
 )
 from femgear.report.style import (
     BLACK,
@@ -36,13 +31,10 @@ from femgear.report.style import (
     ORANGE,
     SIZE,
     VERMILION,
-    distinct_lines,
     label,
     legend_below,
-    line_style,
     new_figure,
     periodic,
-    rpm,
     xy,
 )
 from femgear.system.rigid_bodies import CENTRAL, gear_geometry
@@ -56,8 +48,6 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 _CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
-# of the carrier and of the dials of a phase diagram
-_DIAL = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
 _BODIES = {"carrier": GREEN, "ring": BLACK, "sun": VERMILION, "planets": BLUE}
 # modes that are shown and that stand in a row, harmonics of mesh forces
 _SHOWN, _COLUMNS, _HARMONICS = 12, 4, 4
@@ -205,37 +195,9 @@ def _mesh_stiffness(modes: xr.Dataset, static: xr.Dataset) -> Figure:
 
 
 def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
-    """Draw the fluctuation of the dynamic transmission error over one mesh period beside the static one.
-
-    Parameters
-    ----------
-    dynamics, modes : xarray.Dataset
-        Contents of dynamics.nc, of which at most four speeds are drawn, and of modes.nc.
-    """
-    speeds = some_speeds(dynamics.sizes["speed"])
-    figure, axes = panels(len(speeds), above=1.2)
-    h = dynamics["harmonic"].values
-    position = fine_positions(int(h.max()))
-    wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
-    dte = 1e6 * harmonics_of(dynamics, "dte")[..., h > 0]
-    ste = modes["helical_ste"].values
-    # what is one line at one speed need not be one at another: the lines are those of all speeds
-    curves = np.hstack([*(dte[speeds] @ wave).real, 1e6 * ste])
-    lines = distinct_lines(dynamics["mesh"].values, curves, partly=True)
-    for ax, s in zip(axes, speeds):
-        for i, (text, row) in enumerate(lines):
-            style = line_style(i)
-            ax.plot(position, (dte[s, row] @ wave).real, linewidth=2.0, label=text, **style)
-            draw_static(ax, modes["position"], ste[row], excited_harmonics(dynamics, s), position, style)
-        ax.set_xlim(0.0, 1.0)
-        frequency = float(dynamics["mesh_frequency"].values[s])
-        title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
-        label(ax, "position in the mesh period [1]", title=title)
-    for ax in axes[::2]:
-        label(ax, y="transmission error less its mean [µm]")
-    name_kinds(axes[0], dynamics)
-    legend_below(figure, columns=3)
-    return figure
+    """Draw the transmission errors of dynamics.nc over one mesh period beside the static ones of modes.nc."""
+    static = modes[["helical_ste"]].rename(helical_ste="ste")
+    return transmission_error_period(dynamics, static, together=True)
 
 
 def _mesh_force_spectra(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
@@ -296,9 +258,9 @@ def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 
         ax.set_axis_off()
         ax.set_aspect("equal")
     for h, (ax, row) in enumerate(zip(axes, factors)):
-        ax.plot(*xy(_DIAL), color="0.85", linewidth=1.0)
+        ax.plot(*xy(_CIRCLE), color="0.85", linewidth=1.0)
         for n, centre in enumerate(centres):
-            ax.plot(*xy(centre + dial * _DIAL), color=GREY, linewidth=1.0)
+            ax.plot(*xy(centre + dial * _CIRCLE), color=GREY, linewidth=1.0)
             number = centre * (1.0 + 1.35 * dial)
             ax.text(*xy(number), str(n + 1), ha="center", va="center", fontsize=SIZE - 2)
             ends = centre + 0.9j * dial * row[[n, phasing.n_planets + n]]

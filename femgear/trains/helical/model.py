@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from femgear.case.case import material_of
+from femgear.case.gear_set import material_of
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError
@@ -214,17 +214,16 @@ def helical_excitation(
 
     Parameters
     ----------
-    record : MeshExcitation or MeshCycle
+    record : MeshExcitation
         Of the spur gears of the normal section, all of it loaded as the whole helical mesh; stiffnesses and
         deflections along the tooth normals. Their teeth are as long as the contact lines, so that the face
         width is ``b / cos beta_b`` (ISO 6336-1, method B: ``c' b cos beta_b`` in the transverse section).
-        Mesh phases are those at mid-face. A `femgear.contact.cycle.MeshCycle` knows no backlash, which is
-        then zero.
+        Mesh phases are those at mid-face.
     overlap_ratio : float or (n_meshes,) array
         eps_beta, 0 or more.
     slices : int
         Number S of equal slices of the face width; each has a row of its own with its part of stiffness and
-        force, in the order of the columns of `mesh_directions`.
+        force, in the order of the columns of `femgear.system.assembler.mesh_directions`.
     hand : {1, -1}
         1 where height +z runs ahead: a right-handed sun that turns counter-clockwise against the carrier, or
         a left-handed one that turns clockwise. Only slices see it.
@@ -242,7 +241,6 @@ def helical_excitation(
     count = len(record.stiffness)
     overlap = np.broadcast_to(np.asarray(overlap_ratio, float), count)
     ahead = slice_phases(np.zeros(count), overlap, slices=slices, hand=hand).reshape(count, slices)
-    backlash = np.broadcast_to(getattr(record, "backlash", 0.0), count)
     filtered = [
         _sliced(values, record.periods, ahead, overlap / slices) / slices
         for values in (record.stiffness, record.force, record.stiffness * record.deflection)
@@ -257,7 +255,7 @@ def helical_excitation(
         stiffness=stiffness,
         deflection=weighted / stiffness,
         force=force,
-        backlash=np.repeat(backlash, slices),
+        backlash=np.repeat(np.broadcast_to(record.backlash, count), slices),
         periods=record.periods,
     )
 

@@ -17,12 +17,12 @@ from femgear.case.quantities import RPM
 from femgear.gears import profile
 from femgear.gears.planetary import virtual_teeth
 from femgear.report.tables import Block
-from femgear.storage.results import FOURIER, complex_entries, dataset, response_entries
+from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness, contact_ratios
 from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
-from femgear.trains.static.description import static_warnings
+from femgear.trains.static.results import static_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,7 +43,8 @@ class HelicalModesResult:
     """Modes with mean mesh stiffness, and what excites them.
 
     ``excitation`` has a row a slice, ``whole`` a row a mesh at its static state with fixed centres, both
-    along the tooth normals and None where the mesh stiffness is given; ``phasing`` is that of every mode.
+    along the tooth normals and None where the mesh stiffness is given; ``phasing`` is that of every mode,
+    ``flank`` the sign of `femgear.system.assembler.mesh_directions`.
     """
 
     planetary_set: PlanetarySet
@@ -80,13 +81,12 @@ class HelicalModesResult:
                 "static transmission error along the transverse line of action, centres fixed",
             ),
         }  # fmt: skip
-        coords = {"position": (("position",), position, "1", "position in mesh periods")}
-        return found.merge(dataset(curves, coords=coords, attrs={}))
+        return found.merge(dataset(curves, coords=coordinates(position=position), attrs={}))
 
 
 @dataclass(frozen=True)
 class HelicalDynamicsResult:
-    """Periodic response at every speed, its stability, and loads.
+    """Periodic response at every ``input_speed`` (speeds,) [rad/s], its stability, and loads.
 
     ``loads`` holds complex harmonics by name: ``pin`` (speeds, N, 6, H + 1) and ``support``
     (speeds, 3, 6, H + 1), three forces [N] and three moments [N m] each.
@@ -142,18 +142,17 @@ class HelicalDynamicsResult:
 
 
 def _coordinates(result: HelicalDynamicsResult) -> dict[str, tuple]:
-    data, meshes = result.modes.data, list(result.modes.planetary_set.mesh_names)
-    harmonics, planets = np.arange(result.response.force.shape[-1]), np.arange(1, data.n_planets + 1)
-    return {
-        "mesh": (("mesh",), meshes, "1", "gear mesh"),
-        "speed": (("speed",), result.input_speed / RPM, "rpm", "speed of the input"),
-        "harmonic": (("harmonic",), harmonics, "1", "harmonic of the mesh frequency"),
-        "slice": (("slice",), data.slice_heights, "m", "height of the slice above mid-face"),
-        "planet": (("planet",), planets, "1", "planet"),
-        "direction": (("direction",), ["radial", "tangential", "axial"], "1", "direction at the planet"),
-        "member": (("member",), list(CENTRAL), "1", "member"),
-        "axis": (("axis",), ["x", "y", "z"], "1", "axis of the frame of the carrier"),
-    }
+    data = result.modes.data
+    slices = {"slice": ("slice", data.slice_heights, "m", "height of the slice above mid-face")}
+    return slices | coordinates(
+        mesh=result.modes.planetary_set.mesh_names,
+        speed=result.input_speed / RPM,
+        harmonic=np.arange(result.response.force.shape[-1]),
+        planet=np.arange(1, data.n_planets + 1),
+        direction=["radial", "tangential", "axial"],
+        member=CENTRAL,
+        axis=["x", "y", "z"],
+    )
 
 
 def _attributes(result: HelicalModesResult) -> dict:
@@ -170,15 +169,7 @@ def _attributes(result: HelicalModesResult) -> dict:
 
 
 def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block, ...]:
-    """Tabulate helix, contact ratios, bodies and supports of a helical case.
-
-    Parameters
-    ----------
-    case : Case
-        With a section helical.
-    planetary : PlanetarySet
-        Of its transverse section.
-    """
+    """Tabulate helix, contact ratios, bodies and supports of a case with its transverse section."""
     return _teeth(case, planetary), Block(
         "Helical model", _BODIES, tuple(_bodies(case)), _model(case, planetary)
     )
@@ -242,16 +233,9 @@ def _model(case: HelicalCase, s: PlanetarySet) -> tuple[str, ...]:
 
 
 def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None, *, module: float) -> Block:
-    """Numbers of static.nc, which holds spur gears, and beside them those of the helical meshes.
+    """Tabulate static.nc, which holds spur gears, and beside them the helical meshes of modes.nc.
 
-    Parameters
-    ----------
-    static : xarray.Dataset
-        Contents of static.nc of a helical case.
-    modes : xarray.Dataset, optional
-        Contents of modes.nc, which has stiffness and transmission error of the helical meshes.
-    module : float
-        In the transverse section [m].
+    ``module`` is that of the transverse section [m].
     """
     sources = [("spur", static["ste"], static["mesh_stiffness"])]
     if modes is not None and "helical_ste" in modes:

@@ -30,8 +30,8 @@ Turning = Annotated[float, Quantity(TORSION, 0.0, 1e13)]
 Diametral = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
 
 
-class _Supported(Section):
-    """What a body needs beyond its mass, polar inertia and radial support to move in space."""
+class HelicalBodySection(Section):
+    """What sun, carrier and planets need beyond mass, polar inertia and radial support to move in space."""
 
     diametral_inertia: Diametral
     axial_stiffness: Stiffness
@@ -39,19 +39,7 @@ class _Supported(Section):
     torsional_stiffness: Turning | None = None
 
 
-class HelicalSunSection(_Supported):
-    """The sun in space."""
-
-
-class HelicalCarrierSection(_Supported):
-    """The carrier in space."""
-
-
-class HelicalPlanetSection(_Supported):
-    """Each planet in space, on its pin."""
-
-
-class HelicalRingSection(_Supported):
+class HelicalRingSection(HelicalBodySection):
     """The ring as a rigid body on its support in the housing."""
 
     mass: Annotated[float, Quantity(MASS, 1e-6, 1e6)]
@@ -72,10 +60,10 @@ class HelicalSection(Section):
     contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
     section: Literal["normal", "transverse"] = "normal"
     mesh_stiffness: MeshStiffnessSection | None = None
-    sun: HelicalSunSection
+    sun: HelicalBodySection
     ring: HelicalRingSection
-    carrier: HelicalCarrierSection
-    planet: HelicalPlanetSection
+    carrier: HelicalBodySection
+    planet: HelicalBodySection
 
     @property
     def signed_helix_angle(self) -> float:
@@ -84,13 +72,7 @@ class HelicalSection(Section):
 
 
 def helical_notices(data: dict) -> Iterator[Finding]:
-    """What a helical case gives without effect.
-
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file that was checked, with a section helical.
-    """
+    """What a helical case gives without effect, by the tables of its checked file."""
     unused = entries_without_effect(data)
     unused += [f"static.{key}" for key in ("stresses", "back_flanks") if key in data.get("static", {})]
     if data["planet"].get("bearing_clearance"):

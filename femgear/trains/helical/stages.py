@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears import profile
 from femgear.report.tables import describe_modes, describe_response, response_warnings
@@ -42,7 +42,7 @@ from femgear.trains.helical.results import (
     describe_helical_static,
 )
 from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
-from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
 from femgear.trains.rigid import (
     driving_torque,
     gear_set_modes,
@@ -64,7 +64,7 @@ _SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "t
 
 
 def solve_helical_static(
-    case: HelicalCase, *, cache: Path | None = None, progress: Progress | None = None
+    case: HelicalCase, *, cache: Path | None = None, progress: Progress = silent
 ) -> StaticResult:
     """Solve the spur gears of the transverse section, the whole face width loaded at once."""
     return static_stages.solve_static(_drive_flanks(case), cache=cache, progress=progress)
@@ -134,7 +134,7 @@ def solve_helical_modes(
 
 @one_blas_thread()
 def solve_helical_dynamics(
-    case: HelicalCase, modes: HelicalModesResult, *, progress: Progress | None = None
+    case: HelicalCase, modes: HelicalModesResult, *, progress: Progress = silent
 ) -> HelicalDynamicsResult:
     """Solve for the periodic response at all speeds by the spectral method, with a Floquet verdict at each.
 
@@ -155,13 +155,11 @@ def solve_helical_dynamics(
         response_harmonics=case.response_harmonics,
         tolerance=dynamics.tolerance,
     )
-    if progress is not None:
-        progress("dynamics", 1, 2)
+    progress("dynamics", 1, 2)
     verdict = floquet_verdict(
         modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics
     )
-    if progress is not None:
-        progress("dynamics", 2, 2)
+    progress("dynamics", 2, 2)
     return HelicalDynamicsResult(
         modes, np.array(operation.speeds), turning, response, verdict, _loads(modes, response)
     )
@@ -201,10 +199,6 @@ def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarr
 def _remarks(results: Results, stem: str) -> Iterator[str]:
     if stem in _SPUR_TEETH:
         yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
-
-
-def _check_gears(case: HelicalCase) -> None:
-    planetary_set(case)
 
 
 def _given(case: HelicalCase) -> bool:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.report.response import MODE_CAPTIONS, harmonics_of, mode_shapes, shown_speeds
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure, runs
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
@@ -41,7 +41,8 @@ _INSTANTS = 20_000
 def pieces(stable, wanted: int) -> list[slice]:
     """Find runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
 
-    A segment is drawn once: unknown where one of its ends is, otherwise unstable where one is.
+    A segment between two of the points (p,) is drawn once: unknown where one of its ends is, otherwise
+    unstable where one is.
     """
     stable = np.asarray(stable, int)
     return runs(np.minimum(stable[:-1], stable[1:]) == wanted)
@@ -66,29 +67,32 @@ def orbits(curves: Sequence[tuple], *, title: str = "") -> Figure:
     return figure
 
 
-def bearing_forces(angle, curves: Sequence[tuple], *, title: str = "") -> Figure:
-    """Draw sizes of bearing forces over one turn of the weight against the carrier.
+def bearing_forces(
+    angle, curves: Sequence[tuple], *, title: str = "", over: str = "phase of the weight [°]"
+) -> Figure:
+    """Draw sizes of bearing forces over one turn, of the weight against the carrier or of the carrier.
 
     Parameters
     ----------
     angle : (n,) array
         [rad]
     curves : sequence of (text, force (2, n) [N])
-    title : str
+    title, over : str
+        Above the figure, and under its axis.
     """
     figure, (ax,) = new_figure()
     for number, (text, force) in enumerate(curves):
         ax.plot(np.degrees(angle), 1e-3 * np.hypot(*force), label=text, **line_style(number))
-    _phase_axis(ax)
+    _turn_axis(ax, over)
     label(ax, y="force [kN]", title=title)
     legend_below(figure)
     return figure
 
 
-def _phase_axis(ax) -> None:
+def _turn_axis(ax, over: str = "phase of the weight [°]") -> None:
     ax.set_xlim(0.0, 360.0)
     ax.set_xticks(np.arange(0.0, 361.0, 60.0))
-    label(ax, "phase of the weight [°]")
+    label(ax, over)
 
 
 def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
@@ -107,9 +111,8 @@ def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
 def weight_response(branch: xr.Dataset) -> Figure:
     """Draw amplitudes of carrier, ring and sun by what is known of their stability, folds marked."""
     figure, axes = new_figure(rows=3, width=8.5, height=8.0, sharex=True)
-    hertz, folds = branch["weight_frequency"].values, merged_folds(
-        branch["weight_frequency"].values, branch["fold"].values
-    )  # fmt: skip
+    hertz = branch["weight_frequency"].values
+    folds = merged_folds(hertz, branch["fold"].values)
     for ax, colour, member in zip(axes, COLOURS, branch["member"].values):
         size = 1e6 * branch["rms"].sel(member=member).values[:, 0]
         _mark_tails(ax, hertz, size, branch["tail"].values)
@@ -197,7 +200,7 @@ def _flank_forces(branch: xr.Dataset) -> Figure:
             force = branch[kind].values[-1, mesh]
             ax.plot(degrees, 1e-3 * force, label=names[mesh], **line_style(number))
         label(ax, y="force [kN]", title=words)
-    _phase_axis(axes[-1])
+    _turn_axis(axes[-1])
     # what is doubted stands on a line of its own, below
     words, *doubt = _top(branch).split("\n")
     label(axes[0], title="\n".join([f"{words}: drive flanks", *doubt]))
@@ -230,15 +233,9 @@ def _response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
     """Sizes of the planet-bearing forces over one carrier turn."""
     lines = harmonics_of(response, "planet_bearing_force")[speed]
     turn, wave = _carrier_turn(response, speed)
-    figure, (ax,) = new_figure()
-    for number, one in enumerate(lines):
-        force = np.hypot(*(one @ wave.T).real)
-        ax.plot(360.0 * turn, 1e-3 * force, linewidth=1.0, label=f"planet {number + 1}", **line_style(number))
-    ax.set_xlim(0.0, 360.0 * turn[-1])
+    curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
     title = f"{float(response['speed'][speed]):.6g} rpm" + _doubt(_tails(response)[speed])
-    label(ax, "carrier angle [°]", "force [kN]", title)
-    legend_below(figure)
-    return figure
+    return bearing_forces(2.0 * np.pi * turn, curves, title=title, over="carrier angle [°]")
 
 
 def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:

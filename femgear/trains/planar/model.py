@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.dependencies import check_entries, static_entries
+from femgear.case.gear_set import pin_errors
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
@@ -22,16 +23,8 @@ from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.assembler import free_motions, mesh_elements, pin_directions
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import (
-    constant,
-    line_tail,
-)
-from femgear.system.rigid_bodies import (
-    CENTRAL,
-    PlanarBody,
-    PlanarSet,
-    planar_from_set,
-)
+from femgear.system.fourier import constant, line_tail
+from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
 from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
 from femgear.trains.rigid import (
     Bearings,
@@ -47,6 +40,7 @@ from femgear.trains.rigid import (
     working_springs,
 )
 from femgear.trains.static.results import StaticResult
+from femgear.trains.static.stages import mesh_backlash
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -162,7 +156,7 @@ def planar_model(
         torque=driving_torque(case, reacts=planar.reaction == "output"),
         bearings=bearings,
         gravity=_gravity(case, gears, mesh_frequency),
-        pin_errors=_pin_errors(case, gears.n_planets) if planar.mesh_stiffness else None,
+        pin_errors=pin_errors(case, gears) if planar.mesh_stiffness else None,
         carrier_speed=carrier_speed,
         damping=planar_ratios(case),
     )
@@ -175,7 +169,7 @@ def carrier_sense(case: PlanarCase, gears: PlanetarySet) -> int:
 
 
 def planar_ratios(case: PlanarCase) -> float | tuple[float, ...]:
-    """Read the damping ratios of a case: of all modes, or one a natural frequency as of `mode_ratios`."""
+    """Read the damping ratios of a case: of all modes, or see `femgear.trains.rigid.mode_ratios`."""
     return case.planar.damping_ratios or case.dynamics.damping_ratio
 
 
@@ -184,7 +178,7 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
     planar, N = case.planar, gears.n_planets
     backlash = planar.line_backlash
     if backlash is None:
-        play = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], N)
+        play = mesh_backlash(gears)
         backlash = np.where(play > 0.0, play, np.inf)
     options = {"backlash": backlash, "smoothing": planar.smoothing}
     if planar.mesh_stiffness is not None:
@@ -210,36 +204,34 @@ def _gravity(case: PlanarCase, gears: PlanetarySet, mesh_frequency: bool) -> Gra
     return Gravity(given.acceleration, given.direction, orders)
 
 
-def _pin_errors(case: PlanarCase, n_planets: int) -> np.ndarray:
-    pins = np.zeros((n_planets, 2))
-    for pin in case.set.pin_errors:
-        pins[pin.planet - 1] = pin.radial, pin.tangential
-    return pins
+MOTIONS = {
+    "force_tail": (
+        "", "1", "share of the fluctuating force in the upper half of the lines, of the kind of mesh with "
+        "more of it",
+    ),
+    "motion": ("", "m", "farthest that a member's centre moves from its place"),
+    "rms": ("member axis", "m", "displacement about its mean, r.m.s."),
+    "displacement": ("member axis line", "m", "displacement in the carrier frame"),
+    "mesh_force": ("mesh line", "N", "mesh force along the line of the drive flanks"),
+    "back_force": ("mesh line", "N", "force of the back flanks on their own line"),
+    "planet_bearing_force": ("planet direction line", "N", "force of the pin on the planet"),
+    "carrier_bearing_force": ("axis line", "N", "force of the carrier bearing on the carrier"),
+    "drive_contact": (
+        "mesh", "1", "share of the time in which the drive flanks touch: 1 in contact, 0 not",
+    ),
+    "back_contact": ("mesh", "1", "share of the time in which the back flanks touch: 1 in contact, 0 not"),
+}  # fmt: skip
+"""Of `MotionLines`, under the names of branch.nc and response.nc: dimensions, unit, and what they are."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionLines:
-    """Motions, forces and contact of a solution, under the names of branch.nc and response.nc.
+    """Motions, forces and contact of a solution; `MOTIONS` gives dimensions, unit and meaning of each.
 
-    Parameters
-    ----------
-    force_tail : float
-        Share of the fluctuating force in the upper half of the lines, of the kind of mesh, sun-planet or
-        planet-ring with both flanks, that has more of it; see `femgear.system.fourier.line_tail`.
-    motion : float
-        Farthest that the centre of carrier, ring or sun moves from its place [m].
-    rms, displacement : (3, 2) array, (3, 2, L) complex array
-        x and y of carrier, ring and sun in the carrier frame, root mean square about the mean and lines [m].
-    mesh_force, back_force : (2N, L) complex arrays
-        Along the line of action of the drive flanks, and of the back flanks [N].
-    planet_bearing_force : (N, 2, L) complex array
-        Force of the pin on the planet, radially outwards and tangentially [N].
-    carrier_bearing_force : (2, L) complex array
-        x and y of the force of the carrier bearing on the carrier [N]; zero without one.
-    drive_contact, back_contact : (2N,) arrays
-        Shares of the time in which drive and back flanks touch.
-    approach : float
-        Largest deflection of a mesh [m].
+    The members are carrier, ring and sun, the axes x and y of the carrier frame, and the directions at the
+    planet radially outwards and tangential; lines (L,) are complex. ``force_tail`` is that of
+    `femgear.system.fourier.line_tail`, of drive and back flanks together; the carrier bearing has no force
+    where there is none. ``approach`` is the largest deflection of a mesh [m].
     """
 
     force_tail: float

@@ -19,9 +19,10 @@ from femgear.case.sections import output_member
 from femgear.errors import Finding, remark
 from femgear.gears.kinematics import torques
 from femgear.report.tables import Block, chosen, first_speeds, tabulate
-from femgear.storage.results import complex_entries, dataset
+from femgear.storage.results import complex_entries, coordinates, dataset
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.planar.model import (
+    MOTIONS,
     TAIL_LIMIT,
     MotionLines,
     flank_forces,
@@ -68,25 +69,6 @@ _OF_SOLUTIONS = {
     "spectral_radius": "spectral radius of the fixed point",
 }
 
-# of `MotionLines`: dimensions behind that of the solutions, unit and description
-_MOTIONS = {
-    "force_tail": (
-        "", "1", "share of the fluctuating force in the upper half of the lines, of the kind of mesh with "
-        "more of it",
-    ),
-    "motion": ("", "m", "farthest that a member's centre moves from its place"),
-    "rms": ("member axis", "m", "displacement about its mean, r.m.s."),
-    "displacement": ("member axis line", "m", "displacement in the carrier frame"),
-    "mesh_force": ("mesh line", "N", "mesh force along the line of the drive flanks"),
-    "back_force": ("mesh line", "N", "force of the back flanks on their own line"),
-    "planet_bearing_force": ("planet direction line", "N", "force of the pin on the planet"),
-    "carrier_bearing_force": ("axis line", "N", "force of the carrier bearing on the carrier"),
-    "drive_contact": (
-        "mesh", "1", "share of the time in which the drive flanks touch: 1 in contact, 0 not",
-    ),
-    "back_contact": ("mesh", "1", "share of the time in which the back flanks touch: 1 in contact, 0 not"),
-}  # fmt: skip
-
 # pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces
 _BY_STABILITY = ("weight_response", "tooth_contact")
 _OF_RESPONSE = ("response_", "contact_over_speed")
@@ -113,7 +95,11 @@ class PlanarModesResult:
 
 @dataclass(frozen=True)
 class BranchResult:
-    """Periodic responses to the weight over its frequency in the carrier frame."""
+    """Periodic responses to the weight over its frequency in the carrier frame.
+
+    ``lines`` has one entry a point of the branch; ``sense`` is 1 where the carrier turns counter-clockwise,
+    else -1; ``ending`` says where the branch ended and why.
+    """
 
     planetary_set: PlanetarySet
     model: PlanarModel
@@ -177,7 +163,7 @@ class BranchResult:
 
 @dataclass(frozen=True)
 class PlanarResponseResult:
-    """Responses to weight and mesh frequency together, one a speed."""
+    """Responses to weight and mesh frequency together, one at every ``input_speed`` (speeds,) [rad/s]."""
 
     planetary_set: PlanetarySet
     input_speed: np.ndarray
@@ -206,8 +192,8 @@ class PlanarResponseResult:
         }
         variables |= _motions(self.lines, "speed", "line")
         orders, line = found[0].orders, ("line",)
-        coords = _coordinates(self.planetary_set) | {
-            "speed": (speed, self.input_speed / RPM, "rpm", "speed of the input"),
+        coords = _coordinates(self.planetary_set) | coordinates(speed=self.input_speed / RPM)
+        coords |= {
             "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
             "mesh_order": (line, orders[:, 1], "1", "multiple of the mesh frequency"),
         }
@@ -248,7 +234,7 @@ def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
 def _motions(lines: Sequence[MotionLines], along: str, line: str) -> dict[str, tuple]:
     """Displacements, forces and contact of all solutions, which stand along the first axis."""
     entries = {}
-    for name, (dims, unit, words) in _MOTIONS.items():
+    for name, (dims, unit, words) in MOTIONS.items():
         values = np.array([getattr(one, name) for one in lines])
         axes = (along, *(line if axis == "line" else axis for axis in dims.split()))
         entry = (axes, values, unit, words)
@@ -256,15 +242,14 @@ def _motions(lines: Sequence[MotionLines], along: str, line: str) -> dict[str, t
     return entries
 
 
-def _coordinates(gears) -> dict[str, tuple]:
-    numbers = np.arange(1, gears.n_planets + 1)
-    return {
-        "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
-        "planet": (("planet",), numbers, "1", "planet"),
-        "member": (("member",), list(CENTRAL), "1", "member"),
-        "axis": (("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
-        "direction": (("direction",), ["radial", "tangential"], "1", "direction at the planet"),
-    }
+def _coordinates(gears: PlanetarySet) -> dict[str, tuple]:
+    return coordinates(
+        mesh=gears.mesh_names,
+        planet=np.arange(1, gears.n_planets + 1),
+        member=CENTRAL,
+        axis=["x", "y"],
+        direction=["radial", "tangential"],
+    )
 
 
 def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
@@ -370,14 +355,7 @@ def _tails(data: xr.Dataset) -> str:
 
 
 def tail_warnings(data: xr.Dataset, key: str) -> tuple[Finding, ...]:
-    """What truncation of the lines does to branch.nc or response.nc.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-    key : str
-        Entry of the case file to raise.
-    """
+    """What truncation of the lines does to branch.nc or response.nc; ``key`` is the entry to raise."""
     tail, force = data["tail"].values, data["force_tail"].values
     worst = np.maximum(tail, force)
     if (wrong := worst > TAIL_LIMIT).any():

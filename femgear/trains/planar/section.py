@@ -4,15 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Annotated, Literal
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    StrictBool,
-    model_validator,
-)
+from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, model_validator
 
 from femgear.case.quantities import (
     ACCELERATION,
@@ -28,11 +23,12 @@ from femgear.case.quantities import (
     Quantity,
     Section,
     Title,
+    printable_line,
 )
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
-from femgear.case.text import described
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
+    Gravity,
     entries_without_effect,
     flank_entries,
     listed,
@@ -47,6 +43,7 @@ Frequency = Annotated[float, Quantity(FREQUENCY, 0.01, 1e5)]
 Clearance = Annotated[float, Quantity(LENGTH, 0.0, 0.01)]
 Torsion = Annotated[float, Quantity(TORSION, 0.0, 1e15)]
 Ratio = Annotated[float, Number(0.0, 1.0, open_high=True)]
+Comparison = Annotated[str, BeforeValidator(partial(printable_line, name="comparison", most=600))]
 
 # figures of a planar case that may be compared with published ones
 FigureName = Literal[
@@ -62,16 +59,6 @@ FigureName = Literal[
     "response_spectrum",
     "contact_over_speed",
 ]
-
-
-def _sentence(value: object) -> str:
-    if not isinstance(value, str):
-        raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
-    if len(value) > 600 or not value.isprintable():
-        raise CaseError(
-            "the comparison must be one printable line", code="E-RANGE", limit="600 printable characters"
-        )
-    return value
 
 
 def _some(values: tuple) -> tuple:
@@ -108,8 +95,8 @@ class CarrierBearingSection(Section):
 class GravitySection(Section):
     """Weight of all bodies; its direction counts from the x axis when the carrier's phase is zero."""
 
-    acceleration: Annotated[float, Quantity(ACCELERATION, 1e-3, 1e3)] = 9.80665
-    direction: Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)] = -0.5 * math.pi
+    acceleration: Annotated[float, Quantity(ACCELERATION, 1e-3, 1e3)] = Gravity.acceleration
+    direction: Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)] = Gravity.direction
 
 
 class BranchSection(Section):
@@ -135,7 +122,7 @@ class PlanarPublished(Section):
     kind: Literal["rotational", "translational", "planet"] | None = None
     frequency: Frequency | None = None
     figure: FigureName | None = None
-    comparison: Annotated[str, BeforeValidator(_sentence)] | None = None
+    comparison: Comparison | None = None
     source: Title
 
     @model_validator(mode="after")
@@ -175,13 +162,7 @@ class PlanarSection(Section):
 
 
 def planar_notices(data: dict) -> Iterator[Finding]:
-    """What a planar case gives without effect.
-
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file that was checked, with a section planar.
-    """
+    """What a planar case gives without effect, by the tables of its checked file."""
     planar = data["planar"]
     keys = ["tolerance"]
     if "response" not in planar:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
@@ -43,7 +43,7 @@ from femgear.trains.planar.results import (
     response_warnings,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
 from femgear.trains.rigid import (
     check_one_period,
     gear_set_modes,
@@ -54,7 +54,7 @@ from femgear.trains.rigid import (
 )
 from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
-from femgear.trains.static.stages import STATIC, STRESS
+from femgear.trains.static.stages import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -63,10 +63,10 @@ if TYPE_CHECKING:
     from femgear.trains.planar.model import MotionLines, PlanarModel
     from femgear.trains.planar.section import BranchSection
 
-# largest motion of a member and largest deflection of a mesh [modules], as in the static stage
-_MODULES = {"motion": 2.0, "approach": 0.5}
 # distance of a line from an undamped natural frequency, relative to it, at which the response has no bound
 _ON_RESONANCE = 1e-3
+# play of a rounding error, which is none [m]
+_NO_PLAY = 1e-9
 # what a curve holds of every point
 _ALONG = ("points", "parameter", "tangent", "iterations", "error")
 
@@ -79,10 +79,8 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
     CaseError
         E-BACKLASH: back flanks without play. E-PERIODS: a static record of several mesh periods.
     """
-    planar = case.planar
-    play = min(gears.backlash_sun_planet, gears.backlash_planet_ring)
-    # play of a rounding error is none
-    if planar.back_flanks and planar.line_backlash is None and play < 1e-9:
+    planar, play = case.planar, _least_play(case, gears)
+    if planar.back_flanks and planar.line_backlash is None and not play > _NO_PLAY:
         raise CaseError(
             f"back flanks need play, and the gears have {max(play, 0.0) * 1e6:.3g} um",
             code="E-BACKLASH",
@@ -94,6 +92,12 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
         )
     if planar.mesh_stiffness is None:
         check_one_period(case, gears, "the planar model takes")
+
+
+def _least_play(case: PlanarCase, gears: PlanetarySet) -> float:
+    """Least play of a mesh along its line of action [m]."""
+    given = case.planar.line_backlash
+    return float(mesh_backlash(gears).min()) if given is None else given
 
 
 def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -> None:
@@ -108,10 +112,7 @@ def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -
         E-RANGE: a smoothing length above half the play or above the mean compression.
     """
     smoothing, limits = case.planar.smoothing, {}
-    play = case.planar.line_backlash
-    play = min(gears.backlash_sun_planet, gears.backlash_planet_ring) if play is None else play
-    # play of a rounding error is none
-    if play > 1e-9:
+    if (play := _least_play(case, gears)) > _NO_PLAY:
         limits["half the play"] = 0.5 * play
     if (compression := mean_compression(model)) > 0.0:
         limits["the mean compression of a mesh, force / stiffness"] = compression
@@ -227,10 +228,12 @@ def _check_response_motions(
 def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
     """Why displacements are not small; empty where they are."""
     module = gears.sun.module
-    for name, words in (("motion", "a member moves"), ("approach", "the flanks of a mesh approach")):
-        value, limit = getattr(one, name), _MODULES[name] * module
-        if not value <= limit:
-            allowed = f"{limit * 1e3:.4g} mm ({_MODULES[name]:g} modules)"
+    for value, modules, words in (
+        (one.motion, LARGEST_MOTION, "a member moves"),
+        (one.approach, LARGEST_APPROACH, "the flanks of a mesh approach"),
+    ):
+        if not value <= modules * module:
+            allowed = f"{modules * module * 1e3:.4g} mm ({modules:g} modules)"
             return f"{words} by {value * 1e3:.4g} mm, more than {allowed}"
     return ""
 
@@ -286,7 +289,7 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
 
 @one_blas_thread()
 def solve_branch(
-    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress | None = None
+    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress = silent
 ) -> BranchResult:
     """Follow periodic responses to the weight past limit points, with a Floquet verdict at each.
 
@@ -315,9 +318,8 @@ def solve_branch(
     )
     branch, lines = _bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
     if wanted.stability:
-        tell = progress or (lambda stage, done, total: None)
         branch = judged_branch(
-            model.problem, branch, lambda done, total: tell("branch", 0.3 * total + 0.7 * done, total)
+            model.problem, branch, lambda done, total: progress("branch", 0.3 * total + 0.7 * done, total)
         )
     ending = _end_of_branch(branch, wanted)
     return BranchResult(gears, model, branch, lines, carrier_sense(case, gears), ending)
@@ -325,7 +327,7 @@ def solve_branch(
 
 @one_blas_thread()
 def solve_planar_response(
-    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress | None = None
+    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress = silent
 ) -> PlanarResponseResult:
     """Solve for responses to weight and mesh frequency together at the speeds of the operation.
 
@@ -356,8 +358,7 @@ def solve_planar_response(
             found = solve_harmonic_balance(model.problem, frequency, **options)
         solutions.append(found)
         lines.append(motion_lines(model, found))
-        if progress is not None:
-            progress("response", number + 1, len(turning))
+        progress("response", number + 1, len(turning))
     _check_response_motions(operation.speeds, solutions, lines, gears)
     return PlanarResponseResult(gears, np.array(operation.speeds), turning, tuple(solutions), tuple(lines))
 

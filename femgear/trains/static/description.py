@@ -1,9 +1,8 @@
-"""A planetary set in tables, and what deserves a look: gears, meshes, phasing, operation, static solution.
+"""A planetary set in tables, and what deserves a look in it: gears, meshes, phasing, operation.
 
 The phases of the meshes decide which of their harmonics sun and ring hear, and which kinds of modes these
 excite; neighbouring tooth numbers are listed with what they would change in that. The findings of
-`set_warnings` hold for any planetary set, those of `static_warnings` for any static solution; `check_motions`
-refuses one whose displacements are not small.
+`set_warnings` hold for any planetary set.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations, shaft_lines
+from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
-from femgear.errors import ContactError, Finding
+from femgear.errors import Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import tooth_thickness
@@ -25,10 +24,7 @@ from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_se
 from femgear.report.tables import Block, chosen, tabulate
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from femgear.case.sections import Case
-    from femgear.contact.cycle import MeshCycle
     from femgear.gears.planetary import PlanetarySet
 
 # harmonics whose phasing is listed
@@ -50,115 +46,19 @@ def describe_set(case: Case) -> tuple[Block, ...]:
     )
 
 
-def set_warnings(case: Case) -> tuple[Finding, ...]:
+def set_warnings(case: Case) -> Iterator[Finding]:
     """What is allowed in any planetary set but deserves a look."""
     planetary = planetary_set(case)
-    found = [*check_set(planetary), *case.notices, *check_deviations(set_deviations(case), planetary)]
-    if case.operation.torque == 0:
-        text = "without torque no tooth touches; only static results exist"
-        found.append(Finding("W-TORQUE", "operation.torque", text))
-    if case.operation.torque < 0:
-        text = "a negative torque loads the other flanks"
-        found.append(Finding("W-TORQUE", "operation.torque", text))
-    return tuple(found)
-
-
-def check_motions(cycle: MeshCycle, module: float) -> None:
-    """Refuse a static result in which the gears have moved too far for small displacements.
-
-    Raises
-    ------
-    ContactError
-        E-MOTION: flanks that approach by more than half a module, members that move by more than two.
-    """
-    for name, motion, modules, remedy in (
-        ("the flanks approach", cycle.deflection, 0.5, "reduce operation.torque or the errors"),
-        (
-            "a member moves",
-            cycle.member_motion,
-            2.0,
-            "stiffen the supports and bearings, reduce the clearance or operation.torque",
-        ),
-    ):
-        largest = float(np.abs(motion).max(initial=0.0))
-        if largest > modules * module:
-            raise ContactError(
-                f"{name} by {largest * 1e3:.4g} mm: the model is one of small displacements",
-                code="E-MOTION",
-                value=f"{largest * 1e3:.4g} mm",
-                limit=f"{modules:g} modules, {modules * module * 1e3:.4g} mm",
-                remedy=remedy,
-            )
-
-
-def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
-    """What is wrong with the contents of static.nc in an engineer's eyes.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-    module : float
-        Of the gears, of helical ones in their transverse section [m].
-    """
-    names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
-    force, back, pressure, motion, approach = (data[name].values for name in names)
-    if pressure.max(initial=0.0) > 4e9:
-        text = (
-            f"the contact pressure reaches {pressure.max() * 1e-6:.0f} MPa: no steel carries that, and the "
-            "model stays elastic"
-        )
-        yield Finding("W-PRESSURE", "", text)
-    moved = np.abs(motion).max(initial=0.0)
-    if np.abs(approach).max(initial=0.0) > 0.05 * module:
-        yield Finding("W-DEFLECTION", "", _deflection(approach, moved, members=len(motion)))
-    if moved > 0.05 * module:
-        text = (
-            f"a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points and arms "
-            "are those of the unmoved set"
-        )
-        yield Finding("W-MOTION", "", text)
-    if ((force > 0) & (pressure <= 0)).any():
-        text = (
-            "at some positions every contact of a mesh lies at the end of a flank: its pressure has no limit "
-            "and is not given"
-        )
-        yield Finding("W-EDGE", "", text)
-    unloaded = (force + back)[: len(force) // 2] <= 0.0
-    if unloaded.any() and force.any():
-        planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
-        yield Finding("W-OPEN", "", f"planet {planets} carries nothing at some positions")
-    if ((force > 0) & (back > 0)).any():
-        yield Finding("W-WEDGED", "", "some meshes are loaded on both flanks at once")
-    if ((back > 0) & ~(force > 0)).any():
-        text = "some meshes carry on their back flanks alone: planets work against one another"
-        yield Finding("W-BACK", "", text)
-
-
-def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
-    """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
-    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(approach, 2))
-    if not members:
-        return (
-            f"the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: small displacements "
-            "no longer hold"
-        )
-    return (
-        f"the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
-        "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
-        "not the deflection of the teeth alone: it contains the motion of the members, up to "
-        f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "
-        'static.members = "fixed" shows the teeth'
-    )
+    yield from (*check_set(planetary), *case.notices)
+    yield from check_deviations(set_deviations(case), planetary)
+    if case.operation.torque <= 0:
+        nothing = "without torque no tooth touches; only static results exist"
+        text = "a negative torque loads the other flanks" if case.operation.torque < 0 else nothing
+        yield Finding("W-TORQUE", "operation.torque", text)
 
 
 def describe_phasing(planetary_set: PlanetarySet) -> tuple[Block, Block]:
-    """Tabulate the phasing of the first harmonics of the mesh frequency, and neighbouring tooth numbers.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-        Of a case that `femgear.gears.checks.check_set` accepts.
-    """
+    """Tabulate the phasing of the first harmonics of the mesh frequency, and neighbouring tooth numbers."""
     return _harmonics(planetary_set), _neighbours(planetary_set)
 
 

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case.case import material_of, planetary_set, set_deviations
+from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import Case
-from femgear.contact.bodies import make_sectors
+from femgear.contact.bodies import Sectors, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.flank_pairs import loaded_image
 from femgear.contact.tooth_loads import deformed_set
@@ -57,19 +57,9 @@ _TENSION, _COMPRESSION = "root of the loaded flank, largest stress", "root of th
 _CRITICAL_SLOPE = {False: 30.0, True: 60.0}
 _KINDS = ("sun-planet", "planet-ring")
 
-# pictures need no converged stresses: a sector of some thousand nodes keeps the files small
-PICTURE_FLANK_ELEMENTS = 6
-PICTURE_REFINE = 0.35
-
 
 def static_transmission_error(static: xr.Dataset) -> Figure:
-    """Draw the static transmission error of every mesh, and of sun to ring over every planet.
-
-    Parameters
-    ----------
-    static : xarray.Dataset
-        Contents of static.nc, as `femgear.trains.static.results.STATIC_VARIABLES` declares them.
-    """
+    """Draw the static transmission error of every mesh, and of sun to ring over every planet (static.nc)."""
     figure, (left, right) = new_figure(columns=2, width=9.5, sharex=True)
     names = static["mesh"].values
     drawn = distinct_lines(names, static["ste"])
@@ -122,13 +112,7 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
 
 
 def load_sharing(static: xr.Dataset) -> Figure:
-    """Draw the share of every planet in the sun's torque over the mesh period.
-
-    Parameters
-    ----------
-    static : xarray.Dataset
-        Contents of static.nc.
-    """
+    """Draw the share of every planet in the sun's torque over the mesh period (static.nc)."""
     figure, (ax,) = new_figure(height=3.8)
     position, share = periodic(static["position"], static["load_share"] * 100)
     for i, text in enumerate(_of_planets(static, share)):
@@ -146,16 +130,11 @@ def load_sharing(static: xr.Dataset) -> Figure:
 
 
 def tooth_loads(static: xr.Dataset) -> Figure:
-    """Draw the load of a tooth pair from first to last contact, in a sun-planet and a planet-ring mesh.
+    """Draw the load of a tooth pair from first to last contact in both meshes of a planet (static.nc).
 
     The simultaneous pairs of the dataset are one base pitch apart on the path of contact, and a pair goes on
     to the next place with every mesh period: from period to period and place to place the loads are the
     history of one pair. The meshes are those of the first planet.
-
-    Parameters
-    ----------
-    static : xarray.Dataset
-        Contents of static.nc.
     """
     figure, axes = new_figure(columns=2, width=9.5, sharey=True)
     names = [str(name) for name in static["mesh"].values]
@@ -195,13 +174,9 @@ def _while_loaded(loaded: np.ndarray) -> slice:
 
 
 def root_stress_history(stress: xr.Dataset) -> Figure:
-    """Draw the root stresses of one tooth of every gear from mesh to mesh, on the planet with the largest.
+    """Draw root stresses of one tooth of each gear (stress.nc), on the planet with the largest.
 
-    Parameters
-    ----------
-    stress : xarray.Dataset
-        Contents of stress.nc, as `femgear.trains.static.results.STRESS_VARIABLES` declares them; where it
-        has ``iso_root_stress``, the nominal stress is drawn too.
+    The nominal ones, ``iso_root_stress``, too, where the file has them.
     """
     gears = _four_gears(stress)
 
@@ -222,13 +197,7 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
 
 
 def root_stress_profile(stress: xr.Dataset) -> Figure:
-    """Draw the stress along both roots of a tooth when its tension is largest, on the planet where that is.
-
-    Parameters
-    ----------
-    stress : xarray.Dataset
-        Contents of stress.nc.
-    """
+    """Draw the stress along both roots of the tooth with the largest tension (stress.nc)."""
     gears = _four_gears(stress)
 
     def draw(number: int, ax) -> str:
@@ -250,13 +219,7 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
 
 
 def contact_pressure(stress: xr.Dataset) -> Figure:
-    """Draw the contact pressure of a tooth pair over its path, in both meshes of the planet with the largest.
-
-    Parameters
-    ----------
-    stress : xarray.Dataset
-        Contents of stress.nc.
-    """
+    """Draw the contact pressure of a tooth pair over its path (stress.nc), on the planet with the largest."""
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6)
     top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
     # at the end of a flank the pressure grows as cells shrink: it only decides where there is no other
@@ -307,13 +270,7 @@ def _along_path(row):
 
 
 def load_spectrum(stress: xr.Dataset) -> Figure:
-    """Draw the load spectrum of the teeth in both meshes of the planet with the largest load.
-
-    Parameters
-    ----------
-    stress : xarray.Dataset
-        Contents of stress.nc.
-    """
+    """Draw the load spectrum of the teeth in both meshes of the planet with the largest load (stress.nc)."""
     figure, axes = new_figure(columns=2, width=9.5, sharex=True, sharey=True)
     edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
     time = stress["load_time_share"].values
@@ -335,13 +292,7 @@ def load_spectrum(stress: xr.Dataset) -> Figure:
 
 
 def planet_bending(stress: xr.Dataset) -> Figure:
-    """Draw the stress in both roots of a tooth of the worst planet while it turns once against the carrier.
-
-    Parameters
-    ----------
-    stress : xarray.Dataset
-        Contents of stress.nc.
-    """
+    """Draw root stresses of a tooth while the worst planet turns once against the carrier (stress.nc)."""
     figure, (ax,) = new_figure()
     values = stress["planet_root_stress"].values * 1e-6
     planets = len(values) // 2
@@ -405,7 +356,7 @@ def _crossing(slope, arc, angle) -> float | None:
 
 
 def _four_panels(draw: Callable[[int, Any], str], y: str, *, columns: int, sharex: bool = False) -> Figure:
-    """Draw sun, planets (either side) and ring in panels of one scale; `draw(panel, axes)` gives titles."""
+    """Draw sun, planets (either side) and ring in panels of one scale; ``draw(panel, axes)`` gives titles."""
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharex=sharex, sharey=True)
     for number, ax in enumerate(axes):
         label(ax, title=draw(number, ax))
@@ -560,6 +511,11 @@ def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
     return figures
 
 
+def picture_sectors(drawn: Drawn, gears: PlanetarySet) -> Sectors:
+    """Make sectors of some thousand nodes: pictures need no converged stresses, and files stay small."""
+    return make_sectors(gears, material_of(drawn.case), flank_elements=6, refine=0.35, cache=drawn.cache)
+
+
 def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     """Write the whole set deformed by the static loads of position zero, as VTU and picture."""
     static, case = drawn.results.get("static"), drawn.case
@@ -567,13 +523,7 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         return []
 
     gears, cycle = _left_flanks_loaded(static, case)
-    sectors = make_sectors(
-        gears,
-        material_of(case),
-        flank_elements=PICTURE_FLANK_ELEMENTS,
-        refine=PICTURE_REFINE,
-        cache=drawn.cache,
-    )
+    sectors = picture_sectors(drawn, gears)
     bodies = []
     for body in deformed_set(gears, sectors, cycle):
         sector = getattr(sectors, body.kind)

@@ -1,4 +1,4 @@
-"""Results of the stages "static" and "stress": static.nc, stress.nc, and their tables.
+"""Results of the stages "static" and "stress": static.nc, stress.nc, their tables and warnings.
 
 Every variable of a file carries its units. The table of stresses sets those of finite elements beside the
 nominal stresses of ISO 6336.
@@ -6,6 +6,7 @@ nominal stresses of ISO 6336.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,7 @@ from femgear.case.dependencies import Entries
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
 from femgear.errors import Finding
 from femgear.report.tables import Block, tabulate
-from femgear.storage.results import dataset, declared
-from femgear.trains.static.description import static_warnings
+from femgear.storage.results import coordinates, dataset, declared
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,7 +106,8 @@ STRESS_VARIABLES = {
 class StaticResult:
     """Static transmission error, load sharing and mesh stiffness of all meshes.
 
-    ``entries`` are those of the case that it depends on, as in the results that follow.
+    ``sun_torque`` [N m] keeps its sign, ``period_message`` tells how the errors repeat, and ``entries`` are
+    those of the case that it depends on, as in the results that follow.
     """
 
     planetary_set: PlanetarySet
@@ -127,16 +128,15 @@ class StaticResult:
         cycle, gears = self.cycle, self.planetary_set
         bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
         values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in STATIC_VARIABLES}
-        teeth, planets = cycle.tooth_load.shape[1], gears.n_planets
+        teeth, planets = cycle.tooth_load.shape[1], np.arange(1, gears.n_planets + 1)
         found = dataset(
             declared(STATIC_VARIABLES, values),
             coords={
-                "mesh": ("mesh", list(gears.mesh_names), "1", "gear mesh"),
-                "position": ("position", cycle.position, "1", "position in mesh periods"),
-                "planet": ("planet", np.arange(1, planets + 1), "1", "planet"),
-                "axis": ("axis", ["x", "y"], "1", "axis of the frame of the carrier"),
                 "member": ("member", list(cycle.member_names), "1", "moving member and direction"),
                 "tooth": ("tooth", np.arange(teeth), "1", "tooth pair in the order of the path"),
+                **coordinates(
+                    mesh=gears.mesh_names, position=cycle.position, planet=planets, axis=["x", "y"]
+                ),
             },
             attrs={
                 "title": "static transmission error, load sharing and mesh stiffness",
@@ -236,11 +236,9 @@ class StressResult:
                 "pressure_centre": cycle.pressure_centre,
                 "pressure_path": cycle.path,
             }
-        coords = {
-            "mesh": ("mesh", list(self.planetary_set.mesh_names), "1", "gear mesh"),
+        coords = coordinates(mesh=self.planetary_set.mesh_names, position=cycle.position) | {
             "gear": ("gear", ["first", "second"], "1", "gear of the mesh"),
             "root": ("root", ["loaded", "back"], "1", "flank above the root"),
-            "position": ("position", cycle.position, "1", "position in mesh periods"),
             "load_bin": ("load_bin", 0.5 * (edges[1:] + edges[:-1]), "N", "middle of the load class"),
         }
         if "planet_root_stress" in values:
@@ -334,6 +332,66 @@ def _by_gear(rows) -> np.ndarray:
         rows = [np.pad(row, [*missing, (0, longest - row.shape[-1])], constant_values=np.nan) for row in rows]
     values = np.array(rows)
     return values.reshape(-1, 2, *values.shape[1:])
+
+
+def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
+    """What is wrong with the contents of static.nc in an engineer's eyes.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    module : float
+        Of the gears, of helical ones in their transverse section [m].
+    """
+    names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
+    force, back, pressure, motion, approach = (data[name].values for name in names)
+    if pressure.max(initial=0.0) > 4e9:
+        text = (
+            f"the contact pressure reaches {pressure.max() * 1e-6:.0f} MPa: no steel carries that, and the "
+            "model stays elastic"
+        )
+        yield Finding("W-PRESSURE", "", text)
+    moved = np.abs(motion).max(initial=0.0)
+    if np.abs(approach).max(initial=0.0) > 0.05 * module:
+        yield Finding("W-DEFLECTION", "", _deflection(approach, moved, members=len(motion)))
+    if moved > 0.05 * module:
+        text = (
+            f"a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points and arms "
+            "are those of the unmoved set"
+        )
+        yield Finding("W-MOTION", "", text)
+    if ((force > 0) & (pressure <= 0)).any():
+        text = (
+            "at some positions every contact of a mesh lies at the end of a flank: its pressure has no limit "
+            "and is not given"
+        )
+        yield Finding("W-EDGE", "", text)
+    unloaded = (force + back)[: len(force) // 2] <= 0.0
+    if unloaded.any() and force.any():
+        planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
+        yield Finding("W-OPEN", "", f"planet {planets} carries nothing at some positions")
+    if ((force > 0) & (back > 0)).any():
+        yield Finding("W-WEDGED", "", "some meshes are loaded on both flanks at once")
+    if ((back > 0) & ~(force > 0)).any():
+        text = "some meshes carry on their back flanks alone: planets work against one another"
+        yield Finding("W-BACK", "", text)
+
+
+def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
+    """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(approach, 2))
+    if not members:
+        return (
+            f"the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: small displacements "
+            "no longer hold"
+        )
+    return (
+        f"the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
+        "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
+        "not the deflection of the teeth alone: it contains the motion of the members, up to "
+        f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "
+        'static.members = "fixed" shows the teeth'
+    )
 
 
 def describe_static(data: xr.Dataset, module: float) -> Block:

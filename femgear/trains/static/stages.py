@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
+from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, Sector, Sectors, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
@@ -27,14 +28,13 @@ from femgear.contact.root_stress import (
 )
 from femgear.contact.supports import RIGID, Supports
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
-from femgear.errors import GeometryError
+from femgear.errors import ContactError, GeometryError
 from femgear.fe.elasticity import foundation
 from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import PlanetarySet
-from femgear.trains.protocol import Progress, Stage, one_blas_thread
-from femgear.trains.static.description import check_motions
+from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.static.results import (
     NominalStresses,
     StaticResult,
@@ -46,13 +46,15 @@ from femgear.trains.static.results import (
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
 # would take a quarter of a gigabyte for three planets
 WHOLE_RECORD = 16
+LARGEST_MOTION, LARGEST_APPROACH = 2.0, 0.5
+"""Of a member and of the flanks of a mesh for which displacements count as small [modules]."""
 # longer than any record: the true common period of a set
 _UNLIMITED = 10**12
 
 
 @one_blas_thread()
 def solve_static(
-    case: Case, *, cache: Path | None = None, progress: Progress | None = None, steps: Steps | None = None
+    case: Case, *, cache: Path | None = None, progress: Progress = silent, steps: Steps | None = None
 ) -> StaticResult:
     """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
 
@@ -90,11 +92,33 @@ def solve_static(
         options=CycleOptions(
             both_flanks=case.static.back_flanks,
             pressures=case.static.stresses and periods == 1,
-            progress=None if progress is None else lambda done, total: progress("contact", done, total),
+            progress=partial(progress, "contact"),
         ),
     )
-    check_motions(cycle, gears.sun.module)
+    _check_motions(cycle, gears.sun.module)
     return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)
+
+
+def _check_motions(cycle: MeshCycle, module: float) -> None:
+    """Refuse flanks that approach by half a module, members that move by two: no small displacements."""
+    for name, motion, modules, remedy in (
+        ("the flanks approach", cycle.deflection, LARGEST_APPROACH, "reduce operation.torque or the errors"),
+        (
+            "a member moves",
+            cycle.member_motion,
+            LARGEST_MOTION,
+            "stiffen the supports and bearings, reduce the clearance or operation.torque",
+        ),
+    ):
+        largest = float(np.abs(motion).max(initial=0.0))
+        if largest > modules * module:
+            raise ContactError(
+                f"{name} by {largest * 1e3:.4g} mm: the model is one of small displacements",
+                code="E-MOTION",
+                value=f"{largest * 1e3:.4g} mm",
+                limit=f"{modules:g} modules, {modules * module * 1e3:.4g} mm",
+                remedy=remedy,
+            )
 
 
 def flank_compliances(
@@ -117,7 +141,7 @@ def flank_compliances(
 
 
 @one_blas_thread()
-def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None = None) -> StressResult:
+def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silent) -> StressResult:
     """Find root stresses of every gear in every mesh, their ranges over a turn, load and nominal stresses.
 
     The static solution need not have pressures (`StaticResult.cycle.pressure`); where it has, they are part
@@ -139,8 +163,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
     check_entries(static, StaticResult, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
     influences = _influences(case, static)
-    if progress is not None:
-        progress("stress", 1, 2)
+    progress("stress", 1, 2)
     repeats, _ = common_period(set_deviations(case), gears, limit=_UNLIMITED)
     closes = repeats == cycle.periods
     teeth = loaded_teeth(cycle, reverse=reverse)

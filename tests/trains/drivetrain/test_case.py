@@ -8,7 +8,7 @@ import pytest
 from published.wind_turbine_drivetrain import paper_torques, ratio_of_radii, wind_turbine_drivetrain
 
 from femgear.case import text as case_text
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, torque_histories
 from femgear.trains.drivetrain.checks import check_drivetrain

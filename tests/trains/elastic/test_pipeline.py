@@ -168,7 +168,7 @@ def test_nodal_diameters_do_not_depend_on_the_points_of_the_housing(case, points
 
 
 def test_what_the_dynamics_cannot_represent_is_refused_before_computing(case):
-    from femgear.case.case import planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.errors import CaseError
     from femgear.trains.elastic.checks import check_dynamic_case
 

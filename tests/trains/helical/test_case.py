@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from published.planetary_sets import kahraman_set
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import check_set
 from femgear.trains.helical.model import HelicalSet, check_helical_case, contact_ratios, helical_data

@@ -10,7 +10,7 @@ from validation.helical import PHASINGS, TABLE_4
 
 from femgear import cli
 from femgear.case import text as case_text
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.run import grid_cache, run_case

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from published.wind_turbine import gravity_problem_b, wind_turbine_a, wind_turbine_b
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.checks import check_set
 from femgear.system.rigid_bodies import PlanarSet

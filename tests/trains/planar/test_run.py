@@ -10,7 +10,7 @@ from published.wind_turbine import bearing_problem_a, gravity_problem_b
 from published.wind_turbine_response import member_rms, resonance, weight_branch
 
 from femgear import cli
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, ConvergenceError
 from femgear.run import run_case
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance

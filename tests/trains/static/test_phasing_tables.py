@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case.case import planetary_set
+from femgear.case.gear_set import planetary_set
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.description import describe_phasing
 

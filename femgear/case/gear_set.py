@@ -8,6 +8,7 @@ shaft its support stiffness. Refusals name the entries of the case file, with fi
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -172,21 +173,18 @@ def _name_root_radius(error: GeometryError, case: Case) -> None:
 def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float | None:
     """Largest root radius [modules] of four decimals that is not refused with one of the codes, if any."""
 
-    def fits(steps: int) -> bool:
+    def refused(steps: int) -> bool:
         rack = rack_at(case, key).model_copy(update={"root_radius": steps / 1e4})
         gear = key.partition(".")[0]
         owner = {} if gear == "rack" else {gear: getattr(case, gear).model_copy(update={"rack": rack})}
         try:
             check_set(_closed_set(case.model_copy(update=owner or {"rack": rack})))
         except GeometryError as other:
-            return other.code not in codes
-        return True
+            return other.code in codes
+        return False
 
-    low, high = -1, round(1e4 * rack_at(case, key).root_radius)
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low / 1e4 if low >= 0 else None
+    first = bisect_left(range(round(1e4 * rack_at(case, key).root_radius)), True, key=refused)
+    return (first - 1) / 1e4 if first else None
 
 
 def set_deviations(case: Case) -> SetDeviations:
@@ -203,9 +201,6 @@ def set_deviations(case: Case) -> SetDeviations:
     planets = [_planet_errors(case, n) for n in range(1, s.n_planets + 1)]
     pitch = [_pitch(errors, s.planet) for errors in planets]
     oval = ring.ovality
-    pins = np.zeros((s.n_planets, 2))
-    for pin in case.set.pin_errors:
-        pins[pin.planet - 1] = pin.radial, pin.tangential
     found = replace(
         no_deviations(s),
         sun=_flank_form(case, s.sun),
@@ -221,7 +216,7 @@ def set_deviations(case: Case) -> SetDeviations:
         planet_runout=tuple(_runout(errors) for errors in planets),
         ring_runout=_runout(ring),
         carrier_runout=_runout(case.carrier.errors or CarrierErrors()),
-        pin_errors=pins,
+        pin_errors=pin_errors(case, s),
         ovality=Ovality(**oval.model_dump()) if oval else Ovality(),
         sun_thickness=sun.thickness_reduction or 0.0,
         planet_thickness=[errors.thickness_reduction or 0.0 for errors in planets],
@@ -233,6 +228,14 @@ def set_deviations(case: Case) -> SetDeviations:
         error.file = case.location(error.key or "")
         raise
     return found
+
+
+def pin_errors(case: Case, gears: PlanetarySet) -> np.ndarray:
+    """Displacement (N, 2) of the pins of all planets, radial and tangential [m]."""
+    pins = np.zeros((gears.n_planets, 2))
+    for pin in case.set.pin_errors:
+        pins[pin.planet - 1] = pin.radial, pin.tangential
+    return pins
 
 
 def _planet_errors(case: Case, number: int) -> GearErrors:
