@@ -26,8 +26,8 @@ def model():
 def run(duration, step, **options):
     from published.wind_turbine_drivetrain import PRINTED, paper_torques
 
-    from femgear.trains.drivetrain.data import constant_torques
-    from femgear.trains.drivetrain.time import march_drivetrain
+    from femgear.trains.drivetrain.parts import constant_torques
+    from femgear.trains.drivetrain.simulation import march_drivetrain
 
     torques = constant_torques(paper_torques(balanced=True))
     return march_drivetrain(
@@ -36,7 +36,7 @@ def run(duration, step, **options):
 
 
 def test_a_minute_at_20_khz(benchmark):
-    from femgear.trains.drivetrain.time import Records
+    from femgear.trains.drivetrain.simulation import Records
 
     benchmark.group = MINUTE
     model()

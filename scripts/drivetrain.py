@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from drivetrain_figures import backlash_figure, sensitivity_figure, with_balance
 from script_tools import Progress, print_table, ready_folder, run_script, say_files, write_csv
 
-from femgear.errors import FemgearError
+from femgear.errors import CaseError, FemgearError
 
 PAPER = Path(__file__).resolve().parents[1] / "cases" / "wind_turbine_drivetrain.toml"
 STAGES = ("planetary", "gear 1-2", "gear 2-3")
@@ -51,19 +51,28 @@ def main(
     sensitivity
         Whether to vary the assumed inputs of the published set.
     """
-    from femgear.trains.drivetrain.checks import case_model, check_spectrum
+    from femgear.trains.drivetrain.checks import check_spectrum
+    from femgear.trains.drivetrain.model import case_model
     from femgear.trains.drivetrain.results import describe_drivetrain, describe_spectrum, describe_transient
-    from femgear.trains.drivetrain.section import need_drivetrain
     from femgear.trains.reading import read_case, with_value
 
-    data, paper = need_drivetrain(read_case(case)), read_case(PAPER)
+    data, paper = read_case(case), read_case(PAPER)
+    if getattr(data, "model", "") != "drivetrain":
+        raise CaseError(
+            "this is no drivetrain",
+            code="E-MODEL",
+            key="model",
+            limit='model = "drivetrain"',
+            remedy="name a case file of a drivetrain",
+            file=str(case),
+        )
     if duration is not None:
         data = with_value(with_value(data, "simulation.settle", None), "simulation.duration", duration)
     if rate is not None:
         data = with_value(data, "simulation.rate", rate)
     if modes is not None:
         data = with_value(data, "simulation.modes", modes)
-    data = need_drivetrain(with_value(data, "simulation.torsional", torsional))
+    data = with_value(data, "simulation.torsional", torsional)
     data = with_balance(data) if balanced else data
     blocks = describe_drivetrain(data)  # refuse before the folder is touched
     if gears := bool(data.parallel or data.planetary):

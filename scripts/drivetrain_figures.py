@@ -63,8 +63,8 @@ def separating_start(case, model, *, steps: int):
     The second is None where the linear motion outgrows the numbers.
     """
     from femgear.errors import ConvergenceError
-    from femgear.trains.drivetrain.section import settle_time, torque_histories
-    from femgear.trains.drivetrain.time import march_drivetrain
+    from femgear.trains.drivetrain.case_file import settle_time, torque_histories
+    from femgear.trains.drivetrain.simulation import march_drivetrain
 
     s, torques = case.simulation, torque_histories(case, model.ratio)
     duration = min(max(settle_time(case), 10.0 / s.rate), s.duration, steps / s.rate)
@@ -154,9 +154,9 @@ def line_amplitudes(assumed) -> np.ndarray:
     """Amplitudes [N] of four lines of the mesh forces at constant speed, 20 s behind 10 s of settling."""
     from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
-    from femgear.trains.drivetrain.data import constant_torques
     from femgear.trains.drivetrain.model import drivetrain_model
-    from femgear.trains.drivetrain.time import march_drivetrain
+    from femgear.trains.drivetrain.parts import constant_torques
+    from femgear.trains.drivetrain.simulation import march_drivetrain
 
     model = drivetrain_model(wind_turbine_drivetrain(assumed))
     torques = constant_torques(paper_torques(balanced=True))

@@ -6,14 +6,14 @@ import numpy as np
 from published.wind_turbine_drivetrain import wind_turbine_drivetrain
 
 from femgear.system.force_laws import positive_part
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
     MeshSection,
     ParallelSection,
 )
-from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model
 
 PAIR_RADII, PAIR_INERTIAS = (0.05, 0.1), (0.2, 0.9)
 

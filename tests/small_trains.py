@@ -10,7 +10,7 @@ from published.multistage_example import CASES
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.system.system import MechanicalSystem
 from femgear.trains.gear_pair.model import ImpactPair
-from femgear.trains.multistage.model import Stage, in_series
+from femgear.trains.multistage.model import PlanetaryStage, in_series
 
 EVEN = 2.0 * np.pi * np.arange(3) / 3
 
@@ -44,7 +44,7 @@ def stage(teeth, module=4e-3, *, fixed="ring", phases=None, angle=0.0, **changes
         if fixed is not None:
             held[fixed] = replace(getattr(data, fixed), torsional_support=1e7)
         data = replace(data, **held)
-    return Stage(data=data, teeth=teeth, fixed=fixed, phases=phases, angle=angle)
+    return PlanetaryStage(data=data, teeth=teeth, fixed=fixed, phases=phases, angle=angle)
 
 
 def two_stages(*, torsional=3e5, lateral=1e8, **options):

@@ -46,7 +46,8 @@ ROUNDING = 0.05e-6
 
 Deviation = Annotated[float, Quantity(LENGTH, -0.02, 0.02)]
 Amplitude = Annotated[float, Quantity(LENGTH, 0.0, 0.02)]
-Phase = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
+Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
+PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
 Diameter = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 RollAngle = Annotated[float, Quantity(ANGLE, 0.0, 4 * math.pi)]
 RollLength = Annotated[float, Quantity(LENGTH, 0.0, 10.0)]
@@ -139,7 +140,7 @@ class CarrierErrors(Section):
     """Eccentricity of the circle of the planet pins."""
 
     runout_amplitude: Amplitude | None = None
-    runout_phase: Phase | None = None
+    runout_phase: Angle | None = None
 
 
 class GearErrors(CarrierErrors):
@@ -171,7 +172,7 @@ class OvalitySection(Section):
 
     nodal_diameter: Annotated[int, Count(1, 1000)]
     amplitude: Amplitude
-    phase: Phase = 0.0
+    phase: Angle = 0.0
     inextensional: StrictBool = False
 
 
@@ -217,7 +218,7 @@ class SetSection(Section):
     planets: Annotated[int, Count(1, 1000)]
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-3, 10.0)] | None = None
     face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
-    planet_angles: tuple[Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)], ...] | None = None
+    planet_angles: tuple[Angle, ...] | None = None
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
     pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
 
@@ -263,7 +264,7 @@ class SunSection(Section):
 
     teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
     module: Annotated[float, Quantity(LENGTH, 5e-5, 0.1)]
-    pressure_angle: Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
+    pressure_angle: PressureAngle
     profile_shift: Shift | None = None
     bore_radius: Radius
     mass: Mass
@@ -404,7 +405,7 @@ class HousingSection(Section):
 
     form: Literal["exact", "linear"] = "exact"
     points: Annotated[int, Count(3, 100_000)] = 54
-    sensor_angle: Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)] = 0.0
+    sensor_angle: Angle = 0.0
     published: tuple[PublishedLines, ...] = ()
 
 

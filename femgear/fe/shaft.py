@@ -30,7 +30,7 @@ AXES = ("x", "y", "tilt x", "tilt y", "rotation")
 
 
 @dataclass(frozen=True)
-class ShaftSection:
+class RoundSection:
     """Round section and material.
 
     Parameters
@@ -106,14 +106,14 @@ class JointSprings:
     shear: float = math.inf
 
 
-def joint_springs(section: ShaftSection, length: float) -> JointSprings:
+def joint_springs(section: RoundSection, length: float) -> JointSprings:
     """Springs of the joint of two links that have the static stiffness matrix of a Timoshenko shaft.
 
     ``E I / l`` in bending, ``G J / l`` in torsion, and a joint that shears with ``12 E I / ((1 + Phi) l^3)``.
 
     Parameters
     ----------
-    section : ShaftSection
+    section : RoundSection
     length : float
         [m]
     """
@@ -135,7 +135,7 @@ def joint_deflections(length: float) -> np.ndarray:
     return np.hstack([-first, second])
 
 
-def beam_element(section: ShaftSection, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def beam_element(section: RoundSection, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass, stiffness and gyroscopic matrix (10, 10) of an element of a length [m] between two stations.
 
     Returns
@@ -178,7 +178,7 @@ def _mass_terms(l: float, phi: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_matrices(mass: float, polar: float, transverse: float) -> tuple[np.ndarray, np.ndarray]:
-    """Mass (5, 5) and gyroscopic matrix (5, 5) of a rigid disc on its station.
+    """Mass and gyroscopic matrix (5, 5) of a rigid disc on its station.
 
     Its mass is in kg, its polar and transverse moments of inertia I_p and I_t are in kg m^2:
     ``I_t tilt_x'' + I_p Omega tilt_y' = moment``, ``I_t tilt_y'' - I_p Omega tilt_x' = moment``.
@@ -228,7 +228,7 @@ def timoshenko_flexibility(steps: Sequence[ShaftStep], material) -> np.ndarray:
     result = np.zeros((2, 2))
     for step in steps:
         near = far - step.length
-        section = ShaftSection(
+        section = RoundSection(
             step.outer_diameter, step.inner_diameter, material.youngs_modulus, material.poisson_ratio
         )
         bending = section.young * section.second_moment

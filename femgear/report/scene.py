@@ -262,7 +262,7 @@ def deformed_picture(
     rest = surface.extract_feature_edges(**_OUTLINE)
     surface.points = grid.points + scale * u
     surface.point_data[colour_label] = colour_factor * length
-    plotter = _new_plotter(size)
+    plotter = new_plotter(size, size)
     plotter.add_mesh(rest, color="#A0A0A0", line_width=1.0, lighting=False)
     add_coloured(plotter, surface, colour_label, size, cmap="cividis")
     plotter.add_mesh(surface.extract_feature_edges(**_OUTLINE), color="black", line_width=1.2, lighting=False)
@@ -275,9 +275,9 @@ def deformed_picture(
     return scale
 
 
-def _new_plotter(size: int) -> pv.Plotter:
-    """Make a plotter of `size` by `size` pixels without a screen, with smooth edges."""
-    plotter = load_pyvista().Plotter(off_screen=True, window_size=[size, size])
+def new_plotter(width: int, height: int) -> pv.Plotter:
+    """Make a plotter of so many pixels without a screen, with smooth edges."""
+    plotter = load_pyvista().Plotter(off_screen=True, window_size=[width, height])
     plotter.enable_anti_aliasing("ssaa")
     return plotter
 
@@ -474,7 +474,7 @@ class _Field:
 
 def _draw(planetary_set, field, carrier, sensor_angle, title, size):
     """Draw the frames, arrays (size, size, 3), one for every angle of the carrier [rad]."""
-    pv, plotter = load_pyvista(), _new_plotter(size)
+    pv, plotter = load_pyvista(), new_plotter(size, size)
     outer, text = planetary_set.ring.rim_radius, "radial displacement [µm]"
     corners = _ring_corners(planetary_set)
     ring_angle = np.angle(corners)

@@ -97,6 +97,14 @@ def legend_below(figure: Figure, ax=None, *, columns: int = 3) -> None:
         )
 
 
+def show_changes(ax, least: float) -> None:
+    """Let the ordinate leave out zero, and span this share of its largest value at least."""
+    low, high = ax.get_ylim()
+    middle, half = 0.5 * low + 0.5 * high, max(0.5 * high - 0.5 * low, 0.5 * least * max(abs(low), abs(high)))
+    ax.set_ylim(middle - half, middle + half)
+    ax.ticklabel_format(axis="y", useOffset=False)
+
+
 def line_style(index: int) -> dict[str, str]:
     """Choose colour and dash of the line number `index`: neighbours differ in both, 28 lines in one."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}

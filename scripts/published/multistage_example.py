@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from femgear.trains.multistage.case_file import MultistageCase, multistage_of
 from femgear.trains.multistage.model import MultistageSet
-from femgear.trains.multistage.section import MultistageCase, multistage_of
 from femgear.trains.reading import read_case, with_values
 
 CASES = Path(__file__).resolve().parents[2] / "cases"

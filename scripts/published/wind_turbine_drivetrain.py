@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,

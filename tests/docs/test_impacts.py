@@ -12,7 +12,7 @@ PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (
     "published.transmission_errors", "femgear.system.fourier", "femgear.trains.gear_pair.model",
     "femgear.trains.gear_pair.model",
-    "femgear.trains.gear_pair.section",
+    "femgear.trains.gear_pair.case_file",
     "femgear.trains.gear_pair.figures", "femgear.solvers.linear.modal", "femgear.solvers.stability.lyapunov",
     "femgear.solvers.continuation.branches", "femgear.solvers.time.stroboscopic",
 )  # fmt: skip
@@ -49,7 +49,7 @@ def test_named_functions_exist():
     for module in MODULES:
         known |= set(vars(importlib.import_module(module)))
     named = set(re.findall(r"`([A-Za-z_]\w+)`", prose))
-    assert {"ImpactPair", "with_errors", "lyapunov_exponents", "contact_states"} <= named
+    assert {"ImpactPair", "with_errors", "lyapunov_exponents", "range_states"} <= named
     # fields of the result, which are no functions
     fields = {"chaotic", "verdict", "error", "scatter", "step_error"}
     assert fields <= set(dir(LyapunovExponents)) | set(LyapunovExponents.__dataclass_fields__)

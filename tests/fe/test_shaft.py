@@ -8,9 +8,9 @@ from scipy.linalg import eigh, eigvals
 from validation.timoshenko import Disc, Support, free_bending, shaft_system
 
 from femgear.errors import CaseError
-from femgear.fe.shaft import ShaftSection, beam_element, joint_deflections
+from femgear.fe.shaft import RoundSection, beam_element, joint_deflections
 
-SECTION = ShaftSection(0.1, 0.02)
+SECTION = RoundSection(0.1, 0.02)
 LENGTH, COUNT = 1.0, 24
 DISCS = (Disc(6, 20.0, 0.18, 0.10), Disc(16, 35.0, 0.50, 0.30))
 
@@ -138,9 +138,9 @@ def test_joint_does_not_see_rigid_motions():
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: ShaftSection(0.0),
-        lambda: ShaftSection(0.1, 0.1),
-        lambda: ShaftSection(math.nan),
+        lambda: RoundSection(0.0),
+        lambda: RoundSection(0.1, 0.1),
+        lambda: RoundSection(math.nan),
         lambda: shaft(discs=(Disc(25, 1.0, 1.0, 1.0),)),
     ],
 )
@@ -170,7 +170,7 @@ def test_shafts_of_the_printed_springs_are_those_of_the_page():
 
     page = (Path(__file__).parents[2] / "docs" / "drivetrain.md").read_text(encoding="utf-8")
     springs = (PRINTED.low_speed, PRINTED.intermediate, PRINTED.high_speed)
-    round_shaft = ShaftSection(0.1)
+    round_shaft = RoundSection(0.1)
     shear = 12.0 * 2.6 / 16.0 / round_shaft.shear_coefficient
     assert shear == pytest.approx(2.20, abs=5e-3)
     readings = {"energy for each half": (1.5, 4), "beams of half": (6.0, 1), "joint in the middle": (3.0, 1)}

@@ -13,7 +13,7 @@ from validation.support_stiffness import annulus_sector
 from femgear.errors import GeometryError, GridError
 from femgear.fe.elasticity import Material, foundation, stiffness
 from femgear.fe.shaft import (
-    ShaftSection,
+    RoundSection,
     ShaftStep,
     shaft_flexibility,
     shaft_support_stiffness,
@@ -102,7 +102,7 @@ def test_beam_of_two_parts_against_integration():
         bending = 206e9 * np.pi / 64 * (step.outer_diameter**4 - step.inner_diameter**4)
         moments = np.stack([arm, np.ones_like(arm)])
         total += (moments * w) @ moments.T / bending
-        section = ShaftSection(step.outer_diameter, step.inner_diameter, poisson=0.3)
+        section = RoundSection(step.outer_diameter, step.inner_diameter, poisson=0.3)
         shear = STEEL.shear_modulus * section.shear_coefficient * section.area
         total[0, 0] += step.length / shear
         start += step.length

@@ -16,10 +16,17 @@ from published.wind_turbine_drivetrain import (
     wind_turbine_drivetrain,
 )
 
-from femgear.fe.shaft import ShaftSection
+from femgear.fe.shaft import RoundSection
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.assembler import gear_set_system
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.kinematics import planar_of
+from femgear.trains.drivetrain.model import (
+    balanced_torque,
+    drivetrain_model,
+    rectangular_series,
+    torsional_model,
+)
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
@@ -27,21 +34,14 @@ from femgear.trains.drivetrain.data import (
     ParallelSection,
     constant_torques,
 )
-from femgear.trains.drivetrain.geometry import planar_of
-from femgear.trains.drivetrain.model import (
-    balanced_torque,
-    drivetrain_model,
-    rectangular_series,
-    torsional_model,
-)
-from femgear.trains.drivetrain.time import Records, march_drivetrain
+from femgear.trains.drivetrain.simulation import Records, march_drivetrain
 from validation.rows import Row, at_most, information, printed, within
 from validation.timoshenko import Disc, Support, free_bending, shaft_system
 
 PAPER = "Dynamic analysis of the wind turbine drivetrain considering shaft bending effect"
 TRANSFER = "zeros of the exact transfer matrix"
 LIBRARY = "ross-rotordynamics 2.3.0, the same 24 elements"
-SECTION, LENGTH, COUNT = ShaftSection(0.1, 0.02), 1.0, 24
+SECTION, LENGTH, COUNT = RoundSection(0.1, 0.02), 1.0, 24
 DISCS = (Disc(6, 20.0, 0.18, 0.10), Disc(16, 35.0, 0.50, 0.30))
 # two wheels and one mesh: mean stiffness [N/m], teeth
 STIFFNESS, TEETH = 2e8, 20

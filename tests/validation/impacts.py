@@ -144,7 +144,7 @@ def damping_and_impacts() -> tuple[Row, ...]:
         ("down", [low + 0.1, low + 0.03, low + 0.002, low - 0.002], [2, 2, 2, 0]),
     ):
         run = sweep_response(lambda r, pair=pair: (pair.problem(r), 1.0), ratios, steps=400, most=500)
-        found = range_states(run.lowest[:, 0], run.highest[:, 0], drive=DRIVE, back=BACK)
+        found = range_states(run.lowest[:, 0], run.highest[:, 0])
         fold = high if name == "up" else low
         text = f"zeta 0.09: sweep {name} jumps within 0.002 of the limit point {fold:.4f}"
         rows.append(counted("impacts", INTEGRATION, text, 1, int(found.tolist() == states)))

@@ -19,7 +19,7 @@ from published.planetary_sets import lin_parker_set, torsional_set
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
-    Stage,
+    PlanetaryStage,
     StageCoupling,
     mean_mesh_stiffness,
     mesh_columns,
@@ -61,7 +61,7 @@ def uncoupled() -> tuple[Row, ...]:
     rows = []
     for planets in (3, 4, 5):
         data = lin_parker_set(planets)
-        pair = (Stage(data=data), Stage(data=data))
+        pair = (PlanetaryStage(data=data), PlanetaryStage(data=data))
         train = MultistageSet(stages=pair, couplings=(), input=Member(1, "sun"), output=Member(2, "carrier"))
         found, single = multistage_modes(train), gear_set_modes(data)
         elastic = single.frequency > 0.0
@@ -116,7 +116,7 @@ def soft_shaft() -> tuple[Row, ...]:
     return (within("MS", source, "two torsional stages on a soft shaft [Hz]", exact, ours, 1e-6),)
 
 
-def _reflected(stage: Stage) -> float:
+def _reflected(stage: PlanetaryStage) -> float:
     """Inertia of a stage with a fixed ring, felt at its carrier [kg m^2]."""
     data, (zs, zp, zr) = stage.data, stage.teeth
     sun, planet = 1.0 + zr / zs, 1.0 - zr / zp

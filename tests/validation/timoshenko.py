@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.fe.shaft import AXES, ShaftSection, beam_element, disc_matrices
+from femgear.fe.shaft import AXES, RoundSection, beam_element, disc_matrices
 from femgear.system.system import MechanicalSystem
 
 
@@ -32,7 +32,7 @@ class Support:
 
 
 def free_bending(
-    section: ShaftSection,
+    section: RoundSection,
     length: float,
     low: float,
     high: float,
@@ -48,7 +48,7 @@ def free_bending(
 
     Parameters
     ----------
-    section : ShaftSection
+    section : RoundSection
     length, low, high : float
         [m], [Hz]
     discs : sequence of (place [m], Disc)
@@ -86,7 +86,7 @@ def free_bending(
 
 
 def shaft_system(
-    sections: Sequence[ShaftSection],
+    sections: Sequence[RoundSection],
     lengths: Sequence[float],
     *,
     discs: Sequence[Disc] = (),

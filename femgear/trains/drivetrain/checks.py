@@ -1,17 +1,12 @@
-"""Model of a drivetrain case, its loaded flanks, and checks of what a run can represent.
+"""What a run of a drivetrain case can represent: speeds, steps and records, loose motions; its warnings.
 
-The driver of every gear stage, and with it the loaded flanks, follows from statics under the mean torques. A
-motion that nothing holds is found whatever the sizes of springs and inertias; natural frequencies may not lie
-further apart than double precision resolves beside the free spin. Runs are refused, by stage, whose steps,
-records or spectra cannot follow the speeds at which the rigid chain turns under its torques; what is allowed
-but deserves a look is a warning.
+Refusals come by stage, before anything is computed; what is allowed but deserves a look is a warning.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,10 +16,7 @@ from femgear.case.quantities import FREQUENCY, RPM, SPEED, TIME
 from femgear.errors import CaseError, Finding
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import Drivetrain, TorqueHistory
-from femgear.trains.drivetrain.geometry import speed_ratios, springs_of
-from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model, torsional_model
-from femgear.trains.drivetrain.section import (
+from femgear.trains.drivetrain.case_file import (
     FASTEST_RATE,
     DrivetrainCase,
     drivetrain_of,
@@ -32,9 +24,11 @@ from femgear.trains.drivetrain.section import (
     settle_time,
     torque_histories,
 )
-from femgear.trains.drivetrain.time import PASS_BAND, static_deviations
+from femgear.trains.drivetrain.kinematics import springs_of
+from femgear.trains.drivetrain.model import DrivetrainModel, case_model, drivetrain_model, refusals_located
+from femgear.trains.drivetrain.parts import Drivetrain, TorqueHistory
+from femgear.trains.drivetrain.simulation import PASS_BAND
 
-BENDING, TORSIONAL = "with bending", "torsional"
 # Slower instants, over the mean speed, would need records of endless length over a turn.
 SLOWEST = 0.05
 
@@ -43,7 +37,7 @@ SLOWEST = 0.05
 # Not enough where modes lie far above the mesh lines: see `mesh_mode`.
 LEAST_STEPS, GOOD_STEPS = 4, 30
 # Records that nobody chose keep this multiple of the highest mesh frequency, and come this often [Hz].
-KEPT_HARMONIC, LEAST_RECORD_RATE = 3, 1000.0
+_KEPT_HARMONIC, _LEAST_RECORD_RATE = 3, 1000.0
 # Share of its strain energy that a mode has in the meshes where they drive it noticeably.
 MESH_SHARE = 0.1
 
@@ -59,100 +53,6 @@ _MOVED, _NAMED = 1e-3, 6
 
 # Records that spectra take at least.
 LEAST_RECORDS = 64
-
-# Force of a mesh, over the sum of what the single torques would give, that is rounding.
-_NO_FORCE = 1e-6
-
-
-def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
-    """Model of a case, its loaded flanks those that the mean torques press together.
-
-    Raises
-    ------
-    CaseError
-        Stages that leave no single spin (E-DRIVETRAIN), mesh directions that cannot turn (E-TURNING).
-    """
-    build = drivetrain_model if variant == BENDING else torsional_model
-    options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
-    with _located(case):
-        train = drivetrain_of(case)
-        torques = torque_histories(case, speed_ratios(train))
-        return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
-
-
-@contextmanager
-def _located(case: DrivetrainCase) -> Iterator[None]:
-    """Let the refusals of a model name the entries of the case file and their lines."""
-    try:
-        yield
-    except CaseError as error:
-        if error.code == "E-TURNING":
-            error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
-        error.file = case.location(error.key or "")
-        raise
-
-
-def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
-    """The drivetrain with the driver of every stage that the torques make drive.
-
-    The torques, as means over the run, and the inertia forces of the acceleration of the free spin that they
-    give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so that
-    the load of parallel paths follows their stiffness. Weight does not count.
-
-    Parameters
-    ----------
-    train : Drivetrain
-        Stages whose driver is given keep it.
-    torques : sequence of TorqueHistory
-    duration : float
-        Of the run [s].
-
-    Returns
-    -------
-    Drivetrain
-        A stage without load on its flanks, and one that its first body (the carrier) drives, stay as they
-        are.
-
-    Raises
-    ------
-    CaseError
-        A torque on no body, stages that leave no single spin (E-DRIVETRAIN).
-    """
-    stages = train.stages
-    if not torques or all(one.driver is not None for one in stages):
-        return train
-    force = _stage_forces(train, torques, duration)
-    found: list = [
-        one.changed(driver=one.ends[1]) if one.driver is None and value < 0.0 else one
-        for one, value in zip(stages, force)
-    ]
-    planets = len(train.planetary)
-    return replace(train, planetary=tuple(found[:planets]), parallel=tuple(found[planets:]))
-
-
-def mean_torque(history: TorqueHistory, duration: float) -> float:
-    """Mean of a torque from 0 to `duration` [N m], exact."""
-    inside = history.times[(history.times > 0.0) & (history.times < duration)]
-    times = np.concatenate([[0.0], inside, [duration]])
-    return float(np.trapezoid(history.at(times), times) / duration)
-
-
-def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration: float) -> np.ndarray:
-    """Sum of the mean mesh forces of every stage [N]; zero where they are rounding."""
-    model = torsional_model(replace(train, damping_ratio=0.0), harmonics=0, turning=False)
-    W, k, carried = model.system.W, model.mean_stiffness, model.system.M @ model.rigid
-    force = np.zeros((len(k), len(torques)))
-    for column, one in enumerate(torques):
-        load = np.zeros(len(carried))
-        load[model.index(f"{one.body}: rotation")] = mean_torque(one, duration)
-        load -= carried * (model.rigid @ load) / model.inertia
-        force[:, column] = k * (W.T @ static_deviations(model, W, k, load))
-    sums = np.zeros((len(train.stages), len(torques)))
-    np.add.at(sums, model.geometry.stage, force)
-    total = sums.sum(axis=1)
-    # the model's flanks are those of the drivers that are given
-    default = [one.flank for one in train.stages]
-    return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)
 
 
 @dataclass(frozen=True)
@@ -189,16 +89,10 @@ def speed_range(
     ----------
     model : DrivetrainModel
     torques : sequence of TorqueHistory
-    duration : float
-        [s]
+    duration, start : float
+        End and begin of the range [s].
     speed : float
         Of the first body at time zero [rad/s].
-    start : float
-        The range is that from here to the end [s].
-
-    Returns
-    -------
-    SpeedRange
     """
     instants = np.concatenate([[0.0, start, duration], *(one.times for one in torques)])
     times = np.unique(np.clip(instants, 0.0, duration))
@@ -225,10 +119,9 @@ def case_speeds(case: DrivetrainCase, model: DrivetrainModel, *, start: float = 
 def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
     """Steps a record: as given, or what the highest mesh frequency of the run asks for."""
     s = case.simulation
-    record = s.record
-    if record is None:
-        record = default_record_rate(s.rate, highest_mesh(model, case_speeds(case, model).fastest)[1])
-    return max(1, round(s.rate / record))
+    if s.record is not None:
+        return max(1, round(s.rate / s.record))
+    return default_record_every(s.rate, highest_mesh(model, case_speeds(case, model).fastest)[1])
 
 
 def record_rate(case: DrivetrainCase, model: DrivetrainModel) -> float:
@@ -277,15 +170,15 @@ def shift_rate(hertz: float, share: float) -> float:
     return math.pi * hertz / math.sqrt(3.0 * share)
 
 
-def default_record_rate(rate: float, highest: float) -> float:
-    """Records a second where none are given: few, but with the third harmonic of the highest mesh.
+def default_record_every(rate: float, highest: float) -> int:
+    """Steps a record where no rate of records is given; so many steps a second, highest mesh line [Hz].
 
-    The steps a second `rate` [Hz] over the largest whole number for which the pass band of the records holds
-    that harmonic of the frequency `highest` [Hz] and there are 1000 a second; at most the rate.
+    The largest number for which the pass band of the records holds the third harmonic of that line and there
+    are 1000 records a second.
     """
     # a hair more, so that rounding of the speed does not push the harmonic out
-    needed = max(LEAST_RECORD_RATE, 2.0 * KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
-    return rate / max(1, math.floor(rate / needed * (1.0 + 1e-12)))
+    needed = max(_LEAST_RECORD_RATE, 2.0 * _KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
+    return max(1, math.floor(rate / needed * (1.0 + 1e-12)))
 
 
 def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
@@ -298,7 +191,7 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
         natural frequencies too far apart for double precision (E-STIFFNESS); steps that cannot follow the
         meshes (E-RATE); records that are too many (E-RANGE).
     """
-    with _located(case):
+    with refusals_located(case):
         train = drivetrain_of(case)
         count, names = loose_motions(train, turning=case.simulation.turning)
         if count:
@@ -328,7 +221,7 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
         Records that are too few, a resolution that they do not have (E-RANGE); a first body that nearly stops
         or turns back in the part that the spectra take (E-SPECTRUM).
     """
-    with _located(case):
+    with refusals_located(case):
         _check_records(case, record_rate(case, model))
         late = case_speeds(case, model, start=settle_time(case))
         check_turning(late.lowest, late.mean)
@@ -410,13 +303,7 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
 
 
 def drivetrain_warnings(case: DrivetrainCase) -> tuple[Finding, ...]:
-    """What is allowed but deserves a look.
-
-    Raises
-    ------
-    CaseError
-        As `check_drivetrain`.
-    """
+    """What is allowed but deserves a look; refuses what `check_drivetrain` does."""
     model = check_drivetrain(case)
     speeds = case_speeds(case, model)
     return (
@@ -526,7 +413,7 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     -------
     count : int
     names : tuple of str
-        Coordinates of those motions, the largest first, rotations last.
+        Coordinates that move most, rotations last; at most six.
     """
     model = drivetrain_model(replace(train, damping_ratio=0.0), harmonics=0, turning=turning)
     lengths = [one.length for one in train.shafts]

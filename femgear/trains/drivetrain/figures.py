@@ -1,8 +1,4 @@
-"""Figures of a drivetrain case from modes.nc, transient.nc and spectrum.nc.
-
-`over_time` and `spectra` take plain curves, those after them read the files. `FIGURES` at the end ties the
-pictures of the report to their captions.
-"""
+"""Figures of a drivetrain case from modes.nc, transient.nc and spectrum.nc."""
 
 from __future__ import annotations
 
@@ -14,14 +10,13 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.report.response import campbell
-from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure
+from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure, show_changes
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.checks import case_model
-from femgear.trains.drivetrain.data import numbered
-from femgear.trains.drivetrain.model import DrivetrainModel
-from femgear.trains.drivetrain.pictures import mode_pictures
+from femgear.trains.drivetrain.mode_pictures import write_mode_pictures
+from femgear.trains.drivetrain.model import DrivetrainModel, case_model
+from femgear.trains.drivetrain.parts import numbered
 from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
-from femgear.trains.drivetrain.time import PASS_BAND
+from femgear.trains.drivetrain.simulation import PASS_BAND
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
@@ -78,7 +73,7 @@ def over_time(
         if zero:
             ax.axhline(0.0, color=GREY, linewidth=0.8)
         else:
-            _show_changes(ax)
+            show_changes(ax, _LEAST)
     legend_below(figure)
     return figure
 
@@ -163,26 +158,12 @@ def _draw_spectrum(ax, frequency, curves: Sequence[tuple]) -> None:
         ax.set_ylim(1e-5 * top, 2.0 * top)
 
 
-def _show_changes(ax) -> None:
-    """Ordinate that does not reach zero, with whole numbers at its ticks, and does not blow up rounding."""
-    low, high = ax.get_ylim()
-    least = 0.5 * _LEAST * max(abs(low), abs(high))
-    middle, half = 0.5 * low + 0.5 * high, max(0.5 * high - 0.5 * low, least)
-    ax.set_ylim(middle - half, middle + half)
-    ax.ticklabel_format(axis="y", useOffset=False)
-
-
 def _thickness(index: int) -> dict[str, float]:
     return {"linewidth": _WIDTHS[min(index, 1)], "alpha": _ALPHAS[min(index, 1)]}
 
 
 def band(time, values, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Least and largest of values (n,) in `count` pieces of the time, which share their ends.
-
-    Returns
-    -------
-    middle, low, high : (count,) arrays
-    """
+    """Middle, least and largest value (count,) of values (n,) in pieces of the time that share their ends."""
     time, values = np.asarray(time), np.asarray(values)
     first = np.linspace(0, len(time) - 1, count + 1).astype(int)
     low, high = (one.reduceat(values, first[:-1]) for one in (np.minimum, np.maximum))
@@ -394,7 +375,7 @@ def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
 
 def _write_modes(drawn: Drawn, folder: Path) -> list[str]:
     count = drawn.case.simulation.modes
-    return mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
+    return write_mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
 
 
 FIGURES = {

@@ -2,10 +2,10 @@
 
 The coordinates are small deviations, in the fixed frame, from a large common rotation: body b turns by
 ``ratio_b phi(t)`` with the spin phi of the first body. The spin itself is a rigid motion without stiffness,
-see `rigid` of the model; time integration keeps it apart (`femgear.trains.drivetrain.time`).
+see `DrivetrainModel.rigid`; time integration keeps it apart (`femgear.trains.drivetrain.simulation`).
 
 Meshes have a rectangular stiffness by the number of tooth pairs in contact; their directions are those of
-`femgear.trains.drivetrain.geometry`.
+`femgear.trains.drivetrain.kinematics`.
 
 The purely torsional counterpart, `torsional_model`, has one rotation a body and a planet: A. Kahraman,
 J. Sound Vib. 173, 1994, 125-130, for the planetary stage; W. Shi, C.-W. Chung and others, Int. J. Precis.
@@ -16,6 +16,8 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,8 +28,8 @@ from femgear.solvers.linear.modal import modal_damping
 from femgear.system.force_laws import positive_part
 from femgear.system.fourier import FourierSeries, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
-from femgear.trains.drivetrain.data import BearingSection, Drivetrain, MeshSection, numbered
-from femgear.trains.drivetrain.geometry import (
+from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, torque_histories
+from femgear.trains.drivetrain.kinematics import (
     Coordinates,
     FlankContacts,
     MeshGeometry,
@@ -37,11 +39,16 @@ from femgear.trains.drivetrain.geometry import (
     lumped_map,
     mesh_geometry,
     rigid_rotation,
+    speed_ratios,
     springs_of,
 )
+from femgear.trains.drivetrain.parts import BearingSection, Drivetrain, MeshSection, TorqueHistory, numbered
 
+BENDING, TORSIONAL = "with bending", "torsional"
 # Terms of the mesh stiffness: as many as the paper takes.
 HARMONICS = 15
+# Force of a mesh, over the sum of what the single torques would give, that is rounding.
+_NO_FORCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -306,14 +313,13 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
         mass, gyroscopic = disc_matrices(body.mass, body.inertia, body.transverse_inertia)
         M[first : first + 5, first : first + 5] += mass
         G[first : first + 5, first : first + 5] += gyroscopic * spin[first + 4]
-    for shaft, inner in zip(train.shafts, place.inner):
+    for shaft, stations in zip(train.shafts, place.stations):
         if shaft.elements:
             mass, _, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
-            ends = (place.body[shaft.between[0]], *inner, place.body[shaft.between[1]])
-            for one, two in itertools.pairwise(ends):
+            for one, two in itertools.pairwise(stations):
                 at = np.r_[one : one + 5, two : two + 5]
                 M[np.ix_(at, at)] += mass
-                G[np.ix_(at, at)] += gyroscopic * spin[ends[0] + 4]
+                G[np.ix_(at, at)] += gyroscopic * spin[stations[0] + 4]
     for group in springs_of(train, place):
         finite = np.where(np.isinf(group.stiffness), 0.0, group.stiffness)
         K[np.ix_(group.places, group.places)] += (group.rows.T * finite) @ group.rows
@@ -395,3 +401,103 @@ def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:
         gravity=0.0,
     )
     return drivetrain_model(held, **options)
+
+
+def static_flexibility(model: DrivetrainModel, W, k) -> np.ndarray:
+    """Deviations (n, n) per unit of loads that do not drive the spin [m/N].
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+    W : (n, n_meshes) array
+        Directions of the drive flanks at one instant, all in touch.
+    k : (n_meshes,) array
+        Their stiffnesses [N/m].
+    """
+    carried, total = model.system.M @ model.rigid, model.system.K + (W * k) @ W.T
+    size = (np.abs(total).max() or 1.0) / np.abs(carried).max() ** 2
+    return np.linalg.inv(total + size * np.outer(carried, carried))
+
+
+def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
+    """Model of a case, its loaded flanks those that the mean torques press together.
+
+    Raises
+    ------
+    CaseError
+        Stages that leave no single spin (E-DRIVETRAIN), mesh directions that cannot turn (E-TURNING).
+    """
+    build = drivetrain_model if variant == BENDING else torsional_model
+    options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
+    with refusals_located(case):
+        train = drivetrain_of(case)
+        torques = torque_histories(case, speed_ratios(train))
+        return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
+
+
+@contextmanager
+def refusals_located(case: DrivetrainCase) -> Iterator[None]:
+    """Let the refusals of a model name the entries of the case file and their lines."""
+    try:
+        yield
+    except CaseError as error:
+        if error.code == "E-TURNING":
+            error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
+        error.file = case.location(error.key or "")
+        raise
+
+
+def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
+    """The drivetrain with the driver of every stage that the torques make drive.
+
+    The torques, as means over the run, and the inertia forces of the acceleration of the free spin that they
+    give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so that
+    the load of parallel paths follows their stiffness. Weight does not count.
+
+    Parameters
+    ----------
+    train : Drivetrain
+        Stages whose driver is given keep it.
+    torques : sequence of TorqueHistory
+    duration : float
+        Of the run [s].
+
+    Returns
+    -------
+    Drivetrain
+        A stage without load on its flanks, and one that its first body (the carrier) drives, stay as they
+        are.
+
+    Raises
+    ------
+    CaseError
+        A torque on no body, stages that leave no single spin (E-DRIVETRAIN).
+    """
+    stages = train.stages
+    if not torques or all(one.driver is not None for one in stages):
+        return train
+    force = _stage_forces(train, torques, duration)
+    found: list = [
+        one.changed(driver=one.ends[1]) if one.driver is None and value < 0.0 else one
+        for one, value in zip(stages, force)
+    ]
+    planets = len(train.planetary)
+    return replace(train, planetary=tuple(found[:planets]), parallel=tuple(found[planets:]))
+
+
+def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration: float) -> np.ndarray:
+    """Sum of the mean mesh forces of every stage [N]; zero where they are rounding."""
+    model = torsional_model(replace(train, damping_ratio=0.0), harmonics=0, turning=False)
+    W, k, carried = model.system.W, model.mean_stiffness, model.system.M @ model.rigid
+    flexibility, force = static_flexibility(model, W, k), np.zeros((len(k), len(torques)))
+    for column, one in enumerate(torques):
+        load = np.zeros(len(carried))
+        load[model.index(f"{one.body}: rotation")] = one.mean(duration)
+        load -= carried * (model.rigid @ load) / model.inertia
+        force[:, column] = k * (W.T @ flexibility @ load)
+    sums = np.zeros((len(train.stages), len(torques)))
+    np.add.at(sums, model.geometry.stage, force)
+    total = sums.sum(axis=1)
+    # the model's flanks are those of the drivers that are given
+    default = [one.flank for one in train.stages]
+    return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)

@@ -1,7 +1,6 @@
 """Results of a drivetrain case: modes.nc, transient.nc, spectrum.nc, their tables and warnings.
 
-Every variable of a file carries its units. `transient_warnings` tells what the motion says against itself;
-`describe_drivetrain` is about the chain of the case, the other tables about the numbers of a run.
+Every variable of a file carries its units.
 """
 
 from __future__ import annotations
@@ -18,11 +17,11 @@ from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.storage.results import dataset
+from femgear.trains.drivetrain.case_file import DrivetrainCase, torque_histories
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
-from femgear.trains.drivetrain.data import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
-from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
-from femgear.trains.drivetrain.time import BALANCE, PASS_BAND, DrivetrainRun
+from femgear.trains.drivetrain.parts import PlanetarySection, TorqueHistory, numbered
+from femgear.trains.drivetrain.simulation import BALANCE, PASS_BAND, DrivetrainRun
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,6 +33,8 @@ _LOW_PASS = "linear-phase low pass, 0.8 to 1.0 of half the record rate, 80 dB"
 
 # Panels of a figure.
 MOST_PANELS = 6
+# Of the segments of spectra.
+WINDOW = "hann"
 
 _PLANET = re.compile(r"(?:^|-)planet (\d+)(?: \d+)?(?:-ring of |$)")
 
@@ -50,7 +51,10 @@ _NOTHING = 1e-6
 
 @dataclass(frozen=True)
 class DrivetrainModesResult:
-    """Modes at standstill with mean mesh stiffnesses, and over the speed with gyroscopic terms."""
+    """Modes at standstill with mean mesh stiffnesses, and over the speed with gyroscopic terms.
+
+    ``speed`` is that of the first body in operation [rad/s].
+    """
 
     model: DrivetrainModel
     modes: Modes
@@ -97,7 +101,7 @@ class DrivetrainModesResult:
 
 @dataclass(frozen=True)
 class TransientResult:
-    """Motion in time, by variant: with bending, and torsional where it is asked for."""
+    """Motion in time, by variant: with bending, and torsional where it is asked for; external torques."""
 
     models: dict[str, DrivetrainModel]
     runs: dict[str, DrivetrainRun]
@@ -193,7 +197,6 @@ class AveragedSpectrum:
         Distance of lines.
     bandwidth : float
         Equivalent noise bandwidth.
-    window : str
     segments : int
         Averaged.
     """
@@ -202,13 +205,16 @@ class AveragedSpectrum:
     amplitude: np.ndarray
     resolution: float
     bandwidth: float
-    window: str
     segments: int
 
 
 @dataclass(frozen=True)
 class SpectrumResult:
-    """Spectra of the mesh forces by variant, over frequency and order, and the named lines."""
+    """Spectra of the mesh forces by variant, over frequency and order, and the named lines.
+
+    After ``settle`` [s], at the mean ``speed`` of the first body [rad/s]; ``amplitudes`` (L, n_meshes) [N] of
+    the lines, and whether the ``order_distance`` of the record parts them, ``resolved`` (L,).
+    """
 
     transient: TransientResult
     settle: float
@@ -257,7 +263,7 @@ class SpectrumResult:
         }
         attrs = {
             "title": "spectra of the mesh forces",
-            "window": some.window,
+            "window": WINDOW,
             "segments": some.segments,
             "overlap": 0.5,
             "resolution": some.resolution,
@@ -365,20 +371,9 @@ def _shown_factor(power: float) -> str:
 
 
 def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
-    """Tabulate bodies, shafts, gear stages and operation of a drivetrain case.
-
-    Raises
-    ------
-    CaseError
-        As `femgear.trains.drivetrain.checks.check_drivetrain`.
-    """
+    """Tabulate bodies, shafts, gear stages and operation of a case; refuses what `check_drivetrain` does."""
     model = check_drivetrain(case)
-    return (
-        _bodies(case, model),
-        _shafts(model),
-        _stages(case, model),
-        _operation(case, model),
-    )
+    return _bodies(case, model), _shafts(model), _stages(case, model), _operation(case, model)
 
 
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:

@@ -3,9 +3,6 @@
 Spectra of mesh forces are windowed and averaged, over frequency and over orders of the first body. Lines are
 named for what makes them: mesh harmonics, side bands of the turning carriers, sums and differences of two
 meshes.
-
-`DRIVETRAIN` at the end is the train: the table of its stages, with what the report says and draws of each,
-and the case file of its own.
 """
 
 from __future__ import annotations
@@ -20,10 +17,15 @@ import numpy as np
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import campbell_data
+from femgear.trains.drivetrain.case_file import (
+    DrivetrainCase,
+    check_entries_together,
+    drivetrain_notices,
+    embed_torques,
+    settle_time,
+    torque_histories,
+)
 from femgear.trains.drivetrain.checks import (
-    BENDING,
-    TORSIONAL,
-    case_model,
     check_drivetrain,
     check_spectrum,
     check_turning,
@@ -32,8 +34,9 @@ from femgear.trains.drivetrain.checks import (
     record_rate,
 )
 from femgear.trains.drivetrain.figures import FIGURES
-from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.model import BENDING, TORSIONAL, DrivetrainModel, case_model
 from femgear.trains.drivetrain.results import (
+    WINDOW,
     AveragedSpectrum,
     DrivetrainModesResult,
     MeshLine,
@@ -45,15 +48,7 @@ from femgear.trains.drivetrain.results import (
     describe_transient,
     transient_warnings,
 )
-from femgear.trains.drivetrain.section import (
-    DrivetrainCase,
-    check_entries_together,
-    drivetrain_notices,
-    embed_torques,
-    settle_time,
-    torque_histories,
-)
-from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
+from femgear.trains.drivetrain.simulation import PASS_BAND, DrivetrainRun, Records, march_drivetrain
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import modes_verdict
 
@@ -66,8 +61,8 @@ _SPEEDS, _FASTEST, _HIGHEST, _MOST_BRANCHES = 21, 10.0 / 3.0, 2.5, 40
 _ORDERS = 0.25
 # Mesh harmonics and side bands of the carrier's turn that have names.
 _HARMONICS, _SIDE_BANDS = 3, 3
-# Of the spectra, and half the width of its main lobe in lines (F. J. Harris, Proc. IEEE 66, 1978, 51-83).
-_WINDOW, _LOBE = "hann", 2.0
+# Half the main lobe of Hann's window in lines (F. J. Harris, Proc. IEEE 66, 1978, 51-83).
+_LOBE = 2.0
 # Growth of the free motion from which linear meshes are asked whether the motion means anything, and the
 # vibration of a body over its own speed that means nothing.
 _GROWN, _WILD = 1e3, 100.0
@@ -161,10 +156,7 @@ def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
 def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> SpectrumResult:
     """Spectra of the mesh forces after the start, over frequency and over orders of the first body.
 
-    Raises
-    ------
-    CaseError
-        As `femgear.trains.drivetrain.checks.check_spectrum`.
+    Refuses what `check_spectrum` does.
     """
     check_spectrum(case, transient.models[BENDING])
     first, settle = next(iter(transient.runs.values())), settle_time(case)
@@ -222,7 +214,7 @@ def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
 
 
 def resolved_lines(model: DrivetrainModel, lines, distance: float) -> np.ndarray:
-    """Whether (L,) Hann's window parts a line from others and mesh harmonics; distance of orders."""
+    """Whether Hann's window parts lines (L,) from one another and mesh harmonics; distance of orders."""
     order = np.array([line.order for line in lines])
     harmonics = np.outer(np.arange(1, 11), model.base_ratio[np.unique(model.mesh_base)]).ravel()
     apart = np.abs(order[:, None] - np.concatenate([order, harmonics]))
@@ -277,16 +269,14 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     signal = np.asarray(signal, float)
     length = round(1.0 / (resolution * step))
     hop = max(1, round(0.5 * length))
-    weight = np.asarray(windows.get_window(_WINDOW, length))
+    weight = np.asarray(windows.get_window(WINDOW, length))
     options = {"window": weight, "noverlap": length - hop, "detrend": "constant", "scaling": "spectrum"}
     frequency, power = welch(signal, 1.0 / step, nperseg=length, axis=0, return_onesided=False, **options)
     kept = length // 2 + 1
     amplitude = 2.0 * np.sqrt(np.moveaxis(power[:kept], 0, -1))
     bandwidth = float(np.sum(weight**2) / weight.sum() ** 2 / step)
     segments = (len(signal) - length) // hop + 1
-    return AveragedSpectrum(
-        np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, _WINDOW, segments
-    )
+    return AveragedSpectrum(np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, segments)
 
 
 def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> AveragedSpectrum:

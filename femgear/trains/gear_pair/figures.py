@@ -20,6 +20,7 @@ from femgear.report.style import (
     legend_below,
     new_figure,
     runs,
+    show_changes,
 )
 from femgear.trains.gear_pair.model import STATE_NAMES
 from femgear.trains.protocol import Drawn, Figures
@@ -37,7 +38,7 @@ _SPARSE = 80
 def amplitude_and_mean(
     curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, x: str = "frequency ratio [1]",
     unit: str = "half backlash", title: str = "",
-):  # fmt: skip
+) -> Figure:  # fmt: skip
     """Amplitude and mean of a deflection over frequency, dashed where it is not known to be stable.
 
     Parameters
@@ -46,10 +47,6 @@ def amplitude_and_mean(
     sweeps : sequence of (text, ratio (f,), amplitude (f,), mean (f,))
         Drawn as markers.
     x, unit, title : str
-
-    Returns
-    -------
-    Figure
     """
     figure, (top, bottom) = new_figure(rows=2, width=8.5, height=7.0, sharex=True)
     for number, (text, ratio, amplitude, mean, stable) in enumerate(curves):
@@ -67,12 +64,7 @@ def amplitude_and_mean(
     if not all(np.all(stable) for *_, stable in curves):
         top.plot([], [], "--", color=GREY, label="not stable")
     top.set_ylim(bottom=0.0)
-    # a mean that hardly changes is shown as such, not as its rounding
-    low, high = bottom.get_ylim()
-    middle, half = 0.5 * (low + high), 0.05 * max(abs(low), abs(high))
-    if high - low < 2.0 * half:
-        bottom.set_ylim(middle - half, middle + half)
-    bottom.ticklabel_format(axis="y", useOffset=False)
+    show_changes(bottom, 0.1)
     label(top, y=f"amplitude [{unit}]", title=title)
     label(bottom, x, f"mean [{unit}]")
     legend_below(figure, columns=3)

@@ -18,9 +18,8 @@ through the inertia of ``u = x + e - y_1 + y_2`` alone: ``x'' + 2 zeta x' + k(t)
 bearings. Time is scaled once more so that the tooth frequency is one for every frequency ratio Omega,
 ``theta = Omega t``: M and C carry Omega^2 and Omega, and branches over Omega are branches over a parameter.
 
-`contact_states` tells how its flanks touch over a motion. No impact, single-sided and double-sided impact are
-told apart, as in the paper of 1990, by the range of the relative deflection, or by the signs of the mesh
-forces.
+No impact, single-sided and double-sided impact are told apart, as in the paper of 1990, by the range of the
+relative deflection.
 """
 
 from __future__ import annotations
@@ -31,7 +30,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from femgear.errors import CaseError, checked_numbers
 from femgear.solvers.continuation.branches import Branch
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.force_laws import GearMeshes
@@ -108,8 +106,9 @@ class ImpactPair:
     def problem(self, ratio: float, *, divided: int = 1) -> NonlinearSystem:
         """The pair at the frequency ratio Omega, tooth frequency over omega_n, in the scaled time.
 
-        Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `frequency`; for motions that
-        repeat after several tooth periods ``divided`` counts these, and the first base is 1 / divided.
+        Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `ImpactPair.frequency`; for
+        motions that repeat after several tooth periods ``divided`` counts these, and the first base is
+        1 / divided.
         """
         M, C, K, along = self._matrices()
         system = MechanicalSystem(
@@ -120,7 +119,7 @@ class ImpactPair:
         return NonlinearSystem(system, (self.mesh(divided),), forces)
 
     def mesh(self, divided: int = 1) -> GearMeshes:
-        """The mesh with its play on the one column, see `problem`."""
+        """The mesh with its play on the one column, see `ImpactPair.problem`."""
         orders = _orders(0, divided, len(self.frequency))
         k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders)
         return GearMeshes(np.array([0]), k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
@@ -205,125 +204,46 @@ def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
 
 NORMAL, ONE_SIDED, TWO_SIDED, UNKNOWN = 0, 1, 2, 3
 STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
+"""One flank stays closed; it opens and the other does not close; both close."""
 
 
-@dataclass(frozen=True)
-class ContactStates:
-    """What every mesh of a motion does.
-
-    Parameters
-    ----------
-    state : (..., g) int array
-        Index into `STATE_NAMES`: one flank stays closed; it opens and the other does not close; both close.
-    drive, free, back : (..., g) arrays
-        Shares of the instants with the drive flanks, no flanks and the back flanks in contact.
-    """
-
-    state: np.ndarray
-    drive: np.ndarray
-    free: np.ndarray
-    back: np.ndarray
-
-
-def contact_states(meshes: GearMeshes, x, theta) -> ContactStates:
-    """Contact over the instants of a motion.
-
-    Parameters
-    ----------
-    meshes : GearMeshes
-        Meshes that separate.
-    x : (..., T, n_columns) array
-        Deflections of all columns at T instants, at least one period of them [m].
-    theta : (T, n_bases) array
-        Phases of the instants [rad].
-
-    Raises
-    ------
-    CaseError
-        Meshes that do not separate, no instants, deflections or forces that are not finite (E-CONTACT).
-    """
-    if not meshes.separates:
-        raise CaseError(
-            "meshes that do not separate have no impacts", code="E-CONTACT", limit="separates=True"
-        )
-    x = checked_numbers(x, "x", code="E-CONTACT", unit="m")
-    theta = checked_numbers(theta, "theta", code="E-CONTACT", unit="rad")
-    if x.ndim < 2 or x.shape[-1] <= meshes.columns.max(initial=-1) or theta.ndim != 2 or not len(theta):
-        _refuse(f"deflections of shape {x.shape} at phases of shape {theta.shape}")
-    if x.shape[-2] != len(theta):
-        _refuse(f"{x.shape[-2]} deflections of every column at {len(theta)} instants")
-    _, line, behind, has_back = meshes.flank_forces(x[..., meshes.columns], theta)
-    if not np.all(np.isfinite(line)):
-        _refuse("deflections or forces that are not finite")
-    drive, back = line > 0.0, has_back & (behind < 0.0)
-    both = drive.any(axis=-2) & back.any(axis=-2)
-    closed = drive.all(axis=-2) | back.all(axis=-2)
-    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
-    return ContactStates(state, drive.mean(axis=-2), (~drive & ~back).mean(axis=-2), back.mean(axis=-2))
-
-
-def solution_states(meshes: GearMeshes, solution, *, samples: int = 1024) -> ContactStates:
-    """Contact in a periodic solution, at equidistant phases; with several bases on a grid of all phases.
-
-    Parameters
-    ----------
-    meshes : GearMeshes
-    solution : PeriodicSolution
-        With lines ``orders`` (L, n_bases) and amplitudes ``deflection`` (n_columns, L).
-    samples : int
-        Phases of every base: 1024 for one base, ``samples ** (1 / n_bases)`` but 64 at least for several.
-    """
-    bases = solution.orders.shape[1]
-    each = samples if bases == 1 else max(64, round(samples ** (1.0 / bases)))
-    axes = np.meshgrid(*[2.0 * np.pi * np.arange(each) / each] * bases, indexing="ij")
-    theta = np.stack([axis.ravel() for axis in axes], axis=1)
-    x = (np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T).real
-    return contact_states(meshes, x, theta)
-
-
-def range_states(lowest, highest, *, drive: float, back: float) -> np.ndarray:
-    """States (...) from the smallest and largest deflection, where the flanks close at constant deflections.
+def range_states(lowest, highest) -> np.ndarray:
+    """Contact states (...), indices into `STATE_NAMES`, from the range of the relative deflection.
 
     `UNKNOWN` where an extreme is nan or infinite, as of a motion that did not settle.
 
     Parameters
     ----------
     lowest, highest : (...) arrays
-        Of the relative deflection.
-    drive, back : float
-        Deflections above and below which the drive and the back flanks touch.
+        Extremes of the deflection, in half backlashes.
     """
-    lowest, highest, drive, back = (
-        checked_numbers(value, name, code="E-CONTACT", unit="m")
-        for name, value in (("lowest", lowest), ("highest", highest), ("drive", drive), ("back", back))
-    )
-    if not (np.all(np.isfinite([drive, back])) and np.all(back <= drive)):
-        _refuse(f"flanks that close above {drive} and below {back}")
-    if lowest.shape != highest.shape or np.any(lowest > highest):
-        _refuse("smallest deflections above the largest, or of another number")
-    both = (highest > drive) & (lowest < back)
-    closed = (lowest >= drive) | (highest <= back)
+    lowest, highest = np.asarray(lowest, float), np.asarray(highest, float)
+    both = (highest > DRIVE) & (lowest < BACK)
+    closed = (lowest >= DRIVE) | (highest <= BACK)
     state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
     return np.where(np.isfinite(lowest) & np.isfinite(highest), state, UNKNOWN)
 
 
+def contact_shares(x) -> dict[str, np.ndarray]:
+    """Shares (...) of the instants with the drive flanks, none or the back flanks in contact.
+
+    Parameters
+    ----------
+    x : (..., T) array
+        Relative deflections over a period, in half backlashes.
+    """
+    drive, back = np.asarray(x) > DRIVE, np.asarray(x) < BACK
+    touching = {"drive": drive, "free": ~drive & ~back, "back": back}
+    return {name: closed.mean(axis=-1) for name, closed in touching.items()}
+
+
 def state_regions(parameter, state) -> list[tuple[int, float, float]]:
-    """Runs of equal states along a curve or sweep: state, first and last value of the parameter.
+    """Runs of equal states (n,) along a curve or sweep: state, first and last value of the parameter (n,).
 
     Neighbouring runs share no value; where the state changes the border lies between them.
     """
-    parameter = checked_numbers(parameter, "parameter", code="E-CONTACT", unit="")
-    state = checked_numbers(state, "state", code="E-CONTACT", unit="")
-    if parameter.ndim != 1 or parameter.shape != state.shape:
-        _refuse(f"states of shape {state.shape} over parameters of shape {parameter.shape}")
     ends = np.flatnonzero(np.diff(state, append=-1, prepend=-1))
     return [
         (int(state[first]), float(parameter[first]), float(parameter[last - 1]))
         for first, last in pairwise(ends)
     ]
-
-
-def _refuse(message: str):
-    raise CaseError(
-        message, code="E-CONTACT", limit="finite numbers, as many instants as phases, one or more"
-    )

@@ -1,7 +1,7 @@
 """The pipeline of a gear pair: response by harmonic balance, sweep and chaos by integration in time.
 
-The stages know nothing of one another. Lengths count in half backlashes and times in 1 / omega_n, as in
-`femgear.trains.gear_pair.model`; every file tells these units. `GEAR_PAIR` at the end is the train.
+Lengths count in half backlashes and times in 1 / omega_n, as in `femgear.trains.gear_pair.model`; every file
+tells these units.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.stability.lyapunov import LyapunovExponents, lyapunov_exponents
 from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
 from femgear.storage.results import FOURIER, complex_entries, dataset
+from femgear.trains.gear_pair.case_file import GearPairCase, cross_check, pair_of, scales_of
 from femgear.trains.gear_pair.figures import FIGURES
 from femgear.trains.gear_pair.model import (
     BACK,
     DRIVE,
     STATE_NAMES,
+    contact_shares,
     impact_borders,
     range_states,
     separation_ratios,
-    solution_states,
     state_regions,
 )
-from femgear.trains.gear_pair.section import GearPairCase, cross_check, pair_of, scales_of
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
@@ -52,7 +52,11 @@ _LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
 
 @dataclass(frozen=True, eq=False)
 class ResponseResult:
-    """Periodic motions along the branch, extremes and shares (p,), and ratios where flanks part or hit."""
+    """Periodic motions along the branch, and ratios (b,) where flanks part or hit, by level.
+
+    Of every motion the extremes (p,) in half backlashes, and shares (p,) of the time with the drive flanks,
+    none or the back flanks in contact.
+    """
 
     case: GearPairCase
     branch: Branch
@@ -69,7 +73,7 @@ class ResponseResult:
             "point",
             stable=(branch.stable, "whether the motion is known to be stable"),
             multiplier=(branch.largest_multiplier, "largest Floquet multiplier"),
-            **{name: (share, _SHARES[name.partition("_")[0]]) for name, share in self.shares.items()},
+            **{f"{name}_share": (share, _SHARES[name]) for name, share in self.shares.items()},
         )
         variables |= _numbers("limit_point", fold=(branch.folds, "number of the point, from 0"))
         words = "frequency ratio from which {} flanks {}"
@@ -118,7 +122,7 @@ class SweepResult:
 
 @dataclass(frozen=True, eq=False)
 class ChaosResult:
-    """Exponents and sections over the ratio, and long sections at some of the ratios."""
+    """Exponents and sections over the ratio (r,), and long sections at some of the ratios."""
 
     case: GearPairCase
     ratio: np.ndarray
@@ -170,7 +174,7 @@ def _motions(dims: str, lowest, highest, mean) -> dict[str, tuple]:
         lowest=(lowest, f"smallest deflection {_LENGTH}"),
         highest=(highest, f"largest deflection {_LENGTH}"),
         state=(
-            np.array(STATE_NAMES)[range_states(lowest, highest, drive=DRIVE, back=BACK)],
+            np.array(STATE_NAMES)[range_states(lowest, highest)],
             "contact state",
         ),
     )
@@ -204,10 +208,8 @@ def solve_response(case: GearPairCase) -> ResponseResult:
     )  # fmt: skip
     phase = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
     x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
-    states = [solution_states(pair.mesh(), one, samples=_INSTANTS) for one in branch.solutions]
-    shares = {f"{name}_share": np.array([getattr(one, name)[0] for one in states]) for name in _SHARES}
     borders = {level: np.sort(impact_borders(pair, branch, level)) for level in (DRIVE, BACK)}
-    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), shares, borders)
+    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), contact_shares(x), borders)
 
 
 @one_blas_thread()

@@ -39,9 +39,6 @@ from femgear.system.system import MechanicalSystem
 
 # radii of base circles may be rounded; tooth numbers that differ by more are another set
 _RADII = 1e-3
-# largest finite stiffness of a coupling [N m/rad, N/m]; beyond, rounding hides the other springs
-STIFFEST = {"torsional": 1e12, "lateral": 1e15}
-
 # singular values below this share of the largest one count as none
 _RANK = 1e-12
 
@@ -68,7 +65,7 @@ class Member:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stage:
+class PlanetaryStage:
     """One planetary set of the train.
 
     Parameters
@@ -79,7 +76,7 @@ class Stage:
     fixed : {"carrier", "ring", "sun"}, optional
         Member that the housing holds; None where all three turn.
     phases : (2N,) array, optional
-        Mesh phases as fractions of the mesh period, as in `PlanetarySet.mesh_phases`.
+        Mesh phases as fractions of the mesh period, as in `femgear.gears.planetary.PlanetarySet.mesh_phases`.
     angle : float
         Angle of the stage's x axis against the common frame at time zero [rad]; lateral couplings see it.
 
@@ -134,7 +131,7 @@ class StageCoupling:
     Raises
     ------
     CaseError
-        Members of one stage, a stiffness above `STIFFEST` (E-RANGE).
+        Members of one stage (E-RANGE).
     """
 
     first: Member
@@ -147,14 +144,6 @@ class StageCoupling:
             raise CaseError(
                 f"a coupling inside stage {self.first.stage}", code="E-RANGE", limit="members of two stages"
             )
-        for name, unit in (("torsional", "N m/rad"), ("lateral", "N/m")):
-            value = getattr(self, name)
-            if STIFFEST[name] < value < math.inf:
-                raise CaseError(
-                    f"a {name} stiffness of {value:g} {unit}", code="E-RANGE", key=name,
-                    limit=f"up to {STIFFEST[name]:g} {unit}: beyond, rounding hides all other springs",
-                    remedy="take infinite for a rigid coupling",
-                )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,7 +152,7 @@ class MultistageSet:
 
     Parameters
     ----------
-    stages : tuple of Stage
+    stages : tuple of PlanetaryStage
     couplings : tuple of StageCoupling
         `in_series` makes those of a plain train. None: stages side by side.
     input, output : Member
@@ -175,7 +164,7 @@ class MultistageSet:
         One member for input and output, or one that is fixed (E-MECHANISM).
     """
 
-    stages: tuple[Stage, ...]
+    stages: tuple[PlanetaryStage, ...]
     couplings: tuple[StageCoupling, ...]
     input: Member
     output: Member
@@ -194,12 +183,14 @@ class MultistageSet:
         return sum(2 * stage.data.n_planets for stage in self.stages)
 
 
-def in_series(stages: Sequence[Stage], *, torsional: float = math.inf, lateral: float = 0.0) -> MultistageSet:
+def in_series(
+    stages: Sequence[PlanetaryStage], *, torsional: float = math.inf, lateral: float = 0.0
+) -> MultistageSet:
     """Join stages one after the other: each carrier turns the next sun.
 
     Parameters
     ----------
-    stages : sequence of Stage
+    stages : sequence of PlanetaryStage
     torsional, lateral : float
         Of every coupling, see `StageCoupling`.
     """
@@ -284,11 +275,6 @@ def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) ->
     radii : bool
         Balance of the lumped sets, from base radii and pressure angles (see `torque_shares`), instead of
         tooth numbers. Both agree where the radii close.
-
-    Raises
-    ------
-    CaseError
-        As `train_speeds`.
     """
     weights = _radius_weights(data) if radii else _tooth_weights(data)
     # unknown: lambda of every row, and the torque of the output
@@ -299,13 +285,7 @@ def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) ->
 
 
 def speed_ratio(data: MultistageSet) -> float:
-    """Speed of the input over that of the output.
-
-    Raises
-    ------
-    CaseError
-        As `train_speeds`, and an output that stands (E-MECHANISM).
-    """
+    """Speed of the input over that of the output; refuses an output that stands (E-MECHANISM)."""
     output = train_speeds(data, 1.0).of(data.output)
     if abs(output) < 1e-12:
         raise CaseError(f"the output, {data.output}, stands still", code="E-MECHANISM")
@@ -313,13 +293,7 @@ def speed_ratio(data: MultistageSet) -> float:
 
 
 def check_turns(data: MultistageSet) -> None:
-    """Refuse loops of couplings and fixed members: trains that are locked, or held twice.
-
-    Raises
-    ------
-    CaseError
-        E-MECHANISM.
-    """
+    """Refuse loops of couplings and fixed members: trains that are locked, or held twice (E-MECHANISM)."""
     rows = _rows(data, _radius_weights(data))
     rank = np.linalg.matrix_rank(rows, tol=_RANK * np.linalg.norm(rows, 2))
     if rank < len(rows) or rank == rows.shape[1]:
@@ -418,22 +392,23 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     turning = turning_couplings(data, speed)
     carrier = train_speeds(data, speed).carrier if speed else np.zeros(len(data.stages))
     parts = [gear_set_system(one.data, carrier_speed=w) for one, w in zip(data.stages, carrier.tolist())]
-    T, Z = _stage_motions(data), joined_motions(data)
+    motions, Z = _member_motions(data), joined_motions(data)
     K = block_diag(*(part.K for part in parts)) + _centrifugal_stiffness(data, carrier)
     for number, coupling in enumerate(data.couplings):
-        columns, stiffness = _springs(data, T, coupling, lateral=number not in turning)
+        columns, stiffness = _springs(data, motions, coupling, lateral=number not in turning)
         K += (columns * stiffness) @ columns.T
     meshes = [free_motions(one.data).T @ mesh_directions(one.data, sign)
               for one, sign in zip(data.stages, _stage_flanks(data, torque))]  # fmt: skip
-    ends = [_ends(data, T, data.couplings[number]) for number in turning]
-    load = np.concatenate([part.load for part in parts]) + _torque_load(data, T, torque)
+    turned = [member for n in turning for member in (data.couplings[n].first, data.couplings[n].second)]
+    ends = [motions[member][:2].T for member in turned]
+    load = np.concatenate([part.load for part in parts]) + _torque_load(data, motions, torque)
     return MechanicalSystem(
         M=Z.T @ block_diag(*(part.M for part in parts)) @ Z,
         C=np.zeros((Z.shape[1], Z.shape[1])),
         K=Z.T @ K @ Z,
         W=Z.T @ np.hstack([np.asarray(block_diag(*meshes)), *ends]),
         load=Z.T @ load,
-        dofs=_names(data, T, Z),
+        dofs=_names(data, Z),
         gyroscopic=Z.T @ _gyroscopic(parts, carrier / speed) @ Z if speed else None,
     )
 
@@ -500,11 +475,11 @@ def joined_motions(data: MultistageSet) -> np.ndarray:
     The rows are those of the `gear_set_system` of every stage, one after the other. Of two joined coordinates
     that of the earlier place stays.
     """
-    T = _stage_motions(data)
-    Z = np.eye(T.shape[1])
+    motions = _member_motions(data)
+    Z = np.eye(motions[data.input].shape[1])
     for coupling in data.couplings:
-        rows = [_twist(data, T, coupling)] if math.isinf(coupling.torsional) else []
-        rows += list(_shift(data, T, coupling).T) if math.isinf(coupling.lateral) else []
+        rows = [_twist(motions, coupling)] if math.isinf(coupling.torsional) else []
+        rows += list(_shift(data, motions, coupling).T) if math.isinf(coupling.lateral) else []
         for row in rows:
             row = row @ Z
             moved = np.flatnonzero(np.abs(row) > _ROUNDING * np.abs(row).max(initial=0.0))
@@ -550,55 +525,50 @@ def _gyroscopic(parts: list[MechanicalSystem], ratio: np.ndarray) -> np.ndarray:
     return np.asarray(block_diag(*(one * matrix for one, matrix in zip(ratio, still))))
 
 
-def _axis(data: MultistageSet, T: np.ndarray, member: Member, axis: int) -> np.ndarray:
-    """Row of `_stage_motions` of x, y or u of a member; zero where it is held."""
-    first = sum(3 * (stage.data.n_planets + 3) for stage in data.stages[: member.stage - 1])
-    return T[first + 3 * CENTRAL.index(member.name) + axis]
+def _member_motions(data: MultistageSet) -> dict[Member, np.ndarray]:
+    """x, y and rotation [rad] (3, n) of every member per coordinate of `_stage_motions`; zero where held."""
+    T, found, first = _stage_motions(data), {}, 0
+    for number, stage in enumerate(data.stages, 1):
+        for name in CENTRAL:
+            found[Member(number, name)] = T[first : first + 3].copy()
+            found[Member(number, name)][2] /= member_radius(stage.data, name)
+            first += 3
+        first += 3 * stage.data.n_planets
+    return found
 
 
-def _rotation(data: MultistageSet, T: np.ndarray, member: Member) -> np.ndarray:
-    """Rotation of a member [rad] per coordinate."""
-    return _axis(data, T, member, 2) / member_radius(data.stages[member.stage - 1].data, member.name)
-
-
-def _twist(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
+def _twist(motions: dict[Member, np.ndarray], coupling: StageCoupling) -> np.ndarray:
     """Rotation of the first member less that of the second, per coordinate."""
-    return _rotation(data, T, coupling.first) - _rotation(data, T, coupling.second)
+    return motions[coupling.first][2] - motions[coupling.second][2]
 
 
-def _shift(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
+def _shift(data: MultistageSet, motions: dict[Member, np.ndarray], coupling: StageCoupling) -> np.ndarray:
     """x and y (n, 2) of the first centre less the second, in the first frame, both as they stand."""
     turn = data.stages[coupling.second.stage - 1].angle - data.stages[coupling.first.stage - 1].angle
-    ends, c, s = _ends(data, T, coupling), math.cos(turn), math.sin(turn)
-    return ends[:, :2] - ends[:, 2:] @ np.array([[c, s], [-s, c]])
+    c, s = math.cos(turn), math.sin(turn)
+    return motions[coupling.first][:2].T - motions[coupling.second][:2].T @ np.array([[c, s], [-s, c]])
 
 
-def _ends(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
-    """x and y of the first and of the second member (n, 4)."""
-    members = (coupling.first, coupling.second)
-    return np.stack([_axis(data, T, member, k) for member in members for k in (0, 1)], axis=1)
-
-
-def _springs(data: MultistageSet, T: np.ndarray, coupling: StageCoupling, *, lateral: bool):
-    """Columns (n, g) and stiffnesses (g,) of what is elastic in a coupling."""
-    columns, stiffness = [np.empty((T.shape[1], 0))], []
+def _springs(data: MultistageSet, motions: dict[Member, np.ndarray], coupling: StageCoupling, *, lateral):
+    """Columns (n, g) and stiffnesses (g,) of what is elastic in a coupling, `lateral` among it or not."""
+    columns, stiffness = [np.empty((motions[coupling.first].shape[1], 0))], []
     if math.isfinite(coupling.torsional):
-        columns.append(_twist(data, T, coupling)[:, None])
+        columns.append(_twist(motions, coupling)[:, None])
         stiffness.append(coupling.torsional)
     if lateral and coupling.lateral and math.isfinite(coupling.lateral):
-        columns.append(_shift(data, T, coupling))
+        columns.append(_shift(data, motions, coupling))
         stiffness += [coupling.lateral] * 2
     return np.hstack(columns), np.array(stiffness)
 
 
-def _torque_load(data: MultistageSet, T: np.ndarray, torque: float) -> np.ndarray:
+def _torque_load(data: MultistageSet, motions: dict[Member, np.ndarray], torque: float) -> np.ndarray:
     """Forces on ``u`` of input and output."""
-    load = np.zeros(T.shape[1])
+    load = np.zeros(motions[data.input].shape[1])
     if not torque:
         return load
     output = train_torques(data, torque, radii=True).output
     for member, value in ((data.input, torque), (data.output, output)):
-        rotation = _rotation(data, T, member)
+        rotation = motions[member][2]
         if not np.any(rotation):
             raise CaseError(
                 f"the torque acts on the {member}, which is held", code="E-MECHANISM",
@@ -608,8 +578,8 @@ def _torque_load(data: MultistageSet, T: np.ndarray, torque: float) -> np.ndarra
     return load
 
 
-def _names(data: MultistageSet, T: np.ndarray, Z: np.ndarray) -> tuple[str, ...]:
+def _names(data: MultistageSet, Z: np.ndarray) -> tuple[str, ...]:
     """Name of every coordinate that is left: its own row of ``Z`` is a unit row."""
     names = [f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in dof_names(one.data)]
-    own = np.argmax(T == 1.0, axis=0)
+    own = np.argmax(_stage_motions(data) == 1.0, axis=0)
     return tuple(names[own[row]] for row in np.argmax(Z == 1.0, axis=0))

@@ -16,6 +16,7 @@ from femgear.errors import Finding
 from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
 from femgear.storage.results import FOURIER, complex_entries, dataset
 from femgear.system.assembler import mesh_names
+from femgear.trains.multistage.case_file import MultistageCase, multistage_of
 from femgear.trains.multistage.model import (
     MultistageSet,
     mean_mesh_stiffness,
@@ -25,7 +26,6 @@ from femgear.trains.multistage.model import (
     train_speeds,
     train_torques,
 )
-from femgear.trains.multistage.section import MultistageCase, multistage_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -142,7 +142,8 @@ class ResponseResult:
 class BalanceResult:
     """Mesh forces (F, meshes, lines) by harmonic balance with k(t) of all meshes.
 
-    ``orders`` (lines, S) are the multiples of the mesh frequencies; the first line is the mean.
+    ``orders`` (lines, S) are the multiples of the mesh frequencies; the first line is the mean. At the
+    speeds (F,) of the input [rad/s]; ``converged`` (F,).
     """
 
     data: MultistageSet

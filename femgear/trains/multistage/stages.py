@@ -1,8 +1,7 @@
 """The pipeline of a multistage case: modes -> response, and balance.
 
 Modes come with their kinds and the stage in which each one lives; the response is that to transmission errors
-of every stage, by modal summation; harmonic balance has the stiffnesses k(t) of all meshes. `MULTISTAGE` at
-the end is the train: the table of its stages, with what the report says and draws of each.
+of every stage, by modal summation; harmonic balance has the stiffnesses k(t) of all meshes.
 """
 
 from __future__ import annotations
@@ -21,6 +20,14 @@ from femgear.system.force_laws import GearMeshes, TurningSprings, turning_wave
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample, tooth_lines
 from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
+from femgear.trains.multistage.case_file import (
+    MultistageCase,
+    OperationSection,
+    ResponseSection,
+    cross_check,
+    multistage_of,
+    stage_gears,
+)
 from femgear.trains.multistage.figures import FIGURES
 from femgear.trains.multistage.model import (
     MultistageSet,
@@ -43,16 +50,7 @@ from femgear.trains.multistage.results import (
     describe_stage_modes,
     multistage_warnings,
 )
-from femgear.trains.multistage.section import (
-    MultistageCase,
-    OperationSection,
-    ResponseSection,
-    cross_check,
-    multistage_of,
-    stage_gears,
-)
-from femgear.trains.protocol import OwnFile, Progress, Train, one_blas_thread
-from femgear.trains.protocol import Stage as RunStage
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
 
 # relative distance of frequencies that count as one
 _MULTIPLE = 1e-7
@@ -157,11 +155,6 @@ def error_response(
     -------
     dict of int to MeshErrorResponse
         By the stage that excites; deflection and force of all meshes of the train.
-
-    Raises
-    ------
-    CaseError
-        As `train_speeds`.
     """
     speed = np.atleast_1d(np.asarray(speed, float))
     system, k = multistage_system(data), mean_mesh_stiffness(data)
@@ -183,7 +176,7 @@ def error_response(
 
 
 def base_frequencies(data: MultistageSet, speed: float) -> np.ndarray:
-    """Base frequencies of `multistage_problem` [rad/s]: meshes of every stage, frames that turn apart."""
+    """Base frequencies of `multistage_problem` at a speed of the input [rad/s]: meshes, then frames."""
     mesh = 2.0 * np.pi * train_speeds(data, speed).mesh_frequency
     return np.concatenate([mesh, np.abs(list(turning_couplings(data, speed).values()))])
 
@@ -388,14 +381,14 @@ MULTISTAGE = Train(
     own_file=OwnFile(),
     cross_check=cross_check,
     stages=(
-        RunStage(
+        Stage(
             name="modes",
             title="Modes",
             solve=solve_multistage_modes,
             verdict=lambda result: {"modes": len(result.modes.frequency)},
             describe=lambda results: describe_stage_modes(results.modes),
         ),
-        RunStage(
+        Stage(
             name="response",
             title="Response",
             solve=solve_response,
@@ -405,7 +398,7 @@ MULTISTAGE = Train(
             unavailable=_no_response,
             needs=lambda case: ("modes",),
         ),
-        RunStage(
+        Stage(
             name="balance",
             title="Harmonic balance",
             solve=solve_balance,

@@ -8,7 +8,13 @@ import pytest
 from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivetrain
 
 from femgear.solvers.time.transient import solve_transient
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.model import (
+    balanced_torque,
+    drivetrain_model,
+    drivetrain_problem,
+    torsional_model,
+)
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
@@ -17,13 +23,7 @@ from femgear.trains.drivetrain.data import (
     TorqueHistory,
     constant_torques,
 )
-from femgear.trains.drivetrain.model import (
-    balanced_torque,
-    drivetrain_model,
-    drivetrain_problem,
-    torsional_model,
-)
-from femgear.trains.drivetrain.time import Records, march_drivetrain
+from femgear.trains.drivetrain.simulation import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 ALPHA, RADIUS = math.radians(20.0), 0.0345

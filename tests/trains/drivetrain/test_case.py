@@ -10,8 +10,9 @@ from published.wind_turbine_drivetrain import paper_torques, ratio_of_radii, win
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
-from femgear.trains.drivetrain.checks import case_model, check_drivetrain
-from femgear.trains.drivetrain.section import DrivetrainCase, drivetrain_of, torque_histories
+from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, torque_histories
+from femgear.trains.drivetrain.checks import check_drivetrain
+from femgear.trains.drivetrain.model import case_model
 from femgear.trains.drivetrain.stages import DRIVETRAIN
 from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_value
 

@@ -8,7 +8,8 @@ import pytest
 
 from femgear.case import text as case_text
 from femgear.errors import CaseError
-from femgear.trains.drivetrain.checks import case_model, check_drivetrain, check_spectrum, record_rate
+from femgear.trains.drivetrain.checks import check_drivetrain, check_spectrum, record_rate
+from femgear.trains.drivetrain.model import case_model
 from femgear.trains.drivetrain.stages import DRIVETRAIN
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 

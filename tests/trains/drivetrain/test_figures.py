@@ -10,7 +10,12 @@ import pytest
 
 from femgear.report.style import png_bytes
 from femgear.trains.drivetrain.figures import band, over_time, spectra, spectrum_figures, transient_figures
-from femgear.trains.drivetrain.pictures import Layout, ModeView, Wheel, drivetrain_pictures, mode_pictures
+from femgear.trains.drivetrain.mode_pictures import (
+    Layout,
+    Wheel,
+    draw_motion,
+    write_mode_pictures,
+)
 from femgear.trains.drivetrain.stages import remarks
 from femgear.trains.reading import read_case, with_value
 
@@ -176,16 +181,12 @@ def test_picture_of_a_mode(tmp_path):
     line = np.linspace(0.0, 1.0, 9)[:, None] * [0.0, 0.0, 1.0]
     still, up = np.zeros((2, 3)), np.array([[0.0, 1.0, 0.0], [0.0] * 3])
     bulge = np.sin(np.pi * line[:, 2:]) * [0.0, 4.0, 0.0]
-    views = [
-        ModeView(tmp_path / f"{name}.png", name, move, still, [(line, across)])
-        for name, move, across in (
-            ("disc", up, 0.0 * line),
-            ("shaft", up, bulge),
-            ("rest", still, 0.0 * line),
-        )
+    motions = {"disc": (up, 0.0 * line), "shaft": (up, bulge), "rest": (still, 0.0 * line)}
+    scales = [
+        draw_motion(tmp_path / f"{name}.png", layout, move, still, [(line, across)], title=name, size=300)
+        for name, (move, across) in motions.items()
     ]
-    scales = drivetrain_pictures(views, layout, size=300)
-    images = [iio.imread(view.path) for view in views]
+    images = [iio.imread(tmp_path / f"{name}.png") for name in motions]
     # a disc moves by the share of the length, 1.1 m from face to face; or the shaft, which moves most
     assert scales == pytest.approx([0.12 * 1.1, 0.12 * 1.1 / 4.0, 0.0], rel=1e-6)
     assert all(image.shape[:2] == (216, 300) and np.ptp(image) > 100 for image in images)
@@ -195,18 +196,24 @@ def test_picture_of_a_mode(tmp_path):
 def test_modes_have_the_numbers_of_the_table(tmp_path, monkeypatch):
     import xarray as xr
 
-    from femgear.trains.drivetrain import pictures
-    from femgear.trains.drivetrain.checks import case_model
+    from femgear.trains.drivetrain import mode_pictures
+    from femgear.trains.drivetrain.model import case_model
 
     model, drawn = case_model(read_case(CASE)), []
-    monkeypatch.setattr(pictures, "drivetrain_pictures", lambda views, _: drawn.extend(views))
+    monkeypatch.setattr(
+        mode_pictures,
+        "draw_motion",
+        lambda path, layout, move, turn, shafts, title: drawn.append((title, len(shafts))),
+    )
     kinds, hertz = ["rigid", "bending", "torsional"], [0.0, 5.0, 7.0]
     shapes = np.eye(len(model.rigid))[:, :3]
     data = {"kind": ("mode", kinds), "frequency": ("mode", hertz), "shape": (("dof", "mode"), shapes)}
     modes = xr.Dataset(data)
-    assert mode_pictures(tmp_path, model, modes, 2) == ["drivetrain_mode_2.png", "drivetrain_mode_3.png"]
-    assert [view.title for view in drawn] == ["mode 2: 5.00 Hz, bending", "mode 3: 7.00 Hz, torsional"]
-    assert [len(view.shafts) for view in drawn] == [2, 2]
+    assert write_mode_pictures(tmp_path, model, modes, 2) == [
+        "drivetrain_mode_2.png",
+        "drivetrain_mode_3.png",
+    ]
+    assert drawn == [("mode 2: 5.00 Hz, bending", 2), ("mode 3: 7.00 Hz, torsional", 2)]
 
 
 def test_window_of_the_first_separation(monkeypatch):

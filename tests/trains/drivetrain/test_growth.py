@@ -16,14 +16,14 @@ from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.stability.parametric import stability
 from femgear.system.system import MeshExcitation
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.model import balanced_torque, drivetrain_model, torsional_model
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
     constant_torques,
 )
-from femgear.trains.drivetrain.model import balanced_torque, drivetrain_model, torsional_model
-from femgear.trains.drivetrain.time import PIECE, FreeMotion, march_drivetrain
+from femgear.trains.drivetrain.simulation import PIECE, FreeMotion, march_drivetrain
 
 TEETH, HARMONICS = 20, 3
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from published.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
 
-from femgear.trains.drivetrain.data import BearingSection, BodySection, Drivetrain, ShaftSection
+from femgear.trains.drivetrain.mode_pictures import beam_shape, drivetrain_layout, layout_motion, shaft_lines
 from femgear.trains.drivetrain.model import drivetrain_model
-from femgear.trains.drivetrain.pictures import beam_shape, drivetrain_layout, layout_motion, shaft_lines
+from femgear.trains.drivetrain.parts import BearingSection, BodySection, Drivetrain, ShaftSection
 
 TRAIN = wind_turbine_drivetrain()
 MODEL, LAYOUT = drivetrain_model(TRAIN), drivetrain_layout(TRAIN)

@@ -11,8 +11,18 @@ from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivet
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.trains.drivetrain.checks import BENDING, TORSIONAL, case_model, mean_torque, with_drivers
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.case_file import drivetrain_of
+from femgear.trains.drivetrain.kinematics import speed_ratios
+from femgear.trains.drivetrain.model import (
+    BENDING,
+    TORSIONAL,
+    balanced_torque,
+    case_model,
+    drivetrain_model,
+    torsional_model,
+    with_drivers,
+)
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
@@ -21,14 +31,7 @@ from femgear.trains.drivetrain.data import (
     TorqueHistory,
     constant_torques,
 )
-from femgear.trains.drivetrain.geometry import speed_ratios
-from femgear.trains.drivetrain.model import (
-    balanced_torque,
-    drivetrain_model,
-    torsional_model,
-)
-from femgear.trains.drivetrain.section import drivetrain_of
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.simulation import march_drivetrain
 from femgear.trains.reading import read_case, with_value
 
 TRAIN = wind_turbine_drivetrain()
@@ -222,9 +225,9 @@ def test_two_paths_share_by_their_stiffness():
 def test_mean_torque_is_exact():
     series = TorqueHistory("motor", [1.0, 2.0, 4.0], [0.0, 6.0, 2.0])
     # nothing for a second, a triangle of 3, then 6 to 4 within a second
-    assert mean_torque(series, 3.0) == pytest.approx((3.0 + 5.0) / 3.0, rel=1e-14)
-    assert mean_torque(series, 0.5) == 0.0
-    assert mean_torque(series, 6.0) == pytest.approx((3.0 + 8.0 + 4.0) / 6.0, rel=1e-14)
+    assert series.mean(3.0) == pytest.approx((3.0 + 5.0) / 3.0, rel=1e-14)
+    assert series.mean(0.5) == 0.0
+    assert series.mean(6.0) == pytest.approx((3.0 + 8.0 + 4.0) / 6.0, rel=1e-14)
 
 
 OWN = Path(__file__).parents[3] / "cases" / "own_chain.toml"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from femgear.trains.drivetrain.case_file import drivetrain_of
 from femgear.trains.drivetrain.checks import loose_motions
-from femgear.trains.drivetrain.data import BearingSection, BodySection, Drivetrain, ShaftSection
-from femgear.trains.drivetrain.section import drivetrain_of
+from femgear.trains.drivetrain.parts import BearingSection, BodySection, Drivetrain, ShaftSection
 from femgear.trains.reading import read_case
 
 CASES = Path(__file__).parents[3] / "cases"

@@ -19,20 +19,20 @@ from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.assembler import gear_set_system
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.kinematics import planar_of
+from femgear.trains.drivetrain.model import (
+    drivetrain_model,
+    rectangular_series,
+    torsional_model,
+)
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
     MeshSection,
     ShaftSection,
 )
-from femgear.trains.drivetrain.geometry import planar_of
-from femgear.trains.drivetrain.model import (
-    drivetrain_model,
-    rectangular_series,
-    torsional_model,
-)
-from femgear.trains.drivetrain.time import Records, march_drivetrain
+from femgear.trains.drivetrain.simulation import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 SHORT_CUT = ShaftSection.in_si(between=("rotor", "generator"), length=3.0, bending=1e6, torsion=1e6)

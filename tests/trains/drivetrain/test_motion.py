@@ -11,15 +11,15 @@ from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbi
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import FourierSeries, distinct_lines
-from femgear.trains.drivetrain.data import TorqueHistory, constant_torques
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
     drivetrain_problem,
     torsional_model,
 )
+from femgear.trains.drivetrain.parts import TorqueHistory, constant_torques
+from femgear.trains.drivetrain.simulation import Records, march_drivetrain
 from femgear.trains.drivetrain.stages import averaged_spectrum, order_spectrum
-from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from femgear.trains.drivetrain.checks import BENDING, case_model
-from femgear.trains.drivetrain.data import numbered
 from femgear.trains.drivetrain.figures import stiffness_figure
+from femgear.trains.drivetrain.model import BENDING, case_model
+from femgear.trains.drivetrain.parts import numbered
 from femgear.trains.drivetrain.results import chosen_meshes
 from femgear.trains.drivetrain.stages import solve_transient_run
 from femgear.trains.reading import parse_case

@@ -8,19 +8,19 @@ from drivetrain_references import PAIR_INERTIAS, PAIR_RADII, held_pair
 from scipy.integrate import solve_ivp
 
 from femgear.trains.drivetrain.checks import (
-    case_model,
-    default_record_rate,
+    default_record_every,
     frequency_shift,
     highest_mesh,
     mesh_mode,
     shift_rate,
     speed_range,
 )
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.model import case_model
+from femgear.trains.drivetrain.parts import (
     TorqueHistory,
     constant_torques,
 )
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.simulation import march_drivetrain
 from femgear.trains.reading import read_case
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -93,7 +93,7 @@ def test_highest_mesh(model):
 @pytest.mark.parametrize("rate", [900.0, 5e3, 20e3, 50e3, 1e6])
 @pytest.mark.parametrize("highest", [0.0, 1.0, 130.0, 567.3333, 4000.0])
 def test_records_keep_the_third_harmonic(rate, highest):
-    record = default_record_rate(rate, highest)
+    record = rate / default_record_every(rate, highest)
     every = rate / record
     assert every == pytest.approx(round(every)) and record <= rate
     # the next whole number would be too slow

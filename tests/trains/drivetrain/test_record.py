@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.trains.drivetrain.time import Decimator
+from femgear.trains.drivetrain.simulation import Decimator
 
 EVERY, COUNT = 20, 6000
 

@@ -16,11 +16,18 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.run import report_again, run_case
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.storage.results import run_folder
-from femgear.trains.drivetrain.checks import BENDING, TORSIONAL, case_model, check_spectrum
+from femgear.trains.drivetrain.case_file import DrivetrainCase
+from femgear.trains.drivetrain.checks import check_spectrum
 from femgear.trains.drivetrain.figures import spectrum_figures
-from femgear.trains.drivetrain.model import balanced_torque, drivetrain_problem
+from femgear.trains.drivetrain.model import (
+    BENDING,
+    TORSIONAL,
+    balanced_torque,
+    case_model,
+    drivetrain_problem,
+)
 from femgear.trains.drivetrain.results import MeshLine, describe_drivetrain, describe_transient
-from femgear.trains.drivetrain.section import DrivetrainCase
+from femgear.trains.drivetrain.simulation import Decimator
 from femgear.trains.drivetrain.stages import (
     DRIVETRAIN,
     _check_sense,
@@ -31,7 +38,6 @@ from femgear.trains.drivetrain.stages import (
     solve_spectrum,
     solve_transient_run,
 )
-from femgear.trains.drivetrain.time import Decimator
 from femgear.trains.reading import open_results, parse_case, read_case, with_value
 from femgear.trains.registry import stages_of as stages_of_case
 

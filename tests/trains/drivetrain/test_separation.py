@@ -10,19 +10,19 @@ from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbi
 
 from femgear.errors import CaseError
 from femgear.solvers.time.transient import solve_transient
-from femgear.trains.drivetrain import scheme
-from femgear.trains.drivetrain.data import (
-    TorqueHistory,
-    constant_torques,
-)
+from femgear.trains.drivetrain import integrator
+from femgear.trains.drivetrain.integrator import solve_overlaps
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
     drivetrain_problem,
     torsional_model,
 )
-from femgear.trains.drivetrain.scheme import solve_overlaps
-from femgear.trains.drivetrain.time import Records, march_drivetrain
+from femgear.trains.drivetrain.parts import (
+    TorqueHistory,
+    constant_torques,
+)
+from femgear.trains.drivetrain.simulation import Records, march_drivetrain
 
 K, BACKLASH = 2e8, 1e-4
 
@@ -230,7 +230,7 @@ def test_contacts_against_all_there_are(skew, monkeypatch):
         size, first = np.abs(free).max() + np.abs(wanted).max(), random.integers(0, 2, n) == 1
         assert np.abs(solve_overlaps(G, free, first, k)[0] - wanted).max() < 1e-9 * size
         with monkeypatch.context() as patch:
-            patch.setattr(scheme, "_ROUNDS", 0)
+            patch.setattr(integrator, "_ROUNDS", 0)
             assert np.abs(solve_overlaps(G, free, first, k)[0] - wanted).max() < 1e-9 * size
 
 

@@ -11,8 +11,8 @@ from small_trains import example_pair, lightly_loaded_pair
 from femgear import cli
 from femgear.errors import CaseError
 from femgear.trains import registry
+from femgear.trains.gear_pair.case_file import pair_of, scales_of
 from femgear.trains.gear_pair.model import separation_ratios
-from femgear.trains.gear_pair.section import pair_of, scales_of
 from femgear.trains.gear_pair.stages import GEAR_PAIR
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value, with_values
 

@@ -14,8 +14,8 @@ from femgear.solvers.time.stroboscopic import sweep_response
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, SummedSeries, constant, harmonic_lines
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from femgear.trains.gear_pair.case_file import scales_of
 from femgear.trains.gear_pair.model import ImpactPair, PairBearings, range_states, separation_ratios
-from femgear.trains.gear_pair.section import scales_of
 from femgear.trains.reading import read_case, with_values
 
 
@@ -163,5 +163,5 @@ def test_damping_of_fifteen_per_cent_leaves_one_answer_and_nine_per_cent_does_no
     border = level_crossings(lively.parameter, lively_lowest, -1.0).max()
     ratios = [border + 0.02, border - 0.02, lively.parameter[lively.folds].min() - 0.01]
     run = sweep_response(lambda r: (example_pair(0.09).problem(r), 1.0), ratios, steps=100, most=250)
-    states = range_states(run.lowest[:, 0], run.highest[:, 0], drive=1.0, back=-1.0)
+    states = range_states(run.lowest[:, 0], run.highest[:, 0])
     assert states.tolist() == [1, 2, 0]

@@ -8,7 +8,7 @@ from published.multistage_example import CASES
 from femgear import cli, open_results
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.trains.gear_pair.section import pair_of, scales_of
+from femgear.trains.gear_pair.case_file import pair_of, scales_of
 from femgear.trains.gear_pair.stages import solve_sweep
 from femgear.trains.reading import case_schema, read_case, to_toml, with_values
 from femgear.trains.registry import stages_of

@@ -8,10 +8,10 @@ from published.multistage_example import CASES, four_stage_case, published_case
 
 from femgear import cli
 from femgear.errors import CaseError
-from femgear.fe.shaft import ShaftSection, joint_springs
+from femgear.fe.shaft import RoundSection, joint_springs
 from femgear.trains import registry
+from femgear.trains.multistage.case_file import multistage_of, stage_gears
 from femgear.trains.multistage.model import Member, in_series, train_speeds
-from femgear.trains.multistage.section import multistage_of, stage_gears
 from femgear.trains.multistage.stages import MULTISTAGE
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value, with_values
 
@@ -43,7 +43,7 @@ def test_gears_phases_and_stiffness_follow_from_the_module(case):
 def test_shafts_are_beams_whose_ends_do_not_tilt(case):
     train = multistage_of(case)
     for one, size in zip(train.couplings, ((0.045, 0.12), (0.08, 0.18), (0.13, 0.26))):
-        joint = joint_springs(ShaftSection(size[0]), size[1])
+        joint = joint_springs(RoundSection(size[0]), size[1])
         assert (one.torsional, one.lateral) == pytest.approx((joint.torsion, joint.shear), rel=1e-14)
     rigid = with_value(case, "coupling[1].torsional", "rigid")
     assert multistage_of(rigid).couplings[1].torsional == math.inf

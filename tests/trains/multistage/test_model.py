@@ -18,7 +18,7 @@ from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
-    Stage,
+    PlanetaryStage,
     StageCoupling,
     in_series,
     joined_motions,
@@ -110,7 +110,7 @@ def test_differential_stage_with_two_couplings():
 @pytest.mark.parametrize("planets", [3, 4, 5])
 def test_identical_uncoupled_stages_give_each_mode_twice(planets):
     data = lin_parker_set(planets)
-    pair = (Stage(data=data), Stage(data=data))
+    pair = (PlanetaryStage(data=data), PlanetaryStage(data=data))
     train = MultistageSet(stages=pair, couplings=(), input=Member(1, "sun"), output=Member(2, "carrier"))
     found, single = multistage_modes(train), gear_set_modes(data)
     expected = np.repeat(single.frequency, 2)
@@ -326,15 +326,14 @@ def test_turning_stages_are_planar_sets_at_their_own_speeds():
 @pytest.mark.parametrize(
     ("make", "code"),
     [
-        (lambda: Stage(data=closed_set((20, 20, 60)), fixed="planet"), "E-MECHANISM"),
-        (lambda: Stage(data=closed_set((20, 20, 60)), fixed="sun"), "E-MECHANISM"),
-        (lambda: Stage(data=closed_set((20, 20, 60)), teeth=(20, 20, 62)), "E-TEETH"),
-        (lambda: Stage(data=closed_set((20, 20, 60)), teeth=(20, 20.5, 61)), "E-TEETH"),
+        (lambda: PlanetaryStage(data=closed_set((20, 20, 60)), fixed="planet"), "E-MECHANISM"),
+        (lambda: PlanetaryStage(data=closed_set((20, 20, 60)), fixed="sun"), "E-MECHANISM"),
+        (lambda: PlanetaryStage(data=closed_set((20, 20, 60)), teeth=(20, 20, 62)), "E-TEETH"),
+        (lambda: PlanetaryStage(data=closed_set((20, 20, 60)), teeth=(20, 20.5, 61)), "E-TEETH"),
         (lambda: StageCoupling(Member(1, "sun"), Member(1, "ring")), "E-RANGE"),
-        (lambda: StageCoupling(Member(1, "sun"), Member(2, "sun"), 1e30), "E-RANGE"),
         (lambda: replace(two_stages(), output=Member(2, "ring")), "E-MECHANISM"),
         (lambda: train_speeds(replace(two_stages(), couplings=()), 1.0), "E-MECHANISM"),
-        (lambda: train_speeds(in_series([Stage(data=lin_parker_set())] * 2), 1.0), "E-TEETH"),
+        (lambda: train_speeds(in_series([PlanetaryStage(data=lin_parker_set())] * 2), 1.0), "E-TEETH"),
         (lambda: multistage_system(two_stages(lateral=math.inf), speed=10.0), "E-RANGE"),
         (lambda: multistage_problem(two_stages(), damping=np.eye(3)), "E-SHAPE"),
     ],

@@ -14,6 +14,7 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import mesh_elements
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonic_lines, tooth_lines
 from femgear.system.rigid_bodies import PlanarTorque
+from femgear.trains.multistage.case_file import stage_gears
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
@@ -25,7 +26,6 @@ from femgear.trains.multistage.model import (
     train_torques,
     turning_couplings,
 )
-from femgear.trains.multistage.section import stage_gears
 from femgear.trains.multistage.stages import base_frequencies, error_response, multistage_problem
 from femgear.trains.rigid import gear_set_problem, phased_series
 

@@ -9,8 +9,8 @@ from published.multistage_example import CASES, four_stage_case
 
 from femgear import cli, open_results
 from femgear.errors import CaseError
+from femgear.trains.multistage.case_file import multistage_of
 from femgear.trains.multistage.model import multistage_system, train_speeds
-from femgear.trains.multistage.section import multistage_of
 from femgear.trains.reading import case_schema, read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
 

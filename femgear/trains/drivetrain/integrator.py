@@ -7,7 +7,7 @@ so that only small matrices, made for many instants at once, change from step to
 integrated apart: it takes the mean acceleration, turns the mesh phases, and cannot drift into the deviations.
 
 Meshes that separate add the search for the flanks that touch. Drive and back flanks are contacts of their own
-(`femgear.trains.drivetrain.geometry`) with the force ``k max(u, 0)`` of their overlap u, the approach less
+(`femgear.trains.drivetrain.kinematics`) with the force ``k max(u, 0)`` of their overlap u, the approach less
 the gap. With the contacts known that touch, the overlaps at the end of a step obey a small linear system. The
 forces do not fall with the overlap and the flexibility takes no energy back, so that there is one solution.
 Changing the wrong contacts and solving again mostly ends after one round; where it does not, only the first
@@ -25,8 +25,8 @@ from scipy import linalg
 from femgear.errors import ConvergenceError
 from femgear.solvers.time.steps import AVERAGE_ACCELERATION
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import TorqueHistory
 from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.parts import TorqueHistory
 
 # Points of the table of a mesh period, between which the stiffness is linear.
 _TABLE = 8192
@@ -43,7 +43,7 @@ class Block:
     """Loads and meshes at the instants (t,) of a block of steps, its start included.
 
     ``loads`` (t, d): one for the weight, then the torques [N m]; ``selection`` (t, m, n_meshes): ``S`` of
-    `MeshGeometry`; ``stiffness`` (t, n_meshes) [N/m]; of the spin ``angle`` [rad], ``speed`` [rad/s],
+    the model's geometry; ``stiffness`` (t, n_meshes) [N/m]; of the spin ``angle`` [rad], ``speed`` [rad/s],
     ``torque`` and, without regard to signs, ``effort`` [N m].
     """
 
@@ -106,7 +106,8 @@ class Scheme:
     """One step, mesh forces g on the simple motions at its end left open.
 
     Rows ``z = (q, v without g, g)`` go on by ``(q, v without g, x without g) = z advance + loads``; the state
-    is ``(q, v) = z[:2n] - drawn g``, and ``x = U^T q`` becomes ``x without g - flexibility g``.
+    is ``(q, v) = z[:2n] - drawn g``, and ``x = U^T q`` becomes ``x without g - flexibility g``. There are
+    n coordinates, m simple motions ``basic`` (n, m), and loads (d, 2 n + m) at both ends of the step.
     """
 
     advance: np.ndarray
@@ -257,7 +258,7 @@ class Separating:
         self._take(self.drive)
 
     def _take(self, closed) -> None:
-        """Keep the contacts that touch, and the overlaps from `least` to `most` that fit them."""
+        """Keep the contacts that touch, and the overlaps from ``least`` to ``most`` that fit them."""
         self.closed, self.drives = closed, np.array_equal(closed, self.drive)
         self.touching = np.flatnonzero(closed)
         self.play = self.gap[self.touching]

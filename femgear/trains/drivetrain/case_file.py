@@ -1,8 +1,6 @@
 """The case file with ``model = "drivetrain"``: its chain, operation and simulation, and what it refuses.
 
-A torque series in a CSV file that the case names is read once and kept inside the case. What no entry shows
-alone is refused: names, chain, teeth and radii, places of the planets, torques, times; what is allowed but
-deserves a look is a notice. `drivetrain_of` and `torque_histories` are the chain and the torques of a case.
+A torque series in a CSV file that the case names is read once and kept inside the case.
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ from femgear.case.quantities import (
 )
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError, Finding
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
     Drivetrain,
@@ -43,7 +41,6 @@ from femgear.trains.drivetrain.data import (
     TorqueHistory,
 )
 
-MODEL = "drivetrain"
 FASTEST_RATE = 1e7
 _MOST_PARTS = 200
 _MOST_POINTS = 20_000
@@ -140,20 +137,6 @@ class DrivetrainCase(Section, ReadCase):
     simulation: SimulationSection
 
 
-def need_drivetrain(case: object) -> DrivetrainCase:
-    """Return the case, refused where it is no drivetrain (E-MODEL)."""
-    if not isinstance(case, DrivetrainCase):
-        raise CaseError(
-            "this is no drivetrain",
-            code="E-MODEL",
-            key="model",
-            limit=f'model = "{MODEL}"',
-            remedy="name a case file of a drivetrain",
-            file=getattr(case, "name", None) or None,
-        )
-    return case
-
-
 def drivetrain_of(case: DrivetrainCase) -> Drivetrain:
     """The chain of a case."""
     gravity = 0.0 if case.gravity is None else case.gravity.acceleration
@@ -169,10 +152,6 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
     case : DrivetrainCase
     ratio : mapping of str to float
         Speeds of the bodies over that of the first one.
-
-    Returns
-    -------
-    tuple of TorqueHistory
     """
     found = [
         TorqueHistory(one.body, np.array(one.times or [0.0]), np.array(one.torques or [one.torque]))
@@ -402,14 +381,7 @@ def _simulation(case: DrivetrainCase) -> Iterator[CaseError]:
 
 
 def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
-    """What the records of a run cannot hold.
-
-    Parameters
-    ----------
-    case : DrivetrainCase
-    record : float
-        Records a second [Hz]: as given, or what `femgear.trains.drivetrain.time` takes for it.
-    """
+    """What so many records a second [Hz], as given or chosen for the run, cannot hold."""
     s, ratio = case.simulation, case.simulation.rate / record
     if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
         yield CaseError(

@@ -1,26 +1,20 @@
-"""Pictures of the lowest elastic modes of a drivetrain: discs on shafts, at rest and moved.
-
-`drivetrain_layout` places the bodies in space, `layout_motion` and `shaft_lines` move them, and
-`drivetrain_pictures` draws them.
-"""
+"""Pictures of the lowest elastic modes of a drivetrain: discs on shafts, at rest and moved."""
 
 from __future__ import annotations
 
-import io
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.report.scene import add_coloured, load_pyvista
+from femgear.report.scene import add_coloured, load_pyvista, new_plotter, write_png
 from femgear.report.style import VERMILION
-from femgear.storage.files import replace_file
-from femgear.trains.drivetrain.data import Drivetrain
 from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.parts import Drivetrain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -92,12 +86,11 @@ def drivetrain_layout(train: Drivetrain) -> Layout:
     centre = [places[name] for name in names]
     wheels = _wheels(train, places, size)
     for stage in train.planetary:
-        prefix = "planet" if len(train.planetary) == 1 else f"planet of {stage.carrier}"
         for p, angle in enumerate(stage.angles, start=1):
             arm = stage.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
             centre.append(places[stage.carrier] + arm)
-            wheels.append(Wheel(f"planet {p}", centre[-1], stage.pitch_radii[1], 0.2 * size, len(names)))
-            names.append(f"{prefix} {p}")
+            wheels.append(Wheel(f"planet {p}", centre[-1], stage.pitch_radii[1], 0.2 * size, len(centre) - 1))
+        names += train.planet_names(stage)
     shafts = tuple((names.index(s.between[0]), names.index(s.between[1])) for s in train.shafts)
     return Layout(tuple(names), np.array(centre), tuple(wheels), shafts)
 
@@ -165,10 +158,8 @@ def shaft_lines(
     """
     place, full = model.place, model.free @ shape
     found = []
-    for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
-        one, two = (place.body[name] for name in shaft.between)
-        first = np.array([one, *inner, two])
-        stations = full[first[:, None] + np.arange(5)]
+    for shaft, first, ends in zip(model.train.shafts, place.stations, layout.shafts):
+        stations = full[np.array(first)[:, None] + np.arange(5)]
         share, across = _beam_line(shaft, stations, points if shaft.elements else 3 * points)
         one, two = layout.centre[list(ends)]
         rest = one + share[:, None] * (two - one)
@@ -204,7 +195,7 @@ def _joint_shear_ratio(shaft) -> float:
 
 
 def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
-    """Deflection (k, 4) of a Timoshenko element per unit of (w, slope) at its first and second end.
+    """Deflection (k, 4) of a Timoshenko element per unit of (w, slope) at its ends; length [m].
 
     Exact for an element without load; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
     These are the functions behind the consistent mass of `femgear.fe.shaft.beam_element`
@@ -221,80 +212,50 @@ def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
     ], axis=-1) / (1.0 + phi)  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ModeView:
-    """One picture of a mode shape.
+def draw_motion(
+    path: Path, layout: Layout, move, turn, shafts: Sequence[tuple] = (), *, title: str = "", size: int = 1000
+) -> float:
+    """Draw a motion as PNG: every disc moves as a rigid body, shafts are the lines that they are given.
 
     Parameters
     ----------
     path : Path
-        PNG file.
-    title : str
-    move, turn : (n, 3) arrays
-        Translation and rotation vector of every place, in the proportions of the mode.
-    shafts : sequence of (rest (k, 3), displacement (k, 3))
-        Centre lines [m].
-    """
-
-    path: Path
-    title: str
-    move: np.ndarray
-    turn: np.ndarray
-    shafts: Sequence[tuple[np.ndarray, np.ndarray]] = ()
-
-
-def drivetrain_pictures(views: Iterable[ModeView], layout: Layout, *, size: int = 1000) -> list[float]:
-    """Pictures of mode shapes: every disc moves as a rigid body, shafts are the lines that they are given.
-
-    Parameters
-    ----------
-    views : iterable of ModeView
     layout : Layout
         Discs, and the names of the places that are written beside them.
+    move, turn : (n, 3) arrays
+        Translation and rotation vector of every place, in the proportions of the motion.
+    shafts : sequence of (rest (k, 3), displacement (k, 3))
+        Centre lines [m].
+    title : str
     size : int
         Width in pixels.
 
     Returns
     -------
-    list of float
-        The factors of the shapes.
+    float
+        The factor of the motion.
 
     Raises
     ------
     FemgearError
-        See `load_pyvista`.
+        See `femgear.report.scene.load_pyvista`.
     StorageError
-        When a file cannot be written.
+        When the file cannot be written.
     """
-    pv = load_pyvista()
-    discs = [_disc(pv, wheel) for wheel in layout.wheels]
-    # one window for all: opening it takes as long as drawing
-    plotter = pv.Plotter(off_screen=True, window_size=[size, round(_HEIGHT * size)])
-    plotter.enable_anti_aliasing("ssaa")
+    pv, plotter = load_pyvista(), new_plotter(size, round(_HEIGHT * size))
     plotter.set_background("white")  # type: ignore[call-arg]
     plotter.enable_parallel_projection()  # type: ignore[call-arg]
-    found = []
-    try:
-        for view in views:
-            plotter.suppress_rendering = True
-            plotter.clear()
-            scale, points = _add_shape(pv, plotter, view, discs, layout, size)
-            _add_texts(plotter, view.title, layout, size)
-            _frame(plotter, points)
-            plotter.suppress_rendering = False
-            plotter.render()
-            _write(plotter, view.path)
-            found.append(scale)
-    finally:
-        plotter.close()
-    return found
+    scale, points = _add_shape(pv, plotter, layout, move, turn, shafts, size)
+    _add_texts(plotter, title, layout, size)
+    _frame(plotter, points)
+    write_png(plotter, path)
+    return scale
 
 
-def _add_shape(pv, plotter, view: ModeView, discs, layout: Layout, size: int):
-    """Discs and shafts, at rest and moved; the factor of the shape, and all points of the discs (n, 3)."""
-    move, turn = np.asarray(view.move, float), np.asarray(view.turn, float)
+def _add_shape(pv, plotter, layout: Layout, move, turn, lines, size: int):
+    """Discs and shafts, at rest and moved; the factor of the motion, and all points of the discs (n, 3)."""
     centres, places = layout.centre, [wheel.body for wheel in layout.wheels]
-    lines = [tuple(np.asarray(one, float) for one in pair) for pair in view.shafts]
+    discs = [_disc(pv, wheel) for wheel in layout.wheels]
     fields = [move[p] + np.cross(turn[p], d.points - centres[p]) for d, p in zip(discs, places)]
     lengths = [np.linalg.norm(one, axis=1) for one in (*fields, *(across for _, across in lines))]
     extent = np.ptp(np.vstack([disc.points for disc in discs]), axis=0).max()
@@ -356,16 +317,6 @@ def _frame(plotter, points) -> None:
     plotter.reset_camera_clipping_range()
 
 
-def _write(plotter, path) -> None:
-    """The picture whole or not at all; the window stays open."""
-    import imageio.v3 as iio
-
-    stream, image = io.BytesIO(), plotter.screenshot(filename=None, return_img=True)
-    iio.imwrite(stream, image, extension=".png", compress_level=4)
-    data = stream.getvalue()
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
-
-
 def _moved(points, centre, shift, turn) -> np.ndarray:
     """Points turned by a rotation vector about a centre, and shifted: rigid, however large the angle."""
     from scipy.spatial.transform import Rotation
@@ -395,20 +346,18 @@ def _polylines(pv, lines):
     return pv.PolyData(np.vstack(lines), lines=np.concatenate(cells)) if lines else pv.PolyData()
 
 
-def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
-    """The lowest elastic modes as PNG files; returns their names.
+def write_mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
+    """As many of the lowest elastic modes as PNG files; returns their names.
 
     Modes have the numbers of the table: the free spin, which is not drawn, is the first.
     """
     layout = drivetrain_layout(model.train)
     kinds, hertz = modes["kind"].values.astype(str), modes["frequency"].values
-    names, views = [], []
+    names = []
     for mode in np.flatnonzero(kinds != "rigid")[:count].tolist():
         shape = modes["shape"].values[:, mode]
         title = f"mode {mode + 1}: {hertz[mode]:.2f} Hz, {kinds[mode]}"
         names.append(f"drivetrain_mode_{mode + 1}.png")
-        moved = layout_motion(model, layout, shape)
-        views.append(ModeView(folder / names[-1], title, *moved, shaft_lines(model, layout, shape)))
-    if views:
-        drivetrain_pictures(views, layout)
+        move, turn = layout_motion(model, layout, shape)
+        draw_motion(folder / names[-1], layout, move, turn, shaft_lines(model, layout, shape), title=title)
     return names

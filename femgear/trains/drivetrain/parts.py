@@ -4,7 +4,7 @@ All axes are parallel to z; rotations are positive about z. The tables of a case
 themselves. A file gives numbers as texts with units, within the windows that stand beside the entries; in
 Python `Part.in_si` takes SI numbers, radians and names, and `Part.changed` other ones. What follows from the
 entries, such as pitch radii and springs, are properties. Contradictions between entries are refused where a
-file is read (`femgear.trains.drivetrain.section`).
+file is read (`femgear.trains.drivetrain.case_file`).
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from femgear.case.quantities import (
     Section,
     StiffnessOrRigid,
 )
+from femgear.case.sections import Angle, PressureAngle
 from femgear.case.text import described
 from femgear.errors import CaseError
 from femgear.fe import shaft as shafts
@@ -87,8 +88,6 @@ Radius = Annotated[float, Quantity(LENGTH, 1e-4, 100.0)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 1e3)]
 Offset = Annotated[float, Quantity(LENGTH, -100.0, 100.0)]
 Module = Annotated[float, Quantity(LENGTH, 5e-5, 0.5)]
-Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
-PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
 Teeth = Annotated[int, Count(4, 5000)]
 Joint = Annotated[float, StiffnessOrRigid(TORSION, 1e-3, 1e15)]
 BOTH = BeforeValidator(_two)
@@ -107,7 +106,7 @@ class Part(Section):
         return cls.model_construct(**values)
 
     def changed(self, **values: Any) -> Self:
-        """Copy the part with other values, as of `in_si`."""
+        """Copy the part with other values, as of `Part.in_si`."""
         return self.model_copy(update=values)
 
 
@@ -142,10 +141,10 @@ class ShaftSection(Part):
     """Timoshenko elements of the section; 0 takes two rigid links and a joint of springs, without mass."""
 
     @property
-    def section(self) -> shafts.ShaftSection:
+    def section(self) -> shafts.RoundSection:
         """Round section, of a shaft that has one."""
         assert self.outer_diameter is not None
-        return shafts.ShaftSection(
+        return shafts.RoundSection(
             self.outer_diameter, self.inner_diameter, self.youngs_modulus, self.poisson_ratio, self.density
         )
 
@@ -366,6 +365,11 @@ class Drivetrain:
             found.append(Mesh(one.name, len(self.planetary) + i, f"parallel[{i}].mesh", one.mesh))
         return tuple(found)
 
+    def planet_names(self, stage: PlanetarySection) -> list[str]:
+        """Of all planets of a stage: ``planet 1``, or ``planet of carrier 1`` beside other stages."""
+        prefix = "planet" if len(self.planetary) == 1 else f"planet of {stage.carrier}"
+        return [f"{prefix} {number}" for number in range(1, len(stage.angles) + 1)]
+
     def body(self, name: str) -> BodySection:
         """The body of that name."""
         return next(one for one in self.bodies if one.name == name)
@@ -395,6 +399,12 @@ class TorqueHistory:
     def at(self, times) -> np.ndarray:
         """Torque [N m] at any instants [s]."""
         return np.interp(times, self.times, self.values)
+
+    def mean(self, duration: float) -> float:
+        """Mean torque from 0 to `duration` [s], exact [N m]."""
+        inside = self.times[(self.times > 0.0) & (self.times < duration)]
+        times = np.concatenate([[0.0], inside, [duration]])
+        return float(np.trapezoid(self.at(times), times) / duration)
 
 
 def constant_torques(torques: dict[str, float]) -> tuple[TorqueHistory, ...]:

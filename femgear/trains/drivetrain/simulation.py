@@ -1,14 +1,12 @@
 """Newmark's method for a drivetrain through time, with meshes that are linear or separate.
 
-`march_drivetrain` takes the steps of `femgear.trains.drivetrain.scheme`. What else it works with stands below
-it: the start, the free motion, the balances of energy and momentum, and the records.
-
 Beside the motion goes the free one without loads, whose growth tells a parametric resonance. It takes the
-same steps, with the tangents of the meshes, and is brought back to size one every few steps; the slope of the
-logarithm of its size is the largest Lyapunov exponent (G. Benettin, L. Galgani, A. Giorgilli and
-J.-M. Strelcyn, Meccanica 15, 1980, 9-30). The weights exp(-1 / (s (1 - s))) over the run take the oscillation
-of the size out of the mean (S. Das, Y. Saiki, E. Sander and J. A. Yorke, Nonlinearity 30, 2017, 4111-4140).
-With linear meshes at a constant speed it is the largest Floquet exponent, at any load.
+same steps (`femgear.trains.drivetrain.integrator`), with the tangents of the meshes, and is brought back to
+size one every few steps; the slope of the logarithm of its size is the largest Lyapunov exponent
+(G. Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15, 1980, 9-30). The weights
+exp(-1 / (s (1 - s))) over the run take the oscillation of the size out of the mean (S. Das, Y. Saiki,
+E. Sander and J. A. Yorke, Nonlinearity 30, 2017, 4111-4140). With linear meshes at a constant speed it is
+the largest Floquet exponent, at any load.
 """
 
 from __future__ import annotations
@@ -19,10 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.trains.drivetrain.data import TorqueHistory
-from femgear.trains.drivetrain.geometry import FlankContacts
-from femgear.trains.drivetrain.model import DrivetrainModel, contact_model
-from femgear.trains.drivetrain.scheme import (
+from femgear.trains.drivetrain.integrator import (
     Block,
     MeshBlock,
     Scheme,
@@ -31,6 +26,9 @@ from femgear.trains.drivetrain.scheme import (
     march_closed,
     solve_overlaps,
 )
+from femgear.trains.drivetrain.kinematics import FlankContacts
+from femgear.trains.drivetrain.model import DrivetrainModel, contact_model, static_flexibility
+from femgear.trains.drivetrain.parts import TorqueHistory
 
 # Errors of the balances, relative, beyond which a run is refused.
 BALANCE = 1e-6
@@ -248,7 +246,7 @@ def _start_state(
         if start == "static":
             load = spin.directions @ block.loads[0]
             load = load - spin.carried * (model.rigid @ load) / spin.inertia
-            q = static_deviations(model, U @ S, k, load, contacts=contacts)
+            q = _static_deviations(model, U @ S, k, load, contacts)
     else:
         q, v = (np.asarray(one, float) for one in start)
     approach = (U @ S).T @ q
@@ -256,17 +254,14 @@ def _start_state(
     return np.concatenate([q, v, S @ force])
 
 
-def static_deviations(model: DrivetrainModel, W, k, load, *, contacts: FlankContacts | None = None):
+def _static_deviations(model: DrivetrainModel, W, k, load, contacts: FlankContacts | None) -> np.ndarray:
     """Deviations (n,) under a load that does not drive the spin, meshes or contacts W (n, c) at one instant.
 
     Drive flanks that part, and back flanks that touch, are found as corrections of drive flanks that all
     touch.
     """
     meshes = len(model.meshes)
-    drive, stiffness = W[:, :meshes], k[:meshes]
-    carried, total = model.system.M @ model.rigid, model.system.K + (drive * stiffness) @ drive.T
-    size = (np.abs(total).max() or 1.0) / np.abs(carried).max() ** 2
-    flexible = np.linalg.inv(total + size * np.outer(carried, carried))
+    stiffness, flexible = k[:meshes], static_flexibility(model, W[:, :meshes], k[:meshes])
     q = flexible @ load
     if contacts is None:
         return q
@@ -349,7 +344,7 @@ class FreeMotion:
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Energies [J] of a run: what was there at the ends, and the work in between."""
+    """Energies [J] of a run at its ends, and the work of loads, damping and meshes in between."""
 
     before: float
     after: float

@@ -20,7 +20,7 @@ from femgear.errors import CaseError
 from femgear.fe.shaft import AXES, joint_deflections, joint_springs
 from femgear.system.assembler import mesh_directions, pin_directions
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.trains.drivetrain.data import (
+from femgear.trains.drivetrain.parts import (
     Drivetrain,
     ParallelSection,
     PlanetarySection,
@@ -38,13 +38,13 @@ class Coordinates:
     """Places of everything among all n coordinates, before constraints.
 
     ``names`` (n,); ``body`` name -> first of five places; ``planets`` per planetary stage (N, 3), radial,
-    tangential and rotation; ``inner`` per shaft, first places of the stations inside it.
+    tangential and rotation; ``stations`` per shaft, first places of its ends and the stations between them.
     """
 
     names: tuple[str, ...]
     body: dict[str, int]
     planets: tuple[np.ndarray, ...]
-    inner: tuple[tuple[int, ...], ...]
+    stations: tuple[tuple[int, ...], ...]
 
     @property
     def count(self) -> int:
@@ -53,35 +53,28 @@ class Coordinates:
 
 def coordinates_of(train: Drivetrain) -> Coordinates:
     """Five coordinates a body and a station of a shaft, three a planet; planets follow their carrier."""
-    names, body, planets, inner = [], {}, {}, {}
+    names, body, planets, stations = [], {}, {}, []
     for one in train.bodies:
         body[one.name] = len(names)
         names += [f"{one.name}: {axis}" for axis in AXES]
         for number, stage in enumerate(train.planetary):
             if stage.carrier == one.name:
-                prefix = "planet" if len(train.planetary) == 1 else f"planet of {one.name}"
-                n = len(stage.angles)
-                planets[number] = len(names) + np.arange(3 * n).reshape(n, 3)
-                names += [
-                    f"{prefix} {p + 1}: {axis}"
-                    for p in range(n)
-                    for axis in ("radial", "tangential", "rotation")
-                ]
-    for number, shaft in enumerate(train.shafts):
-        inner[number] = tuple(len(names) + 5 * i for i in range(max(shaft.elements - 1, 0)))
-        for i in range(len(inner[number])):
-            names += [f"shaft {'-'.join(shaft.between)} {i + 1}: {axis}" for axis in AXES]
-    return Coordinates(
-        tuple(names), body, tuple(planets[n] for n in range(len(planets))),
-        tuple(inner[n] for n in range(len(inner))),
-    )  # fmt: skip
+                planets[number] = len(names) + np.arange(3 * len(stage.angles)).reshape(-1, 3)
+                axes = ("radial", "tangential", "rotation")
+                names += [f"{name}: {axis}" for name in train.planet_names(stage) for axis in axes]
+    for shaft in train.shafts:
+        first, last = (body[name] for name in shaft.between)
+        inner = range(1, max(shaft.elements, 1))
+        stations.append((first, *(len(names) + 5 * (i - 1) for i in inner), last))
+        names += [f"shaft {'-'.join(shaft.between)} {i}: {axis}" for i in inner for axis in AXES]
+    return Coordinates(tuple(names), body, tuple(planets[n] for n in range(len(planets))), tuple(stations))
 
 
 @dataclass(frozen=True)
 class Springs:
-    """Springs of a part: places (m,) that they join, deflections (k, m), stiffness (k,) [N/m, N m/rad].
+    """Springs of a part: places (m,) that they join, ``rows`` (k, m) of deflections, stiffness (k,).
 
-    ``turns`` (k,): whether a spring acts against a rotation.
+    ``turns`` (k,): whether a spring acts against a rotation [N m/rad], else [N/m].
     """
 
     places: np.ndarray
@@ -96,13 +89,12 @@ def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
     Stiffnesses [N/m] along and [N m/rad] about the coordinates of ``place``; infinite ones are conditions.
     """
     found, turns = [], np.array([False, False, True, True, True])
-    stations = {shaft.between: inner for shaft, inner in zip(train.shafts, place.inner)}
-    for shaft, inner in zip(train.shafts, place.inner):
-        ends = (place.body[shaft.between[0]], *inner, place.body[shaft.between[1]])
+    stations = {shaft.between: own for shaft, own in zip(train.shafts, place.stations)}
+    for shaft in train.shafts:
         length = shaft.length / max(shaft.elements, 1)
         s = joint_springs(shaft.section, length) if shaft.elements else shaft.springs
         stiffness = np.array([s.shear, s.shear, s.bending, s.bending, s.torsion])
-        for one, two in pairwise(ends):
+        for one, two in pairwise(stations[shaft.between]):
             places = np.r_[one : one + 5, two : two + 5]
             found.append(Springs(places, joint_deflections(length), stiffness, turns))
     for bearing in train.bearings:
@@ -112,7 +104,7 @@ def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
         if bearing.station is None:
             first = place.body[bearing.body or ""]
         else:
-            first = stations[bearing.shaft or ()][bearing.station - 1]
+            first = stations[bearing.shaft or ()][bearing.station]
         found.append(Springs(first + np.arange(4), rows, stiffness, turns[:4]))
     for number, stage in enumerate(train.planetary):
         if math.isfinite(stage.planet_bearing):
@@ -185,9 +177,9 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
             row[at] += factor
         rows.append(row / np.abs(row).max())
 
-    for shaft, inner in zip(train.shafts, place.inner):
-        for at in (turn[shaft.between[1]], *(first + 4 for first in inner)):
-            condition((turn[shaft.between[0]], 1.0), (at, -1.0))
+    for first, *inner, last in place.stations:
+        for at in (last, *inner):
+            condition((first + 4, 1.0), (at + 4, -1.0))
     for stage in train.parallel:
         condition(*((turn[name], radius) for name, radius in zip(stage.between, stage.pitch_radii)))
     for stage, planets in zip(train.planetary, place.planets):
@@ -197,7 +189,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
             condition((s, sun), (p, planet), (c, -stage.centre_distance))
             condition((c, stage.ring_radius - planet), (p, planet))
     rotations = sorted({*turn.values(), *(int(p) for own in place.planets for p in own[:, 2])})
-    rotations += [first + 4 for inner in place.inner for first in inner]
+    rotations += [first + 4 for _, *inner, _ in place.stations for first in inner]
     table = np.array(rows).reshape(-1, place.count)[:, rotations]
     _, values, vectors = np.linalg.svd(table)
     spins = len(rotations) - int(np.count_nonzero(values > 1e-10 * values.max(initial=1.0)))
@@ -270,7 +262,7 @@ class MeshGeometry:
 
 
 def mesh_geometry(train: Drivetrain, place: Coordinates, spin: np.ndarray) -> MeshGeometry:
-    """Directions of the drive flanks of all meshes among all coordinates."""
+    """Directions of the drive flanks of all meshes among all coordinates; spin (n,) of `rigid_rotation`."""
     stages = np.array([mesh.stage for mesh in train.meshes], int)
     total, planar = _flank_directions(train, place, spin), _planar_places(train, place)
     # simple motions: the part of every mesh that does not turn, then x and y of carriers and suns
@@ -333,7 +325,7 @@ def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
 
 
 def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.ndarray:
-    """Coordinates of the lumped set (3 (N + 3), n) per unit of those of the chain, carrier at angle zero."""
+    """Coordinates (3 (N + 3), n) of the planetary stage `number` per unit of the chain's, at angle zero."""
     own, cosine = place.planets[number], math.cos(stage.pressure_angle)
     B = np.zeros((9 + 3 * len(own), place.count))
     for row, name, radius in (

@@ -1,8 +1,4 @@
-"""The sections of a case file with ``model = "multistage"``: planetary stages, shafts, operation, response.
-
-`multistage_of` makes the train of a case, `stage_gears` the gears of a stage that has a module. `cross_check`
-refuses entries that contradict one another, and trains that cannot turn.
-"""
+"""The case file with ``model = "multistage"``: planetary stages, shafts, operation, response."""
 
 from __future__ import annotations
 
@@ -14,7 +10,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from femgear.case.quantities import (
-    ANGLE,
     LENGTH,
     PAIR,
     RPM,
@@ -30,10 +25,10 @@ from femgear.case.quantities import (
     StiffnessOrRigid,
     Title,
 )
-from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
+from femgear.case.sections import FORMAT, Angle, Inertia, Mass, MeshStiffnessSection, PressureAngle, Radius
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError, FemgearError
-from femgear.fe.shaft import ShaftSection, joint_springs
+from femgear.fe.shaft import RoundSection, joint_springs
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
@@ -41,10 +36,9 @@ from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, planar_from_set
 from femgear.trains.multistage.model import (
-    STIFFEST,
     Member,
     MultistageSet,
-    Stage,
+    PlanetaryStage,
     StageCoupling,
     check_turns,
     in_series,
@@ -74,11 +68,11 @@ def _member(value: object) -> str:
     return value
 
 
+# beyond, rounding hides the other springs [N m/rad, N/m]
+_STIFFEST_TORSION, _STIFFEST_LATERAL = 1e12, 1e15
 MemberName = Annotated[str, BeforeValidator(_member)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
-Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
-PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
 Teeth = Annotated[int, Count(4, 5000)]
 
 
@@ -147,8 +141,8 @@ class CouplingSection(Section):
     between: Annotated[tuple[MemberName, ...], PAIR]
     diameter: Length | None = None
     length: Length | None = None
-    torsional: Annotated[float, StiffnessOrRigid(TORSION, 1e-3, STIFFEST["torsional"])] | None = None
-    lateral: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, STIFFEST["lateral"])] | None = None
+    torsional: Annotated[float, StiffnessOrRigid(TORSION, 1e-3, _STIFFEST_TORSION)] | None = None
+    lateral: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, _STIFFEST_LATERAL)] | None = None
 
 
 class OperationSection(Section):
@@ -207,6 +201,11 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
         if (stage.gears is None) == (stage.radii is None):
             key, limit = f"stage[{n}].gears", "one of the tables gears and radii"
             yield CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=limit)
+        if case.operation is not None and stage.radii is not None and stage.radii.teeth is None:
+            yield CaseError(
+                f"no tooth numbers in stage {n + 1}", code="E-TEETH", key=f"stage[{n}].radii.teeth",
+                limit="given where there is an operation", remedy="give the teeth of sun, planet and ring",
+            )  # fmt: skip
     named = [(f"coupling[{n}].between", one) for n, c in enumerate(case.coupling) for one in c.between]
     if case.operation is not None:
         named += [(f"operation.{key}", getattr(case.operation, key)) for key in ("input", "output")]
@@ -232,15 +231,7 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
 
 
 def multistage_of(case: MultistageCase) -> MultistageSet:
-    """The train of a case.
-
-    Without couplings each carrier turns the next sun, joined rigidly.
-
-    Raises
-    ------
-    CaseError
-        With the keys of the file.
-    """
+    """The train of a case; without couplings each carrier turns the next sun, joined rigidly."""
     stages = [_named(_stage, f"stage[{n}]", one) for n, one in enumerate(case.stage)]
     couplings = [_named(_coupling, f"coupling[{n}]", one) for n, one in enumerate(case.coupling)]
     operation = case.operation
@@ -280,7 +271,7 @@ def _coupling(one: CouplingSection) -> StageCoupling:
     springs = {}
     if one.diameter is not None and one.length is not None:
         # ends that do not tilt: Timoshenko's beam (Przemieniecki, Theory of Matrix Structural Analysis, 5.6)
-        shaft, length = ShaftSection(one.diameter), one.length
+        shaft, length = RoundSection(one.diameter), one.length
         bending = 12.0 * shaft.young * shaft.second_moment / (length**3 * (1.0 + shaft.shear_ratio(length)))
         springs = {"torsional": joint_springs(shaft, length).torsion, "lateral": bending}
     first, second = (_member_of(text) for text in one.between)
@@ -307,7 +298,7 @@ def stage_gears(stage: StageSection) -> PlanetarySet:
     return closed
 
 
-def _stage(stage: StageSection) -> Stage:
+def _stage(stage: StageSection) -> PlanetaryStage:
     members = (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
     lumped: dict[str, Any] = {
         name: PlanarBody(one.mass, one.inertia, one.support_stiffness, one.torsional_stiffness)
@@ -323,14 +314,16 @@ def _stage(stage: StageSection) -> Stage:
     if isinstance(size, GearsSection):
         gears = stage_gears(stage)
         data = planar_from_set(gears, **_iso_stiffness(size, gears) | lumped)
-        return Stage(data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle)
+        return PlanetaryStage(
+            data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle
+        )
     alpha = size.pressure_angle
     data = PlanarSet(
         **lumped, sun_radius=size.sun, planet_radius=size.planet, ring_radius=size.sun + 2.0 * size.planet,
         centre_distance=(size.sun + size.planet) / math.cos(alpha), planet_angles=stage.angles,
         pressure_angle_sun_planet=alpha, pressure_angle_planet_ring=alpha,
     )  # fmt: skip
-    return Stage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
+    return PlanetaryStage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
 
 
 def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, Any]:

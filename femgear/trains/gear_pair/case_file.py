@@ -1,4 +1,4 @@
-"""The sections of a case file with ``model = "gear_pair"``: two gears, their mesh, and what is computed."""
+"""The case file with ``model = "gear_pair"``: two gears, their mesh, and what is computed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from femgear.case.quantities import (
-    ANGLE,
     LENGTH,
     PAIR,
     STIFFNESS,
@@ -22,12 +21,11 @@ from femgear.case.quantities import (
     Section,
     Title,
 )
-from femgear.case.sections import FORMAT, Inertia, Mass, Radius, Stiffness
+from femgear.case.sections import FORMAT, Angle, Inertia, Mass, Radius, Stiffness
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError
 from femgear.trains.gear_pair.model import ImpactPair, PairBearings
 
-Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
 Ratio = Annotated[float, Number(1e-3, 100.0)]
 Steps = Annotated[int, Count(20, 10_000)]
 _MOST_WAVES = 50
