@@ -74,13 +74,7 @@ def node_of_dof(grid: Grid, scalar) -> np.ndarray:
     return nodes
 
 
-def stiffness(
-    grid: Grid,
-    material: Material,
-    *,
-    state: str | Mapping[str, str] = "plane strain",
-    thickness: float = 1.0,
-):
+def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness=1.0):
     """Assemble the stiffness matrix of a plane body.
 
     Parameters
@@ -88,7 +82,7 @@ def stiffness(
     grid, material : Grid, Material
     state : str or mapping of region to str
         ``"plane strain"`` or ``"plane stress"``.
-    thickness : float
+    thickness : float or mapping of region to float
         [m].
 
     Returns
@@ -100,11 +94,15 @@ def stiffness(
 
     scalar = basis(grid)
     nodes = node_of_dof(grid, scalar)
-    lame = np.full((2, len(grid.triangles), 1), np.nan)
-    for name, one in state.items() if isinstance(state, Mapping) else [(None, state)]:
-        elements = slice(None) if name is None else grid.regions[name]
-        lame[:, elements, 0] = thickness * np.array(material.lame(one))[:, None]
-    lam, mu = (np.broadcast_to(value, scalar.dx.shape) for value in lame)
+    pairs = {name: material.lame(value) for name, value in _by_region(state).items()}
+    depth = _per_element(grid, thickness)
+    lam, mu = (
+        np.broadcast_to(
+            (depth * _per_element(grid, {name: pair[i] for name, pair in pairs.items()}))[:, None],
+            scalar.dx.shape,
+        )
+        for i in range(2)
+    )
     # three scalar forms instead of one with vectors: a quarter of the calls
     xx, yy, xy = (BilinearForm(form).assemble(scalar, lam=lam, mu=mu).tocoo() for form in (_xx, _yy, _xy))
     rows = [2 * nodes[xx.row], 2 * nodes[yy.row] + 1, 2 * nodes[xy.row], 2 * nodes[xy.col] + 1]
@@ -115,16 +113,25 @@ def stiffness(
     return 0.5 * (K + K.T).tocsc()
 
 
-def mass(grid: Grid, material: Material, thickness: float = 1.0):
+def mass(grid: Grid, material: Material, thickness=1.0):
     """Assemble the consistent mass matrix, shape (2n, 2n) [kg]; arguments as in `stiffness`."""
     from skfem import BilinearForm
 
     scalar = basis(grid)
     nodes = node_of_dof(grid, scalar)
-    weight = material.density * thickness
-    one = BilinearForm(lambda u, v, w: weight * u * v).assemble(scalar).tocoo()
+    weight = (material.density * _per_element(grid, thickness))[:, None]
+    form = BilinearForm(lambda u, v, w: w.weight * u * v)
+    one = form.assemble(scalar, weight=np.broadcast_to(weight, scalar.dx.shape)).tocoo()
     shape = (grid.n_nodes, grid.n_nodes)
     return kron(csc_array((one.data, (nodes[one.row], nodes[one.col])), shape=shape), np.eye(2), format="csc")
+
+
+def _per_element(grid: Grid, value) -> np.ndarray:
+    """One number for each element, from a number or a mapping of all regions to numbers, shape (m,)."""
+    result = np.full(len(grid.triangles), np.nan)
+    for name, number in _by_region(value).items():
+        result[slice(None) if name is None else grid.regions[name]] = number
+    return result
 
 
 def foundation(grid: Grid, boundary: str, radial: float, tangential: float, *, thickness: float):
@@ -166,6 +173,11 @@ def _yy(u, v, w):
 
 def _xy(u, v, w):
     return w.lam * u.grad[1] * v.grad[0] + w.mu * u.grad[0] * v.grad[1]
+
+
+def _by_region(value):
+    """A mapping of regions, or one number or state for all elements under the name None."""
+    return dict(value) if isinstance(value, Mapping) else {None: value}
 
 
 def edge_quadrature(grid, name):

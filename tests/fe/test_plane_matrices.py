@@ -80,7 +80,7 @@ def test_uniaxial_stress_strains_by_the_textbook(plate):
         assert np.allclose(field, [pull, 0.0, 0.0], rtol=0, atol=1e-8 * pull)
 
 
-def test_states_by_region():
+def test_states_and_thicknesses_by_region():
     t = np.linspace(0, 1, 9)[:, None]
     corners = np.array([(0, 0), (2, 0), (2, 1), (0, 1)], dtype=float)
     sides = [(1 - t) * a + t * b for a, b in zip(corners, np.roll(corners, -1, axis=0))]
@@ -90,22 +90,28 @@ def test_states_by_region():
         (("left", (0.5, 0.5)), ("right", (1.5, 0.5))),
     )
     grid = mesh_outline(outline)
-    states = {"left": "plane strain", "right": "plane stress"}
-    mixed = stiffness(grid, STEEL, state=states, thickness=0.1)
+    mixed = stiffness(
+        grid,
+        STEEL,
+        state={"left": "plane strain", "right": "plane stress"},
+        thickness={"left": 0.1, "right": 0.3},
+    )
     parts = []
-    for name, state in states.items():
+    for name, state, thickness in (("left", "plane strain", 0.1), ("right", "plane stress", 0.3)):
         part = Grid(grid.points, grid.triangles[grid.regions[name]])
         used, triangles = np.unique(part.triangles, return_inverse=True)
-        K = stiffness(Grid(grid.points[used], triangles.reshape(-1, 6)), STEEL, state=state, thickness=0.1)
+        K = stiffness(
+            Grid(grid.points[used], triangles.reshape(-1, 6)), STEEL, state=state, thickness=thickness
+        )
         dofs = np.ravel([2 * used, 2 * used + 1], order="F")
         place = csc_array(
             (np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(2 * grid.n_nodes, len(dofs))
         )
         parts.append(place @ K @ place.T)
     assert abs(mixed - parts[0] - parts[1]).max() < 1e-14 * abs(mixed).max()
-    M = mass(grid, STEEL, 0.1)
+    M = mass(grid, STEEL, {"left": 0.1, "right": 0.3})
     assert np.ones(2 * grid.n_nodes) @ M @ np.ones(2 * grid.n_nodes) == pytest.approx(
-        2 * 7850 * 0.2, rel=1e-13
+        2 * 7850 * 0.4, rel=1e-13
     )
 
 
