@@ -171,7 +171,8 @@ def test_pin_errors_beyond_the_backlash_are_a_warning_with_the_amount(tmp_path):
     case = read_case(case_of(tmp_path, edited(('# backlash = "0.1 mm"', 'backlash = "20 um"')) + pins))
     (warning,) = check_deviations(set_deviations(case), planetary_set(case))
     assert (warning.code, warning.key) == ("W-WEDGING", "set.backlash")
-    assert "um" in str(warning) and warning.value < 0 and warning.limit
+    (amount,) = re.findall(r"exceed the backlash by ([0-9.]+) um", str(warning))
+    assert float(amount) > 0 and warning.limit
 
 
 def test_a_pitch_error_that_separates_a_planet_is_computed_and_said():
