@@ -291,7 +291,7 @@ def test_campbell_diagram(benchmark):
     from published.planetary_sets import lin_parker_set
 
     from femgear.solvers.linear.tracking import campbell_data
-    from femgear.system.assembler import gear_set_system
+    from femgear.system.mesh_directions import gear_set_system
 
     data = lin_parker_set(3)
     found = ask(

@@ -18,7 +18,7 @@ def inputs():
     from published.planetary_sets import kahraman_set
 
     from femgear.gears.phasing import MeshPhasing, phase_factors
-    from femgear.system.assembler import gear_set_system
+    from femgear.system.mesh_directions import gear_set_system
     from femgear.trains.rigid import gear_set_modes
 
     data = kahraman_set()

@@ -32,7 +32,7 @@ def planet_train(damping: float) -> NonlinearSystem:
     """Example set of Lin and Parker (1999) with three planets, 300 N m and 20 um of backlash."""
     from published.planetary_sets import lin_parker_set
 
-    from femgear.system.assembler import mesh_elements
+    from femgear.system.mesh_directions import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.rigid import gear_set_problem
 
@@ -45,7 +45,7 @@ def two_base_train(damping: float) -> NonlinearSystem:
     """The same set with its weight, which turns with the carrier: carrier first, mesh second frequency."""
     from published.planetary_sets import lin_parker_set
 
-    from femgear.system.assembler import mesh_elements
+    from femgear.system.mesh_directions import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.rigid import Gravity, gear_set_problem
 

@@ -49,7 +49,7 @@ def main(
 
     from femgear.report.style import save_figure
     from femgear.solvers.linear.tracking import campbell_data
-    from femgear.system.assembler import gear_set_system
+    from femgear.system.mesh_directions import gear_set_system
 
     if not (np.isfinite(highest) and highest > 0.0) or speeds < 5 or modes < 1 or harmonics < 0:
         raise CaseError(

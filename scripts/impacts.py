@@ -193,8 +193,8 @@ def eccentric_set(eccentricity: float, floating: bool):
         with_errors,
     )
 
-    from femgear.system.assembler import mesh_elements
     from femgear.system.fourier import tooth_lines
+    from femgear.system.mesh_directions import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.rigid import gear_set_problem, phased_series
 

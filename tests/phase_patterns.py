@@ -52,7 +52,7 @@ def mesh_loads(directions, phasing: MeshPhasing, harmonics) -> np.ndarray:
     Parameters
     ----------
     directions : (n, 2N) array
-        Mesh columns of a model, such as `femgear.system.assembler.mesh_directions`.
+        Mesh columns of a model, such as `femgear.system.mesh_directions.mesh_directions`.
     phasing : MeshPhasing
     harmonics : (H,) sequence of int
 

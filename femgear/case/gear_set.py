@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.checks import check_floating
-from femgear.case.problems import in_terms_of_the_case, rack_at
+from femgear.case.mistakes import in_terms_of_the_case, rack_at
 from femgear.case.sections import (
     CarrierErrors,
     Case,

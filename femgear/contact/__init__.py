@@ -14,13 +14,13 @@ if TYPE_CHECKING:
         mesh_windows,
     )
     from femgear.contact.bodies import Bodies, Sectors, make_bodies, make_sectors
-    from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
-    from femgear.contact.flank_pairs import loaded_image, mirrored_set
+    from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
     from femgear.contact.loaded_period import LoadedPeriod, loaded_period
     from femgear.contact.root_stress import RootStresses, root_ranges, root_stress_cycle
     from femgear.contact.solve import ContactState, solve_contact
     from femgear.contact.supports import RIGID, Supports, moving_members
     from femgear.contact.tooth_loads import deformed_set, load_spectrum, loaded_teeth
+    from femgear.gears.planetary import mirrored_set
 
 __all__ = [
     "RIGID",

@@ -26,7 +26,6 @@ from femgear.contact.assembly import (
 )
 from femgear.contact.batch import BatchState, ContactTangents, solve_batch
 from femgear.contact.bodies import Bodies
-from femgear.contact.flank_pairs import loaded_image
 from femgear.contact.supports import (
     RIGID,
     BearingSprings,
@@ -37,9 +36,9 @@ from femgear.contact.supports import (
     pin_forces,
 )
 from femgear.errors import ContactError
-from femgear.gears.deviations import SetDeviations
+from femgear.gears.deviations import SetDeviations, mirrored_deviations
 from femgear.gears.kinematics import rotation_approach
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet, mirrored_set
 
 LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""
@@ -222,6 +221,24 @@ _AXES = {
 """Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, position (time)."""
 _ODD = ("path", "back_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
 """What counts the other way round in the mirror image."""
+
+
+def loaded_image(
+    planetary_set: PlanetarySet, sun_torque: float, deviations: SetDeviations | None = None
+) -> tuple[PlanetarySet, np.ndarray, SetDeviations | None]:
+    """Find the set whose drive flanks a torque loads: the set itself, or its mirror image.
+
+    The mirror image turns the other way: position ``tau`` of the set is position ``-tau`` of the image.
+
+    A negative torque [N m] loads the right flanks of the sun. With the set come its ``order`` (N,), see
+    `femgear.gears.planetary.mirrored_set`, and the deviations as it has them.
+    """
+    if sun_torque >= 0:
+        return planetary_set, np.arange(planetary_set.n_planets), deviations
+    mirrored, order = mirrored_set(planetary_set)
+    if deviations is not None:
+        deviations = mirrored_deviations(deviations, planetary_set, mirrored, order)
+    return mirrored, order, deviations
 
 
 def walk_mesh_cycle(

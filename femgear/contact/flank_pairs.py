@@ -10,15 +10,16 @@ Gear 1 drives. Its flank is drawn as a left flank; roll lengths on gear 1 grow w
 teeth a pair consists of is told by `tooth_numbers`; tooth number zero of every gear stands where
 `femgear.gears.kinematics.orientations` has its centreline.
 
-The back flanks of a set are the drive flanks of its mirror image (`mirrored_set`), and so are the flanks that
-a negative torque loads (`loaded_image`). Mesh ``2N + j`` is the back side of mesh ``j``: its path coordinate
-runs backwards, and its flanks approach when those of mesh ``j`` part.
+The back flanks of a set are the drive flanks of its mirror image (`femgear.gears.planetary.mirrored_set`),
+and so are the flanks that a negative torque loads (`femgear.contact.cycle.loaded_image`). Mesh ``2N + j`` is
+the back side of mesh ``j``: its path coordinate runs backwards, and its flanks approach when those of mesh
+``j`` part.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,13 +27,12 @@ from femgear.errors import ContactError
 from femgear.gears.deviations import (
     SetDeviations,
     body_separation,
-    mirrored_deviations,
     profile_separation,
     tooth_separation,
 )
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet, mirrored_set
 
 LEFT, RIGHT = 0, 1
 """Flanks of a tooth."""
@@ -226,36 +226,6 @@ def side_teeth(planetary_set: PlanetarySet, index: np.ndarray, direction: float)
     teeth[0, N:] += of_planets
     teeth[1, N:] += offset(image.ring, here.ring, s.ring)
     return teeth
-
-
-def mirrored_set(planetary_set: PlanetarySet) -> tuple[PlanetarySet, np.ndarray]:
-    """Mirror a set: as it is seen from behind, and the places ``order`` of its planets in the original one.
-
-    Planet angles are counted the other way round, ascending from the first planet; mirrored planet ``i`` is
-    original planet ``order[i]``.
-    """
-    angles = np.asarray(planetary_set.planet_angles)
-    turned = np.mod(angles[0] - angles, 2 * np.pi)
-    order = np.argsort(turned, kind="stable")
-    return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
-
-
-def loaded_image(
-    planetary_set: PlanetarySet, sun_torque: float, deviations: SetDeviations | None = None
-) -> tuple[PlanetarySet, np.ndarray, SetDeviations | None]:
-    """Find the set whose drive flanks a torque loads: the set itself, or its mirror image.
-
-    The mirror image turns the other way: position ``tau`` of the set is position ``-tau`` of the image.
-
-    A negative torque [N m] loads the right flanks of the sun. With the set come its ``order`` (N,), see
-    `mirrored_set`, and the deviations as it has them.
-    """
-    if sun_torque >= 0:
-        return planetary_set, np.arange(planetary_set.n_planets), deviations
-    mirrored, order = mirrored_set(planetary_set)
-    if deviations is not None:
-        deviations = mirrored_deviations(deviations, planetary_set, mirrored, order)
-    return mirrored, order, deviations
 
 
 def profile_form(

@@ -216,6 +216,18 @@ def close_set(
     return PlanetarySet(sun, planet, ring, centre_distance, planet_angles)
 
 
+def mirrored_set(planetary_set: PlanetarySet) -> tuple[PlanetarySet, np.ndarray]:
+    """Mirror a set: as it is seen from behind, and the places ``order`` of its planets in the original one.
+
+    Planet angles are counted the other way round, ascending from the first planet; mirrored planet ``i`` is
+    original planet ``order[i]``.
+    """
+    angles = np.asarray(planetary_set.planet_angles)
+    turned = np.mod(angles[0] - angles, 2 * np.pi)
+    order = np.argsort(turned, kind="stable")
+    return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
+
+
 def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:
     """Whole tooth numbers next to ``z / cos^3(beta)`` of sun, planet and ring, helix angle beta in rad."""
     cube = math.cos(helix_angle) ** 3

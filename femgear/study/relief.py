@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.gear_set import planetary_set, set_deviations
-from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
-from femgear.contact.flank_pairs import loaded_image, mesh_pairs
+from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
+from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations

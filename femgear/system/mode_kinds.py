@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.assembler import free_motions
+from femgear.system.mesh_directions import free_motions
 from femgear.system.rigid_bodies import RigidSet, body_masses
 
 PURE = 0.99

@@ -20,7 +20,7 @@ from femgear.case import text as case_text
 from femgear.case.checks import cross_check
 from femgear.case.csv_columns import embed_profiles
 from femgear.case.gear_set import with_shafts
-from femgear.case.problems import added_material, combine, notices, translate
+from femgear.case.mistakes import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.text import described, text_with_points
 from femgear.errors import CaseError, Finding

@@ -23,15 +23,15 @@ from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
 from femgear.storage.results import coordinates, dataset
-from femgear.system.assembler import (
+from femgear.system.force_laws import GearMeshes, RadialBearings
+from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of, tooth_lines
+from femgear.system.mesh_directions import (
     check_mesh_columns,
     free_motions,
     gear_set_system,
     mesh_directions,
     mesh_elements,
 )
-from femgear.system.force_laws import GearMeshes, RadialBearings
-from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of, tooth_lines
 from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis
 from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, RigidSet, flank_sign
 from femgear.system.system import HarmonicForce, MechanicalSystem, Modes, NonlinearSystem

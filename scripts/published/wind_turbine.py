@@ -16,7 +16,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
-from femgear.system.assembler import mesh_elements
+from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque
 from femgear.system.system import NonlinearSystem
 from femgear.trains.rigid import (

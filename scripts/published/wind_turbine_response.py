@@ -12,7 +12,7 @@ from femgear.solvers.continuation.branches import Branch
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.time.stroboscopic import SweepResponse, stroboscopic_map
-from femgear.system.assembler import free_motions, pin_directions
+from femgear.system.mesh_directions import free_motions, pin_directions
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import NonlinearSystem
 from femgear.trains.planar.model import column_contact, fluctuation, weight_curve

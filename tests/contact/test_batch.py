@@ -12,7 +12,7 @@ from femgear.case.gear_set import material_of, planetary_set
 from femgear.contact.assembly import contact_candidates, mesh_windows
 from femgear.contact.batch import ContactTangents, solve_batch
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.flank_pairs import loaded_image
+from femgear.contact.cycle import loaded_image
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, bearing_springs, moving_members
 from femgear.fe.elasticity import Material

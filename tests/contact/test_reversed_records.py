@@ -8,10 +8,10 @@ from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.flank_pairs import mirrored_set
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import Runout, common_period, mirrored_deviations, no_deviations
+from femgear.gears.planetary import mirrored_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0

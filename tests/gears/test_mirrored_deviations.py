@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from deviation_sets import ALPHA, UM, make_set
 
-from femgear.contact.flank_pairs import mirrored_set, tooth_numbers
+from femgear.contact.flank_pairs import tooth_numbers
 from femgear.gears.deviations import (
     Ovality,
     Runout,
@@ -18,6 +18,7 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.kinematics import orientations
 from femgear.gears.modifications import FlankForm, ProfileSlope
+from femgear.gears.planetary import mirrored_set
 
 
 def random_deviations(s, seed=3):

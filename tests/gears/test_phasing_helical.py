@@ -6,7 +6,7 @@ from phase_patterns import mesh_loads
 
 from femgear.gears.phasing import mesh_phasing, phasing_table
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
-from femgear.system.assembler import gear_set_system, mesh_directions, pin_directions
+from femgear.system.mesh_directions import gear_set_system, mesh_directions, pin_directions
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
 from femgear.trains.helical.model import HelicalSet
 from femgear.trains.rigid import gear_set_modes

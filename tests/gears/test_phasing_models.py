@@ -11,7 +11,7 @@ from femgear.gears.phasing import (
     phasing_table,
 )
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
-from femgear.system.assembler import gear_set_system, mesh_directions, pin_directions
+from femgear.system.mesh_directions import gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import (
     equally_spaced,
     gear_set_motions,

@@ -14,7 +14,7 @@ from published.transmission_errors import (
 from scipy import linalg
 
 from femgear.errors import CaseError
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 
 
 def ratios(M, C, K):

@@ -5,7 +5,7 @@ import pytest
 from published.planetary_sets import lin_parker_set
 from validation.reference.mode_energy import motion_planes, signed_phase_shares
 
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.mode_kinds import (
     class_energies,
     class_shares,

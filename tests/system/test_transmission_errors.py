@@ -18,8 +18,8 @@ from published.transmission_errors import (
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.assembler import gear_set_system, mesh_elements
 from femgear.system.fourier import tooth_lines
+from femgear.system.mesh_directions import gear_set_system, mesh_elements
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains.rigid import gear_set_problem
 

@@ -18,7 +18,7 @@ from published.wind_turbine_drivetrain import (
 
 from femgear.fe.shaft import RoundSection
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.trains.drivetrain.kinematics import planar_of
 from femgear.trains.drivetrain.model import (
     balanced_torque,

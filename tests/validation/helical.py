@@ -11,7 +11,7 @@ from published.planetary_sets import TABLE_2, cases, kahraman_set
 
 from femgear.gears.phasing import phase_factors
 from femgear.solvers.linear.receptance import modal_error_response
-from femgear.system.assembler import gear_set_system, mesh_directions
+from femgear.system.mesh_directions import gear_set_system, mesh_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.trains.helical.model import HelicalSet
 from femgear.trains.rigid import gear_set_modes

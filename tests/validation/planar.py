@@ -10,7 +10,7 @@ from published.planetary_sets import lin_parker_set, torsional_set
 from published.wind_turbine import wind_turbine_b
 
 from femgear.errors import ConvergenceError
-from femgear.system.assembler import mesh_elements
+from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import (
     PlanarBody,
     PlanarSet,

@@ -17,9 +17,9 @@ from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmo
 from femgear.solvers.periodic.shooting import ShootingSolution, solve_shooting
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.assembler import mesh_elements
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, harmonics_of
+from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.system.system import NonlinearSystem
 from femgear.trains.rigid import gear_set_problem, phased_series

@@ -1,10 +1,10 @@
 """Coordinates of a drivetrain, what ties them, the free spin, and the directions of its flanks.
 
 Mesh directions of planetary stages turn with their carrier; those of planets alone come from
-`femgear.system.assembler`. Where meshes separate, drive and back flanks are one-sided contacts, each with its
-own normal: on the back flank the tangential and the axial part of the normal are reversed, the radial one is
-not. Gears that come closer close both flanks, and teeth wedge (Y. Guo and R. G. Parker, Eur. J. Mech. A 29,
-2010, 1022-1033; for parallel axes the left and the right line of action of ISO 21771).
+`femgear.system.mesh_directions`. Where meshes separate, drive and back flanks are one-sided contacts, each
+with its own normal: on the back flank the tangential and the axial part of the normal are reversed, the
+radial one is not. Gears that come closer close both flanks, and teeth wedge (Y. Guo and R. G. Parker, Eur. J.
+Mech. A 29, 2010, 1022-1033; for parallel axes the left and the right line of action of ISO 21771).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy import linalg
 
 from femgear.errors import CaseError
 from femgear.fe.shaft import AXES, joint_deflections, joint_springs
-from femgear.system.assembler import mesh_directions, pin_directions
+from femgear.system.mesh_directions import mesh_directions, pin_directions
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.trains.drivetrain.parts import (
     Drivetrain,

@@ -25,7 +25,7 @@ from femgear.housing.sensor import (
 )
 from femgear.report.tables import Block, chosen, tabulate
 from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
-from femgear.system.assembler import mesh_names
+from femgear.system.mesh_directions import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 

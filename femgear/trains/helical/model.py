@@ -1,10 +1,10 @@
 """Helical planetary set of rigid bodies that move in space: the set of a case, and what its teeth excite.
 
-Carrier, ring, sun and N planets have three translations and three rotations each, 6 (N + 3) coordinates.
-A. Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
+Carrier, ring, sun and N planets have three translations and three rotations each, 6 (N + 3) coordinates. A.
+Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
 springs along the tooth normals, supports and planet pins in all directions, without terms of the carrier's
-speed. The matrices are those of `femgear.system.assembler.gear_set_system`; with the meshes as elements,
-`femgear.trains.rigid.gear_set_problem`, they have a stiffness that changes, play and contact loss.
+speed. The matrices are those of `femgear.system.mesh_directions.gear_set_system`; with the meshes as
+elements, `femgear.trains.rigid.gear_set_problem`, they have a stiffness that changes, play and contact loss.
 
 The mesh stiffness follows from that of spur teeth. Teeth are solved as spur gears of the transverse section;
 those of the normal section, the virtual gears, tell by how much their stiffness differs. A helical gear is
@@ -34,7 +34,7 @@ from femgear.gears import profile
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import virtual_set
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import (
     ContactLines,
     HelicalBody,
@@ -223,7 +223,7 @@ def helical_excitation(
         eps_beta, 0 or more.
     slices : int
         Number S of equal slices of the face width; each has a row of its own with its part of stiffness and
-        force, in the order of the columns of `femgear.system.assembler.mesh_directions`.
+        force, in the order of the columns of `femgear.system.mesh_directions.mesh_directions`.
     hand : {1, -1}
         1 where height +z runs ahead: a right-handed sun that turns counter-clockwise against the carrier, or
         a left-handed one that turns clockwise. Only slices see it.

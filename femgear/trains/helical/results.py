@@ -44,7 +44,7 @@ class HelicalModesResult:
 
     ``excitation`` has a row a slice, ``whole`` a row a mesh at its static state with fixed centres, both
     along the tooth normals and None where the mesh stiffness is given; ``phasing`` is that of every mode,
-    ``flank`` the sign of `femgear.system.assembler.mesh_directions`.
+    ``flank`` the sign of `femgear.system.mesh_directions.mesh_directions`.
     """
 
     planetary_set: PlanetarySet

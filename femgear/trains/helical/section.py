@@ -140,7 +140,7 @@ def check_helical(case: HelicalCase) -> Iterator[CaseError]:
             code="E-RANGE",
             key="helical.helix_angle",
             value="0 deg",
-            limit="above 0 deg up to 45 deg",
+            limit=f"above 0 deg up to {ANGLE.show(_LARGEST_HELIX)}",
             remedy="leave the section helical out",
         )
     yield from rigid_refusals(case, "helical", without_torque=", so there is no mesh stiffness")

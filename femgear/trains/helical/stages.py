@@ -20,7 +20,7 @@ from femgear.report.tables import describe_modes, describe_response, response_wa
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
-from femgear.system.assembler import free_motions, gear_set_system, mesh_directions, pin_directions
+from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation

@@ -1,12 +1,12 @@
 """Planetary stages in series as one mechanical system: data, speeds and torques, matrices.
 
-The stages are lumped sets (`femgear.system.assembler`), each in the frame of its own carrier; the shafts
-between members are springs or rigid. One rotation is the same in all frames, so that torsional couplings are
-exact at any speed. The centres of two members meet in the fixed frame: with ``z = x + i y`` in frames at the
-angles psi the lateral spring sees ``z_1 exp(i psi_1) - z_2 exp(i psi_2)``. It is a constant spring where both
-frames turn at one speed, or stand; otherwise its columns stay in ``W`` for the periodic element
-`femgear.system.force_laws.TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16)
-couple stages with the same springs.
+The stages are lumped sets (`femgear.system.mesh_directions`), each in the frame of its own carrier; the
+shafts between members are springs or rigid. One rotation is the same in all frames, so that torsional
+couplings are exact at any speed. The centres of two members meet in the fixed frame: with ``z = x + i y`` in
+frames at the angles psi the lateral spring sees ``z_1 exp(i psi_1) - z_2 exp(i psi_2)``. It is a constant
+spring where both frames turn at one speed, or stand; otherwise its columns stay in ``W`` for the periodic
+element `femgear.system.force_laws.TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129,
+2007, 1-16) couple stages with the same springs.
 
 Speeds and torques follow from Willis' equation of every stage in one linear system: with the speeds ``w`` of
 all central members, every stage, coupling, and fixed member is one row of ``A w = 0``. Ideal torques follow
@@ -26,7 +26,7 @@ from scipy.linalg import block_diag
 
 from femgear.errors import CaseError
 from femgear.gears.kinematics import planet_motion, torque_ratios
-from femgear.system.assembler import dof_names, free_motions, gear_set_system, mesh_directions
+from femgear.system.mesh_directions import dof_names, free_motions, gear_set_system, mesh_directions
 from femgear.system.rigid_bodies import (
     CENTRAL,
     PlanarSet,

@@ -15,9 +15,9 @@ import numpy as np
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import MeshErrorResponse, modal_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.system.assembler import gear_set_system, mesh_elements
 from femgear.system.force_laws import GearMeshes, TurningSprings, turning_wave
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample, tooth_lines
+from femgear.system.mesh_directions import gear_set_system, mesh_elements
 from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 from femgear.trains.multistage.case_file import (

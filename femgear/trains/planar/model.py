@@ -21,9 +21,9 @@ from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
-from femgear.system.assembler import free_motions, mesh_elements, pin_directions
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import constant, line_tail
+from femgear.system.mesh_directions import free_motions, mesh_elements, pin_directions
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
 from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
 from femgear.trains.rigid import (

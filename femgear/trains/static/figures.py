@@ -18,8 +18,7 @@ import numpy as np
 from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import Case
 from femgear.contact.bodies import Sectors, make_sectors
-from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
-from femgear.contact.flank_pairs import loaded_image
+from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.tooth_loads import deformed_set
 from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.gears.deviations import SetDeviations

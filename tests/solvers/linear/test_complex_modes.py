@@ -9,7 +9,7 @@ from validation.reference.mode_energy import motion_planes
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, solve_modes, whirl
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.system import MechanicalSystem, damping_matrix
 
 NO_MESH = np.zeros(0)

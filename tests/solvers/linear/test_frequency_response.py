@@ -17,7 +17,7 @@ from validation.reference.frequency_response import (
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, solve_modes
 from femgear.solvers.linear.receptance import modal_response
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.system import MechanicalSystem
 from femgear.trains.rigid import gear_set_modes
 

@@ -7,7 +7,7 @@ from published.planetary_sets import lin_parker_set
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import output_load, output_response, residual_output, solve_modes
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.system import MechanicalSystem
 
 

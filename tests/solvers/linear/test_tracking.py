@@ -20,7 +20,7 @@ from validation.reference.mode_energy import (
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes
 from femgear.solvers.linear.tracking import campbell_data, oscillating, track_modes
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.system import MechanicalSystem
 from femgear.trains.rigid import gear_set_modes

@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 from validation.reference.cornered_springs import BearingSprings
 
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.system.assembler import mesh_elements
 from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, harmonic_lines, harmonics_of
+from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.system.system import (
     HarmonicForce,

@@ -17,8 +17,8 @@ from scipy.linalg import eigh
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import gear_set_system
 from femgear.system.fourier import FourierSeries
+from femgear.system.mesh_directions import gear_set_system
 from femgear.trains.drivetrain.kinematics import planar_of
 from femgear.trains.drivetrain.model import (
     drivetrain_model,

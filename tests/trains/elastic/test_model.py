@@ -17,7 +17,7 @@ from femgear.fe.reduction import CyclicModes
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles
 from femgear.solvers.linear.modal import complex_modes, solve_modes
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import PlanarBody, planar_from_set
 from femgear.trains.elastic.model import (
     RADIAL,

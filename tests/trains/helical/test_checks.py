@@ -8,7 +8,7 @@ import pytest
 from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import CENTRAL, HelicalBody, HelicalSupport, PlanarTorque
 
 

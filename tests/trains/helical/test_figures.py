@@ -10,7 +10,7 @@ from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
 from femgear.report.style import png_bytes
-from femgear.system.assembler import free_motions, gear_set_system
+from femgear.system.mesh_directions import free_motions, gear_set_system
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.trains.helical.figures import spatial_mode_shapes
 from femgear.trains.rigid import gear_set_modes, in_space

@@ -15,7 +15,13 @@ from validation.planetary import nrel_set
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import dof_names, free_motions, gear_set_system, mesh_directions, pin_directions
+from femgear.system.mesh_directions import (
+    dof_names,
+    free_motions,
+    gear_set_system,
+    mesh_directions,
+    pin_directions,
+)
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque, body_masses, gear_geometry
 from femgear.trains.helical.model import HelicalSet, contact_ratios
 

@@ -15,7 +15,7 @@ from femgear.solvers.linear.receptance import modal_error_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.assembler import mesh_elements
+from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque
 from femgear.system.system import MeshExcitation, element_forces
 from femgear.trains.helical.model import HelicalSet, helical_excitation

@@ -10,7 +10,7 @@ from validation.reference.mode_energy import gear_set_springs, signed_phase_shar
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears.phasing import MeshPhasing
 from femgear.solvers.linear.receptance import modal_error_response
-from femgear.system.assembler import free_motions, gear_set_system
+from femgear.system.mesh_directions import free_motions, gear_set_system
 from femgear.system.mode_kinds import gear_set_motions
 from femgear.system.rigid_bodies import body_masses
 from femgear.trains.rigid import gear_set_modes

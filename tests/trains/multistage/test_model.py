@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 from small_trains import closed_set, published_table, stage, two_stages
 
 from femgear.errors import CaseError
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.multistage.model import (
     Member,

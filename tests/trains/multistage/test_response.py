@@ -11,8 +11,8 @@ from validation.reference.frequency_response import mesh_error_response
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.assembler import mesh_elements
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonic_lines, tooth_lines
+from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains.multistage.case_file import stage_gears
 from femgear.trains.multistage.model import (

@@ -13,7 +13,7 @@ from validation.planetary import nrel_set
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import (
+from femgear.system.mesh_directions import (
     dof_names,
     free_motions,
     gear_set_system,

@@ -10,13 +10,13 @@ from validation import planar
 from validation.planar import sharing_set, static_mesh_forces, sun_forces
 
 from femgear.errors import CaseError
-from femgear.system.assembler import (
+from femgear.system.fourier import FourierSeries, StepSeries, constant
+from femgear.system.mesh_directions import (
     gear_set_system,
     mesh_directions,
     mesh_elements,
     pin_directions,
 )
-from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, torque_shares
 from femgear.system.system import MeshExcitation, element_forces, external_force
 from femgear.trains.rigid import (

@@ -17,7 +17,7 @@ from femgear.solvers.periodic.solution import open_verdict
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.solvers.time.transient import solve_transient
 from femgear.storage.results import run_folder
-from femgear.system.assembler import gear_set_system
+from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains import registry
 from femgear.trains.planar.figures import (

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.contact.flank_pairs import mirrored_set
+from femgear.gears.planetary import mirrored_set
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.static.figures import _left_flanks_loaded
 from femgear.trains.static.stages import solve_static

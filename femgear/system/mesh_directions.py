@@ -1,4 +1,4 @@
-"""Matrices of planetary sets of rigid bodies: bodies, springs, meshes and what is held.
+"""Directions of meshes and springs of planetary sets of rigid bodies, and the matrices assembled from them.
 
 Carrier, ring, sun and N planets move along x, y and z, tilt by ``w = r phi`` and turn by ``u = r theta``, in
 the order and with the signs of J. Lin and R. G. Parker, J. Vib. Acoust. 121, 1999, 316-321: x and y of the
