@@ -29,13 +29,23 @@ def grid_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "femgear" / "meshes"
 
 
+class Solution(dict[str, Any]):
+    """Results of the computed stages by name, in order."""
+
+    def __repr__(self) -> str:
+        return f"<Solution: {', '.join(self) or 'no stage'}>"
+
+    def __missing__(self, name: str):
+        raise KeyError(f"{name!r} was not computed: there are {', '.join(self) or 'no stages'}")
+
+
 def solve(
     case: Any,
     only: str | None = None,
     *,
     progress: Progress = silent,
     done: Callable[[Stage, Any, float], None] | None = None,
-) -> dict[str, Any]:
+) -> Solution:
     """Compute the stages of a case in memory: transmission error, modes, vibration, whatever its train has.
 
     Parameters
@@ -51,8 +61,8 @@ def solve(
 
     Returns
     -------
-    dict of str to result
-        By the name of the stage, in order; ``dataset()`` of each has its numbers with units.
+    Solution
+        Results by the name of the stage, in order; ``dataset()`` of each has its numbers with units.
 
     Raises
     ------
@@ -63,7 +73,7 @@ def solve(
     stages = stages_of(case, only)
     if only is not None:
         case = stages[-1].asked(case)
-    results, options = {}, {"cache": grid_cache(), "progress": progress}
+    results, options = Solution(), {"cache": grid_cache(), "progress": progress}
     with one_blas_thread():
         for stage in stages:
             progress(stage.name, 0, 1)

@@ -231,6 +231,12 @@ class Results:
     def __getitem__(self, name: str) -> xr.Dataset:
         return getattr(self, name)
 
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.stages)
+
+    def __len__(self) -> int:
+        return len(self.stages)
+
     def stage(self, name: str) -> xr.Dataset:
         """Contents of the file of one stage."""
         return read_dataset(self._checked(f"{name}.nc"))

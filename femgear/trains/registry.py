@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from femgear.case.text import described
 from femgear.errors import CaseError
 from femgear.trains.drivetrain.stages import DRIVETRAIN
 from femgear.trains.elastic.stages import ELASTIC
@@ -16,8 +17,13 @@ TRAINS: tuple[Train, ...] = (MULTISTAGE, GEAR_PAIR, DRIVETRAIN, HELICAL, PLANAR,
 
 
 def train_of(case) -> Train:
-    """Train that a case is one of."""
-    return next(train for train in TRAINS if isinstance(case, train.model))
+    """Train that a case is one of; other things are refused (E-TYPE)."""
+    for train in TRAINS:
+        if isinstance(case, train.model):
+            return train
+    raise CaseError(
+        f"a case is needed, not {described(case)}", code="E-TYPE", remedy="femgear.read_case(path) reads one"
+    )
 
 
 def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:

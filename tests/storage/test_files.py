@@ -467,6 +467,7 @@ def test_results_and_cases_show_themselves_in_a_line(tmp_path):
     finish(folder, ["case.toml", "static.nc"], timings={"static": 0.5}, convergence={})
     results = open_results(folder)
     assert repr(results) == f"<Results in {folder}: static; complete>"
+    assert list(results) == ["static"] and len(results) == 1 and "modes" not in results
     assert "<td>static</td>" in results._repr_html_() and "0.50 s" in results._repr_html_()
     case = results.case
     assert repr(case) == f"<Case {case.title!r} of {folder / 'case.toml'}>"

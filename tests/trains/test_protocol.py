@@ -68,6 +68,11 @@ def test_stages_are_solved_in_memory(path):
     results = solve(read_case(path), progress=lambda *one: said.append(one))
     assert list(results) == ["modes", "receptance"] and said[-1] == ("receptance", 1, 1)
     assert results["receptance"].dataset()["receptance"].max() == pytest.approx(1 / (0.04 * 8e5), rel=1e-3)
+    assert repr(results) == "<Solution: modes, receptance>"
+    with pytest.raises(KeyError, match="'housing' was not computed: there are modes, receptance"):
+        results["housing"]
+    with pytest.raises(CaseError, match="a case is needed, not a text"):
+        solve(str(path))
     assert list(solve(read_case(path), "modes")) == ["modes"]
     with pytest.raises(CaseError, match="no stage of an oscillator"):
         solve(read_case(path), "housing")
