@@ -337,13 +337,15 @@ class _ActiveSets:
         return sure & (self.residual[done] < _RESIDUAL)
 
     def _alone(self, at) -> None:
-        """Solve one position by itself."""
+        """Solve one position by itself, from what touches at the position before."""
         problem, candidate = self.found.problem(at), self.found.candidate[at]
+        before = max(at - 1, 0)
         arrays = problem.compliance, problem.gap, problem.G
         if self.bearings is not None:
             arrays = self.bearings.joined(*arrays)
-        start = np.concatenate([self.active[at][candidate], self.springs[at]])
+        start = np.concatenate([self.active[before][candidate], self.springs[before]])
         state = solve_contact(*arrays, self.given, start=start)
+        self.springs[at] = state.active[len(problem.gap) :]
         for name in ("loads", "gaps", "active"):
             values = getattr(self, name)
             values[at] = 0
