@@ -240,9 +240,15 @@ def _krylov(problem: HarmonicProblem) -> np.ndarray:
 
     right = _rows(problem.source)[0]
     operator = sparse_linalg.LinearOperator((len(right), len(right)), matvec=image, dtype=float)  # type: ignore[call-arg]
-    row, _ = sparse_linalg.gmres(operator, right, rtol=0.1 * _ROUNDING, atol=0.0, restart=200, maxiter=4)
-    found = np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)
-    return found if _harmonic_residual(problem, found)[0] <= _ROUNDING else _eliminated(problem)
+    row = None
+    for _ in range(4):
+        row, _ = sparse_linalg.gmres(
+            operator, right, x0=row, rtol=0.1 * _ROUNDING, atol=0.0, restart=400, maxiter=1
+        )
+        found = np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)
+        if _harmonic_residual(problem, found)[0] <= _ROUNDING:
+            return found
+    return _eliminated(problem)
 
 
 def _eliminated(problem: HarmonicProblem) -> np.ndarray:
