@@ -3,6 +3,7 @@
 import contextlib
 import importlib.util
 import io
+import os
 import signal
 import subprocess
 import sys
@@ -10,6 +11,10 @@ import threading
 from pathlib import Path
 
 import pytest
+
+# before NumPy is loaded, as the Makefile has it: threads of BLAS and workers of pytest would share the cores
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 
 TESTS = Path(__file__).parent
 
