@@ -130,7 +130,7 @@ def solve_step(problem: Problem, active: np.ndarray) -> Step:
     scale = np.abs(elastic).max(initial=0.0)
     blocked = forced = np.zeros(0, int)
     if null.shape[1]:
-        shift, blocked, forced = _settle(problem, null, gaps, active)
+        shift, blocked, forced = settle(problem.G, problem.load, problem.arm, null, gaps, active)
         motions = motions + null @ shift
         # the multipliers of the least distance problem carry the rounding of its largest row
         scale += 10 * np.abs(problem.G @ (null @ shift)).max(initial=0.0)
@@ -193,23 +193,42 @@ def _residual(problem: Problem, active, loads, gaps) -> float:
     return float(max(touching / length, penetration / length, pull / force, imbalance / force))
 
 
-def _settle(problem: Problem, null, gaps, active):
-    """Motions that no touching candidate restrains: their shift, who cannot be judged, who must touch.
+def settle(G, load, arm, null, gaps, active):
+    """Move what no touching candidate restrains: the shift, who cannot be judged, who must touch.
 
-    Amounts (k,) along the columns of `null`, numbers of the candidates whose gaps mean nothing because no
-    shift settles these motions, and of those that must touch.
+    Parameters
+    ----------
+    G, load, arm : (n, m), (m,), (m,) arrays
+        Of a `Problem`.
+    null : (m, k) array
+        Motions that no touching candidate restrains.
+    gaps : (n,) array
+        Separations before these motions.
+    active : (n,) bool array
+
+    Returns
+    -------
+    tuple
+        Amounts (k,) along the columns of `null`, the smallest that end all penetration; numbers of the
+        candidates whose gaps mean nothing because no shift settles these motions, and of those that must
+        touch.
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-OPEN when no candidate can balance the load.
     """
-    arms = problem.G @ null
+    arms = G @ null
     moved = np.flatnonzero(~active & (np.abs(arms).max(axis=1) > 1e-9))
-    pull = null.T @ problem.load
-    if np.abs(pull).max() > 1e-9 * np.abs(problem.load).max(initial=0.0):
+    pull = null.T @ load
+    if np.abs(pull).max() > 1e-9 * np.abs(load).max(initial=0.0):
         speed = arms[moved] @ pull
         meets = speed > 1e-9 * np.abs(speed).max(initial=0.0)
         if not meets.any():
             raise ContactError(
                 "no candidate can balance the load: the contacts cannot push in its direction",
                 code="E-CONTACT-OPEN",
-                value=(problem.load * problem.arm).tolist(),
+                value=(load * arm).tolist(),
                 remedy="check the sign of the load and that every mesh has candidates",
             )
         first = moved[meets][np.argmin(gaps[moved[meets]] / speed[meets])]

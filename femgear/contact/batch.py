@@ -8,8 +8,8 @@ up to one, so that a motion q approaches the cells of all windows by ``Pi e G q`
     (I + Q S) z - Q e G q = -Pi^T y,    (e G)^T z = load,    Q = Pi^T Y,    p = -y - Y (S z - e G q)
 
 has three unknowns a window instead of its cells. All cells that pull or penetrate change sides at once, until
-there are none. Positions where that does not end, motions that nothing restrains, and loads that may be
-rounding are left to `femgear.contact.solve.solve_contact`.
+there are none. Positions where that does not end, and loads that may be rounding, are left to
+`femgear.contact.solve.solve_contact`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.contact.active_set import NULL, RIGID, ROUNDING
+from femgear.contact.active_set import NULL, RIGID, ROUNDING, settle
 from femgear.contact.assembly import ROUGH_STIFFNESS, Candidates
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import BearingSprings
@@ -225,16 +225,15 @@ class _ActiveSets:
             right = np.dstack([found.gap[place], found.polynomials[place]])
             columns = _local_solution(found.local[place], self.active[place], right)
             self.offset[place], self.columns[place] = columns[..., 0], columns[..., 1:]
-            loads, motions, restrained = self._linear(todo, self.offset[todo], self.load, self.clearance)
-            flips, spring_flips = self._conditions(todo, loads, motions)
+            step = self._linear(todo, self.offset[todo], self.load, self.clearance)
+            flips, spring_flips = self._conditions(todo, *step)
             wrong = flips.any(axis=(1, 2)) | spring_flips.any(axis=1)
-            solved[todo[restrained & ~wrong]] = True
-            more = restrained & wrong
-            todo, flips = todo[more], flips[more]
+            solved[todo[~wrong]] = True
+            todo, flips = todo[wrong], flips[wrong]
             if not len(todo):
                 break
             self.active[todo] ^= flips
-            self.springs[todo] ^= spring_flips[more]
+            self.springs[todo] ^= spring_flips[wrong]
             changed = flips.any(axis=-1)
         # what is left may have lost all contact on its way
         self.active[~solved], self.springs[~solved] = (start[~solved] for start in first)
@@ -244,13 +243,13 @@ class _ActiveSets:
             self._alone(at)
 
     def _linear(self, todo, offset, load, clearance):
-        """Loads and motions when exactly the active cells touch, and whether the motions are restrained.
+        """Loads, motions and unrestrained motions when exactly the active cells touch.
 
-        From ``L^-1 gap`` (t, W, C), the load (t, m) or (m,) and the clearance of the bearings. The motion of
-        a planet that touches nothing is zero.
+        From ``L^-1 gap`` (t, W, C), the load (t, m) or (m,) and the clearance of the bearings. Motions that
+        nothing restrains are zero; they are the columns (m, k) of the arrays, by position.
         """
         S, columns = self.S[todo], self.columns[todo]
-        T, n, planet = len(todo), 3 * S.shape[1], np.arange(self.found.setup.n_planets)
+        T, n = len(todo), 3 * S.shape[1]
         onto, G = self.found.polynomials[todo].swapaxes(-1, -2), np.repeat(self.G, 3, axis=0)
         Q, moments = onto @ columns, onto @ offset[..., None]
         matrix = (Q @ S.reshape(T, -1, 3, n)).reshape(T, n, n) + np.eye(n)
@@ -259,23 +258,16 @@ class _ActiveSets:
         springs = self.springs[todo] / self.softness
         stiffness = G.T @ solved[..., :-1] + np.swapaxes(self.arms * springs[..., None], -1, -2) @ self.arms
         balance = load + solved[..., -1] @ G + clearance * (springs @ self.arms)
-        stiffness[:, planet, planet] += self._unloaded(todo) * stiffness.max(axis=(1, 2))[:, None]
         held, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.swapaxes(-1, -2)))
-        restrained = held[:, 0] > NULL * held[:, -1]
-        held = np.where(restrained[:, None], held, 1.0)[..., None]
-        motions = vectors @ (vectors.swapaxes(-1, -2) @ balance[..., None] / held)
+        free = held <= NULL * held[:, -1:]
+        along = vectors.swapaxes(-1, -2) @ balance[..., None]
+        motions = vectors @ np.where(free[..., None], 0.0, along / np.where(free, 1.0, held)[..., None])
         moved = S.reshape(T, n, n) @ (solved[..., :-1] @ motions - solved[..., -1:]) - G @ motions
         loads = -offset - (columns @ moved.reshape(T, -1, 3, 1))[..., 0]
-        return loads, motions[..., 0], restrained
+        null = {at: vectors[at][:, free[at]] for at in np.flatnonzero(free.any(axis=1))}
+        return loads, motions[..., 0], null
 
-    def _unloaded(self, todo) -> np.ndarray:
-        """Planets that touch nothing and whose bearings hold their axes in place, (t, N)."""
-        N = self.found.setup.n_planets
-        on_planet = self.found.mesh % N == np.arange(N)[:, None]
-        touching = np.asarray(self.active[todo].any(axis=-1))[:, None] & on_planet
-        return ~touching.any(axis=-1) & (self.bearings is None)
-
-    def _conditions(self, todo, loads, motions):
+    def _conditions(self, todo, loads, motions, null):
         """Keep a linear solution; find the cells and springs that violate the other conditions."""
         found, active, springs = self.found, self.active[todo], self.springs[todo]
         candidate, values, gap = found.candidate[todo], found.polynomials[todo], found.gap[todo]
@@ -284,15 +276,15 @@ class _ActiveSets:
         bodies = (self.S[todo].reshape(T, n, n) @ moments).reshape(T, -1, 3, 1)
         elastic = np.where(candidate, (found.local[todo] @ loads[..., None] + values @ bodies)[..., 0], 0.0)
         separation = np.where(candidate, gap + elastic, np.inf)
-        motions, forced = self._turned(todo, separation - (motions @ self.G.T)[..., None], motions)
+        motions, turned, blocked, forced = self._settled(todo, separation, motions, null)
         approach = (motions @ self.G.T)[..., None]
         gaps = separation - approach
         closed = motions @ self.arms.T - self.clearance
         carried = np.where(springs, closed / self.softness, 0.0)
         moved, largest = np.abs(elastic).max(axis=(1, 2)), np.abs(loads).max(axis=(1, 2))
         largest = np.maximum(largest, np.abs(carried).max(axis=1, initial=0.0))[:, None, None]
-        rounding = ROUNDING * (np.abs(gap) + moved[:, None, None] + np.abs(approach))
-        flips = np.where(active, loads < -10 * ROUNDING * largest, gaps < -rounding) | forced
+        rounding = ROUNDING * (np.abs(gap) + (moved + 10 * turned)[:, None, None] + np.abs(approach))
+        flips = np.where(active, loads < -10 * ROUNDING * largest, gaps < -rounding)
         imbalance = self.load - loads.sum(axis=-1) @ self.G - carried @ self.arms
         length = np.maximum(moved, RIGID * np.abs(gap).max(axis=(1, 2)))
         apart = np.where(active, np.abs(gaps), -gaps).max(axis=(1, 2)) / np.where(length > 0, length, 1.0)
@@ -302,21 +294,33 @@ class _ActiveSets:
         self.loads[todo], self.motions[todo], self.imbalance[todo] = loads, motions, imbalance
         self.gaps[todo] = np.where(candidate, gaps, 0.0)
         self.iterations[todo] += 1
-        rounding = ROUNDING * (self.clearance + np.abs(closed))
-        return flips, np.where(springs, closed < -rounding, closed > rounding)
+        rounding = ROUNDING * (self.clearance + 10 * turned[:, None] + np.abs(closed))
+        spring_flips = np.where(springs, closed < -rounding, closed > rounding)
+        return flips & ~blocked[0] | forced[0], spring_flips & ~blocked[1] | forced[1]
 
-    def _turned(self, todo, gaps, motions):
-        """Turn planets that touch nothing as little as they must; tell which cells (t, W, C) must touch."""
-        forced, motions = np.zeros(gaps.shape, bool), motions.copy()
-        for at, planet in zip(*np.nonzero(self._unloaded(todo)), strict=True):
-            arms, turn = self.G[:, planet, None], motions[at, planet]
-            highest = np.where(arms > 0, turn + gaps[at], np.inf)
-            lowest = np.where(arms < 0, turn - gaps[at], -np.inf)
-            if lowest.max() <= highest.min():
-                motions[at, planet] = np.clip(0.0, lowest.max(), highest.min())
-            else:
-                forced[at].ravel()[[lowest.argmax(), highest.argmin()]] = True
-        return motions, forced
+    def _settled(self, todo, separation, motions, null):
+        """Move planets that nothing restrains as little as they must.
+
+        Gives the motions, the largest approach (t,) by it, and which cells (t, W, C) and springs (t, n) have
+        gaps that mean nothing and which must touch, see `femgear.contact.active_set.settle`.
+        """
+        motions, turned = motions.copy(), np.zeros(len(todo))
+        blocked, forced = (
+            (np.zeros(separation.shape, bool), np.zeros((len(todo), len(self.arms)), bool)) for _ in range(2)
+        )
+        for at, free in null.items():
+            candidate = self.found.candidate[todo[at]]
+            arms = np.vstack([self.G[np.nonzero(candidate)[0]], self.arms])
+            gaps = np.append(separation[at][candidate], np.full(len(self.arms), self.clearance))
+            active = np.append(self.active[todo[at]][candidate], self.springs[todo[at]])
+            motions[at] -= free @ (free.T @ motions[at])
+            shift, *numbers = settle(arms, self.load, self.arm, free, gaps - arms @ motions[at], active)
+            motions[at] += free @ shift
+            turned[at] = np.abs(arms @ (free @ shift)).max(initial=0.0)
+            for (cells, springs), chosen in zip((blocked, forced), numbers, strict=True):
+                told = np.isin(np.arange(len(gaps)), chosen)
+                cells[at][candidate], springs[at] = np.split(told, [candidate.sum()])
+        return motions, turned, blocked, forced
 
     def _refined(self, done) -> np.ndarray:
         """Take what rounding left out of solved positions; tell which of them need no second look."""
@@ -324,8 +328,8 @@ class _ActiveSets:
         rows = np.nonzero(active.any(axis=-1))
         at, offset = (done[rows[0]], rows[1]), np.zeros(active.shape)
         offset[rows] = _local_solution(self.found.local[at], active[rows], self.gaps[at][..., None])[..., 0]
-        loads, motions, _ = self._linear(done, offset, self.imbalance[done], 0.0)
-        conditions = self._conditions(done, self.loads[done] + loads, self.motions[done] + motions)
+        loads, motions, null = self._linear(done, offset, self.imbalance[done], 0.0)
+        conditions = self._conditions(done, self.loads[done] + loads, self.motions[done] + motions, null)
         loads = self.loads[done]
         largest = loads.max(axis=(1, 2), keepdims=True)
         doubtful = (active & (loads <= _FAINT * largest)) | conditions[0]
