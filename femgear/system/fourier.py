@@ -9,6 +9,7 @@ once. Lines of a spectrum are the combinations ``orders . omega`` kept.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -19,6 +20,8 @@ from femgear.errors import CaseError, checked_numbers
 _ROUNDING = 1e-12
 # Difference of two line frequencies, relative to the highest one, below which they are one.
 _COINCIDE = 1e-9
+# Harmonics up to which a matrix multiplies faster than transforms.
+_FEW = 100
 
 
 def harmonics_of(samples, count: int) -> np.ndarray:
@@ -76,45 +79,52 @@ def pad(amplitudes: np.ndarray, count: int) -> np.ndarray:
     return out
 
 
-def product_matrix(factor: np.ndarray, count: int) -> np.ndarray:
-    """Real matrix that multiplies harmonics by a periodic factor, without aliasing.
+@dataclass(frozen=True)
+class Product:
+    """Multiplication of the harmonics of signals by periodic factors, without aliasing.
 
-    With two-sided coefficients ``a_n`` of the factor, ``(a x)_h = sum_m a_{h-m} X_m + a_{h+m} conj(X_m)``
-    for h > 0 and half of it for h = 0: a Toeplitz and a Hankel part.
+    By a matrix, or in time where there are many harmonics.
 
     Parameters
     ----------
-    factor : (..., n + 1) complex array
-        One-sided harmonics of the factor.
-    count : int
-        Highest harmonic of the other factor and of the product.
-
-    Returns
-    -------
-    (..., 2 (count + 1), 2 (count + 1)) array
-        Acts on, and gives, the interleaved column ``Re X_0, Im X_0 (zero), Re X_1, Im X_1, ...``.
+    factor : (n, H + 1) complex array
+        One-sided harmonics of the factors.
     """
-    size = count + 1
-    half = pad(factor, 2 * count) * 0.5
-    half[..., 0] *= 2.0
-    two_sided = np.concatenate([np.conj(half[..., :0:-1]), half], axis=-1)
-    # rows that start one later each; of the Toeplitz part, turned round
-    rows = sliding_window_view(two_sided, size, axis=-1)
-    toeplitz, hankel = rows[..., count : 2 * count + 1, ::-1], rows[..., 2 * count : 3 * count + 1, :]
-    out = np.empty((*factor.shape[:-1], size, 2, size, 2))
-    np.add(toeplitz.real, hankel.real, out=out[..., 0, :, 0])
-    np.add(toeplitz.imag, hankel.imag, out=out[..., 1, :, 0])
-    np.subtract(hankel.imag, toeplitz.imag, out=out[..., 0, :, 1])
-    np.subtract(toeplitz.real, hankel.real, out=out[..., 1, :, 1])
-    out[..., 0, :, :, :] *= 0.5
-    return out.reshape(*factor.shape[:-1], 2 * size, 2 * size)
 
+    factor: np.ndarray
 
-def multiply(matrix: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
-    """Harmonics of the product: ``matrix`` (n, L, L) of :func:`product_matrix`, amplitudes (n, ..., L/2)."""
-    amplitudes = np.ascontiguousarray(amplitudes, dtype=complex)
-    flat = amplitudes.view(float).reshape(amplitudes.shape[0], -1, matrix.shape[-1])
-    return np.matmul(flat, matrix.transpose(0, 2, 1)).view(complex).reshape(amplitudes.shape)
+    def __call__(self, amplitudes: np.ndarray) -> np.ndarray:
+        """Harmonics (n, ..., H + 1) of the products with one-sided harmonics of the same shape."""
+        n, size = self.factor.shape
+        if size <= _FEW:
+            flat = np.ascontiguousarray(amplitudes, dtype=complex).view(float).reshape(n, -1, 2 * size)
+            return np.matmul(flat, self.matrix.transpose(0, 2, 1)).view(complex).reshape(amplitudes.shape)
+        # with so many instants no harmonic is another one's alias
+        points = 1 << (3 * size - 1).bit_length()
+        instants = sample(self.factor, points).reshape(n, *(1,) * (amplitudes.ndim - 2), points)
+        return harmonics_of(instants * sample(amplitudes, points), size - 1)
+
+    @cached_property
+    def matrix(self) -> np.ndarray:
+        """Real matrices (n, 2 (H + 1), 2 (H + 1)) that act on, and give, columns ``Re X_0, Im X_0 (zero), ...``.
+
+        With two-sided coefficients ``a_n`` of the factor, ``(a x)_h = sum_m a_{h-m} X_m + a_{h+m} conj(X_m)``
+        for h > 0 and half of it for h = 0: a Toeplitz and a Hankel part.
+        """
+        n, size = self.factor.shape
+        half = pad(self.factor, 2 * (size - 1)) * 0.5
+        half[:, 0] *= 2.0
+        two_sided = np.concatenate([np.conj(half[:, :0:-1]), half], axis=-1)
+        # rows that start one later each; of the Toeplitz part, turned round
+        rows = sliding_window_view(two_sided, size, axis=-1)
+        toeplitz, hankel = rows[:, size - 1 : 2 * size - 1, ::-1], rows[:, 2 * size - 2 : 3 * size - 2, :]
+        out = np.empty((n, size, 2, size, 2))
+        np.add(toeplitz.real, hankel.real, out=out[..., 0, :, 0])
+        np.add(toeplitz.imag, hankel.imag, out=out[..., 1, :, 0])
+        np.subtract(hankel.imag, toeplitz.imag, out=out[..., 0, :, 1])
+        np.subtract(toeplitz.real, hankel.real, out=out[..., 1, :, 1])
+        out[:, 0] *= np.array([0.5, 1.0])[:, None, None]
+        return out.reshape(n, 2 * size, 2 * size)
 
 
 @dataclass(frozen=True)

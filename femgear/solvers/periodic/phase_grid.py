@@ -96,7 +96,7 @@ class PhaseGrid:
     def products(self, coefficients: np.ndarray) -> np.ndarray:
         """Matrices (n, L, 2 L - 1) that give the lines of a product from ``Re X_0, Re X_1, Im X_1, ...``.
 
-        Toeplitz and Hankel parts as in `fourier.product_matrix`; they are the exact derivatives of the
+        Toeplitz and Hankel parts as in `fourier.Product`; they are the exact derivatives of the
         sampled transform, aliasing included.
         """
         toeplitz, hankel = _pick(coefficients, self.differences), _pick(coefficients, self.sums)

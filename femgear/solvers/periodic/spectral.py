@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import linalg as sparse_linalg
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.system.fourier import multiply, pad, product_matrix, sample
+from femgear.system.fourier import Product, pad, sample
 from femgear.system.system import MeshExcitation, Modes, Response, mesh_harmonics
 
 # Two signals or receptances closer than this (relative) are equal: identical planets.
@@ -102,12 +102,12 @@ def solve_spectral(
 class HarmonicProblem:
     """``E_h + T_h (g E)_h = S_h`` for every harmonic h, mesh and speed.
 
-    Receptance T (n, n, n_speeds, H + 1) [m/N]; product (n, 2 (H + 1), 2 (H + 1)), multiplication by the
-    stiffness fluctuation of each mesh, see `fourier.product_matrix` [N/m]; source S (n, n_speeds, H + 1) [m].
+    Receptance T (n, n, n_speeds, H + 1) [m/N]; multiplication by the stiffness fluctuation g (n, H + 1) of
+    each mesh [N/m]; source S (n, n_speeds, H + 1) [m].
     """
 
     receptance: np.ndarray
-    product: np.ndarray
+    product: Product
     source: np.ndarray
 
     def take(self, speeds) -> HarmonicProblem:
@@ -180,7 +180,7 @@ def transfer(receptances: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 def _apply(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
     """``T G E`` of (n, n_speeds, H + 1) harmonics."""
-    return transfer(problem.receptance, multiply(problem.product, deflection))
+    return transfer(problem.receptance, problem.product(deflection))
 
 
 def _harmonic_residual(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
@@ -197,7 +197,7 @@ def norm(deflection: np.ndarray) -> np.ndarray:
 def matrices(problem: HarmonicProblem) -> np.ndarray:
     """``T G`` as matrices (n_speeds, n L, n L) on interleaved real and imaginary parts, L = 2 (H + 1)."""
     n, _, speeds, size = problem.receptance.shape
-    product = problem.product.reshape(n, size, 2, 2 * size)
+    product = problem.product.matrix.reshape(n, size, 2, 2 * size)
     columns = product[:, :, 0] + 1j * product[:, :, 1]
     out = np.empty((speeds, n, size, 2, n, 2 * size))
     for i in range(n):
@@ -228,15 +228,10 @@ def solve_direct(problem: HarmonicProblem) -> np.ndarray:
 def _krylov(problem: HarmonicProblem) -> np.ndarray:
     """Harmonics (n, 1, H + 1) [m] of one speed by GMRES, or by elimination."""
     n, _, size = problem.source.shape
-    # the first column of a product is its factor; with so many instants no harmonic is another one's alias
-    points = 1 << (3 * size - 1).bit_length()
-    stiffness = sample(problem.product[:, ::2, 0] + 1j * problem.product[:, 1::2, 0], points)
 
     def image(row: np.ndarray) -> np.ndarray:
-        deflection = np.ascontiguousarray(row.reshape(n, 2 * size)).view(complex)
-        force = np.fft.rfft(stiffness * sample(deflection, points), axis=-1)[:, :size] * (2.0 / points)
-        force[:, 0] *= 0.5
-        return row + _rows(transfer(problem.receptance, force[:, None]))[0]
+        deflection = np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)
+        return row + _rows(_apply(problem, deflection))[0]
 
     right = _rows(problem.source)[0]
     operator = sparse_linalg.LinearOperator((len(right), len(right)), matvec=image, dtype=float)  # type: ignore[call-arg]
@@ -297,7 +292,7 @@ def reduce_twins(problem: HarmonicProblem, twins: Twins) -> HarmonicProblem | No
     for j, g in enumerate(twins.group):
         if np.any(np.abs(folded[j] - twins.shift[j] * reduced[g]) > _EQUAL * scale):
             return None
-    return HarmonicProblem(reduced, problem.product[twins.leaders], problem.source[twins.leaders])
+    return HarmonicProblem(reduced, Product(problem.product.factor[twins.leaders]), problem.source[twins.leaders])
 
 
 def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
@@ -400,7 +395,7 @@ def _checked(modes, excitation, mesh_frequency, method, tolerance, max_iteration
 class _Data:
     """What does not depend on speed: the fluctuation, the forcing ``F - k s`` and who repeats whom."""
 
-    product: np.ndarray
+    product: Product
     forcing: np.ndarray
     twins: Twins
 
@@ -409,11 +404,11 @@ class _Data:
         stiffness, deflection, force = (
             pad(signal, count) for signal in mesh_harmonics(excitation, harmonics)
         )
-        forcing = force - multiply(product_matrix(stiffness, count), deflection)
+        forcing = force - Product(stiffness)(deflection)
         stiffness[:, 0] -= modes.mesh_stiffness
         load = pad(modes.load_deflection[:, None], count)
         twins = find_twins((stiffness, forcing, load))
-        return cls(product_matrix(stiffness, count), forcing, twins)
+        return cls(Product(stiffness), forcing, twins)
 
 
 def _solve_batch(modes, data: _Data, fundamental, options, top: int) -> tuple[np.ndarray, ...]:
@@ -440,7 +435,7 @@ def _solve_batch(modes, data: _Data, fundamental, options, top: int) -> tuple[np
     if len(rough) and method != "fixed point":
         deflection[:, rough], direct[rough] = solve_direct(problem.take(rough)), True
         residual[rough] = _harmonic_residual(problem.take(rough), deflection[:, rough])
-    total = forcing + multiply(data.product, deflection)
+    total = forcing + data.product(deflection)
     force = total + modes.mesh_stiffness[:, None, None] * deflection
     work = -np.tensordot(modes.mesh_deflection, total, axes=(0, 0))
     if modes.modal_load is not None:

@@ -8,7 +8,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic import spectral
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.fourier import harmonics_of, multiply, pad, product_matrix, sample
+from femgear.system.fourier import Product, harmonics_of, pad, sample
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 
@@ -52,11 +52,13 @@ def integrate(system, excitation, modes, frequency, harmonics, instants=64):
     return system.W.T @ motion
 
 
-def test_product_of_harmonics_is_the_product_of_signals():
+@pytest.mark.parametrize("few", [100, 0], ids=["matrix", "in time"])
+def test_product_of_harmonics_is_the_product_of_signals(few, monkeypatch):
+    monkeypatch.setattr("femgear.system.fourier._FEW", few)
     rng = np.random.default_rng(0)
     a, b = (rng.standard_normal((2, 64)) for _ in range(2))
     a, b = harmonics_of(a, 4), harmonics_of(b, 6)
-    product = multiply(product_matrix(a, 6), b[:, None, :])[:, 0]
+    product = Product(pad(a, 6))(b[:, None, :])[:, 0]
     np.testing.assert_allclose(product, harmonics_of(sample(a, 64) * sample(b, 64), 6), atol=1e-14)
 
 
@@ -174,7 +176,7 @@ def full_problem(modes, excitation, frequency):
     """The unreduced equations, built by hand from samples and the modal sum."""
     k, s, f = (harmonics_of(a, 6) for a in (excitation.stiffness, excitation.deflection, excitation.force))
     k, s, f = (np.pad(a, ((0, 0), (0, 6))) for a in (k, s, f))
-    forcing = f - multiply(product_matrix(k, 12), s)
+    forcing = f - Product(k)(s)
     k[:, 0] -= modes.mesh_stiffness
     omega, w = 2 * np.pi * np.outer(frequency, np.arange(13)), 2 * np.pi * modes.frequency
     modal = 1 / (w**2 - omega[..., None] ** 2 + 2j * modes.damping_ratio * w * omega[..., None])
@@ -182,7 +184,7 @@ def full_problem(modes, excitation, frequency):
     receptance = np.einsum("ik,jk,shk->ijsh", r, r, modal) + modes.residual[:, :, None, None]
     source = -np.einsum("ijsh,jh->ish", receptance, forcing)
     source[..., 0] += modes.load_deflection[:, None]
-    return spectral.HarmonicProblem(receptance, product_matrix(k, 12), source)
+    return spectral.HarmonicProblem(receptance, Product(k), source)
 
 
 @pytest.mark.parametrize("spoiled", [False, True])
