@@ -4,6 +4,8 @@
 
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
+# Hundreds of commands and workers start here: none compiles again what another one has.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Relative paths, so that the place of the clone may hold blanks.
 PY := .venv/bin/python
