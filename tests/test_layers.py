@@ -167,3 +167,13 @@ def test_heavy_libraries_are_imported_late(code):
 def test_checking_a_case_loads_no_library_that_draws_or_solves():
     case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
     assert heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])") == {"pint"}
+
+
+def test_no_function_is_longer_than_70_lines():
+    functions = ast.FunctionDef, ast.AsyncFunctionDef
+    long = {}
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, functions) and node.end_lineno - node.lineno >= 70:
+                long[f"{place(path)}:{node.name}"] = node.end_lineno - node.lineno + 1
+    assert not long
