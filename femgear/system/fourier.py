@@ -106,7 +106,7 @@ class Product:
 
     @cached_property
     def matrix(self) -> np.ndarray:
-        """Real matrices (n, 2 (H + 1), 2 (H + 1)) that act on, and give, columns ``Re X_0, Im X_0 (zero), ...``.
+        """Real matrices (n, 2 (H + 1), 2 (H + 1)) from and to columns ``Re X_0, Im X_0 (zero), ...``.
 
         With two-sided coefficients ``a_n`` of the factor, ``(a x)_h = sum_m a_{h-m} X_m + a_{h+m} conj(X_m)``
         for h > 0 and half of it for h = 0: a Toeplitz and a Hankel part.

@@ -165,7 +165,7 @@ def solve_modes(
 
 
 def _residual_flexibility(system, mesh_stiffness, static, rows, omega) -> np.ndarray:
-    """Flexibility (n_meshes, n_meshes) [m/N] of the modes left out and of what the system has beside its own."""
+    """Flexibility (n_meshes, n_meshes) [m/N] of the modes left out and of the meshes themselves."""
     residual = static - _modal_flexibility(rows, rows, omega)
     if system.flexibility is not None:
         residual += _spring_share(system, mesh_stiffness) @ system.flexibility

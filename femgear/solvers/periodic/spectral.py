@@ -292,7 +292,8 @@ def reduce_twins(problem: HarmonicProblem, twins: Twins) -> HarmonicProblem | No
     for j, g in enumerate(twins.group):
         if np.any(np.abs(folded[j] - twins.shift[j] * reduced[g]) > _EQUAL * scale):
             return None
-    return HarmonicProblem(reduced, Product(problem.product.factor[twins.leaders]), problem.source[twins.leaders])
+    product = Product(problem.product.factor[twins.leaders])
+    return HarmonicProblem(reduced, product, problem.source[twins.leaders])
 
 
 def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
