@@ -103,24 +103,21 @@ class ImpactPair:
         """Tooth periods after which everything repeats."""
         return math.lcm(*(z for e, z in zip(self.eccentricity, self.teeth) if e))
 
-    def problem(self, ratio: float, *, divided: int = 1) -> NonlinearSystem:
-        """The pair at the frequency ratio Omega, tooth frequency over omega_n, in the scaled time.
+    def problem(self, ratio: float) -> NonlinearSystem:
+        """Assemble the pair at the frequency ratio Omega, tooth frequency over omega_n, in the scaled time.
 
-        Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `ImpactPair.frequency`; for
-        motions that repeat after several tooth periods ``divided`` counts these, and the first base is
-        1 / divided.
+        Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `ImpactPair.frequency`.
         """
         M, C, K, along = self._matrices()
         system = MechanicalSystem(
             M=ratio**2 * M, C=ratio * C, K=K, W=np.eye(len(M))[:, -1:], load=self.load * along,
             dofs=("y 1", "y 2", "x") if self.bearings else ("x",),
         )  # fmt: skip
-        forces = tuple(self._forces(ratio, along, divided))
-        return NonlinearSystem(system, (self.mesh(divided),), forces)
+        return NonlinearSystem(system, (self.mesh(),), tuple(self._forces(ratio, along)))
 
-    def mesh(self, divided: int = 1) -> GearMeshes:
-        """The mesh with its play on the one column, see `ImpactPair.problem`."""
-        orders = _orders(0, divided, len(self.frequency))
+    def mesh(self) -> GearMeshes:
+        """Make the mesh with its play on the one column, see `ImpactPair.problem`."""
+        orders = _orders(0, 1, len(self.frequency))
         k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders)
         return GearMeshes(np.array([0]), k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
 
@@ -134,12 +131,12 @@ class ImpactPair:
         damping[-1] = 2.0 * self.damping_ratio
         return np.diag(mass) + np.outer(along, along), np.diag(damping), np.diag(stiffness), along
 
-    def _forces(self, ratio: float, along, divided: int):
+    def _forces(self, ratio: float, along):
         """Inertia forces ``-e''`` of the errors."""
         count, base = len(self.frequency), 0
         for h, error in enumerate(self.tooth_error, 1):
             if error:
-                yield HarmonicForce((ratio * h) ** 2 * error * along, _orders(0, h * divided, count))
+                yield HarmonicForce((ratio * h) ** 2 * error * along, _orders(0, h, count))
         for error, z in zip(self.eccentricity, self.teeth):
             if error:
                 base += 1
