@@ -9,6 +9,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 # only libraries that are loaded can be limited to one thread, and SciPy brings a BLAS of its own
 import scipy.linalg  # noqa: F401
 
@@ -229,3 +231,18 @@ class Train:
     def _in(self, results: Results) -> list[Stage]:
         """Stages whose results there are."""
         return [stage for stage in self.stages if stage.name in results.stages]
+
+
+def modes_verdict(result: Any) -> dict:
+    """Count the modes and coordinates of any result with modes, for the manifest."""
+    return {"modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape)}
+
+
+def response_verdict(result: Any) -> dict:
+    """Tell convergence and stability of any result with a periodic response, for the manifest."""
+    return {
+        "converged": bool(np.all(result.response.converged)),
+        "stable": bool(np.all(result.stability.stable)),
+        "residual": float(np.max(result.response.residual)),
+        "message": result.response.message,
+    }

@@ -187,11 +187,6 @@ def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:
     return 1 if found.sun > found.carrier else -1
 
 
-def modes_verdict(result: Any) -> dict:
-    """Numbers of modes and of coordinates for the manifest."""
-    return {"modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape)}
-
-
 _AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
 # natural frequencies closer than this, relative to the frequency, count as one
 _SAME = 1e-3

@@ -49,8 +49,7 @@ from femgear.trains.drivetrain.results import (
     transient_warnings,
 )
 from femgear.trains.drivetrain.simulation import PASS_BAND, DrivetrainRun, Records, march_drivetrain
-from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
-from femgear.trains.rigid import modes_verdict
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -85,7 +84,7 @@ def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
 
 
 @one_blas_thread()
-def solve_transient_run(case: DrivetrainCase, *, progress: Progress | None = None) -> TransientResult:
+def solve_transient_run(case: DrivetrainCase, *, progress: Progress = silent) -> TransientResult:
     """Integrate the case; records are low-passed before they are thinned out.
 
     Raises
@@ -100,8 +99,7 @@ def solve_transient_run(case: DrivetrainCase, *, progress: Progress | None = Non
         model = models[variant] = case_model(case, variant)
         torques = torque_histories(case, model.ratio)
         runs[variant] = _run(case, variant, model, torques)
-        if progress is not None:
-            progress("transient", done + 1, len(variants))
+        progress("transient", done + 1, len(variants))
     return TransientResult(models, runs, torques)
 
 

@@ -84,18 +84,19 @@ from femgear.trains.elastic.results import (
     describe_housing,
     mesh_bands,
 )
-from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
-from femgear.trains.rigid import member_speeds, modes_verdict
+from femgear.trains.protocol import (
+    Progress,
+    Stage,
+    Train,
+    modes_verdict,
+    one_blas_thread,
+    response_verdict,
+    silent,
+)
+from femgear.trains.rigid import member_speeds
 from femgear.trains.static.description import describe_set
 from femgear.trains.static.results import StaticResult
-from femgear.trains.static.stages import (
-    STATIC,
-    STRESS,
-    case_supports,
-    mesh_backlash,
-    response_verdict,
-    ring_foundation,
-)
+from femgear.trains.static.stages import STATIC, STRESS, case_supports, mesh_backlash, ring_foundation
 
 _LOWEST = 20e3
 """The excitation reaches the end of hearing at least [Hz]."""

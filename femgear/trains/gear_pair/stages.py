@@ -32,7 +32,7 @@ from femgear.trains.gear_pair.model import (
     separation_ratios,
     state_regions,
 )
-from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread, silent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -226,15 +226,14 @@ def solve_sweep(case: GearPairCase) -> SweepResult:
 
 
 @one_blas_thread()
-def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> ChaosResult:
+def solve_chaos(case: GearPairCase, *, progress: Progress = silent) -> ChaosResult:
     """Lyapunov exponents over the ratio, each from the last point of the one before, and long sections."""
     pair, given, found = pair_of(case), case.chaos, []
     assert given is not None
     ratios, start = np.linspace(given.start, given.to, given.count), None
     options: dict[str, Any] = {"steps": given.steps * pair.periods, "periods": pair.periods}
     for number, ratio in enumerate(ratios):
-        if progress is not None:
-            progress("chaos", number, len(ratios))
+        progress("chaos", number, len(ratios))
         found.append(
             lyapunov_exponents(
                 pair.problem(ratio), pair.frequency, points=given.points, skip=given.skip, start=start,

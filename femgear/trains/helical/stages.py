@@ -42,15 +42,16 @@ from femgear.trains.helical.results import (
     describe_helical_static,
 )
 from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
-from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
-from femgear.trains.rigid import (
-    driving_torque,
-    gear_set_modes,
-    member_speeds,
+from femgear.trains.protocol import (
+    Progress,
+    Stage,
+    Train,
     modes_verdict,
-    needed,
-    rotation_sense,
+    one_blas_thread,
+    response_verdict,
+    silent,
 )
+from femgear.trains.rigid import driving_torque, gear_set_modes, member_speeds, needed, rotation_sense
 from femgear.trains.static import stages as static_stages
 from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
@@ -242,7 +243,7 @@ HELICAL = Train(
             solve=solve_helical_dynamics,
             takes=("modes",),
             options=("progress",),
-            verdict=static_stages.response_verdict,
+            verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             unavailable=lambda case: (
                 _NOTHING_EXCITES if _given(case) else ""

@@ -50,7 +50,7 @@ from femgear.trains.multistage.results import (
     describe_stage_modes,
     multistage_warnings,
 )
-from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread, silent
 
 # relative distance of frequencies that count as one
 _MULTIPLE = 1e-7
@@ -285,7 +285,7 @@ def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResu
 
 
 @one_blas_thread()
-def solve_balance(case: MultistageCase, *, progress: Progress | None = None) -> BalanceResult:
+def solve_balance(case: MultistageCase, *, progress: Progress = silent) -> BalanceResult:
     """Harmonic balance with the stiffnesses k(t) of all meshes, first orders of two stages together."""
     train, (operation, given) = multistage_of(case), _asked(case)
     stages, unit = len(train.stages), np.eye(len(train.stages), dtype=int)
@@ -297,8 +297,7 @@ def solve_balance(case: MultistageCase, *, progress: Progress | None = None) -> 
     speeds = np.linspace(given.lowest, given.highest, given.balance_points + 2)[1:-1]
     found = []
     for number, speed in enumerate(speeds):
-        if progress is not None:
-            progress("balance", number, len(speeds))
+        progress("balance", number, len(speeds))
         frequency = base_frequencies(train, speed)[:stages]
         found.append(
             solve_harmonic_balance(problem, frequency, orders=distinct_lines(orders), stability=False)

@@ -43,13 +43,12 @@ from femgear.trains.planar.results import (
     response_warnings,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
+from femgear.trains.protocol import Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.rigid import (
     check_one_period,
     gear_set_modes,
     member_speeds,
     mode_ratios,
-    modes_verdict,
     needed,
 )
 from femgear.trains.static.description import describe_set, set_warnings

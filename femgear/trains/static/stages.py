@@ -8,6 +8,7 @@ finds root stresses, contact pressures, load spectra and nominal stresses of tha
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -48,8 +49,6 @@ from femgear.trains.static.results import (
 WHOLE_RECORD = 16
 LARGEST_MOTION, LARGEST_APPROACH = 2.0, 0.5
 """Of a member and of the flanks of a mesh for which displacements count as small [modules]."""
-# longer than any record: the true common period of a set
-_UNLIMITED = 10**12
 
 
 @one_blas_thread()
@@ -164,7 +163,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
     influences = _influences(case, static)
     progress("stress", 1, 2)
-    repeats, _ = common_period(set_deviations(case), gears, limit=_UNLIMITED)
+    repeats, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
     closes = repeats == cycle.periods
     teeth = loaded_teeth(cycle, reverse=reverse)
     ranges = root_ranges(gears, influences, teeth, closes=closes)
@@ -294,28 +293,16 @@ def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
     return replace(cycle, position=np.arange(len(take)) / each, periods=length, **parts)
 
 
-def static_verdict(result: StaticResult) -> dict:
-    """Tell residual, message and kind of contact of a static solution, for the manifest."""
-    cycle = result.cycle
-    return {"residual": float(cycle.residual.max()), "message": cycle.message, "contact": cycle.contact}
-
-
-def response_verdict(result) -> dict:
-    """Tell convergence and stability of a periodic response, for the manifest."""
-    return {
-        "converged": bool(np.all(result.response.converged)),
-        "stable": bool(np.all(result.stability.stable)),
-        "residual": float(np.max(result.response.residual)),
-        "message": result.response.message,
-    }
-
-
 STATIC = Stage(
     name="static",
     title="Static",
     solve=solve_static,
     options=("cache", "progress"),
-    verdict=static_verdict,
+    verdict=lambda result: {
+        "residual": float(result.cycle.residual.max()),
+        "message": result.cycle.message,
+        "contact": result.cycle.contact,
+    },
     describe=lambda results: describe_static(results.static, planetary_set(results.case).sun.module),
     check=planetary_set,
 )
