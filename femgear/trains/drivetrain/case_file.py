@@ -29,6 +29,7 @@ from femgear.case.quantities import (
     Section,
     Title,
 )
+from femgear.case.sections import FORMAT
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError, Finding
 from femgear.trains.drivetrain.parts import (
@@ -124,7 +125,7 @@ class DrivetrainCase(Section, ReadCase):
     deserves to be said.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = 1
+    format: Annotated[int, Count(1, 2**31)] = FORMAT
     model: Literal["drivetrain"]
     title: Title
     body: Annotated[tuple[BodySection, ...], Field(min_length=1, max_length=_MOST_PARTS)]
@@ -475,7 +476,7 @@ def _ratios(stage: ParallelSection | PlanetarySection) -> list[tuple[str, float,
     if isinstance(stage, ParallelSection):
         first, second = stage.radii or stage.base_radii or (0.0, 0.0)
         return [("teeth", second / first, stage.teeth[1] / stage.teeth[0])]
-    sun, planet = (stage.sun_radius, stage.planet_radius)
+    sun, planet = stage.sun_radius, stage.planet_radius
     if sun is None or planet is None:
         sun, planet = stage.sun_base_radius or 0.0, stage.planet_base_radius or 0.0
     found = [("ring_teeth", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)]

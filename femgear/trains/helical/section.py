@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from femgear.case.quantities import ANGLE, INERTIA, MASS, STIFFNESS, TORSION, Count, Quantity, Section
-from femgear.case.sections import MeshStiffnessSection, RigidCase
+from femgear.case.quantities import ANGLE, STIFFNESS, TORSION, Count, Quantity, Section
+from femgear.case.sections import Inertia, Mass, MeshStiffnessSection, RigidCase
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     entries_without_effect,
@@ -27,13 +27,12 @@ _LONG = 60.0
 # stiffer supports are lost in the rounding of those that mesh springs feel
 Stiffness = Annotated[float, Quantity(STIFFNESS, 0.0, 1e14)]
 Turning = Annotated[float, Quantity(TORSION, 0.0, 1e13)]
-Diametral = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
 
 
 class HelicalBodySection(Section):
     """What sun, carrier and planets need beyond mass, polar inertia and radial support to move in space."""
 
-    diametral_inertia: Diametral
+    diametral_inertia: Inertia
     axial_stiffness: Stiffness
     tilt_stiffness: Turning
     torsional_stiffness: Turning | None = None
@@ -42,8 +41,8 @@ class HelicalBodySection(Section):
 class HelicalRingSection(HelicalBodySection):
     """The ring as a rigid body on its support in the housing."""
 
-    mass: Annotated[float, Quantity(MASS, 1e-6, 1e6)]
-    inertia: Diametral
+    mass: Mass
+    inertia: Inertia
     support_stiffness: Stiffness
 
 

@@ -13,9 +13,7 @@ from femgear.case.quantities import (
     ACCELERATION,
     ANGLE,
     FREQUENCY,
-    INERTIA,
     LENGTH,
-    MASS,
     STIFFNESS,
     TORSION,
     Count,
@@ -25,7 +23,7 @@ from femgear.case.quantities import (
     Title,
     printable_line,
 )
-from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
+from femgear.case.sections import Inertia, Mass, MeshStiffnessSection, RigidCase, Stiffness, output_member
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     Gravity,
@@ -71,8 +69,8 @@ def _some(values: tuple) -> tuple:
 class PlanarRingSection(Section):
     """The ring as a rigid body on its support in the housing."""
 
-    mass: Annotated[float, Quantity(MASS, 1e-6, 1e6)]
-    inertia: Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
+    mass: Mass
+    inertia: Inertia
     support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)]
 
 
@@ -87,7 +85,7 @@ class TorsionSection(Section):
 class CarrierBearingSection(Section):
     """A bearing of the carrier beside its support."""
 
-    stiffness: Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
+    stiffness: Stiffness
     clearance: Clearance = 0.0
     on: Literal["ring", "housing"] = "housing"
 
