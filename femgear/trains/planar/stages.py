@@ -180,8 +180,11 @@ def _bounded_branch(
         hertz = f"{solution.frequency[0] / (2.0 * np.pi):.6g} Hz"
         words = _too_far(one, gears) if solution.converged else f"no solution: {solution.message}"
         if words:
+            where = f"at {hertz} of the weight"
+            if len(good) < 2 and not solution.converged:
+                raise ConvergenceError(f"{where}: {words}", code="E-CONVERGENCE", key="planar.branch.from")
             if len(good) < 2:
-                raise _moved_too_far(f"at {hertz} of the weight", words, solution.converged)
+                raise _moved_too_far(where, words)
             ending = f"stopped before {hertz}, where {words}" if solution.converged else f"{words} at {hertz}"
             return _cut(branch, len(good), ending), tuple(good)
         good.append(one)
@@ -221,7 +224,7 @@ def _check_response_motions(
         )
     for speed, one in zip(speeds, lines):
         if words := _too_far(one, gears):
-            raise _moved_too_far(f"at {speed / RPM:.6g} rpm", words, True)
+            raise _moved_too_far(f"at {speed / RPM:.6g} rpm", words)
 
 
 def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
@@ -237,9 +240,7 @@ def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
     return ""
 
 
-def _moved_too_far(where: str, words: str, converged: bool) -> ConvergenceError:
-    if not converged:
-        return ConvergenceError(f"{where}: {words}", code="E-CONVERGENCE", key="planar.branch.from")
+def _moved_too_far(where: str, words: str) -> ConvergenceError:
     return ConvergenceError(
         f"{where} {words}: the model is one of small displacements",
         code="E-MOTION",
