@@ -318,13 +318,18 @@ def gear_set_modes(
     if len(data.axes) > 3:
         # tilts of the planets that no mesh feels have one frequency in several classes
         Q = phase_basis(gear_set_motions(data, modes.shape), modes.frequency, tolerance=_ONE_FREQUENCY)
-        modes = replace(
-            modes,
-            shape=modes.shape @ Q,
-            mesh_deflection=modes.mesh_deflection @ Q,
-            modal_load=None if modes.modal_load is None else Q.T @ modes.modal_load,
-        )
+        modes = mixed_modes(modes, Q)
     return replace(modes, kind=gear_set_kinds(data, modes.shape, frequency=modes.frequency))
+
+
+def mixed_modes(modes: Modes, Q: np.ndarray) -> Modes:
+    """Mix modes of like natural frequencies by an orthogonal matrix (n_modes, n_modes)."""
+    return replace(
+        modes,
+        shape=modes.shape @ Q,
+        mesh_deflection=modes.mesh_deflection @ Q,
+        modal_load=None if modes.modal_load is None else Q.T @ modes.modal_load,
+    )
 
 
 def gear_set_problem(

@@ -51,6 +51,7 @@ from femgear.trains.multistage.results import (
     multistage_warnings,
 )
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread, silent
+from femgear.trains.rigid import mixed_modes
 
 # relative distance of frequencies that count as one
 _MULTIPLE = 1e-7
@@ -105,10 +106,7 @@ def _by_stage(modes: Modes, masses: np.ndarray) -> Modes:
             own = shape[:, group]
             weighted = sum(number * own.T @ mass @ own for number, mass in enumerate(masses, 1))
             Q[np.ix_(group, group)] = np.linalg.eigh(weighted)[1]
-    return replace(
-        modes, shape=shape @ Q, mesh_deflection=modes.mesh_deflection @ Q,
-        modal_load=None if modes.modal_load is None else modes.modal_load @ Q,
-    )  # fmt: skip
+    return mixed_modes(modes, Q)
 
 
 def _strain(data: MultistageSet, system: MechanicalSystem, modes: Modes) -> np.ndarray:
