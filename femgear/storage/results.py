@@ -142,6 +142,15 @@ def complex_entries(entries) -> dict[str, tuple]:
     return found
 
 
+def mode_entries(modes: Any) -> dict[str, tuple]:
+    """List what is known of every mode of any system: frequency, damping and kind."""
+    return {
+        "frequency": ("mode", modes.frequency, "Hz", "undamped natural frequency"),
+        "damping_ratio": ("mode", modes.damping_ratio, "1", "fraction of critical damping"),
+        "kind": ("mode", list(modes.kind), "1", "kind of mode"),
+    }
+
+
 def response_entries(result: Any) -> dict[str, tuple]:
     """List what is known of the periodic response at every speed: frequency, convergence, stability.
 

@@ -22,7 +22,7 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
-from femgear.storage.results import coordinates, dataset
+from femgear.storage.results import coordinates, dataset, mode_entries
 from femgear.system.force_laws import GearMeshes, RadialBearings
 from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of, tooth_lines
 from femgear.system.mesh_directions import (
@@ -587,24 +587,18 @@ def modes_dataset(
         What is added to the descriptions of stiffness and deflection of the meshes.
     """
     shape, dofs = in_space(data, modes.shape)
-    count, slices, mode = 2 * data.n_planets, len(data.contact_lines.heights), ("mode",)
+    count, slices = 2 * data.n_planets, len(data.contact_lines.heights)
     stiffness = modes.mesh_stiffness[: count * slices].reshape(count, slices).sum(axis=1)
     deflection = modes.mesh_deflection[: count * slices].reshape(count, slices, -1).mean(axis=1)
-    variables = {
-        "frequency": (mode, modes.frequency, "Hz", "undamped natural frequency"),
-        "damping_ratio": (mode, modes.damping_ratio, "1", "fraction of critical damping"),
-        "kind": (mode, list(modes.kind), "1", "kind of mode"),
-    }
+    variables = mode_entries(modes)
     if phasing:
-        variables["phasing"] = (mode, list(phasing), "1", "phasing of the planets in the mode")
+        variables["phasing"] = ("mode", list(phasing), "1", "phasing of the planets in the mode")
     variables |= {
-        "nodal_diameter": (mode, modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
-        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
-        "mesh_stiffness": (("mesh",), stiffness, "N/m", f"mean mesh stiffness{along}"),
-        "mesh_deflection": (
-            ("mesh", "mode"), deflection, "kg^-1/2", f"mesh deflection of the mode{along}",
-        ),
-    }  # fmt: skip
+        "nodal_diameter": ("mode", modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
+        "shape": ("dof mode", shape, "kg^-1/2", "mass-normalised mode shape"),
+        "mesh_stiffness": ("mesh", stiffness, "N/m", f"mean mesh stiffness{along}"),
+        "mesh_deflection": ("mesh mode", deflection, "kg^-1/2", f"mesh deflection of the mode{along}"),
+    }
     coords = coordinates(mode=np.arange(len(modes.frequency)), dof=dofs, mesh=gears.mesh_names)
     named = {"title": attrs["title"], "unknowns": len(modes.shape)}
     return dataset(variables, coords=coords, attrs=named | attrs)

@@ -16,7 +16,7 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.report.tables import Block, describe_modes, tabulate
-from femgear.storage.results import dataset
+from femgear.storage.results import coordinates, dataset, mode_entries
 from femgear.trains.drivetrain.case_file import DrivetrainCase, torque_histories
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
 from femgear.trains.drivetrain.model import DrivetrainModel
@@ -70,9 +70,7 @@ class DrivetrainModesResult:
         critical, over_speed = found.critical, "natural frequency over the speed"
         at = [one.speed / RPM for one in critical]
         line = orders * self.speed / (2 * np.pi)
-        variables = {
-            "frequency": ("mode", modes.frequency, "Hz", "undamped natural frequency"),
-            "damping_ratio": ("mode", modes.damping_ratio, "1", "fraction of critical damping"),
+        variables = mode_entries(modes) | {
             "kind": ("mode", _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
             "rotation_share": ("mode", rotation, "1", "share of rotations in the kinetic energy"),
             "energy": ("member mode", energy, "1", "share of the member in the kinetic energy"),
@@ -87,8 +85,7 @@ class DrivetrainModesResult:
             "critical_frequency": ("crossing", [c.frequency for c in critical], "Hz", "frequency there"),
         }
         coords = {
-            "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-            "dof": _names("dof", model.system.dofs, "degree of freedom"),
+            **coordinates(mode=np.arange(len(modes.frequency)), dof=numbered(model.system.dofs)),
             "member": _names("member", members, "body, planet or shaft station"),
             "mesh": _names("mesh", model.meshes, "gear mesh"),
             "body": _names("body", model.ratio, "body"),

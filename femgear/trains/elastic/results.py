@@ -24,7 +24,14 @@ from femgear.housing.sensor import (
     hanning_model,
 )
 from femgear.report.tables import Block, chosen, tabulate
-from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
+from femgear.storage.results import (
+    FOURIER,
+    complex_entries,
+    coordinates,
+    dataset,
+    mode_entries,
+    response_entries,
+)
 from femgear.system.mesh_directions import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
@@ -79,10 +86,7 @@ class ModesResult:
         modes, model, state, n_max = self.modes, self.model, self.state, self.max_diameter
         record, supported = "mesh supported_position", "static transmission error of the set on its supports"
         between = "compliance between the meshes through their bodies"
-        variables = {
-            "frequency": ("mode", modes.frequency, "Hz", "undamped natural frequency"),
-            "damping_ratio": ("mode", modes.damping_ratio, "1", "fraction of critical damping"),
-            "kind": ("mode", list(modes.kind), "1", "kind of mode"),
+        variables = mode_entries(modes) | {
             "nodal_diameter": ("mode", modes.nodal_diameter, "1", "dominant nodal diameter of the ring"),
             "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape"),
             "mesh_stiffness": ("mesh", modes.mesh_stiffness, "N/m", "mean mesh stiffness, ring taken out"),

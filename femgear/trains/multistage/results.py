@@ -14,7 +14,7 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
-from femgear.storage.results import FOURIER, complex_entries, dataset
+from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, mode_entries
 from femgear.system.mesh_directions import mesh_names
 from femgear.trains.multistage.case_file import MultistageCase, multistage_of
 from femgear.trains.multistage.model import (
@@ -73,28 +73,22 @@ class MultistageModes:
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""
-        modes, along = self.modes, ("mode",)
+        modes = self.modes
         parts = [
             *(f"meshes of stage {n}" for n in range(1, len(self.share) + 1)),
             "supports, bearings and couplings",
         ]
-        deflection, numbers = modes.mesh_deflection, np.arange(1, len(modes.frequency) + 1)
-        variables = {
-            "frequency": (along, modes.frequency, "Hz", "undamped natural frequency"),
-            "damping_ratio": (along, modes.damping_ratio, "1", "fraction of critical damping"),
-            "kind": (along, list(modes.kind), "1", "kind of mode"),
-            "main_stage": (along, self.stage, "1", "stage with most of the kinetic energy"),
-            "energy": (("stage", "mode"), self.share, "1", "share of the stage in the kinetic energy"),
-            "strain": (("part", "mode"), self.strain, "1", "share in the strain energy"),
-            "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
-            "mesh_deflection": (("mesh", "mode"), deflection, "kg^-1/2", "mesh deflection of the mode"),
-            "mesh_stiffness": (("mesh",), mean_mesh_stiffness(self.data), "N/m", "mean mesh stiffness"),
+        dofs, numbers = multistage_system(self.data).dofs, np.arange(1, len(modes.frequency) + 1)
+        variables = mode_entries(modes) | {
+            "main_stage": ("mode", self.stage, "1", "stage with most of the kinetic energy"),
+            "energy": ("stage mode", self.share, "1", "share of the stage in the kinetic energy"),
+            "strain": ("part mode", self.strain, "1", "share in the strain energy"),
+            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+            "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
+            "mesh_stiffness": ("mesh", mean_mesh_stiffness(self.data), "N/m", "mean mesh stiffness"),
         }
-        coords = _coordinates(self.data) | {
-            "mode": (along, numbers, "1", "mode"),
-            "part": (("part",), parts, "1", "part of the train"),
-            "dof": (("dof",), list(multistage_system(self.data).dofs), "1", "degree of freedom"),
-        }
+        coords = _coordinates(self.data) | coordinates(mode=numbers, dof=dofs)
+        coords["part"] = ("part", parts, "1", "part of the train")
         attrs = {"title": "modes of the train at rest, mean mesh stiffness", "unknowns": len(modes.shape)}
         return dataset(variables, coords, attrs)
 
@@ -182,12 +176,10 @@ def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
         f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in mesh_names(one.data.n_planets)
     ]
     found = {
-        "mesh": (("mesh",), names, "1", "gear mesh"),
-        "stage": (("stage",), range(1, len(data.stages) + 1), "1", "stage"),
+        **coordinates(mesh=names),
+        "stage": ("stage", range(1, len(data.stages) + 1), "1", "stage"),
     }
-    if speed is not None:
-        found["speed"] = ("speed",), speed / RPM, "rpm", "speed of the input"
-    return found
+    return found if speed is None else found | coordinates(speed=speed / RPM)
 
 
 def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
