@@ -30,16 +30,16 @@ from femgear.trains.drivetrain.parts import Drivetrain, TorqueHistory
 from femgear.trains.drivetrain.simulation import PASS_BAND
 
 # Slower instants, over the mean speed, would need records of endless length over a turn.
-SLOWEST = 0.05
+_SLOWEST = 0.05
 
 # Steps a period that can follow a mesh at all, and well: average acceleration lowers its frequency by
 # (2 pi / steps)^2 / 12, 21 % for four, 0.4 % for thirty.
 # Not enough where modes lie far above the mesh lines: see `mesh_mode`.
-LEAST_STEPS, GOOD_STEPS = 4, 30
+_LEAST_STEPS, _GOOD_STEPS = 4, 30
 # Records that nobody chose keep this multiple of the highest mesh frequency, and come this often [Hz].
 _KEPT_HARMONIC, _LEAST_RECORD_RATE = 3, 1000.0
 # Share of its strain energy that a mode has in the meshes where they drive it noticeably.
-MESH_SHARE = 0.1
+_MESH_SHARE = 0.1
 
 # A speed that changes by more is worth a remark.
 _CHANGE = 2.0
@@ -52,7 +52,7 @@ _NOT_RESISTED = 1e-12
 _MOVED, _NAMED = 1e-3, 6
 
 # Records that spectra take at least.
-LEAST_RECORDS = 64
+_LEAST_RECORDS = 64
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def mesh_mode(model: DrivetrainModel, limit: float) -> float:
         The highest line of the mesh stiffness [Hz]; modes above answer it as springs do, without resonance.
     """
     modes, stiffness = solve_modes(model.still, model.mean_stiffness), model.mean_stiffness
-    driven = stiffness @ modes.mesh_deflection**2 > MESH_SHARE * (2.0 * math.pi * modes.frequency) ** 2
+    driven = stiffness @ modes.mesh_deflection**2 > _MESH_SHARE * (2.0 * math.pi * modes.frequency) ** 2
     return float(modes.frequency[driven & (modes.frequency <= limit)].max(initial=0.0))
 
 
@@ -231,13 +231,13 @@ def _check_records(case: DrivetrainCase, record: float) -> None:
     """Refuse records, so many a second [Hz], that have no spectra."""
     s = case.simulation
     late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
-    if late * record < LEAST_RECORDS:
+    if late * record < _LEAST_RECORDS:
         raise CaseError(
             f"{late * record:.3g} records are too few for the spectra",
             code="E-RANGE",
             key=f"simulation.{key}",
             value=TIME.show(getattr(s, key)),
-            limit=f"{LEAST_RECORDS} records or more after simulation.settle",
+            limit=f"{_LEAST_RECORDS} records or more after simulation.settle",
             remedy="take a longer duration, a shorter settle or more records, or write --only transient",
         )
     if s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
@@ -252,12 +252,12 @@ def _check_records(case: DrivetrainCase, record: float) -> None:
 
 def check_turning(lowest: float, mean: float) -> None:
     """Refuse speeds of the first body [rad/s] at which a turn takes endless records (E-SPECTRUM)."""
-    if not lowest > SLOWEST * mean or not mean > 0.0:
+    if not lowest > _SLOWEST * mean or not mean > 0.0:
         raise CaseError(
             f"the first body nearly stops or turns back: {lowest / RPM:.6g} rpm at the slowest, "
             f"{mean / RPM:.6g} rpm in the mean; there are no orders",
             code="E-SPECTRUM", key="operation.torque",
-            limit=f"never slower than {SLOWEST:.0%} of its mean speed where spectra are taken",
+            limit=f"never slower than {_SLOWEST:.0%} of its mean speed where spectra are taken",
             remedy="give torques that keep it turning, or write --only transient",
         )  # fmt: skip
 
@@ -283,12 +283,12 @@ def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
 def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
     speeds, rate = case_speeds(case, model), case.simulation.rate
     name, hertz = highest_mesh(model, speeds.fastest)
-    if rate >= LEAST_STEPS * hertz:
+    if rate >= _LEAST_STEPS * hertz:
         return
     first = case.body[0].name
-    good = FREQUENCY.show(GOOD_STEPS * hertz)
+    good = FREQUENCY.show(_GOOD_STEPS * hertz)
     key, value, remedy = "simulation.rate", FREQUENCY.show(rate), f"take {good} or more"
-    if LEAST_STEPS * hertz > FASTEST_RATE:
+    if _LEAST_STEPS * hertz > FASTEST_RATE:
         remedy = "take a lower speed, or fewer teeth: no simulation.rate is fast enough"
     if speeds.fastest > 1.01 * speeds.first:
         key, value = "operation.torque", None
@@ -297,7 +297,7 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
         f"{rate / hertz:.3g} steps a period ({FREQUENCY.show(rate)}) cannot follow the {name}, "
         f"{FREQUENCY.show(hertz)} at {SPEED.show(speeds.fastest)} of {first}",
         code="E-RATE", key=key, value=value,
-        limit=f"{LEAST_STEPS} steps a period at any time: {FREQUENCY.show(LEAST_STEPS * hertz)} or more",
+        limit=f"{_LEAST_STEPS} steps a period at any time: {FREQUENCY.show(_LEAST_STEPS * hertz)} or more",
         remedy=remedy,
     )  # fmt: skip
 
@@ -353,12 +353,12 @@ def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> 
     where = f"{top:.4g} Hz"
     if speeds.fastest > 1.01 * speeds.first:
         where += f" at {speeds.fastest / RPM:.6g} rpm, the fastest"
-    if rate < GOOD_STEPS * top:
+    if rate < _GOOD_STEPS * top:
         yield Finding(
             "W-RATE",
             "simulation.rate",
             f"{rate / top:.3g} steps a period of the {name} ({where}) shift and damp it",
-            remedy=f"take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz",
+            remedy=f"take {_GOOD_STEPS} or more, {_GOOD_STEPS * top:.4g} Hz",
         )
     # modes above the last line of the mesh stiffness answer as springs
     mode = mesh_mode(model, top * case.simulation.harmonics)

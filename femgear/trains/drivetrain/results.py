@@ -42,7 +42,7 @@ _PLANET = re.compile(r"(?:^|-)planet (\d+)(?: \d+)?(?:-ring of |$)")
 _TORSION = 0.9
 
 # Linear meshes: a free motion that grows by more than this over a run is no longer small.
-GROWN = 10.0
+_GROWN = 10.0
 # The same between any two instants of it.
 _GAINED = 1e3
 # A force that is rounding [N].
@@ -327,7 +327,7 @@ def _growth_warnings(data: xr.Dataset) -> Iterator[Finding]:
     duration, parts = float(data.attrs["steps"]) * float(data.attrs["step"]), separating(data)
     pulls = data["least_force"].values.min(axis=1, initial=0.0) < -_NOTHING
     for (variant, rate, gain), pulled in zip(_growth(data), pulls):
-        grows = rate * duration > math.log(GROWN)
+        grows = rate * duration > math.log(_GROWN)
         if grows and parts:
             text = (
                 f"{variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
@@ -533,7 +533,7 @@ def _growth_notes(data: xr.Dataset) -> Iterator[str]:
         else:
             way = "grows" if rate > 0.0 else "decays"
             text = f"{variant}: the free motion {way} with {abs(rate):.4g} 1/s in the mean"
-            yield f"{text}, at most {_shown_factor(math.log10(gain))} times" if gain > GROWN else text
+            yield f"{text}, at most {_shown_factor(math.log10(gain))} times" if gain > _GROWN else text
 
 
 def describe_spectrum(data: xr.Dataset) -> Block:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 HIGHEST_RESPONSE = 200e3
 """The wavelength of shear in steel there is 16 mm: shorter waves are no matter of plane gear bodies [Hz]."""
-CHECKED = 12
+_CHECKED = 12
 """Speeds at which the level is computed again, at most."""
 NOTICEABLE = 1.0
 """Change of the level that is worth a warning [dB]."""
@@ -216,7 +216,7 @@ def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
     return fastest.mesh_frequency
 
 
-def checked_speeds(count: int, most: int = CHECKED) -> np.ndarray:
+def checked_speeds(count: int, most: int = _CHECKED) -> np.ndarray:
     """Numbers of the speeds at which the level is computed again: all of a few, the ends of many."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 

@@ -251,9 +251,9 @@ def mesh_and_ring_outputs(
     return values[:, :n_meshes], (radial, tangential)
 
 
-RECORD = 2**13
+_RECORD = 2**13
 """Positions of the excitation in one mesh period at least."""
-MODES_ABOVE = 4.0
+_MODES_ABOVE = 4.0
 """The modal basis reaches this many times the excitation: the excitation may be doubled once, and modes up to
 twice a frequency carry the response there."""
 
@@ -299,7 +299,7 @@ def solve_modes(
             progress=partial(progress, "modes"),
         ),
     )
-    stiffness = state.resampled("held_stiffness", RECORD).mean(axis=1)
+    stiffness = state.resampled("held_stiffness", _RECORD).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
     reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
     ring = _ring_of_case(case, static, steps, reach)
@@ -309,7 +309,7 @@ def solve_modes(
         model.system,
         excitation.stiffness.mean(axis=1),
         damping_ratio=case.dynamics.damping_ratio,
-        max_frequency=MODES_ABOVE * reach,
+        max_frequency=_MODES_ABOVE * reach,
     )
     kinds, diameters = mode_kinds(
         modes.shape,
@@ -360,7 +360,7 @@ def _ring_of_case(case: Case, static: StaticResult, steps: Steps, reach: float) 
             ring_foundation(case, sector),
             active_flank_load(sector.grid, gears, side),
             max_diameter=max_nodal_diameter(case),
-            max_frequency=MODES_ABOVE * reach,
+            max_frequency=_MODES_ABOVE * reach,
             side=side,
         ),
     )
@@ -376,7 +376,7 @@ def _excitation(
     )
     flexibility = body_flexibility(state.held_compliance, held)
     # equal planets are equal to rounding when their phases are among the positions
-    record = gears.n_planets * -(-RECORD // gears.n_planets)
+    record = gears.n_planets * -(-_RECORD // gears.n_planets)
     excitation = mesh_excitation(
         state.resampled("held_stiffness", record),
         state.resampled("deflection", record),

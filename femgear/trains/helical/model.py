@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 # Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.
 _CLOSURE = 0.1
 # both sections are solved on the same grid, and only the ratio of their stiffnesses counts
-FLANK_ELEMENTS, POSITIONS = 8, 16
+_FLANK_ELEMENTS, _POSITIONS = 8, 16
 # any stiffness shows whether something takes up the load [N/m, N m/rad]
 _TRIAL = 1e8
 # entries of the supports that helical teeth ask for, their directions, and what they take up
@@ -438,13 +438,13 @@ def _line_load(case: HelicalCase, gears: PlanetarySet) -> float:
 def _pair_stiffness(case: HelicalCase, gears: PlanetarySet, load: float, cache: Path | None) -> np.ndarray:
     """Mean stiffness of a tooth pair per width (2,) of the meshes of one planet [N/m^2]."""
     material = material_of(case)
-    sectors = make_sectors(gears, material, flank_elements=FLANK_ELEMENTS, cache=cache)
+    sectors = make_sectors(gears, material, flank_elements=_FLANK_ELEMENTS, cache=cache)
     width = gears.sun.face_width
     cycle = walk_mesh_cycle(
         gears,
         make_bodies(sectors, material),
         sun_torque=load * width * gears.sun.base_radius,
-        positions=POSITIONS,
+        positions=_POSITIONS,
         contact=case.static.contact,
     )
     ratios = np.array([gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring])

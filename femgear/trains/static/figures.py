@@ -139,7 +139,7 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     names = [str(name) for name in static["mesh"].values]
     position, largest = static["position"].values, 0.0
     periods = int(static.attrs.get("mesh_periods", 1))
-    for ax, kind in zip(axes, ("sun-planet", "planet-ring")):
+    for ax, kind in zip(axes, _KINDS):
         row = next(i for i, name in enumerate(names) if family(name) == kind)
         load, force = static["tooth_load"].values[row], static["mesh_force"].values[row]
         place = np.arange(len(load))[:, None]
