@@ -312,7 +312,7 @@ def _transient_verdict(result: TransientResult) -> dict:
     }
 
 
-def _remarks(results: Results, stem: str) -> Iterator[str]:
+def remarks(results: Results, stem: str) -> Iterator[str]:
     """What a force without its usual sign means, for the caption of its picture."""
     if stem == "transient_forces":
         if results.case.simulation.contact_loss:
@@ -370,5 +370,5 @@ DRIVETRAIN = Train(
     describe=describe_drivetrain,
     warnings=drivetrain_warnings,
     figures=FIGURES,
-    remarks=_remarks,
+    remarks=remarks,
 )  # fmt: skip
