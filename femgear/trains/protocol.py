@@ -33,7 +33,7 @@ def silent(stage: str, done: float, total: float) -> None:
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """One BLAS thread for a block of code, or as ``@one_blas_thread()`` for a function.
+    """Limit a block of code, or as ``@one_blas_thread()`` a function, to one BLAS thread.
 
     Several threads gain nothing on matrices of a few hundred rows, and wait for one another for many times
     the work as soon as other processes want the same cores.
@@ -199,7 +199,7 @@ class Train:
     notices: Callable[[dict, Any], Iterable[Finding]] = lambda tables, case: ()
 
     def stage(self, name: str) -> Stage | None:
-        """The stage of a name, None where the train has none of it."""
+        """Find the stage of a name, None where the train has none of it."""
         return next((stage for stage in self.stages if stage.name == name), None)
 
     def describe_case(self, case: Any) -> tuple[Block, ...]:
@@ -214,7 +214,7 @@ class Train:
         return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
 
     def case_warnings(self, case: Any) -> tuple[Finding, ...]:
-        """What a case is allowed to be but deserves a look, each once.
+        """List what a case is allowed to be but deserves a look, each once.
 
         Raises
         ------
@@ -224,7 +224,7 @@ class Train:
         return tuple(dict.fromkeys(self.warnings(case)))
 
     def result_warnings(self, results: Results) -> tuple[Finding, ...]:
-        """What the solvers say against their own results, each once."""
+        """List what the solvers say against their own results, each once."""
         found = (stage.warnings(results[stage.name]) for stage in self._in(results))
         return tuple(dict.fromkeys(chain.from_iterable(found)))
 

@@ -33,7 +33,7 @@ _SET_FILE = OwnFile(embed=embed_profiles, points="measured profiles", remedy="me
 
 
 def read_case(path: str | os.PathLike) -> Any:
-    """Case of a TOML file: a planetary set, or what its ``model`` names, as ``"drivetrain"``.
+    """Read the case of a TOML file: a planetary set, or what its ``model`` names, as ``"drivetrain"``.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def read_case(path: str | os.PathLike) -> Any:
 
 
 def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
-    """Case of a TOML text; see `read_case`.
+    """Read the case of a TOML text; see `read_case`.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
 
 
 def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
-    """Results of a run; of an interrupted one those stages that are complete, with a warning.
+    """Open the results of a run; of an interrupted one those stages that are complete, with a warning.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
 
 
 def with_value(case: Case, key: str, value: object) -> Case:
-    """The case with one entry changed, checked again as a whole; see `with_values`.
+    """Change one entry of a case, which is checked again as a whole; see `with_values`.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def with_value(case: Case, key: str, value: object) -> Case:
 
 
 def with_values(case: Case, values: Mapping[str, object]) -> Case:
-    """The case with several entries changed at once, checked as a whole after all changes.
+    """Change several entries of a case, which is checked as a whole after all changes.
 
     Published lines whose speed or harmonic is not computed any more are left out; ``notices`` says so.
 
@@ -199,7 +199,7 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
 
 
 def to_toml(case: Case) -> str:
-    """TOML text that gives this case when read.
+    """Write the TOML text that gives this case when read.
 
     The text of its file as long as nothing was changed and it names no measured profile; the points of such
     profiles are in the text, so that it needs no other file.
@@ -208,7 +208,7 @@ def to_toml(case: Case) -> str:
 
 
 def case_schema(model: str | None = None) -> dict[str, Any]:
-    """JSON schema of the case file, for editors; of a planetary set, or of files that name a model.
+    """Make the JSON schema of the case file, for editors; of a planetary set, or of files that name a model.
 
     Raises
     ------
@@ -227,7 +227,7 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
 
 @cache
 def every_section() -> type[Case]:
-    """Model of a planetary set with the sections of all trains, for its keys and their descriptions."""
+    """Make the model of a planetary set with the sections of all trains, for its keys and what they are."""
     fields: dict[str, Any] = {
         train.section: (train.model.model_fields[train.section].annotation | None, None)
         for train in reversed(registry.TRAINS)

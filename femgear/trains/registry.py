@@ -17,7 +17,7 @@ TRAINS: tuple[Train, ...] = (MULTISTAGE, GEAR_PAIR, DRIVETRAIN, HELICAL, PLANAR,
 
 
 def train_of(case) -> Train:
-    """Train that a case is one of; other things are refused (E-TYPE)."""
+    """Find the train that a case is one of; other things are refused (E-TYPE)."""
     for train in TRAINS:
         if isinstance(case, train.model):
             return train
@@ -27,7 +27,7 @@ def train_of(case) -> Train:
 
 
 def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:
-    """Stages to compute, in order.
+    """List the stages to compute, in order.
 
     Parameters
     ----------

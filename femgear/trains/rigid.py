@@ -45,12 +45,12 @@ Entry = TypeVar("Entry")
 
 
 def listed(names: list[str]) -> str:
-    """Entries of a case file with their verb, "a, b have"."""
+    """Write entries of a case file with their verb, "a, b have"."""
     return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
 
 
 def entries_without_effect(data: dict, others: Sequence[str] = ()) -> list[str]:
-    """Entries that no set of rigid bodies takes up: machines and housing, others, foundation of the ring.
+    """List entries that no set of rigid bodies takes up: machines, housing, others, foundation of the ring.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def entries_without_effect(data: dict, others: Sequence[str] = ()) -> list[str]:
 
 
 def flank_entries(data: dict) -> list[str]:
-    """Entries of flanks and errors, which act on the static solution alone."""
+    """List the entries of flanks and errors, which act on the static solution alone."""
     return [
         f"{name}.{key}"
         for name in ("sun", "planet", "ring", "carrier")
@@ -75,7 +75,7 @@ def flank_entries(data: dict) -> list[str]:
 
 
 def rigid_refusals(case: RigidCase, kind: str, *, without_torque: str) -> Iterator[CaseError]:
-    """Refusals of elastic supports of the static solution, and of a torque of zero.
+    """Refuse elastic supports of the static solution, and a torque of zero.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def rigid_refusals(case: RigidCase, kind: str, *, without_torque: str) -> Iterat
 
 
 def unheld_member(case: RigidCase, key: str, remedy: str) -> CaseError:
-    """Refusal of a fixed member whose torsional support is zero."""
+    """Make the refusal of a fixed member whose torsional support, the entry ``key``, is zero."""
     return CaseError(
         f"the {case.operation.fixed} is the fixed member but nothing keeps it from turning",
         code="E-MECHANISM",
@@ -138,28 +138,28 @@ def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
 
 
 def needed(entry: Entry | None, name: str) -> Entry:
-    """What a stage cannot do without: an entry, or the result of a stage before it (E-KEY-MISSING)."""
+    """Refuse the absence of an entry, or of the result of a stage, that is needed here (E-KEY-MISSING)."""
     if entry is None:
         raise CaseError(f"{name} is needed here", code="E-KEY-MISSING", key=name)
     return entry
 
 
 def torsional_support(case: RigidCase, member: str, given: float | None) -> float:
-    """Torsional stiffness of a member [N m/rad]: the fixed one is held where it has none, others are free."""
+    """Choose the torsional stiffness of a member [N m/rad]: infinite of the fixed one where it has none."""
     if given is not None:
         return given
     return math.inf if member == case.operation.fixed else 0.0
 
 
 def torsion_text(case: RigidCase, member: str, given: float | None) -> str:
-    """The torsional support of a member in a table."""
+    """Write the torsional support of a member [N m/rad] in a table."""
     if given is not None:
         return f"{given:.6g}"
     return "held" if member == case.operation.fixed else "0"
 
 
 def mesh_stiffnesses(given: MeshStiffnessSection | None, mean: np.ndarray | None) -> dict[str, Any]:
-    """Stiffness of both kinds of mesh [N/m]: as given, else the means (2N,) of the static solution."""
+    """Choose the stiffness of both kinds of mesh [N/m]: as given, else the static means (2N,) [N/m]."""
     if given is not None:
         return {"stiffness_sun_planet": given.sun_planet, "stiffness_planet_ring": given.planet_ring}
     sun_planet, planet_ring = np.split(np.asarray(mean), 2)
@@ -167,22 +167,22 @@ def mesh_stiffnesses(given: MeshStiffnessSection | None, mean: np.ndarray | None
 
 
 def stiffness_text(given: MeshStiffnessSection) -> str:
-    """The given mesh stiffness in a note."""
+    """Write the given mesh stiffness [N/m] in a note."""
     return f"sun-planet {given.sun_planet:.6g}, planet-ring {given.planet_ring:.6g} N/m, as given"
 
 
 def driving_torque(case: RigidCase, *, reacts: bool = True) -> PlanarTorque:
-    """The driving torque, which the member that is neither driven nor held takes up, or the supports."""
+    """Make the driving torque [N m], which the output takes up, or, where it does not, the supports."""
     return PlanarTorque(case.operation.torque, case.operation.input, output_member(case) if reacts else None)
 
 
 def member_speeds(case: Case, gears: PlanetarySet, speed: float = 1.0) -> Speeds:
-    """Speeds of all members at a speed of the input [rad/s]."""
+    """Compute the speeds of all members [rad/s] at a speed of the input [rad/s]."""
     return speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
 
 
 def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:
-    """1 where the sun turns counter-clockwise against the carrier, else -1."""
+    """Tell the sense of the sun against the carrier: 1 counter-clockwise, -1 clockwise."""
     found = member_speeds(case, gears)
     return 1 if found.sun > found.carrier else -1
 
@@ -250,7 +250,7 @@ class Bearings:
     members: tuple[MemberBearing, ...] = ()
 
     def columns(self, data: RigidSet, *, back_flanks: bool) -> dict[str, np.ndarray]:
-        """Places of the columns of ``W``, of meshes and back flanks (n,), of planets and members (g, 2)."""
+        """Number the columns of ``W``, of meshes and back flanks (n,), of planets and members (g, 2)."""
         meshes, planets = len(data.column_stiffness), self.planet_clearance is not None
         counts = [meshes, meshes * back_flanks, 2 * data.n_planets * planets, 2 * len(self.members)]
         drive, back, pins, members = np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
@@ -262,7 +262,7 @@ class Bearings:
         }
 
     def join(self, data: RigidSet, system: MechanicalSystem) -> MechanicalSystem:
-        """The system of a set with the columns of the members."""
+        """Add the columns of the members to ``W`` of the system of a set."""
         T, columns = free_motions(data), [system.W]
         for one in self.members:
             first, *other = (
@@ -274,7 +274,7 @@ class Bearings:
         return replace(system, W=np.hstack(columns))
 
     def elements(self, data: RigidSet, groups: dict[str, np.ndarray]) -> tuple[RadialBearings, ...]:
-        """The bearings on their `columns`."""
+        """Make the bearings of a set on their places, ``groups`` of `columns`."""
         found = []
         if self.planet_clearance is not None:
             stiffness = data.pin_stiffness[:, 0]

@@ -139,14 +139,14 @@ class DrivetrainCase(Section, ReadCase):
 
 
 def drivetrain_of(case: DrivetrainCase) -> Drivetrain:
-    """The chain of a case."""
+    """Make the chain of a case."""
     gravity = 0.0 if case.gravity is None else case.gravity.acceleration
     parts = case.body, case.shaft, case.parallel, case.planetary, case.bearing
     return Drivetrain(*parts, gravity, case.simulation.damping_ratio)
 
 
 def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[TorqueHistory, ...]:
-    """Torques of a case; a share balances the others over the speed ratios.
+    """Make the torques of a case over time [N m]; a share balances the others over the speed ratios.
 
     Parameters
     ----------
@@ -168,13 +168,13 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
 
 
 def settle_time(case: DrivetrainCase) -> float:
-    """Start that the spectra leave out [s]: as given, or three tenths."""
+    """Choose the start that the spectra leave out [s]: as given, or three tenths of the run."""
     s = case.simulation
     return 0.3 * s.duration if s.settle is None else s.settle
 
 
 def check_entries_together(case: DrivetrainCase) -> list[CaseError]:
-    """What no entry shows alone."""
+    """Refuse what no entry shows alone."""
     names = list(_names(case))
     checks = (_bodies, _bearings, _shafts, _sizes, _torques, _simulation, _coordinates)
     found = [*names, *(problem for check in checks for problem in check(case))]
@@ -382,7 +382,7 @@ def _simulation(case: DrivetrainCase) -> Iterator[CaseError]:
 
 
 def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
-    """What so many records a second [Hz], as given or chosen for the run, cannot hold."""
+    """Refuse what so many records a second [Hz], as given or chosen for the run, cannot hold."""
     s, ratio = case.simulation, case.simulation.rate / record
     if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
         yield CaseError(
@@ -524,7 +524,7 @@ def _given(section, names) -> list[str]:
 
 
 def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
-    """Remarks on a case that was checked."""
+    """Remark what deserves a look in a case that was checked: teeth, bearings and backlash."""
     stages = [(f"parallel[{i}]", stage) for i, stage in enumerate(case.parallel)]
     stages += [(f"planetary[{i}]", stage) for i, stage in enumerate(case.planetary)]
     for key, stage in stages:
@@ -563,7 +563,7 @@ def embed_torques(data: dict, name: str) -> dict[str, str]:
 
 
 def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
-    """``"times"`` [s] and ``"torques"`` [N m] of a CSV file.
+    """Read ``"times"`` [s] and ``"torques"`` [N m] of a CSV file.
 
     Parameters
     ----------

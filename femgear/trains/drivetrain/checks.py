@@ -79,7 +79,7 @@ def speed_range(
     speed: float,
     start: float = 0.0,
 ) -> SpeedRange:
-    """Speeds of the first body as the rigid chain turns under its torques.
+    """Compute the speeds of the first body as the rigid chain turns under its torques.
 
     Newton's law of the rigid chain, d omega / dt = sum(ratio_b T_b(t)) / I with its inertia I about the axis
     of the first body. Torques are linear between their instants, so that the speed there is a sum of
@@ -111,13 +111,13 @@ def speed_range(
 
 
 def case_speeds(case: DrivetrainCase, model: DrivetrainModel, *, start: float = 0.0) -> SpeedRange:
-    """Speeds of the first body from `start` [s] to the end of the run, without its deviation."""
+    """Compute the speeds of the first body from `start` [s] to the end of a run, without its deviation."""
     torques, duration = torque_histories(case, model.ratio), case.simulation.duration
     return speed_range(model, torques, duration=duration, speed=case.operation.speed, start=start)
 
 
 def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
-    """Steps a record: as given, or what the highest mesh frequency of the run asks for."""
+    """Count the steps a record: as given, or what the highest mesh frequency of the run asks for."""
     s = case.simulation
     if s.record is not None:
         return max(1, round(s.rate / s.record))
@@ -125,12 +125,12 @@ def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
 
 
 def record_rate(case: DrivetrainCase, model: DrivetrainModel) -> float:
-    """Records a second [Hz]; see `record_every`."""
+    """Compute the rate of the records [Hz]; see `record_every`."""
     return case.simulation.rate / record_every(case, model)
 
 
 def highest_mesh(model: DrivetrainModel, speed: float) -> tuple[str, float]:
-    """Name and frequency [Hz] of the fastest mesh at a speed of the first body; none, 0 without gears."""
+    """Find name and frequency [Hz] of the fastest mesh at a speed of the first body [rad/s]; none, 0."""
     bases = np.unique(model.mesh_base)
     if not len(bases):
         return "none", 0.0
@@ -139,7 +139,7 @@ def highest_mesh(model: DrivetrainModel, speed: float) -> tuple[str, float]:
 
 
 def mesh_mode(model: DrivetrainModel, limit: float) -> float:
-    """Frequency of the highest mode that the meshes drive noticeably [Hz]; 0 where there is none.
+    """Find the frequency of the highest mode that the meshes drive noticeably [Hz]; 0 without any.
 
     Modes at standstill with mean mesh stiffnesses; the share of the meshes in the strain energy of a mode
     ``phi`` is ``sum(k (w^T phi)^2) / omega^2`` (R. G. Parker and J. Lin, J. Vib. Acoust. 126, 2004, 68-76).
@@ -156,7 +156,7 @@ def mesh_mode(model: DrivetrainModel, limit: float) -> float:
 
 
 def frequency_shift(hertz: float, rate: float) -> float:
-    """Share by which average acceleration lowers a natural frequency [Hz] at so many steps a second [Hz].
+    """Compute by what share average acceleration lowers a natural frequency [Hz] at a rate of steps [Hz].
 
     ``tan(Omega h / 2) = omega h / 2`` for the frequency Omega that the steps have, so that the share is
     ``(omega h)^2 / 12`` for short steps (T. J. R. Hughes, The Finite Element Method, 1987, section 9.3).
@@ -166,12 +166,12 @@ def frequency_shift(hertz: float, rate: float) -> float:
 
 
 def shift_rate(hertz: float, share: float) -> float:
-    """Steps a second [Hz] that lower a natural frequency [Hz] by this small share or a little less."""
+    """Compute the rate of steps [Hz] that lowers a natural frequency [Hz] by this small share or less."""
     return math.pi * hertz / math.sqrt(3.0 * share)
 
 
 def default_record_every(rate: float, highest: float) -> int:
-    """Steps a record where no rate of records is given; so many steps a second, highest mesh line [Hz].
+    """Choose the steps a record by the rate of the steps [Hz] and the highest mesh line [Hz].
 
     The largest number for which the pass band of the records holds the third harmonic of that line and there
     are 1000 records a second.
@@ -182,7 +182,7 @@ def default_record_every(rate: float, highest: float) -> int:
 
 
 def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
-    """Refuse what the stages cannot represent, before anything is computed.
+    """Refuse what the stages cannot represent, before anything is computed; return the model with bending.
 
     Raises
     ------
@@ -303,7 +303,7 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
 
 
 def drivetrain_warnings(case: DrivetrainCase) -> tuple[Finding, ...]:
-    """What is allowed but deserves a look; refuses what `check_drivetrain` does."""
+    """List what is allowed but deserves a look; refuses what `check_drivetrain` does."""
     model = check_drivetrain(case)
     speeds = case_speeds(case, model)
     return (
@@ -396,7 +396,7 @@ def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[Finding]:
 
 
 def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tuple[str, ...]]:
-    """Number of motions besides the free spin that no spring resists, and what moves most in them.
+    """Count the motions besides the free spin that no spring resists, and name what moves most in them.
 
     Whether a motion is resisted does not depend on how stiff the springs are. Therefore all of them get like
     stiffnesses, 1 N/m across and 1 N/m times a length squared against rotation; the coordinates are scaled by

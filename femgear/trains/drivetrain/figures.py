@@ -163,7 +163,7 @@ def _thickness(index: int) -> dict[str, float]:
 
 
 def band(time, values, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle, least and largest value (count,) of values (n,) in pieces of the time that share their ends."""
+    """Find middle of the time (n,), least and largest of values (n,) in pieces (count,) that share ends."""
     time, values = np.asarray(time), np.asarray(values)
     first = np.linspace(0, len(time) - 1, count + 1).astype(int)
     low, high = (one.reduceat(values, first[:-1]) for one in (np.minimum, np.maximum))
@@ -199,7 +199,7 @@ def _name_lines(ax, lines: Sequence[tuple], width: float) -> None:
 
 
 def stiffness_figure(model: DrivetrainModel) -> Figure:
-    """Series of the mesh stiffness of every stage over two mesh periods, and the rectangular wave."""
+    """Draw the series of the mesh stiffness of every stage over two mesh periods, and the wave itself."""
     phase, names = np.linspace(0.0, 2.0, 1601), numbered(model.meshes)
     first = [(row, mesh.section) for row, mesh in enumerate(model.train.meshes) if not mesh.planet]
     first = first[:MOST_PANELS]
@@ -231,7 +231,7 @@ def _campbell_figure(modes: xr.Dataset) -> Figure:
 
 
 def transient_figures(data: xr.Dataset) -> dict[str, Figure]:
-    """Speeds, deviations and mesh forces of transient.nc over time, by name."""
+    """Draw speeds [rpm], deviations [mrad] and mesh forces [kN] of transient.nc over time, by file name."""
     time, count, meshes = data["time"].values, data.sizes["body"], chosen_meshes(data)
     passed = _pass_band(data)
     shown = list(range(1, count))[-MOST_PANELS:] or [0]
@@ -281,7 +281,7 @@ def _pass_band(data: xr.Dataset) -> str:
 
 
 def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:
-    """Spectra over frequency, and side bands over orders, by name; none without meshes.
+    """Draw spectra [kN] over frequency, and side bands over orders, by file name; none without meshes.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ class Spin:
             self.table = np.array(FourierSeries(model.stiffness).at(phase))
 
     def block(self, first: int, count: int) -> Block:
-        """The next `count` steps, which begin with step `first`; the spin moves on to their end."""
+        """Take the next `count` steps, which begin with step `first`; the spin moves on to their end."""
         times = self.step * np.arange(first, first + count + 1)
         values = np.zeros((count + 1, len(self.torques)))
         for column, one in enumerate(self.torques):
@@ -107,7 +107,8 @@ class Scheme:
 
     Rows ``z = (q, v without g, g)`` go on by ``(q, v without g, x without g) = z advance + loads``; the state
     is ``(q, v) = z[:2n] - drawn g``, and ``x = U^T q`` becomes ``x without g - flexibility g``. There are
-    n coordinates, m simple motions ``basic`` (n, m), and loads (d, 2 n + m) at both ends of the step.
+    n coordinates, m simple motions ``basic`` (n, m), loads (d, 2 n + m) at both ends of the step,
+    ``advance`` (2 n + m, 2 n + m), ``drawn`` (m, 2 n) and ``flexibility`` (m, m) [m/N].
     """
 
     advance: np.ndarray
@@ -148,13 +149,13 @@ class Scheme:
         )  # fmt: skip
 
     def states(self, rows) -> np.ndarray:
-        """``(q, v, g)`` of rows ``z`` (..., 2 n + m)."""
+        """Compute states ``(q, v, g)`` of rows ``z``, (..., 2 n + m) both."""
         out = np.array(rows)
         out[..., : 2 * self.n] -= rows[..., 2 * self.n :] @ self.drawn
         return out
 
     def row(self, state) -> np.ndarray:
-        """``z`` of states ``(q, v, g)``."""
+        """Compute rows ``z`` of states ``(q, v, g)``, (..., 2 n + m) both."""
         out = np.array(state)
         out[..., : 2 * self.n] += state[..., 2 * self.n :] @ self.drawn
         return out
@@ -175,7 +176,7 @@ class MeshBlock:
 
     @classmethod
     def of(cls, scheme: Scheme, block: Block, meshes: int) -> MeshBlock:
-        """Of a block whose first `meshes` contacts are drive flanks."""
+        """Make the matrices of a block whose first `meshes` contacts are drive flanks."""
         S, k = np.ascontiguousarray(block.selection[1:, :, :meshes]), block.stiffness[1:, :meshes]
         St = np.swapaxes(S, 1, 2)
         # transposed: x S k (1 + (S^T F S)^T k)^-1 S^T
@@ -209,7 +210,7 @@ def solve_overlaps(
     Parameters
     ----------
     flexibility : (n, n) array
-        With a symmetric part that is not negative [m/N].
+        Overlaps per force, with a symmetric part that is not negative [m/N].
     free : (n,) array
         Overlaps without the forces [m].
     closed : (n,) bool array
@@ -266,7 +267,7 @@ class Separating:
         self.most = np.where(closed, np.inf, 0.0)
 
     def march(self, scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
-        """As `march_closed`, with the contacts that touch."""
+        """Fill rows as `march_closed`, with the contacts that touch."""
         i, stop = steps.start, steps.stop
         while i < stop:
             if self.drives:

@@ -48,11 +48,12 @@ class Coordinates:
 
     @property
     def count(self) -> int:
+        """Number n of all coordinates."""
         return len(self.names)
 
 
 def coordinates_of(train: Drivetrain) -> Coordinates:
-    """Five coordinates a body and a station of a shaft, three a planet; planets follow their carrier."""
+    """List coordinates: five a body and a station of a shaft, three a planet, which follows its carrier."""
     names, body, planets, stations = [], {}, {}, []
     for one in train.bodies:
         body[one.name] = len(names)
@@ -86,7 +87,8 @@ class Springs:
 def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
     """Collect the springs of shafts (a group an element), bearings and planet bearings.
 
-    Stiffnesses [N/m] along and [N m/rad] about the coordinates of ``place``; infinite ones are conditions.
+    Stiffnesses [N/m] along and [N m/rad] about the coordinates ``place`` of the chain, `coordinates_of`;
+    infinite ones are conditions.
     """
     found, turns = [], np.array([False, False, True, True, True])
     stations = {shaft.between: own for shaft, own in zip(train.shafts, place.stations)}
@@ -116,7 +118,7 @@ def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
 
 
 def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray, tuple[str, ...]]:
-    """All coordinates per unit of the free ones (n, n_free), and the names of those.
+    """Compute all coordinates per unit of the free ones (n, n_free), and list the names of those.
 
     Infinitely stiff bearings and joints, bodies that do not tilt and planets fixed to their pins leave
     fewer.
@@ -159,7 +161,7 @@ def _eliminated(rows, free, place):
 
 
 def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
-    """Rotations (n,) of the free spin of the chain, that of the first body being one.
+    """Solve for the free spin (n,) of the chain among its coordinates, one radian of the first body [rad].
 
     Willis' equation for planetary stages: ``r_s (s - c) + r_p (p - c) = 0``, ``r_r c + r_p (p - c) = 0``.
 
@@ -208,7 +210,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
 
 
 def speed_ratios(train: Drivetrain) -> dict[str, float]:
-    """Speed of every body over that of the first one.
+    """Compute the speed of every body over that of the first one.
 
     Raises
     ------
@@ -246,7 +248,7 @@ class MeshGeometry:
     stage: np.ndarray
 
     def selection(self, angles) -> np.ndarray:
-        """``S`` (..., m, n_meshes) at carrier angles (..., P) [rad]."""
+        """Compute ``S`` (..., m, n_meshes) at carrier angles (..., P) [rad]."""
         angles = np.asarray(angles, float)
         whole = np.empty((*angles.shape[:-1], *self.fixed.shape))
         whole[...] = self.fixed
@@ -262,7 +264,7 @@ class MeshGeometry:
 
 
 def mesh_geometry(train: Drivetrain, place: Coordinates, spin: np.ndarray) -> MeshGeometry:
-    """Directions of the drive flanks of all meshes among all coordinates; spin (n,) of `rigid_rotation`."""
+    """Find the directions of the drive flanks of all meshes; spin (n,) of `rigid_rotation`."""
     stages = np.array([mesh.stage for mesh in train.meshes], int)
     total, planar = _flank_directions(train, place, spin), _planar_places(train, place)
     # simple motions: the part of every mesh that does not turn, then x and y of carriers and suns
@@ -307,7 +309,7 @@ def _turned_directions(direction) -> tuple[np.ndarray, np.ndarray]:
 
 
 def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
-    """The stage as a lumped set with a held ring; supports are those of the chain, hence none here."""
+    """Make the lumped set of a stage with a held ring; supports are those of the chain, hence none here."""
     cosine = math.cos(stage.pressure_angle)
     bodies = {
         key: PlanarBody(train.body(name).mass, train.body(name).inertia)
@@ -325,7 +327,7 @@ def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
 
 
 def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.ndarray:
-    """Coordinates (3 (N + 3), n) of the planetary stage `number` per unit of the chain's, at angle zero."""
+    """Compute coordinates (3 (N + 3), n) of the stage `number` per unit of the chain's, at angle zero."""
     own, cosine = place.planets[number], math.cos(stage.pressure_angle)
     B = np.zeros((9 + 3 * len(own), place.count))
     for row, name, radius in (
@@ -394,7 +396,7 @@ class FlankContacts:
     columns: tuple[np.ndarray, ...]
 
     def mesh_forces(self, approach, stiffness):
-        """Forces (..., n_meshes), drive less back flank, and whether any flank touches, from approaches.
+        """Compute forces (..., n_meshes) [N], drive less back flank, and whether any flank touches.
 
         Parameters
         ----------
@@ -415,10 +417,20 @@ class FlankContacts:
 def flank_contacts(
     train: Drivetrain, place: Coordinates, spin, T, geometry: MeshGeometry, backlash
 ) -> FlankContacts:
-    """Contacts of all meshes with their backlash (n_meshes,) [m]; an infinite one has no back flank.
+    """Make the contacts of the drive and back flanks of all meshes.
 
-    The geometry of the drive flanks is among the free coordinates, of which T (n_all, n) makes all; spin
-    (n_all,).
+    Parameters
+    ----------
+    train : Drivetrain
+    place : Coordinates
+    spin : (n_all,) array
+        Of `rigid_rotation`.
+    T : (n_all, n) array
+        All coordinates per unit of the free ones.
+    geometry : MeshGeometry
+        Of the drive flanks, among the free coordinates.
+    backlash : (n_meshes,) array
+        [m]; where it is infinite there is no back flank.
     """
     count, behind = len(geometry.names), np.flatnonzero(np.isfinite(backlash))
     total, planar = _flank_directions(train, place, spin, back=True), _planar_places(train, place)

@@ -64,7 +64,7 @@ class Layout:
 
 
 def drivetrain_layout(train: Drivetrain) -> Layout:
-    """Places along z by shaft lengths, across it by centre distances."""
+    """Place the bodies [m]: along z by shaft lengths, across it by centre distances."""
     names = [body.name for body in train.bodies]
     gears = [radius for s in train.parallel for radius in s.pitch_radii]
     gears += [stage.centre_distance for stage in train.planetary]
@@ -113,7 +113,7 @@ def _wheels(train: Drivetrain, places, size: float) -> list[Wheel]:
 
 
 def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.ndarray, np.ndarray]:
-    """Translation and rotation vector (n, 3) of every place of the layout under a motion (n_free,).
+    """Compute translation and rotation vector (n, 3) of every place under a motion (n_free,) [m], [rad].
 
     Planets fixed to their pins follow the carrier, at its angle zero.
     """
@@ -136,7 +136,7 @@ def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.nda
 def shaft_lines(
     model: DrivetrainModel, layout: Layout, shape, *, points: int = 8
 ) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """Centre lines of the shafts under a motion: places at rest and displacements, (k, 3) each.
+    """Compute the centre lines of the shafts under a motion: places at rest and displacements, (k, 3) each.
 
     A shaft passes through its stations, between them by the shape functions of its elements; one that is
     modelled as a joint is drawn as the one element whose static stiffness the joint stands for.
@@ -195,9 +195,9 @@ def _joint_shear_ratio(shaft) -> float:
 
 
 def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
-    """Deflection (k, 4) of a Timoshenko element per unit of (w, slope) at its ends; length [m].
+    """Compute the deflection (k, 4) of a Timoshenko element per (w, slope) at its ends [m], [rad].
 
-    Exact for an element without load; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
+    Exact for an element of a length [m] without load; ``xi`` (k,) runs from 0 to 1, ``slope`` turns sections.
     These are the functions behind the consistent mass of `femgear.fe.shaft.beam_element`
     (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 11.3; Z. Friedman and
     J. B. Kosmatka, Comput. Struct. 47, 1993, 473-481).
@@ -223,7 +223,7 @@ def draw_motion(
     layout : Layout
         Discs, and the names of the places that are written beside them.
     move, turn : (n, 3) arrays
-        Translation and rotation vector of every place, in the proportions of the motion.
+        Translation and rotation vector of every place, in the proportions of the motion [m], [rad].
     shafts : sequence of (rest (k, 3), displacement (k, 3))
         Centre lines [m].
     title : str
@@ -347,7 +347,7 @@ def _polylines(pv, lines):
 
 
 def write_mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
-    """As many of the lowest elastic modes as PNG files; returns their names.
+    """Draw as many of the lowest elastic modes as PNG files; returns their names.
 
     Modes have the numbers of the table: the free spin, which is not drawn, is the first.
     """

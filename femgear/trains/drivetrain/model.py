@@ -70,13 +70,13 @@ class DrivetrainModel:
     bases : tuple of str
         Base frequencies: per planetary stage the carrier's turn and the mesh, per parallel stage the mesh.
     base_ratio : (n_bases,) array
-        Speeds of the base phases over that of the first body.
+        Speeds of the base phases over that of the first body [1].
     mesh_base : (n_meshes,) int array
         Base of the stiffness of every mesh.
     turning : bool
         Whether mesh directions turn with the carriers.
     rigid : (n,) array
-        Rotations of the free spin, one for the first body.
+        Free spin, a rotation of one of the first body [rad].
     ratio : dict
         Speed of every body over that of the first one.
     contacts : FlankContacts
@@ -104,44 +104,45 @@ class DrivetrainModel:
 
     @property
     def meshes(self) -> tuple[str, ...]:
+        """Names of the meshes (n_meshes,)."""
         return self.geometry.names
 
     @property
     def mean_stiffness(self) -> np.ndarray:
-        """(n_meshes,) [N/m]"""
+        """Mean stiffness (n_meshes,) of the meshes [N/m]."""
         return np.real(self.stiffness[:, 0])
 
     @property
     def total_stiffness(self) -> np.ndarray:
-        """(n, n) with mean mesh stiffnesses."""
+        """Stiffness matrix (n, n) with mean mesh stiffnesses [N/m]."""
         return self.system.K + (self.system.W * self.mean_stiffness) @ self.system.W.T
 
     @property
     def still(self) -> MechanicalSystem:
-        """Without load, damping and gyroscopic terms, for modes."""
+        """System without load, damping and gyroscopic terms, for modes."""
         nothing = {"C": np.zeros_like(self.system.C), "load": np.zeros(len(self.rigid))}
         return replace(self.system, gyroscopic=None, **nothing)
 
     @property
     def inertia(self) -> float:
-        """Of the whole chain about the axis of the first body [kg m^2]."""
+        """Inertia of the whole chain about the axis of the first body [kg m^2]."""
         return float(self.rigid @ self.system.M @ self.rigid)
 
     def index(self, name: str) -> int:
-        """Place of a degree of freedom such as ``"rotor: rotation"``."""
+        """Find the place of a degree of freedom such as ``"rotor: rotation"``."""
         if name not in self.system.dofs:
             raise CaseError(f"no coordinate {name!r}", code="E-DRIVETRAIN", limit=", ".join(self.system.dofs))
         return self.system.dofs.index(name)
 
     def frequencies(self, speed: float) -> np.ndarray:
-        """Base frequencies (n_bases,) [rad/s] at a speed of the first body [rad/s]."""
+        """Compute the base frequencies (n_bases,) [rad/s] at a speed of the first body [rad/s]."""
         return self.base_ratio * speed
 
 
 def drivetrain_model(
     train: Drivetrain, *, harmonics: int = HARMONICS, turning: bool = True
 ) -> DrivetrainModel:
-    """Matrices, mesh directions and mesh stiffness of a drivetrain.
+    """Assemble matrices, mesh directions and mesh stiffness of a drivetrain.
 
     Parameters
     ----------
@@ -199,7 +200,7 @@ def drivetrain_problem(
     separates: bool = False,
     speed: float = 0.0,
 ) -> NonlinearSystem:
-    """The drivetrain for harmonic balance and time integration, on its simple motions.
+    """Assemble a drivetrain for harmonic balance and time integration, on its simple motions.
 
     Parameters
     ----------
@@ -288,7 +289,7 @@ def _flanks(
 
 
 def balanced_torque(model: DrivetrainModel, driver: str, torque: float, output: str) -> dict[str, float]:
-    """A torque on one body and the one on another that holds the spin at its speed [N m]."""
+    """Pair a torque on one body with the one on another that holds the spin at its speed [N m]."""
     return {driver: torque, output: -torque * model.ratio[driver] / model.ratio[output]}
 
 
@@ -370,7 +371,7 @@ def _stiffness(train: Drivetrain, place: Coordinates, spin: np.ndarray, harmonic
 
 
 def rectangular_series(wave: MeshSection, harmonics: int) -> np.ndarray:
-    """Complex harmonics 0 to H (H + 1,) of the rectangular mesh stiffness [N/m].
+    """Compute the complex harmonics 0 to H (H + 1,) of the rectangular mesh stiffness [N/m].
 
     With ``low`` pairs always in contact and one more for the share ``e = ratio - low`` of the period, centred
     at phase zero, ``k = k_low + (k_high - k_low) (e + sum_h 2 / (pi h) sin(pi h e) cos(h omega t))``
@@ -382,8 +383,8 @@ def rectangular_series(wave: MeshSection, harmonics: int) -> np.ndarray:
     return np.append(wave.stiffness, waves * np.exp(2j * np.pi * h * wave.phase)).astype(complex)
 
 
-def contact_model(model):
-    """The model with every contact in the place of a mesh, for integration in time."""
+def contact_model(model: DrivetrainModel) -> DrivetrainModel:
+    """Put every contact in the place of a mesh, for integration in time."""
     contacts = model.contacts
     return replace(
         model, geometry=contacts.geometry, stiffness=model.stiffness[contacts.mesh],
@@ -392,7 +393,7 @@ def contact_model(model):
 
 
 def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:
-    """As `drivetrain_model`, every axis held: no translation, no tilt, shafts that only twist, no weight."""
+    """Make a model as `drivetrain_model` with all axes held: rotations and twist alone, no weight."""
     held = replace(
         train,
         bodies=tuple(one.changed(tilts=False) for one in train.bodies),
@@ -404,7 +405,7 @@ def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:
 
 
 def static_flexibility(model: DrivetrainModel, W, k) -> np.ndarray:
-    """Deviations (n, n) per unit of loads that do not drive the spin [m/N].
+    """Compute the deviations (n, n) per unit of loads that do not drive the spin [m/N].
 
     Parameters
     ----------
@@ -420,7 +421,7 @@ def static_flexibility(model: DrivetrainModel, W, k) -> np.ndarray:
 
 
 def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
-    """Model of a case, its loaded flanks those that the mean torques press together.
+    """Make the model of a case, its loaded flanks those that the mean torques press together.
 
     Raises
     ------
@@ -448,7 +449,7 @@ def refusals_located(case: DrivetrainCase) -> Iterator[None]:
 
 
 def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
-    """The drivetrain with the driver of every stage that the torques make drive.
+    """Choose the driver of every stage by the torques.
 
     The torques, as means over the run, and the inertia forces of the acceleration of the free spin that they
     give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so that

@@ -142,7 +142,7 @@ class ShaftSection(Part):
 
     @property
     def section(self) -> shafts.RoundSection:
-        """Round section, of a shaft that has one."""
+        """Round section of a shaft that has one."""
         assert self.outer_diameter is not None
         return shafts.RoundSection(
             self.outer_diameter, self.inner_diameter, self.youngs_modulus, self.poisson_ratio, self.density
@@ -150,7 +150,7 @@ class ShaftSection(Part):
 
     @property
     def springs(self) -> shafts.JointSprings:
-        """Of the joint."""
+        """Springs of the joint [N m/rad], [N/m]."""
         if self.bending is None or self.torsion is None:
             return shafts.joint_springs(self.section, self.length)
         shear = self.shear
@@ -209,6 +209,7 @@ class ParallelSection(Part):
 
     @property
     def name(self) -> str:
+        """Both bodies, as in "pinion-wheel"."""
         return "-".join(self.between)
 
     @property
@@ -218,7 +219,7 @@ class ParallelSection(Part):
 
     @property
     def pitch_radii(self) -> tuple[float, ...]:
-        """Of both gears [m]."""
+        """Pitch radii of both gears [m]."""
         if self.module is not None:
             return tuple(0.5 * self.module * teeth for teeth in self.teeth)
         return self.radii or tuple(one / math.cos(self.pressure_angle) for one in self.base_radii or ())
@@ -259,6 +260,7 @@ class PlanetarySection(Part):
 
     @property
     def name(self) -> str:
+        """Carrier and sun, as in "carrier-sun"."""
         return f"{self.carrier}-{self.sun}"
 
     @property
@@ -268,12 +270,12 @@ class PlanetarySection(Part):
 
     @property
     def angles(self) -> tuple[float, ...]:
-        """Of the planets (N,) [rad]."""
+        """Angles (N,) of the planets [rad]."""
         return self.planet_angles or equal_planet_angles(self.planets)
 
     @property
     def pitch_radii(self) -> tuple[float, float]:
-        """Of sun and planet [m]."""
+        """Pitch radii of sun and planet [m]."""
         if self.module is not None:
             # half teeth of the planet are a matter of its profile shift
             teeth = self.sun_teeth, 0.5 * (self.ring_teeth - self.sun_teeth)
@@ -286,13 +288,13 @@ class PlanetarySection(Part):
 
     @property
     def centre_distance(self) -> float:
-        """[m]"""
+        """Distance of the planets' axes from that of the sun [m]."""
         sun, planet = self.pitch_radii
         return sun + planet
 
     @property
     def ring_radius(self) -> float:
-        """Pitch radius [m]."""
+        """Pitch radius of the ring [m]."""
         sun, planet = self.pitch_radii
         return sun + 2.0 * planet
 
@@ -349,12 +351,12 @@ class Drivetrain:
 
     @property
     def stages(self) -> tuple[PlanetarySection | ParallelSection, ...]:
-        """Planetary, then parallel ones."""
+        """Planetary stages, then parallel ones."""
         return (*self.planetary, *self.parallel)
 
     @property
     def meshes(self) -> tuple[Mesh, ...]:
-        """Of the stages in their order; of a planetary one those of the sun before those of the ring."""
+        """Meshes of the stages in their order; of a planetary one those of the sun before the ring's."""
         found = []
         for i, one in enumerate(self.planetary):
             suns = [f"{one.sun}-planet {p + 1}" for p in range(len(one.angles))]
@@ -366,12 +368,12 @@ class Drivetrain:
         return tuple(found)
 
     def planet_names(self, stage: PlanetarySection) -> list[str]:
-        """Of all planets of a stage: ``planet 1``, or ``planet of carrier 1`` beside other stages."""
+        """Name the planets of a stage: ``planet 1``, or ``planet of carrier 1`` beside other stages."""
         prefix = "planet" if len(self.planetary) == 1 else f"planet of {stage.carrier}"
         return [f"{prefix} {number}" for number in range(1, len(stage.angles) + 1)]
 
     def body(self, name: str) -> BodySection:
-        """The body of that name."""
+        """Find the body of that name."""
         return next(one for one in self.bodies if one.name == name)
 
 
@@ -397,11 +399,11 @@ class TorqueHistory:
         object.__setattr__(self, "values", np.array(self.values, float))
 
     def at(self, times) -> np.ndarray:
-        """Torque [N m] at any instants [s]."""
+        """Compute the torque (n,) [N m] at any instants (n,) [s]."""
         return np.interp(times, self.times, self.values)
 
     def mean(self, duration: float) -> float:
-        """Mean torque from 0 to `duration` [s], exact [N m]."""
+        """Compute the mean torque from 0 to `duration` [s], exact [N m]."""
         inside = self.times[(self.times > 0.0) & (self.times < duration)]
         times = np.concatenate([[0.0], inside, [duration]])
         return float(np.trapezoid(self.at(times), times) / duration)

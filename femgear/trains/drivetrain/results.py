@@ -62,7 +62,7 @@ class DrivetrainModesResult:
     speed: float
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc."""
+        """Collect the contents of modes.nc."""
         modes, model, found = self.modes, self.model, self.campbell
         members, energy, rotation = _energies(model, modes.shape)
         bases = np.unique(model.mesh_base)
@@ -105,7 +105,7 @@ class TransientResult:
     torques: tuple[TorqueHistory, ...]
 
     def dataset(self) -> xr.Dataset:
-        """Contents of transient.nc."""
+        """Collect the contents of transient.nc."""
         runs = list(self.runs.values())
         first, model = runs[0], next(iter(self.models.values()))
         ratio, bodies = np.array(list(model.ratio.values())), list(model.ratio)
@@ -224,7 +224,7 @@ class SpectrumResult:
     resolved: np.ndarray
 
     def dataset(self) -> xr.Dataset:
-        """Contents of spectrum.nc."""
+        """Collect the contents of spectrum.nc."""
         transient = self.transient
         model, variants = next(iter(transient.models.values())), list(self.spectra)
         some, tracked = self.spectra[variants[0]], self.orders
@@ -299,7 +299,7 @@ def _kinds(frequency, rotation) -> list[str]:
 
 
 def transient_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """What transient.nc says against itself."""
+    """List what transient.nc says against itself."""
     pulling, least = data["pulling"].values, data["least_force"].values
     for v, variant in enumerate(data["variant"].values):
         if pulling[v].any() and least[v].min() < -_NOTHING and not separating(data):
@@ -352,7 +352,7 @@ def _growth_warnings(data: xr.Dataset) -> Iterator[Finding]:
 
 
 def separating(data: xr.Dataset) -> bool:
-    """Whether the meshes of transient.nc lose contact."""
+    """Tell whether the meshes of transient.nc lose contact."""
     return data.attrs["contact"] == "separating"
 
 
@@ -467,7 +467,7 @@ def _damping(ratio: float) -> str:
 
 
 def describe_drivetrain_modes(data: xr.Dataset) -> Block:
-    """Table of modes.nc of a drivetrain."""
+    """Tabulate frequencies, kinds and kinetic energies of the first modes of modes.nc."""
 
     def where(mode: xr.Dataset) -> str:
         energy, members = mode["energy"].values, mode["member"].values
@@ -483,7 +483,7 @@ def describe_drivetrain_modes(data: xr.Dataset) -> Block:
 
 
 def describe_transient(data: xr.Dataset) -> Block:
-    """Table of transient.nc: mesh forces, those of all steps beside the recorded ones, speeds, balances."""
+    """Tabulate transient.nc: mesh forces [kN] of all steps beside the recorded ones, speeds, balances."""
     rows, recorded = [], data["mesh_force"].values
     mean, low, high = (getattr(recorded, name)(axis=1) for name in ("mean", "min", "max"))
     least, largest, pulling = (data[name].values for name in ("least_force", "largest_force", "pulling"))
@@ -519,7 +519,7 @@ def describe_transient(data: xr.Dataset) -> Block:
 
 
 def pass_band(data: xr.Dataset) -> float:
-    """End of the pass band of the records of transient.nc [Hz]."""
+    """Compute the end of the pass band of the records of transient.nc [Hz]."""
     return 0.5 * PASS_BAND / (float(data.attrs["step"]) * int(data.attrs["every"]))
 
 
@@ -537,7 +537,7 @@ def _growth_notes(data: xr.Dataset) -> Iterator[str]:
 
 
 def describe_spectrum(data: xr.Dataset) -> Block:
-    """Table of spectrum.nc: amplitudes of the named lines, of one mesh of every kind."""
+    """Tabulate spectrum.nc: amplitudes of the named lines [N], of one mesh of every kind."""
     meshes, amplitude = chosen_meshes(data), data["line_amplitude"].values
     names, variants = symbols(data), [str(name) for name in data["variant"].values]
     rows = []
@@ -575,13 +575,13 @@ def _combination(orders, names) -> str:
 
 
 def chosen_meshes(data: xr.Dataset) -> list[int]:
-    """One mesh of every kind: of planet 1 of every planetary stage, and of every parallel stage."""
+    """Choose a mesh of every kind: of planet 1 of every planetary stage, and of every parallel stage."""
     numbers = [_PLANET.search(str(name)) for name in data["mesh"].values]
     return [i for i, found in enumerate(numbers) if found is None or found[1] == "1"][:MOST_PANELS]
 
 
 def symbols(data: xr.Dataset) -> list[str]:
-    """Short names of the base frequencies of spectrum.nc: t, or t1 .., turns of carriers; f1 .. meshes."""
+    """Name the base frequencies of spectrum.nc shortly: t, or t1 .., turns of carriers; f1 .. meshes."""
     stages, found, meshes = int(data.attrs["planetary_stages"]), [], 0
     for base in range(data.sizes["base"]):
         if base < 2 * stages and base % 2 == 0:

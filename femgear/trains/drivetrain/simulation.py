@@ -146,7 +146,7 @@ def march_drivetrain(
     records: Records = Records(),
     contact_loss: bool = False,
 ) -> DrivetrainRun:
-    """Step a drivetrain through time.
+    """Integrate the motion of a drivetrain in time by average acceleration.
 
     Parameters
     ----------
@@ -159,7 +159,8 @@ def march_drivetrain(
     speed : float
         Of the first body at the start [rad/s]; gyroscopic terms keep this value.
     start : {"static", "zero"} or pair of (n,) arrays
-        Deviations and their velocities: static under the first loads, none (loads set in suddenly), or given.
+        Deviations [m, rad] and their velocities: static under the first loads, none (loads set in suddenly),
+        or given.
     outputs : sequence of str, optional
         Coordinates to record; all rotations when not given.
     records : Records
@@ -293,14 +294,14 @@ class FreeMotion:
         self.times, self.sizes = [0.0], [0.0]
 
     def start(self) -> np.ndarray:
-        """Row ``z`` (2 n + m,) of random velocities of like energy."""
+        """Make the row ``z`` (2 n + m,) of random velocities of like energy."""
         n = self.scheme.n
         state = np.zeros(len(self.scheme.advance))
         state[n : 2 * n] = np.random.default_rng(0).standard_normal(n) / np.sqrt(np.diag(self.system.M))
         return self._scaled(state)[0]
 
     def renewed(self, row, time: float) -> np.ndarray:
-        """The row at size one; its size at this time [s] is kept."""
+        """Bring a row (2 n + m,) back to size one; its size at this time [s] is kept."""
         row, size = self._scaled(self.scheme.states(row))
         self.times.append(time)
         with np.errstate(divide="ignore"):
@@ -317,7 +318,7 @@ class FreeMotion:
         return self.scheme.row(state / size if size > 0.0 else 0.0 * state), size
 
     def gain(self) -> float:
-        """Largest growth between any two instants of the run, as a factor; NaN without a free motion.
+        """Find the largest growth between two instants of the run, as a factor; NaN without a free motion.
 
         ``exp(max over t of (log size(t) - its least value before))``: a resonance that the speed passes
         shows here, though the mean over the run decays. Infinite beyond all numbers.
@@ -329,7 +330,7 @@ class FreeMotion:
             return float(np.exp((sizes - np.minimum.accumulate(sizes)).max()))
 
     def growth(self) -> float:
-        """Mean rate of the logarithm of the size [1/s] after the first third; NaN without a free motion."""
+        """Compute the mean rate of log size [1/s] after the first third; NaN without a free motion."""
         times, sizes = np.array(self.times), np.array(self.sizes)
         late = times >= _START * times[-1]
         if np.count_nonzero(late) < 2:
@@ -505,7 +506,7 @@ class Decimator:
         self.buffer, self.first, self.done = np.zeros((0, 0)), 0, 0
 
     def push(self, rows) -> np.ndarray:
-        """Records (k, c) that become complete with further rows (n, c)."""
+        """Take further rows (n, c), and give the records (k, c) that become complete with them."""
         rows = np.asarray(rows, float)
         self.buffer = np.vstack([self.buffer, rows]) if self.seen else rows.copy()
         self.seen += len(rows)

@@ -69,7 +69,7 @@ _GROWN, _WILD = 1e3, 100.0
 
 @one_blas_thread()
 def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
-    """Natural frequencies and modes, and the Campbell diagram with the mesh lines."""
+    """Solve for natural frequencies and modes, and the Campbell diagram with the mesh lines."""
     model, speed = check_drivetrain(case), case.operation.speed
     modes = solve_modes(model.still, model.mean_stiffness)
     still = replace(model.still, gyroscopic=model.system.gyroscopic)
@@ -85,7 +85,7 @@ def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
 
 @one_blas_thread()
 def solve_transient_run(case: DrivetrainCase, *, progress: Progress = silent) -> TransientResult:
-    """Integrate the case; records are low-passed before they are thinned out.
+    """Integrate the motion of a case in time; records are low-passed before they are thinned out.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
 
 
 def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> SpectrumResult:
-    """Spectra of the mesh forces after the start, over frequency and over orders of the first body.
+    """Compute spectra of the mesh forces after the start, over frequency and orders of the first body.
 
     Refuses what `check_spectrum` does.
     """
@@ -184,7 +184,7 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
 
 
 def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
-    """Mesh harmonics, side bands of the carrier's turn, sums and differences of two meshes."""
+    """List mesh harmonics, side bands of the carrier's turn, sums and differences of two meshes."""
     count, planets = len(model.bases), len(model.geometry.even)
     meshes = [base for base in range(count) if base % 2 or base >= 2 * planets]
     found = []
@@ -212,7 +212,7 @@ def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
 
 
 def resolved_lines(model: DrivetrainModel, lines, distance: float) -> np.ndarray:
-    """Whether Hann's window parts lines (L,) from one another and mesh harmonics; distance of orders."""
+    """Tell whether Hann's window parts lines (L,) from one another and harmonics; distance of orders."""
     order = np.array([line.order for line in lines])
     harmonics = np.outer(np.arange(1, 11), model.base_ratio[np.unique(model.mesh_base)]).ravel()
     apart = np.abs(order[:, None] - np.concatenate([order, harmonics]))
@@ -222,7 +222,7 @@ def resolved_lines(model: DrivetrainModel, lines, distance: float) -> np.ndarray
 
 
 def line_amplitudes(signal, angle, speed, lines, *, record_rate: float) -> np.ndarray:
-    """Amplitudes (L, c) of lines in signals (n, c), by projection on them at their exact orders.
+    """Compute amplitudes (L, c) of lines in signals (n, c), by projection on them at their exact orders.
 
     Hann's window over the angle; the mean is taken off. NaN beyond the pass band of the records.
 
@@ -249,7 +249,7 @@ def line_amplitudes(signal, angle, speed, lines, *, record_rate: float) -> np.nd
 
 
 def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpectrum:
-    """Spectrum of a signal (n, ...) sampled every ``step`` seconds, segments under Hann's window.
+    """Compute the spectrum of a signal (n, ...) sampled every ``step`` [s], segments under Hann's window.
 
     P. D. Welch, IEEE Trans. Audio Electroacoust. 15, 1967, 70-73, of amplitudes instead of densities; the
     segments overlap by half, and the mean of every one is taken off.
@@ -278,7 +278,7 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
 
 
 def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> AveragedSpectrum:
-    """Spectrum over orders of an angle that need not grow evenly.
+    """Compute the spectrum of a signal over orders of an angle that need not grow evenly.
 
     The signal is taken at equal steps of the angle by cubic splines (K. R. Fyfe and E. D. S. Munck, Mech.
     Syst. Signal Process. 11, 1997, 187-205), then as in `averaged_spectrum`.
@@ -313,7 +313,7 @@ def _transient_verdict(result: TransientResult) -> dict:
 
 
 def remarks(results: Results, stem: str) -> Iterator[str]:
-    """What a force without its usual sign means, for the caption of its picture."""
+    """Tell what a force without its usual sign means, for the caption of its picture."""
     if stem == "transient_forces":
         if results.case.simulation.contact_loss:
             yield "Zero: the teeth are apart; negative: their back flanks touch."

@@ -108,7 +108,7 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
     Parameters
     ----------
     ring_modes : CyclicModes
-    carrier_speeds : sequence of float
+    carrier_speeds : (n_speeds,) sequence of float
         [rad/s]
 
     Raises
@@ -132,7 +132,7 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
 
 
 def case_warnings(case: Case) -> Iterator[Finding]:
-    """What is allowed in a set with an elastic ring but deserves a look."""
+    """List what is allowed in a set with an elastic ring but deserves a look."""
     yield from set_warnings(case)
     if case.dynamics.damping_ratio == 0.0 and case.operation.fixed == "ring":
         yield Finding(
@@ -177,12 +177,12 @@ def _wound_up(case: Case) -> Iterator[Finding]:
 
 
 def max_nodal_diameter(case: Case) -> int:
-    """Largest nodal diameter of the ring model; beyond half the teeth there are none."""
+    """Find the largest nodal diameter of the ring model; beyond half the teeth there are none."""
     return max(min(MAX_DIAMETER, case.ring.teeth // 2 - 1), 2)
 
 
 def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
-    """Mesh frequency of the fastest speed [Hz].
+    """Compute the mesh frequency of the fastest speed [Hz].
 
     Raises
     ------
@@ -217,12 +217,12 @@ def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
 
 
 def checked_speeds(count: int, most: int = _CHECKED) -> np.ndarray:
-    """Numbers of the speeds at which the level is computed again: all of a few, the ends of many."""
+    """Choose the numbers of speeds at which the level is computed again: all of a few, some of many."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
 def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """What the solver says against dynamics.nc: excitation that ends too early, speeds without a solution."""
+    """List what the solver says against dynamics.nc: excitation that ends too early, no solution."""
     if "level_change" in data:
         change, limit = data["level_change"].values, data["excitation_limit"].values
         yield from missing_level(data["speed"].values, change, limit, float(data.attrs["compared_to"]))
@@ -230,7 +230,7 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
 
 
 def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[Finding, ...]:
-    """Warning where the level of the housing would change by `NOTICEABLE` or more.
+    """Warn where the level of the housing would change by `NOTICEABLE` or more.
 
     Parameters
     ----------

@@ -45,9 +45,9 @@ class ElasticSet:
         transmission error of the gears, ring deflection included.
     ring_slice : slice
         Place of the ring's coordinates.
-    ring_diameter, ring_phase : int arrays
+    ring_diameter, ring_phase : (n_ring,) int arrays
         Nodal diameter and kind (0 cosine, 1 sine) of every ring coordinate.
-    ring_mode : int array
+    ring_mode : (n_ring,) int array
         Index into the ring's CyclicModes of every ring coordinate.
     planet_angles : (N,) array
         [rad]
@@ -72,7 +72,7 @@ def _rigid_dofs(n_planets: int, motor: bool = False, brake: bool = False) -> tup
 def elastic_set(
     case: Case, planetary_set: PlanetarySet, ring: RingModel, *, sun_torque: float, flexibility=None
 ) -> ElasticSet:
-    """Assemble the mechanical system.
+    """Assemble the mechanical system of the rigid gears with their elastic ring.
 
     Parameters
     ----------
@@ -120,12 +120,12 @@ def elastic_set(
 
 
 def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.ndarray:
-    """Displacement into the ring at its loaded flanks per unit ring coordinate, shape (coordinates, N).
+    """Compute the displacement (n_ring, N) into the ring at its loaded flanks per unit ring coordinate.
 
     Parameters
     ----------
     ring : CyclicModes
-    ring_mode, ring_phase : int arrays
+    ring_mode, ring_phase : (n_ring,) int arrays
         Mode and kind (0 cosine, 1 sine) of every coordinate.
     angles : (N,) array
         Angles of the loaded teeth [rad].
@@ -182,7 +182,7 @@ def _mesh_directions(W, place, planetary_set: PlanetarySet, sun_torque: float) -
 
 
 def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun_torque: float) -> float:
-    """Highest natural frequency of the rigid gears in a rigid ring whose strain is in the meshes [Hz].
+    """Find the highest natural frequency of rigid gears in a rigid ring with the strain in the meshes [Hz].
 
     Modes with less than a tenth of it there are left out: those of stiff bearings and supports. So are motor
     and brake.
@@ -206,7 +206,7 @@ def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun
 
 
 def ring_mesh_compliance(harmonic_compliance, count: int, angles) -> np.ndarray:
-    """Static compliance of the dynamic ring between its mesh points, shape (N, N) [m/N].
+    """Compute the static compliance (N, N) of the dynamic ring between its mesh points [m/N].
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def ring_mesh_compliance(harmonic_compliance, count: int, angles) -> np.ndarray:
 
 
 def body_flexibility(compliance, held_compliance) -> np.ndarray:
-    """Compliance between the meshes through their bodies that neither springs nor ring modes hold, (2N, 2N).
+    """Compute the compliance (2N, 2N) between the meshes that neither springs nor ring modes hold [m/N].
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def body_flexibility(compliance, held_compliance) -> np.ndarray:
 def mesh_excitation(
     stiffness, deflection, force, held_compliance, *, ring_compliance=None, flexibility=None, backlash
 ) -> MeshExcitation:
-    """Mesh springs of the dynamic model: the static meshes less what the other parts keep elastic.
+    """Make the mesh springs of the dynamic model: static meshes less what other parts keep elastic.
 
     ``1/k_dyn = 1/k - c_jj`` for the tangent stiffness, both with the ring held, so that what the foundation
     gives way, which may be by far the most, cancels nowhere; and ``delta - C F`` for the deflection, with
@@ -303,13 +303,13 @@ def mesh_excitation(
 def ring_field(
     model: ElasticSet, ring: CyclicModes, coordinates, output: int, max_diameter: int
 ) -> np.ndarray:
-    """Circumferential components of a ring output from complex harmonics of the ring's coordinates.
+    """Compute circumferential components of a ring output from harmonics of the ring's coordinates.
 
     ``u(phi, t) = Re sum_h sum_n U[h, n] e^{i n phi} e^{i h omega t}``.
 
     Parameters
     ----------
-    coordinates : (..., ring coordinates) complex array
+    coordinates : (..., n_ring) complex array
         Harmonics of the ring's coordinates.
     output : int
         Index of the output in ``ring.output``.
@@ -319,7 +319,7 @@ def ring_field(
     Returns
     -------
     (..., 2 max_diameter + 1) complex array
-        Components n = -max_diameter .. max_diameter.
+        Components n = -max_diameter .. max_diameter, in the unit of the output [m].
     """
     mode, n = model.ring_mode, model.ring_diameter
     value = (ring.norm * ring.output[:, output])[mode]
@@ -370,7 +370,7 @@ def ring_model(
     max_frequency: float,
     side: float = 1.0,
 ) -> RingModel:
-    """Ring modes for nodal diameters 0..max_diameter.
+    """Compute ring modes for nodal diameters 0..max_diameter.
 
     Parameters
     ----------
@@ -378,9 +378,9 @@ def ring_model(
     grid : Grid
         Sector of the ring.
     stiffness, mass, foundation : (2n, 2n) sparse matrices
-        Of the sector.
+        Of the sector [N/m], [kg], [N/m].
     load : (2n, 1) array
-        Unit force into the ring at the flank that carries.
+        Unit force into the ring at the flank that carries [1].
     max_diameter : int
         Largest nodal diameter.
     max_frequency : float

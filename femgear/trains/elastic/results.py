@@ -82,7 +82,7 @@ class ModesResult:
         return len(self.ring.compliance) - 1
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc."""
+        """Collect the contents of modes.nc."""
         modes, model, state, n_max = self.modes, self.model, self.state, self.max_diameter
         record, supported = "mesh supported_position", "static transmission error of the set on its supports"
         between = "compliance between the meshes through their bodies"
@@ -147,13 +147,13 @@ class DynamicsResult:
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """What an engineer should not overlook in this result."""
+        """Findings that an engineer should not overlook in this result."""
         return missing_level(
             self.input_speed / RPM, self.level_change, self.excitation_limit, self.compared_to
         )
 
     def dataset(self) -> xr.Dataset:
-        """Contents of dynamics.nc."""
+        """Collect the contents of dynamics.nc."""
         response, lines, field = self.response, "speed mesh harmonic", "speed harmonic circumferential"
         words = "outer tangential displacement of the ring"
         n_max = self.ring_radial.shape[-1] // 2
@@ -206,7 +206,7 @@ class HousingResult:
     excitation_limit: np.ndarray
 
     def dataset(self) -> xr.Dataset:
-        """Contents of housing.nc."""
+        """Collect the contents of housing.nc."""
         signal, lines, exact = self.signal, self.lines, self.exact
         heard = np.abs(lines.acceleration), np.abs(exact.acceleration), np.angle(exact.displacement)
         words = (
@@ -243,7 +243,7 @@ class HousingResult:
 
 
 def describe_housing(data: xr.Dataset) -> Block:
-    """Tabulate level and largest lines at every speed of housing.nc."""
+    """Tabulate level and largest lines [m/s^2] at every speed [rpm] of housing.nc."""
     columns = {
         "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
         "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
@@ -264,7 +264,7 @@ def _largest_lines(one: xr.Dataset) -> str:
 
 
 def mesh_bands(results: Results) -> Block:
-    """Dominant lines and lobes around every mesh harmonic of the excitation, at a few speeds."""
+    """Tabulate dominant lines and lobes around every mesh harmonic of the excitation, at a few speeds."""
     housing, case = results.housing, results.case
     teeth = int(housing.attrs["ring_teeth"])
     rows, threshold = [], 0.0

@@ -129,7 +129,7 @@ class _FrequencyLimit:
 
 
 def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
-    """Frequency to which the excitation reaches unless the case says less [Hz].
+    """Choose the frequency to which the excitation reaches unless the case says less [Hz].
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> f
 
 
 def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = None) -> _FrequencyLimit:
-    """Harmonics up to a frequency, or a given number of them.
+    """Count the harmonics (n_speeds,) up to a frequency, or take a given number of them.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def _sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: n
 def mesh_and_ring_outputs(
     result: ModesResult, response: Response
 ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Dynamic transmission error of every mesh, and radial and tangential field of the ring.
+    """Compute the dynamic transmission error of every mesh, and radial and tangential field of the ring.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ twice a frequency carry the response there."""
 def solve_modes(
     case: Case, static: StaticResult, *, progress: Progress = silent, steps: Steps | None = None
 ) -> ModesResult:
-    """Modal basis of the set with its elastic ring and mean mesh stiffnesses.
+    """Solve for the modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
     Its loaded state, from which the meshes take stiffness and excitation, is that of the set on its supports
     and of the ring on its foundation, whatever ``static.members`` shows.
@@ -341,7 +341,7 @@ def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies
 
 
 def linear_supports(case: Case) -> Supports:
-    """Supports of the members without clearance: the bearings of the dynamic model are linear."""
+    """Make the supports of the members without clearance: bearings of the dynamic model are linear."""
     return replace(case_supports(case), planet_clearance=0.0)
 
 
@@ -393,7 +393,7 @@ def _excitation(
 def solve_dynamics(
     case: Case, static: StaticResult, modes: ModesResult, *, progress: Progress = silent
 ) -> DynamicsResult:
-    """Periodic response at the case's speeds by the spectral method, with a Floquet verdict at each.
+    """Solve for the periodic response at the case's speeds by the spectral method, a Floquet verdict at each.
 
     The response is compared with that to excitation up to a higher frequency. Where the case sets no limit it
     is doubled once where that changes the level by 1 dB or more.
@@ -451,7 +451,7 @@ def solve_dynamics(
 
 @one_blas_thread()
 def solve_response(case: Case, modes: ModesResult) -> Response:
-    """Periodic response at the speeds of the case, without stability and fields of `solve_dynamics`.
+    """Solve for the periodic response at the case's speeds, without stability and fields (`solve_dynamics`).
 
     Raises
     ------
@@ -473,7 +473,7 @@ def _turning_speeds(case: Case, modes: ModesResult) -> tuple[Speeds, ...]:
 
 @one_blas_thread()
 def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
-    """Signal and carrier orders of a sensor fixed on the ring while the carrier turns past it.
+    """Compute signal and carrier orders of a sensor fixed on the ring while the carrier turns past it.
 
     With ``housing.form = "linear"`` the static deflection (harmonic zero) is carried exactly all the same:
     its images, where the teeth of the ring are a multiple of the number of points, would fall on the mesh

@@ -118,7 +118,7 @@ class GearPairCase(Section, ReadCase):
 
 
 def cross_check(case: GearPairCase) -> Iterator[CaseError]:
-    """What no entry shows alone."""
+    """Refuse what no entry shows alone."""
     mesh, gears = case.mesh, case.gears
     for wave, angles in (("stiffness_waves", "stiffness_angles"), ("error", "error_angles")):
         count, given = len(getattr(mesh, wave)), len(getattr(mesh, angles))
@@ -167,7 +167,7 @@ class PairScales:
 
 
 def scales_of(case: GearPairCase) -> PairScales:
-    """Half backlash, natural frequency and force that count as one."""
+    """Find half backlash [m], natural angular frequency [rad/s] and force [N] that count as one."""
     gears, mesh = case.gears, case.mesh
     mass = 1.0 / sum(r * r / i for r, i in zip(gears.base_radii, gears.inertia))
     return PairScales(
@@ -176,7 +176,7 @@ def scales_of(case: GearPairCase) -> PairScales:
 
 
 def pair_of(case: GearPairCase) -> ImpactPair:
-    """The dimensionless pair of a case."""
+    """Make the dimensionless pair of a case."""
     gears, mesh, scales = case.gears, case.mesh, scales_of(case)
     bearings = None
     if gears.mass is not None and gears.bearing_stiffness is not None:

@@ -39,7 +39,7 @@ def amplitude_and_mean(
     curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, x: str = "frequency ratio [1]",
     unit: str = "half backlash", title: str = "",
 ) -> Figure:  # fmt: skip
-    """Amplitude and mean of a deflection over frequency, dashed where it is not known to be stable.
+    """Draw amplitude and mean of a deflection over frequency, dashed where it is not known to be stable.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def amplitude_and_mean(
 
 
 def state_bands(rows: Sequence[tuple]) -> Figure:
-    """Contact state over the frequency ratio, one band a row.
+    """Draw the contact state over the frequency ratio, one band a row.
 
     A border is drawn halfway between two ratios; sparse rows show these as dots.
 
@@ -106,7 +106,7 @@ def state_bands(rows: Sequence[tuple]) -> Figure:
 
 
 def bifurcation_and_exponent(chaos: xr.Dataset) -> Figure:
-    """Deflections once a period of chaos.nc over the ratio, and the largest exponent with its error below.
+    """Draw deflections once a period of chaos.nc over the ratio, and below the largest exponent, its error.
 
     Thin lines are the extremes of the motion.
     """
@@ -127,7 +127,7 @@ def bifurcation_and_exponent(chaos: xr.Dataset) -> Figure:
 
 
 def phase_sections(chaos: xr.Dataset) -> Figure:
-    """Stroboscopic sections of chaos.nc side by side, with the exponent of each."""
+    """Draw the stroboscopic sections of chaos.nc side by side, with the exponent of each."""
     names = ("ratio", "exponent", "error", "deflection", "velocity")
     panels = list(zip(*(chaos[f"section_{name}"].values for name in names)))
     figure, axes = new_figure(columns=len(panels), width=4.0 * len(panels), height=4.2)
@@ -145,7 +145,7 @@ def phase_sections(chaos: xr.Dataset) -> Figure:
 
 
 def contact_rows(response: xr.Dataset | None, sweep: xr.Dataset | None) -> list[tuple]:
-    """Rows of `state_bands`: the branch from limit point to limit point, and the sweeps as they ran."""
+    """Make the rows of `state_bands`: the branch from limit point to limit point, the sweeps as they ran."""
     rows = []
     if response is not None:
         ratio, state = response["ratio"].values, _state_numbers(response)

@@ -95,7 +95,7 @@ class ImpactPair:
 
     @property
     def frequency(self) -> np.ndarray:
-        """Base frequencies of the scaled time: the teeth, then the shafts that are eccentric."""
+        """Base frequencies (n_bases,) of the scaled time: the teeth, then the shafts that are eccentric."""
         return np.array([1.0, *(1.0 / z for e, z in zip(self.eccentricity, self.teeth) if e)])
 
     @property
@@ -144,11 +144,12 @@ class ImpactPair:
 
 
 def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tuple[float, ...]:
-    """Frequency ratios at which drive flanks begin to part, ascending: none, one or two.
+    """Find the frequency ratios at which drive flanks begin to part, ascending: none, one or two.
 
-    Rotations, constant stiffness, one harmonic of the error: as long as flanks touch the pair is linear and
-    they part where ``error Omega^2 / |1 - Omega^2 + 2 i zeta Omega| = load``, a quadratic equation of
-    Omega^2 (Kahraman and Singh 1990, transition from no impact to single-sided impact).
+    The load over k b, the error in half backlashes. Rotations, constant stiffness, one harmonic of the
+    error: as long as flanks touch the pair is linear and they part where
+    ``error Omega^2 / |1 - Omega^2 + 2 i zeta Omega| = load``, a quadratic equation of Omega^2
+    (Kahraman and Singh 1990, transition from no impact to single-sided impact).
     """
     s = (error / load) ** 2
     roots = np.roots([1.0 - s, 4.0 * damping_ratio**2 - 2.0, 1.0])
@@ -157,7 +158,7 @@ def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tup
 
 
 def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray:
-    """Ratios (n,) along the branch at which the smallest deflection passes a level, to 1e-6.
+    """Find the ratios (n,) along the branch at which the smallest deflection passes a level, to 1e-6.
 
     The harmonic balance equations are solved again between two points of the branch; at limit points, where
     two points lie within 1e-3 of the ratio, the border is interpolated.
@@ -168,7 +169,7 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
     branch : Branch
         Over the frequency ratio, from ``parameter_curve(pair.problem, ..., 1.0)``.
     level : float
-        `DRIVE` for the first impacts, `BACK` for impacts on both flanks.
+        In half backlashes: `DRIVE` for the first impacts, `BACK` for impacts on both flanks.
     """
     from scipy.optimize import brentq
 
@@ -205,7 +206,7 @@ STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
 
 
 def range_states(lowest, highest) -> np.ndarray:
-    """Contact states (...), indices into `STATE_NAMES`, from the range of the relative deflection.
+    """Tell the contact states (...), indices into `STATE_NAMES`, from the range of the relative deflection.
 
     `UNKNOWN` where an extreme is nan or infinite, as of a motion that did not settle.
 
@@ -222,7 +223,7 @@ def range_states(lowest, highest) -> np.ndarray:
 
 
 def contact_shares(x) -> dict[str, np.ndarray]:
-    """Shares (...) of the instants with the drive flanks, none or the back flanks in contact.
+    """Compute the shares (...) of the instants with the drive flanks, none or the back flanks in contact.
 
     Parameters
     ----------
@@ -235,7 +236,7 @@ def contact_shares(x) -> dict[str, np.ndarray]:
 
 
 def state_regions(parameter, state) -> list[tuple[int, float, float]]:
-    """Runs of equal states (n,) along a curve or sweep: state, first and last value of the parameter (n,).
+    """List runs of equal states (n,) along a curve: state, first and last value of the parameter (n,).
 
     Neighbouring runs share no value; where the state changes the border lies between them.
     """

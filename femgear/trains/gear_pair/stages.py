@@ -66,7 +66,7 @@ class ResponseResult:
     borders: dict[float, np.ndarray]
 
     def dataset(self) -> xr.Dataset:
-        """Contents of response.nc."""
+        """Collect the contents of response.nc."""
         branch = self.branch
         variables = _motions("point", self.lowest, self.highest, np.real(branch.lines[:, 0, 0]))
         variables |= _numbers(
@@ -97,7 +97,7 @@ class SweepResult:
     down: SweepResponse
 
     def dataset(self) -> xr.Dataset:
-        """Contents of sweep.nc; both directions over the ascending ratio."""
+        """Collect the contents of sweep.nc; both directions over the ascending ratio."""
 
         def both(name: str) -> np.ndarray:
             return np.array([getattr(self.up, name), getattr(self.down, name)[::-1]])
@@ -130,7 +130,7 @@ class ChaosResult:
     sections: list[tuple[float, LyapunovExponents]]
 
     def dataset(self) -> xr.Dataset:
-        """Contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
+        """Collect the contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
         ratio, found = self.ratio, self.found
         variables = _numbers(
             "ratio",
@@ -200,7 +200,7 @@ def _units(case: GearPairCase, title: str) -> dict[str, Any]:
 
 @one_blas_thread()
 def solve_response(case: GearPairCase) -> ResponseResult:
-    """Periodic motions over the frequency ratio past limit points, with stability and contact."""
+    """Follow periodic motions over the frequency ratio past limit points, with stability and contact."""
     pair, given = pair_of(case), case.response
     branch = parameter_curve(
         pair.problem, (given.start, given.to), 1.0, harmonics=given.harmonics, samples=1024, radius=False,
@@ -214,7 +214,7 @@ def solve_response(case: GearPairCase) -> ResponseResult:
 
 @one_blas_thread()
 def solve_sweep(case: GearPairCase) -> SweepResult:
-    """Integrate at every ratio until the motion repeats, upwards and from there back."""
+    """Integrate in time at every frequency ratio until the motion repeats, upwards and from there back."""
     pair, given = pair_of(case), case.sweep
     assert given is not None
     ratios = np.concatenate([np.linspace(one.start, one.to, one.count) for one in given.ranges])
@@ -227,7 +227,7 @@ def solve_sweep(case: GearPairCase) -> SweepResult:
 
 @one_blas_thread()
 def solve_chaos(case: GearPairCase, *, progress: Progress = silent) -> ChaosResult:
-    """Lyapunov exponents over the ratio, each from the last point of the one before, and long sections."""
+    """Compute Lyapunov exponents over the ratio, each from the end of the one before, and long sections."""
     pair, given, found = pair_of(case), case.chaos, []
     assert given is not None
     ratios, start = np.linspace(given.start, given.to, given.count), None

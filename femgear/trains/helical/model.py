@@ -120,7 +120,7 @@ class HelicalSet(RigidSet):
 
     @property
     def column_stiffness(self) -> np.ndarray:
-        """Mean stiffness of the 2N S columns of ``W`` [N/m], the slices of a mesh side by side."""
+        """Mean stiffness (2N S,) of the columns of ``W`` [N/m], the slices of a mesh side by side."""
         return np.repeat(self.mesh_stiffness, self.slices) / self.slices
 
     @property

@@ -58,7 +58,7 @@ class HelicalModesResult:
     whole: MeshExcitation | None = None
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
+        """Collect the contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
         found = modes_dataset(
             self.data,
             self.planetary_set,
@@ -100,7 +100,7 @@ class HelicalDynamicsResult:
     loads: dict[str, np.ndarray]
 
     def dataset(self) -> xr.Dataset:
-        """Contents of dynamics.nc of a helical case."""
+        """Collect the contents of dynamics.nc of a helical case."""
         response, basis, lines = self.response, self.modes, ("speed", "mesh", "harmonic")
         data = basis.data
         whole = (len(response.mesh_frequency), 2 * data.n_planets, data.slices, -1)

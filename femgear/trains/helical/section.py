@@ -71,7 +71,7 @@ class HelicalSection(Section):
 
 
 def helical_notices(data: dict) -> Iterator[Finding]:
-    """What a helical case gives without effect, by the tables of its checked file."""
+    """List what a helical case gives without effect, by the tables of its checked file."""
     unused = entries_without_effect(data)
     unused += [f"static.{key}" for key in ("stresses", "back_flanks") if key in data.get("static", {})]
     if data["planet"].get("bearing_clearance"):
@@ -127,6 +127,7 @@ class HelicalCase(RigidCase):
 
     @property
     def helix_angle(self) -> float:
+        """At the reference cylinder, of either hand [rad]."""
         return self.helical.helix_angle
 
 

@@ -131,7 +131,7 @@ class StageSection(Section):
 
     @property
     def angles(self) -> tuple[float, ...]:
-        """Of the planets [rad]: as given, or equally spaced."""
+        """Of the planets (N,) [rad]: as given, or equally spaced."""
         return self.planet_angles or equal_planet_angles(self.planets)
 
 
@@ -186,7 +186,7 @@ class MultistageCase(Section, ReadCase):
 
 
 def cross_check(case: MultistageCase) -> Iterator[CaseError]:
-    """What no entry shows alone."""
+    """Refuse what no entry shows alone."""
     found = list(_entry_problems(case))
     yield from found
     if not found:
@@ -231,7 +231,7 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
 
 
 def multistage_of(case: MultistageCase) -> MultistageSet:
-    """The train of a case; without couplings each carrier turns the next sun, joined rigidly."""
+    """Make the train of a case; without couplings each carrier turns the next sun, joined rigidly."""
     stages = [_named(_stage, f"stage[{n}]", one) for n, one in enumerate(case.stage)]
     couplings = [_named(_coupling, f"coupling[{n}]", one) for n, one in enumerate(case.coupling)]
     operation = case.operation
@@ -279,7 +279,7 @@ def _coupling(one: CouplingSection) -> StageCoupling:
 
 
 def stage_gears(stage: StageSection) -> PlanetarySet:
-    """Geared set of a stage that has gears; the rims have no effect on anything computed here."""
+    """Make the gears of a stage that has some; the rims have no effect on anything computed here."""
     given = stage.gears
     assert given is not None
     sun, planet, ring = (0.5 * given.module * z for z in given.teeth)

@@ -18,7 +18,7 @@ _DASHES = {"rotational": "-", "translational": "--", "planet": ":", "mixed": "-.
 
 
 def stage_energy(modes: xr.Dataset) -> Figure:
-    """Share of every stage in the kinetic energy of the elastic modes of modes.nc, one panel a kind.
+    """Draw the share of every stage in the kinetic energy of the elastic modes of modes.nc, a panel a kind.
 
     Modes of one frequency are drawn once, with their mean share.
     """
@@ -46,7 +46,7 @@ def stage_energy(modes: xr.Dataset) -> Figure:
 
 
 def mesh_orders(modes: xr.Dataset, response: xr.Dataset) -> Figure:
-    """Mesh frequencies of response.nc and their harmonics over the speed, with the modes of modes.nc.
+    """Draw mesh frequencies of response.nc and their harmonics over the speed, with the modes of modes.nc.
 
     Natural frequencies above the highest line are left out.
     """
@@ -73,7 +73,7 @@ def mesh_orders(modes: xr.Dataset, response: xr.Dataset) -> Figure:
 
 
 def stage_forces(response: xr.Dataset, balance: xr.Dataset | None = None) -> Figure:
-    """Dynamic mesh forces of response.nc over the speed by the stage that excites, one panel a stage.
+    """Draw dynamic mesh forces of response.nc over the speed by the stage that excites, a panel a stage.
 
     Those of balance.nc stand beside them as circles.
     """

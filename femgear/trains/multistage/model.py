@@ -60,7 +60,7 @@ class Member:
 
     @property
     def place(self) -> int:
-        """Among the central members of all stages."""
+        """Number among the central members of all stages, from 0."""
         return 3 * (self.stage - 1) + CENTRAL.index(self.name)
 
 
@@ -179,7 +179,7 @@ class MultistageSet:
 
     @property
     def n_meshes(self) -> int:
-        """Of all stages."""
+        """Number of the meshes of all stages."""
         return sum(2 * stage.data.n_planets for stage in self.stages)
 
 
@@ -192,7 +192,7 @@ def in_series(
     ----------
     stages : sequence of PlanetaryStage
     torsional, lateral : float
-        Of every coupling, see `StageCoupling`.
+        Of every coupling [N m/rad], [N/m], see `StageCoupling`.
     """
     couplings = tuple(
         StageCoupling(Member(n, "carrier"), Member(n + 1, "sun"), torsional, lateral)
@@ -213,7 +213,7 @@ class TrainSpeeds:
     mesh_frequency: np.ndarray
 
     def of(self, member: Member) -> float:
-        """Speed of a member [rad/s]."""
+        """Read the speed of a member [rad/s]."""
         return float(getattr(self, member.name)[member.stage - 1])
 
 
@@ -236,7 +236,7 @@ class TrainTorques:
 
 
 def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
-    """Speeds of all bodies from that of the input member.
+    """Compute the speeds of all bodies from that of the input member.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
 
 
 def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) -> TrainTorques:
-    """Torques on all members from that on the input, without losses.
+    """Compute the torques on all members from that on the input, without losses.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) ->
 
 
 def speed_ratio(data: MultistageSet) -> float:
-    """Speed of the input over that of the output; refuses an output that stands (E-MECHANISM)."""
+    """Compute the speed of the input over that of the output; refuses an output that stands (E-MECHANISM)."""
     output = train_speeds(data, 1.0).of(data.output)
     if abs(output) < 1e-12:
         raise CaseError(f"the output, {data.output}, stands still", code="E-MECHANISM")
@@ -363,7 +363,7 @@ def _solved(data: MultistageSet, matrix: np.ndarray, right: np.ndarray) -> np.nd
 
 
 def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float = 0.0) -> MechanicalSystem:
-    """Matrices of the train; meshes and turning lateral couplings are columns of ``W`` and not in ``K``.
+    """Assemble the matrices of the train; meshes and turning lateral couplings are columns of ``W`` alone.
 
     Parameters
     ----------
@@ -414,13 +414,13 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
 
 
 def mesh_columns(data: MultistageSet) -> tuple[np.ndarray, ...]:
-    """Columns of ``W`` with the 2N meshes of every stage."""
+    """Number the columns (2N,) of ``W`` with the meshes of every stage."""
     ends = np.cumsum([0] + [2 * stage.data.n_planets for stage in data.stages])
     return tuple(np.arange(first, last) for first, last in pairwise(ends))
 
 
 def mean_mesh_stiffness(data: MultistageSet) -> np.ndarray:
-    """Of all meshes of all stages [N/m], in the order of `mesh_columns`."""
+    """List the mean stiffness (n_meshes,) of all meshes [N/m], in the order of `mesh_columns`."""
     return np.concatenate([stage.data.mesh_stiffness for stage in data.stages])
 
 
@@ -433,7 +433,7 @@ def _stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
 
 
 def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
-    """Lateral couplings between frames that turn against one another.
+    """Find the lateral couplings between frames that turn against one another.
 
     Parameters
     ----------
@@ -470,7 +470,7 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
 
 
 def joined_motions(data: MultistageSet) -> np.ndarray:
-    """Coordinates of all stages (n_stages, n) per unit of those that rigid couplings leave free.
+    """Compute coordinates of all stages (n_all, n) per unit of those that rigid couplings leave free.
 
     The rows are those of the `gear_set_system` of every stage, one after the other. Of two joined coordinates
     that of the earlier place stays.
@@ -492,7 +492,7 @@ def joined_motions(data: MultistageSet) -> np.ndarray:
 
 
 def stage_slices(data: MultistageSet) -> tuple[slice, ...]:
-    """Rows of `joined_motions` that belong to every stage."""
+    """Find the rows of `joined_motions` that belong to every stage."""
     ends = np.cumsum([0] + [free_motions(stage.data).shape[1] for stage in data.stages])
     return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 

@@ -65,14 +65,14 @@ class MultistageModes:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Such as ``"planet, stage 2 (100 %)"``."""
+        """Kind and stage of every mode, such as ``"planet, stage 2 (100 %)"``."""
         return tuple(
             f"{kind}, stage {stage} ({100.0 * share[stage - 1]:.0f} %)"
             for kind, stage, share in zip(self.modes.kind, self.stage.tolist(), self.share.T)
         )
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc."""
+        """Collect the contents of modes.nc."""
         modes = self.modes
         parts = [
             *(f"meshes of stage {n}" for n in range(1, len(self.share) + 1)),
@@ -95,7 +95,7 @@ class MultistageModes:
 
 @dataclass(frozen=True, eq=False)
 class ResponseResult:
-    """Answers of all meshes to the transmission errors of every stage over the input's speed [rad/s]."""
+    """Answers of all meshes to the transmission errors of every stage at the input's speeds (F,) [rad/s]."""
 
     data: MultistageSet
     speed: np.ndarray
@@ -103,7 +103,7 @@ class ResponseResult:
 
     @property
     def forces(self) -> dict[str, np.ndarray]:
-        """Root mean squares (F, S) of the force in sun-planet 1 of every stage, by the stage that excites."""
+        """R.m.s. force (F, S) in sun-planet 1 of every stage [N], by the stage that excites."""
         first, squares = _first_meshes(self.data), {}
         for n, one in self.answers.items():
             squares[f"meshes of stage {n}"] = 0.5 * (np.abs(one.force[..., first]) ** 2).sum(axis=1)
@@ -111,7 +111,7 @@ class ResponseResult:
         return total | {text: np.sqrt(square) for text, square in squares.items()}
 
     def dataset(self) -> xr.Dataset:
-        """Contents of response.nc."""
+        """Collect the contents of response.nc."""
         answers, along = list(self.answers.values()), ("excited_by", "speed")
         total, *single = self.forces.values()
         words = "r.m.s. of the force in sun-planet 1 of every stage"
@@ -134,7 +134,7 @@ class ResponseResult:
 
 @dataclass(frozen=True, eq=False)
 class BalanceResult:
-    """Mesh forces (F, meshes, lines) by harmonic balance with k(t) of all meshes.
+    """Mesh forces (F, meshes, lines) [N] by harmonic balance with k(t) of all meshes.
 
     ``orders`` (lines, S) are the multiples of the mesh frequencies; the first line is the mean. At the
     speeds (F,) of the input [rad/s]; ``converged`` (F,).
@@ -148,12 +148,12 @@ class BalanceResult:
 
     @property
     def forces(self) -> np.ndarray:
-        """Root mean squares (F, S) of the force in sun-planet 1 of every stage; NaN where not converged."""
+        """R.m.s. force (F, S) in sun-planet 1 of every stage [N]; NaN where not converged."""
         squares = np.abs(self.force[:, _first_meshes(self.data), 1:]) ** 2
         return np.where(self.converged[:, None], np.sqrt(0.5 * squares.sum(axis=2)), np.nan)
 
     def dataset(self) -> xr.Dataset:
-        """Contents of balance.nc."""
+        """Collect the contents of balance.nc."""
         words = "r.m.s. of the force in sun-planet 1 of every stage"
         variables = {
             "orders": (("line", "stage"), self.orders, "1", "multiples of the mesh frequency of the stage"),
@@ -217,7 +217,7 @@ def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
 
 
 def multistage_warnings(case: MultistageCase) -> Iterator[Finding]:
-    """What is allowed but deserves a look."""
+    """List what is allowed but deserves a look."""
     response = case.response
     if response is not None and (case.operation is None or not case.geared):
         text = "without operation, or gears of every stage, there are modes alone"
@@ -234,7 +234,7 @@ def describe_stage_modes(data: xr.Dataset) -> Block:
 
 
 def describe_forces(data: xr.Dataset, title: str) -> Block:
-    """Largest r.m.s. force in sun-planet 1 of every stage, of response.nc or balance.nc."""
+    """Tabulate the largest r.m.s. force in sun-planet 1 of every stage, of response.nc or balance.nc."""
     force = np.nan_to_num(data["total_force"].values)
     largest = data["speed"].values[force.argmax(axis=0)]
     columns = {
@@ -249,7 +249,7 @@ def describe_forces(data: xr.Dataset, title: str) -> Block:
 
 
 def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """What harmonic balance says against balance.nc."""
+    """List what harmonic balance says against balance.nc."""
     lost = data["speed"].values[~data["converged"].values.astype(bool)]
     if len(lost):
         text = f"harmonic balance did not converge at {len(lost)} speeds: {first_speeds(lost)}"

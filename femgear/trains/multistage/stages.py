@@ -58,7 +58,10 @@ _MULTIPLE = 1e-7
 
 
 def multistage_modes(data: MultistageSet, *, damping_ratio: float | Sequence[float] = 0.0) -> MultistageModes:
-    """Modes of the train at rest with mean mesh stiffnesses, with their kinds and stages."""
+    """Solve for the modes of the train at rest with mean mesh stiffnesses, their kinds and stages.
+
+    ``damping_ratio`` is that of all modes, or one a mode (m,).
+    """
     system = multistage_system(data)
     modes = solve_modes(system, mean_mesh_stiffness(data), damping_ratio=damping_ratio)
     masses = _stage_masses(data)
@@ -127,7 +130,7 @@ def error_response(
     damping_ratio: float = 0.0,
     modes: Modes | None = None,
 ) -> dict[int, MeshErrorResponse]:
-    """Response of the whole train to transmission errors of its stages, by modal summation.
+    """Compute the response of the whole train to transmission errors of its stages, by modal summation.
 
     A mesh transmits ``k_j (W_j^T q - e_j)``, so that its error drives the train by ``W_j k_j e_j`` at the
     harmonics of its own stage's mesh frequency. The train is linear: the answers to the stages add up in
@@ -174,7 +177,7 @@ def error_response(
 
 
 def base_frequencies(data: MultistageSet, speed: float) -> np.ndarray:
-    """Base frequencies of `multistage_problem` at a speed of the input [rad/s]: meshes, then frames."""
+    """Compute base frequencies (n_bases,) [rad/s] at a speed of the input [rad/s]: meshes, then frames."""
     mesh = 2.0 * np.pi * train_speeds(data, speed).mesh_frequency
     return np.concatenate([mesh, np.abs(list(turning_couplings(data, speed).values()))])
 
@@ -187,7 +190,7 @@ def multistage_problem(
     speed: float = 0.0,
     damping: float | np.ndarray | None = None,
 ) -> NonlinearSystem:
-    """The train with its meshes as elements: a base frequency a stage, and a pair of frames that turn apart.
+    """Assemble the train, meshes as elements: base frequencies are a stage's, and a pair of frames' apart.
 
     Parameters
     ----------
@@ -203,7 +206,7 @@ def multistage_problem(
         is given, with suns that turn counter-clockwise against their carriers: the model of `error_response`.
     damping : float, (m,) array or (n, n) array, optional
         Damping ratio of all modes, or one a mode, at rest with mean mesh stiffnesses, each end of a
-        turning coupling held by its spring; or the matrix ``C``.
+        turning coupling held by its spring; or the matrix ``C`` [N s/m].
 
     Returns
     -------
@@ -268,14 +271,14 @@ def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int
 
 
 def solve_multistage_modes(case: MultistageCase) -> MultistageModes:
-    """Natural frequencies, modes, their kinds and stages."""
+    """Solve for natural frequencies, modes, their kinds and stages."""
     ratio = 0.0 if case.response is None else case.response.damping_ratio
     return multistage_modes(multistage_of(case), damping_ratio=ratio)
 
 
 @one_blas_thread()
 def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResult:
-    """Response to the transmission errors that the changing number of tooth pairs makes under the torque."""
+    """Solve for the response to transmission errors that the number of tooth pairs makes under the torque."""
     _, given = _asked(case)
     speed = np.linspace(given.lowest, given.highest, given.points)
     errors = loaded_errors(case, modes.data)
@@ -284,7 +287,7 @@ def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResu
 
 @one_blas_thread()
 def solve_balance(case: MultistageCase, *, progress: Progress = silent) -> BalanceResult:
-    """Harmonic balance with the stiffnesses k(t) of all meshes, first orders of two stages together."""
+    """Solve by harmonic balance with the stiffnesses k(t) of all meshes, first orders of two together."""
     train, (operation, given) = multistage_of(case), _asked(case)
     stages, unit = len(train.stages), np.eye(len(train.stages), dtype=int)
     orders = [h * unit[n] for n in range(stages) for h in range(1, given.harmonics + 1)]
@@ -321,7 +324,7 @@ def _stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.
 
 
 def loaded_errors(case: MultistageCase, train: MultistageSet) -> dict[int, np.ndarray]:
-    """Transmission errors (2N, H) [m] of every stage: deflection of its meshes under their mean force.
+    """Compute the transmission errors (2N, H) [m] of every stage: meshes deflect under their mean force.
 
     ``e = F / k(t)`` without its mean. It stands for the stiffness k(t) in linear models where the dynamic
     forces are small beside F.

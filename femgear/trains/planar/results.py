@@ -85,7 +85,7 @@ class PlanarModesResult:
     modes: Modes
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
+        """Collect the contents of modes.nc: translations and rotations of all bodies, no elastic ring."""
         attrs = {
             "title": "modes of the planar set at standstill, bearings closed, back flanks open",
             "planet_angles": np.asarray(self.planetary_set.planet_angles),
@@ -109,7 +109,7 @@ class BranchResult:
     ending: str
 
     def dataset(self) -> xr.Dataset:
-        """Contents of branch.nc."""
+        """Collect the contents of branch.nc."""
         branch, verdicts = self.branch, self.branch.verdicts
         count = len(branch.parameter)
         point, hertz = ("point",), branch.parameter / (2.0 * np.pi)
@@ -172,7 +172,7 @@ class PlanarResponseResult:
     lines: tuple[MotionLines, ...]
 
     def dataset(self) -> xr.Dataset:
-        """Contents of response.nc."""
+        """Collect the contents of response.nc."""
         found, speed = self.solutions, ("speed",)
         mesh = [one.mesh_frequency for one in self.speeds]
         variables = {
@@ -319,7 +319,7 @@ def _sense(case: PlanarCase) -> str:
 
 
 def describe_branch(data: xr.Dataset) -> Block:
-    """Tabulate branch.nc: ends, folds and the largest responses."""
+    """Tabulate branch.nc: ends, folds and the largest responses [um], by frequency of the weight [Hz]."""
     hertz, rms = data["weight_frequency"].values, data["rms"].values
     known = data.attrs["stability"] != "not computed"
     stable = data["stable"].values
@@ -355,7 +355,7 @@ def _tails(data: xr.Dataset) -> str:
 
 
 def tail_warnings(data: xr.Dataset, key: str) -> tuple[Finding, ...]:
-    """What truncation of the lines does to branch.nc or response.nc; ``key`` is the entry to raise."""
+    """Tell what truncation of the lines does to branch.nc or response.nc; ``key`` is the entry to raise."""
     tail, force = data["tail"].values, data["force_tail"].values
     worst = np.maximum(tail, force)
     if (wrong := worst > TAIL_LIMIT).any():
@@ -383,14 +383,14 @@ def _where(data: xr.Dataset, bad: np.ndarray) -> str:
 
 
 def branch_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """What speaks against branch.nc: an early end, and truncation of its lines."""
+    """List what speaks against branch.nc: an early end, and truncation of its lines."""
     if not bool(data.attrs["complete"]):
         yield remark(f"the branch of the response to the weight: {data.attrs['message']!s}")
     yield from tail_warnings(data, "planar.branch.harmonics")
 
 
 def response_warnings(data: xr.Dataset) -> tuple[Finding, ...]:
-    """What truncation of the lines does to response.nc."""
+    """Tell what truncation of the lines does to response.nc."""
     return tail_warnings(data, _response_key(data))
 
 
@@ -426,7 +426,7 @@ def _verdicts(data: xr.Dataset) -> Iterator[str]:
 
 
 def describe_response(data: xr.Dataset) -> Block:
-    """Tabulate response.nc, a row a speed."""
+    """Tabulate displacements [um], mesh forces [kN] and contact of response.nc, a row a speed [rpm]."""
     force = np.hypot(data["mesh_force_real"].values, data["mesh_force_imag"].values)
     varying = fluctuation(force).max(axis=1)
     columns = {

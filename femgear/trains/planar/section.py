@@ -160,7 +160,7 @@ class PlanarSection(Section):
 
 
 def planar_notices(data: dict) -> Iterator[Finding]:
-    """What a planar case gives without effect, by the tables of its checked file."""
+    """List what a planar case gives without effect, by the tables of its checked file."""
     planar = data["planar"]
     keys = ["tolerance"]
     if "response" not in planar:

@@ -47,7 +47,7 @@ def describe_set(case: Case) -> tuple[Block, ...]:
 
 
 def set_warnings(case: Case) -> Iterator[Finding]:
-    """What is allowed in any planetary set but deserves a look."""
+    """List what is allowed in any planetary set but deserves a look."""
     planetary = planetary_set(case)
     yield from (*check_set(planetary), *case.notices)
     yield from check_deviations(set_deviations(case), planetary)

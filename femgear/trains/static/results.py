@@ -120,11 +120,11 @@ class StaticResult:
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """What an engineer should not overlook in this result."""
+        """Findings that an engineer should not overlook in this result."""
         return tuple(static_warnings(self.dataset(), self.planetary_set.sun.module))
 
     def dataset(self) -> xr.Dataset:
-        """Contents of static.nc."""
+        """Collect the contents of static.nc."""
         cycle, gears = self.cycle, self.planetary_set
         bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
         values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in STATIC_VARIABLES}
@@ -191,6 +191,7 @@ class StressResult:
     cycle : MeshCycle
         The static solution that it belongs to.
     influences : RootStresses
+        Stress along the roots per unit flank load [Pa/N].
     roots : tuple of RootCycle
         Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on; of records beyond
         `femgear.trains.static.stages.WHOLE_RECORD` mesh periods those periods in which the worst tooth of
@@ -220,7 +221,7 @@ class StressResult:
     closes: bool
 
     def dataset(self) -> xr.Dataset:
-        """Contents of stress.nc."""
+        """Collect the contents of stress.nc."""
         cycle, edges = self.cycle, self.spectrum.edges
         values: dict[str, Any] = {
             **root_values(self.roots),
@@ -309,7 +310,7 @@ def root_values(roots: tuple[RootCycle, ...]) -> dict[str, np.ndarray]:
     Returns
     -------
     dict of str to array
-        Variables of `STRESS_VARIABLES`; points that a root does not have are NaN.
+        Variables of `STRESS_VARIABLES`, which has shapes and units; points that a root does not have are NaN.
     """
     histories = [root.history() for root in roots]
     return {
@@ -335,7 +336,7 @@ def _by_gear(rows) -> np.ndarray:
 
 
 def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
-    """What is wrong with the contents of static.nc in an engineer's eyes.
+    """List what is wrong with the contents of static.nc in an engineer's eyes.
 
     Parameters
     ----------
@@ -395,7 +396,7 @@ def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
 
 
 def describe_static(data: xr.Dataset, module: float) -> Block:
-    """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
+    """Tabulate transmission errors, stiffnesses and load sharing of static.nc; module of the gears [m]."""
     share = data.load_share.values
     columns = {
         "mesh": lambda one: str(one.mesh.item()),

@@ -222,7 +222,7 @@ def nominal_stresses(
 
 
 def ring_foundation(case: Case, sector: Sector):
-    """Assemble the elastic foundation of one sector of the ring, a sparse matrix [N/m]."""
+    """Assemble the elastic foundation of one sector of the ring, a sparse matrix (2n, 2n) [N/m]."""
     ring, width = case.ring, sector.gear.face_width
     return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
 
@@ -243,7 +243,7 @@ def case_supports(case: Case) -> Supports:
 
 
 def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
-    """List the normal backlash of all 2N meshes [m]."""
+    """List the normal backlash (2N,) of all meshes [m]."""
     n = gears.n_planets
     return np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], n)
 
