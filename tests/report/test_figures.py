@@ -48,9 +48,9 @@ def all_figures():
         "dte spectrum": response.transmission_error_spectrum(dynamics),
         "sweep": response.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
         "deflection": elastic_figures.ring_mean_deflection(dynamics, gears),
-        "signal": elastic_figures.housing_signal(housing.isel(speed=[1]), ring_teeth=TEETH),
-        "orders": elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH),
-        "modulation": elastic_figures.modulation_polar(housing.isel(speed=[1]), ring_teeth=TEETH),
+        "signal": elastic_figures.housing_signal(housing.isel(speed=[1])),
+        "orders": elastic_figures.order_spectrum(housing.isel(speed=[1])),
+        "modulation": elastic_figures.modulation_polar(housing.isel(speed=[1])),
     }
 
 
@@ -217,7 +217,7 @@ def modulated(depth: float, lobes: int):
 
 
 def test_polar_modulation_of_an_amplitude_modulated_signal():
-    figure = elastic_figures.modulation_polar(modulated(0.8, 4), ring_teeth=TEETH)
+    figure = elastic_figures.modulation_polar(modulated(0.8, 4))
     ax = figure.axes[1]
     assert "mesh harmonic 5: 4 lobes" in ax.get_title()
     line = ax.get_lines()[0]
@@ -225,7 +225,7 @@ def test_polar_modulation_of_an_amplitude_modulated_signal():
 
 
 def test_envelope_of_the_housing_signal():
-    figure = elastic_figures.housing_signal(modulated(0.5, 6), ring_teeth=TEETH, harmonics=[5])
+    figure = elastic_figures.housing_signal(modulated(0.5, 6), harmonics=[5])
     line = line_of(figure, "envelope")
     angle = 2 * np.pi * line.get_xdata()
     np.testing.assert_allclose(line.get_ydata(), 1 + 0.5 * np.cos(6 * angle), atol=1e-9)
@@ -321,7 +321,7 @@ def test_silent_housing_is_drawn():
         elastic_figures.order_spectrum,
         elastic_figures.modulation_polar,
     ):
-        assert style.png_bytes(draw(housing, ring_teeth=TEETH)).startswith(b"\x89PNG")
+        assert style.png_bytes(draw(housing)).startswith(b"\x89PNG")
 
 
 def shifted(dataset, names):
@@ -466,9 +466,7 @@ def test_the_whole_signal_lies_between_its_extremes():
     housing = synthetic.housing()
     wave = housing["acceleration"].values
     wave[:] = np.maximum(wave, 0.2 * wave)
-    signal, high, low, *_ = (
-        elastic_figures.housing_signal(housing.isel(speed=[1]), ring_teeth=TEETH).axes[0].get_lines()
-    )
+    signal, high, low, *_ = elastic_figures.housing_signal(housing.isel(speed=[1])).axes[0].get_lines()
     assert np.max(high.get_ydata()) == np.max(wave[1]) and np.min(low.get_ydata()) == np.min(wave[1])
     assert np.all(high.get_ydata()[:-1] >= signal.get_ydata()) and np.all(
         low.get_ydata()[:-1] <= signal.get_ydata()
@@ -484,7 +482,7 @@ def test_spectra_of_hundreds_of_harmonics_stay_legible():
     housing = housing.drop_dims("order").assign_coords(order=order)
     for name in ("order_amplitude", "order_amplitude_exact"):
         housing[name] = (("speed", "order"), lines)
-    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH)
+    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]))
     renderer = drawn(figure)
     (top,) = figure.axes[0].child_axes
     boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
@@ -508,13 +506,10 @@ def test_order_spectra_draw_the_highest_of_lines_too_close_to_part():
 def test_order_spectrum_says_what_its_lines_are():
     """Exact lines are called so and drawn once; how far the excitation reaches stands above."""
     housing = synthetic.housing()
-    names = [
-        text.get_text()
-        for text in elastic_figures.order_spectrum(housing, ring_teeth=TEETH).legends[0].get_texts()
-    ]
+    names = [text.get_text() for text in elastic_figures.order_spectrum(housing).legends[0].get_texts()]
     assert names == ["Heaviside, linear interpolation", "exact circumferential Fourier"]
     housing["order_amplitude"] = housing["order_amplitude_exact"]
     housing["excitation_limit"] = ("speed", [1080.0, 2500.0])
-    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH)
+    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["exact circumferential Fourier"]
     assert not any(ax.get_lines() for ax in figure.axes) and "excited up to 2.5 kHz" in figure.get_suptitle()

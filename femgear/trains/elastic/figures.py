@@ -34,12 +34,7 @@ from femgear.report.response import (
     shown_speeds,
     transmission_error_period,
 )
-from femgear.report.scene import (
-    animate_operating_deflection,
-    deformed_picture,
-    ring_modes_grid,
-    write_vtu,
-)
+from femgear.report.scene import animate_operating_deflection, deformed_picture, ring_modes_grid, write_vtu
 from femgear.report.style import (
     BLACK,
     BLUE,
@@ -142,33 +137,37 @@ def _free_angle(angles) -> float:
     return float(np.degrees(sorted_angles[widest] + gaps[widest] / 2))
 
 
-def _shown_harmonics(housing: xr.Dataset, ring_teeth: int) -> tuple[int, ...]:
+def _shown_harmonics(housing: xr.Dataset) -> tuple[int, ...]:
     """The first mesh harmonic, and the one with the strongest line where that is another one."""
     order, amplitude = housing["order"].values, housing["order_amplitude"].values[0]
-    return tuple(sorted({1, *_strongest_bands(order, amplitude, ring_teeth, 1)}))
+    return tuple(sorted({1, *_strongest_bands(order, amplitude, _ring_teeth(housing), 1)}))
 
 
-def _band(housing: xr.Dataset, ring_teeth: int, harmonic: int) -> BandAnalysis:
+def _ring_teeth(housing: xr.Dataset) -> int:
+    return int(housing.attrs["ring_teeth"])
+
+
+def _band(housing: xr.Dataset, harmonic: int) -> BandAnalysis:
     """Lines, signal, envelope and lobes around one mesh harmonic; see `analyse_band`."""
-    return analyse_band(_spectrum(housing["acceleration"].values[0]), ring_teeth, harmonic)
+    return analyse_band(_spectrum(housing["acceleration"].values[0]), _ring_teeth(housing), harmonic)
 
 
-def housing_signal(housing: xr.Dataset, *, ring_teeth: int, harmonics: Sequence[int] | None = None) -> Figure:
+def housing_signal(housing: xr.Dataset, *, harmonics: Sequence[int] | None = None) -> Figure:
     """Draw the acceleration of housing.nc over one carrier revolution at its first speed.
 
     Whole, and around mesh harmonics with its envelope: those given, or the first and that of the strongest
     line.
     """
-    harmonics = _shown_harmonics(housing, ring_teeth) if harmonics is None else harmonics
+    harmonics = _shown_harmonics(housing) if harmonics is None else harmonics
     speed, count = rpm(housing["speed"].values[0]), 1 + len(harmonics)
     figure, axes = new_figure(rows=count, width=9.5, height=1.0 + 2.5 * count, sharex=True)
     signal = housing["acceleration"].values[0]
     text = "largest and smallest within a mesh period"
-    around = _extremes(signal, ring_teeth)
+    around = _extremes(signal, _ring_teeth(housing))
     title = f"{speed}{excited_to(housing, 0)}: all orders"
     _draw_signal(axes[0], signal, around, title, text=text, colour=ORANGE)
     for ax, harmonic in zip(axes[1:], harmonics):
-        found = _band(housing, ring_teeth, harmonic)
+        found = _band(housing, harmonic)
         around = found.envelope, -found.envelope
         _draw_signal(ax, found.signal, around, _band_title(speed, found))
         lobes = found.lobes
@@ -206,7 +205,7 @@ def _band_title(speed: str, found: BandAnalysis) -> str:
     )
 
 
-def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
+def order_spectrum(housing: xr.Dataset) -> Figure:
     """Draw the order spectrum of housing.nc at its first speed, mesh harmonics marked.
 
     Below are the strongest bands with their lines labelled: one of harmonic ``h`` and nodal diameter ``n``
@@ -214,7 +213,7 @@ def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
     """
     from matplotlib.ticker import MaxNLocator
 
-    order = housing["order"].values
+    order, ring_teeth = housing["order"].values, _ring_teeth(housing)
     linear, exact = (housing[name].values[0] for name in ("order_amplitude", "order_amplitude_exact"))
     bands = _strongest_bands(order, linear, ring_teeth, 2)
     figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.8 * len(bands))
@@ -314,18 +313,18 @@ def _labelled(order, amplitude, candidates, *, spacing):
     return chosen[:_LABELS]
 
 
-def modulation_polar(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
+def modulation_polar(housing: xr.Dataset) -> Figure:
     """Draw the envelope of the acceleration of housing.nc over the angle of the carrier at its first speed.
 
     One polar diagram for each of the mesh harmonics that `housing_signal` shows.
     """
     from matplotlib.ticker import MaxNLocator
 
-    harmonics = _shown_harmonics(housing, ring_teeth)
+    harmonics = _shown_harmonics(housing)
     speed = rpm(housing["speed"].values[0])
     figure, axes = new_figure(columns=len(harmonics), width=5.2 * len(harmonics), height=6.2, polar=True)
     for i, (ax, harmonic) in enumerate(zip(axes, harmonics)):
-        found = _band(housing, ring_teeth, harmonic)
+        found = _band(housing, harmonic)
         lobes, angle = found.lobes, np.linspace(0.0, 2 * np.pi, len(found.envelope) + 1)
         value = np.append(found.envelope, found.envelope[0])
         ax.plot(angle, value, color=COLOURS[i % len(COLOURS)], linewidth=2.0)
@@ -437,7 +436,7 @@ def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
 
 
 def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
-    figures, housing, teeth = {}, drawn.data["housing"], planetary_set(drawn.case).ring.teeth
+    figures, housing = {}, drawn.data["housing"]
     drawings = (
         ("housing_signal", housing_signal),
         ("order_spectrum", order_spectrum),
@@ -446,7 +445,7 @@ def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
     for s in shown_speeds(housing):
         one = housing.isel(speed=[s])
         for name, draw in drawings:
-            figures[f"{name}_{round(float(one['speed'][0]))}_rpm"] = draw(one, ring_teeth=teeth)
+            figures[f"{name}_{round(float(one['speed'][0]))}_rpm"] = draw(one)
     return figures
 
 
