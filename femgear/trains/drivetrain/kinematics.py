@@ -20,12 +20,7 @@ from femgear.errors import CaseError
 from femgear.fe.shaft import AXES, joint_deflections, joint_springs
 from femgear.system.mesh_directions import mesh_directions, pin_directions
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.trains.drivetrain.parts import (
-    Drivetrain,
-    ParallelSection,
-    PlanetarySection,
-    numbered,
-)
+from femgear.trains.drivetrain.parts import Drivetrain, ParallelSection, PlanetarySection, numbered
 
 # Row of a kinematic condition, relative to the largest, that counts as none.
 _RANK = 1e-12

@@ -209,19 +209,13 @@ class HousingResult:
         """Collect the contents of housing.nc."""
         signal, lines, exact = self.signal, self.lines, self.exact
         heard = np.abs(lines.acceleration), np.abs(exact.acceleration), np.angle(exact.displacement)
-        words = (
-            f"acceleration, {lines.method}",
-            "acceleration, exact lines",
-            "displacement phase, exact lines",
-        )
-        at_sensor = "radial acceleration at the sensor", "radial displacement at the sensor"
         variables = {
             "seconds": ("speed time", signal.seconds, "s", "time"),
-            "acceleration": ("speed time", signal.acceleration, "m/s^2", at_sensor[0]),
-            "displacement": ("speed time", signal.displacement, "m", at_sensor[1]),
-            "order_amplitude": ("speed order", heard[0], "m/s^2", words[0]),
-            "order_amplitude_exact": ("speed order", heard[1], "m/s^2", words[1]),
-            "order_phase_exact": ("speed order", heard[2], "rad", words[2]),
+            "acceleration": ("speed time", signal.acceleration, "m/s^2", "radial acceleration at the sensor"),
+            "displacement": ("speed time", signal.displacement, "m", "radial displacement at the sensor"),
+            "order_amplitude": ("speed order", heard[0], "m/s^2", f"acceleration, {lines.method}"),
+            "order_amplitude_exact": ("speed order", heard[1], "m/s^2", "acceleration, exact lines"),
+            "order_phase_exact": ("speed order", heard[2], "rad", "displacement phase, exact lines"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level": ("speed", order_level(lines), "m/s^2", "root mean square of the acceleration"),
         }

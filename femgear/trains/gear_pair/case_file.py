@@ -10,17 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from femgear.case.quantities import (
-    LENGTH,
-    PAIR,
-    STIFFNESS,
-    TORQUE,
-    Count,
-    Number,
-    Quantity,
-    Section,
-    Title,
-)
+from femgear.case.quantities import LENGTH, PAIR, STIFFNESS, TORQUE, Count, Number, Quantity, Section, Title
 from femgear.case.sections import FORMAT, Angle, Inertia, Mass, Radius, Stiffness
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError

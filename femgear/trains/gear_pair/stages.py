@@ -173,10 +173,7 @@ def _motions(dims: str, lowest, highest, mean) -> dict[str, tuple]:
         mean=(mean, f"mean deflection {_LENGTH}"),
         lowest=(lowest, f"smallest deflection {_LENGTH}"),
         highest=(highest, f"largest deflection {_LENGTH}"),
-        state=(
-            np.array(STATE_NAMES)[range_states(lowest, highest)],
-            "contact state",
-        ),
+        state=(np.array(STATE_NAMES)[range_states(lowest, highest)], "contact state"),
     )
 
 
@@ -279,7 +276,7 @@ def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
 
 
 def _case_warnings(case: GearPairCase) -> Iterator[Finding]:
-    """What is allowed but deserves a look."""
+    """List what is allowed but deserves a look."""
     if case.operation.torque == 0.0:
         yield Finding("W-LOAD", "operation.torque", "without load nothing keeps the flanks on one side")
     if not (case.mesh.error or case.mesh.stiffness_waves or any(case.gears.eccentricity)):

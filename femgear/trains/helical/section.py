@@ -9,13 +9,7 @@ from typing import Annotated, Literal
 from femgear.case.quantities import ANGLE, STIFFNESS, TORSION, Count, Quantity, Section
 from femgear.case.sections import Inertia, Mass, MeshStiffnessSection, RigidCase
 from femgear.errors import CaseError, Finding, remark
-from femgear.trains.rigid import (
-    entries_without_effect,
-    flank_entries,
-    listed,
-    rigid_refusals,
-    unheld_member,
-)
+from femgear.trains.rigid import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
 
 _LARGEST_HELIX = math.radians(45.0)
 _MOST_SLICES = 30

@@ -44,13 +44,7 @@ from femgear.trains.planar.results import (
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
 from femgear.trains.protocol import Progress, Stage, Train, modes_verdict, one_blas_thread, silent
-from femgear.trains.rigid import (
-    check_one_period,
-    gear_set_modes,
-    member_speeds,
-    mode_ratios,
-    needed,
-)
+from femgear.trains.rigid import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
 from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
