@@ -251,7 +251,7 @@ def _check_records(case: DrivetrainCase, record: float) -> None:
 
 
 def check_turning(lowest: float, mean: float) -> None:
-    """Refuse speeds of the first body [rad/s] at which a turn takes endless records (E-SPECTRUM)."""
+    """Refuse a first body whose lowest speed, beside its mean [rad/s], leaves no orders (E-SPECTRUM)."""
     if not lowest > _SLOWEST * mean or not mean > 0.0:
         raise CaseError(
             f"the first body nearly stops or turns back: {lowest / RPM:.6g} rpm at the slowest, "

@@ -197,7 +197,8 @@ def _joint_shear_ratio(shaft) -> float:
 def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
     """Compute the deflection (k, 4) of a Timoshenko element per (w, slope) at its ends [m], [rad].
 
-    Exact for an element of a length [m] without load; ``xi`` (k,) runs from 0 to 1, ``slope`` turns sections.
+    Exact for an element of a length [m] without load, with the ``shear_ratio`` Phi of
+    `femgear.fe.shaft.RoundSection`; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
     These are the functions behind the consistent mass of `femgear.fe.shaft.beam_element`
     (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 11.3; Z. Friedman and
     J. B. Kosmatka, Comput. Struct. 47, 1993, 473-481).

@@ -217,7 +217,7 @@ def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
 
 
 def checked_speeds(count: int, most: int = _CHECKED) -> np.ndarray:
-    """Choose the numbers of speeds at which the level is computed again: all of a few, some of many."""
+    """Choose the numbers (n,) of speeds at which the level is computed again: all, or some of many."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 

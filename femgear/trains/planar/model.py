@@ -91,7 +91,7 @@ class PlanarModel:
 
     @property
     def groups(self) -> dict[str, np.ndarray]:
-        """Places of the columns, see `Bearings.columns`."""
+        """Places of the columns (n,) or (g, 2), see `Bearings.columns`."""
         return self.bearings.columns(self.data, back_flanks=self.back_flanks)
 
 
@@ -229,7 +229,9 @@ class MotionLines:
     """Motions, forces and contact of a solution; `MOTIONS` gives dimensions, unit and meaning of each.
 
     The members are carrier, ring and sun, the axes x and y of the carrier frame, and the directions at the
-    planet radially outwards and tangential; lines (L,) are complex. ``force_tail`` is that of
+    planet radially outwards and tangential; lines (L,) are complex. Hence ``rms`` (3, 2), ``displacement``
+    (3, 2, L) [m], forces of meshes (2N, L), planet bearings (N, 2, L) and carrier bearing (2, L) [N], and
+    contacts (2N,). ``force_tail`` is that of
     `femgear.system.fourier.line_tail`, of drive and back flanks together; the carrier bearing has no force
     where there is none. ``approach`` is the largest deflection of a mesh [m].
     """

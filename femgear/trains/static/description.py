@@ -41,7 +41,8 @@ def describe_set(case: Case) -> tuple[Block, ...]:
     return (
         _gears(planetary),
         _meshes(planetary),
-        *describe_phasing(planetary),
+        _harmonics(planetary),
+        _neighbours(planetary),
         _operation(case, planetary),
     )
 
@@ -55,11 +56,6 @@ def set_warnings(case: Case) -> Iterator[Finding]:
         nothing = "without torque no tooth touches; only static results exist"
         text = "a negative torque loads the other flanks" if case.operation.torque < 0 else nothing
         yield Finding("W-TORQUE", "operation.torque", text)
-
-
-def describe_phasing(planetary_set: PlanetarySet) -> tuple[Block, Block]:
-    """Tabulate the phasing of the first harmonics of the mesh frequency, and neighbouring tooth numbers."""
-    return _harmonics(planetary_set), _neighbours(planetary_set)
 
 
 def _gears(s: PlanetarySet) -> Block:
