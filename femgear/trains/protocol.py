@@ -107,8 +107,8 @@ class Stage:
         ``(case) -> bool``: whether a run without ``only`` computes it.
     unavailable : callable
         ``(case) -> str``: why the case cannot have the stage, empty where it can.
-    needs : callable
-        ``(case) -> tuple of str``: stages that must come before.
+    needs : callable, optional
+        ``(case) -> tuple of str``: stages that must come before, where they are not those of `takes`.
     asked : callable
         ``(case) -> case``: the case as it is computed where the stage is the last one by name.
     check : callable, optional
@@ -128,11 +128,15 @@ class Stage:
     options: tuple[str, ...] = ()
     wanted: Callable[[Any], bool] = lambda case: True
     unavailable: Callable[[Any], str] = lambda case: ""
-    needs: Callable[[Any], tuple[str, ...]] = lambda case: ()
+    needs: Callable[[Any], tuple[str, ...]] | None = None
     asked: Callable[[Any], Any] = lambda case: case
     check: Callable[[Any], object] | None = None
     tables: Callable[[Results], Iterable[Block]] = lambda results: ()
     warnings: Callable[[xr.Dataset], Iterable[Finding]] = lambda data: ()
+
+    def before(self, case: Any) -> tuple[str, ...]:
+        """List the stages that must come before this one."""
+        return self.takes if self.needs is None else self.needs(case)
 
 
 @dataclass(frozen=True)

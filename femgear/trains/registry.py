@@ -50,7 +50,7 @@ def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:
         raise CaseError(
             f"no stage {only}: {why}", code="E-STAGE", key="--only", value=only, limit=", ".join(allowed)
         )
-    needs, needed = {stage.name: stage.needs(case) for stage in train.stages}, {only}
+    needs, needed = {stage.name: stage.before(case) for stage in train.stages}, {only}
     while more := {one for name in needed for one in needs[name]} - needed:
         needed |= more
     return tuple(stage for stage in train.stages if stage.name in needed)

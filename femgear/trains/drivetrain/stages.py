@@ -363,7 +363,6 @@ DRIVETRAIN = Train(
             },
             describe=lambda results: describe_spectrum(results.spectrum),
             unavailable=lambda case: "" if case.parallel or case.planetary else "the chain has no gears",
-            needs=lambda case: ("transient",),
             check=lambda case: check_spectrum(case, case_model(case)),
         ),
     ),

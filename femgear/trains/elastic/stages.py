@@ -534,7 +534,6 @@ ELASTIC = Train(
             options=("progress",),
             verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
-            needs=lambda case: ("modes",),
             warnings=dynamics_warnings,
         ),
         Stage(
@@ -544,7 +543,6 @@ ELASTIC = Train(
             takes=("dynamics",),
             verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(results.housing),
-            needs=lambda case: ("dynamics",),
             tables=lambda results: (mesh_bands(results),),
         ),
     ),

@@ -248,7 +248,6 @@ HELICAL = Train(
             unavailable=lambda case: (
                 _NOTHING_EXCITES if _given(case) else ""
             ),
-            needs=lambda case: ("modes",),
             warnings=response_warnings,
         ),
     ),

@@ -396,7 +396,6 @@ MULTISTAGE = Train(
             verdict=lambda result: {"speeds": len(result.speed)},
             describe=lambda results: describe_forces(results.response, "Response"),
             unavailable=_no_response,
-            needs=lambda case: ("modes",),
         ),
         Stage(
             name="balance",

@@ -320,6 +320,5 @@ STRESS = Stage(
     },
     describe=lambda results: describe_stress(results.stress),
     wanted=lambda case: case.static.stresses,
-    needs=lambda case: ("static",),
     asked=lambda case: case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})}),
 )  # fmt: skip
