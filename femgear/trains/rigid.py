@@ -145,7 +145,7 @@ def needed(entry: Entry | None, name: str) -> Entry:
 
 
 def torsional_support(case: RigidCase, member: str, given: float | None) -> float:
-    """Choose the torsional stiffness of a member [N m/rad]: infinite of the fixed one where it has none."""
+    """Choose the torsional stiffness of a member [N m/rad]; not given the fixed one is held, others free."""
     if given is not None:
         return given
     return math.inf if member == case.operation.fixed else 0.0
@@ -172,7 +172,7 @@ def stiffness_text(given: MeshStiffnessSection) -> str:
 
 
 def driving_torque(case: RigidCase, *, reacts: bool = True) -> PlanarTorque:
-    """Make the driving torque [N m], which the output takes up, or, where it does not, the supports."""
+    """Make the driving torque [N m], which the output takes up, or without ``reacts`` the supports."""
     return PlanarTorque(case.operation.torque, case.operation.input, output_member(case) if reacts else None)
 
 

@@ -130,7 +130,7 @@ def record_rate(case: DrivetrainCase, model: DrivetrainModel) -> float:
 
 
 def highest_mesh(model: DrivetrainModel, speed: float) -> tuple[str, float]:
-    """Find name and frequency [Hz] of the fastest mesh at a speed of the first body [rad/s]; none, 0."""
+    """Find the fastest mesh and its frequency [Hz] at a speed of the first body [rad/s], if there is one."""
     bases = np.unique(model.mesh_base)
     if not len(bases):
         return "none", 0.0

@@ -57,7 +57,10 @@ class Block:
 
 
 class Spin:
-    """The free spin in steps [s], from a speed [rad/s], exact for linear torques, and the loads left."""
+    """The free spin, exact for torques that are linear in a step, and the loads that are left.
+
+    In steps of ``step`` [s], from a ``speed`` of the first body [rad/s].
+    """
 
     def __init__(self, model: DrivetrainModel, torques: Sequence[TorqueHistory], step: float, speed: float):
         self.model, self.torques, self.step = model, tuple(torques), step
@@ -121,7 +124,7 @@ class Scheme:
 
     @classmethod
     def of(cls, model: DrivetrainModel, h: float, speed: float, directions) -> Scheme:
-        """Factorise steps h [s] at a speed of the first body [rad/s], loads in ``directions`` (n, d)."""
+        """Factorise average acceleration: steps h [s], speed [rad/s], loads along ``directions`` (n, d)."""
         rule, system, U = AVERAGE_ACCELERATION, model.system, model.geometry.basic
         M, K, n = system.M, system.K, len(system.M)
         D = system.C if system.gyroscopic is None else system.C + speed * system.gyroscopic

@@ -106,7 +106,7 @@ def state_bands(rows: Sequence[tuple]) -> Figure:
 
 
 def bifurcation_and_exponent(chaos: xr.Dataset) -> Figure:
-    """Draw deflections once a period of chaos.nc over the ratio, and below the largest exponent, its error.
+    """Draw deflections once a period of chaos.nc over the ratio, the largest exponent with its error below.
 
     Thin lines are the extremes of the motion.
     """

@@ -190,7 +190,7 @@ def multistage_problem(
     speed: float = 0.0,
     damping: float | np.ndarray | None = None,
 ) -> NonlinearSystem:
-    """Assemble the train, meshes as elements: base frequencies are a stage's, and a pair of frames' apart.
+    """Assemble the train, meshes as elements, a base frequency a stage and pair of frames that turn apart.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def solve_multistage_modes(case: MultistageCase) -> MultistageModes:
 
 @one_blas_thread()
 def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResult:
-    """Solve for the response to transmission errors that the number of tooth pairs makes under the torque."""
+    """Solve for the response to errors that the changing number of tooth pairs makes under the torque."""
     _, given = _asked(case)
     speed = np.linspace(given.lowest, given.highest, given.points)
     errors = loaded_errors(case, modes.data)
@@ -287,7 +287,7 @@ def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResu
 
 @one_blas_thread()
 def solve_balance(case: MultistageCase, *, progress: Progress = silent) -> BalanceResult:
-    """Solve by harmonic balance with the stiffnesses k(t) of all meshes, first orders of two together."""
+    """Solve by harmonic balance with k(t) of all meshes, first orders of two stages together."""
     train, (operation, given) = multistage_of(case), _asked(case)
     stages, unit = len(train.stages), np.eye(len(train.stages), dtype=int)
     orders = [h * unit[n] for n in range(stages) for h in range(1, given.harmonics + 1)]
@@ -324,7 +324,7 @@ def _stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.
 
 
 def loaded_errors(case: MultistageCase, train: MultistageSet) -> dict[int, np.ndarray]:
-    """Compute the transmission errors (2N, H) [m] of every stage: meshes deflect under their mean force.
+    """Compute transmission errors (2N, H) [m] of every stage: its meshes deflect under their mean force.
 
     ``e = F / k(t)`` without its mean. It stands for the stiffness k(t) in linear models where the dynamic
     forces are small beside F.
