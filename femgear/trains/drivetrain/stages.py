@@ -156,9 +156,10 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
 
     Refuses what `check_spectrum` does.
     """
-    check_spectrum(case, transient.models[BENDING])
+    model = transient.models[BENDING]
+    check_spectrum(case, model)
     first, settle = next(iter(transient.runs.values())), settle_time(case)
-    rate = record_rate(case, transient.models[BENDING])
+    rate = record_rate(case, model)
     late, step = first.time >= settle, 1.0 / rate
     span = float(np.ptp(first.time[late]))
     resolution = case.simulation.resolution or max(0.1, 4.0 / span)
@@ -166,7 +167,7 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
     turns = float(np.ptp(first.spin[late])) / (2.0 * np.pi)
     slowest = min(float(run.spin_speed[late].min()) for run in transient.runs.values())
     check_turning(slowest, speed)
-    lines = mesh_lines(transient.models[BENDING])
+    lines = mesh_lines(model)
     per_turn = int(np.ceil(2.0 * np.pi * rate / slowest))
     distance = 1.0 / (0.99 * turns)
     spectra, tracked, amplitudes = {}, {}, {}
@@ -179,7 +180,7 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
             found, frequency=found.frequency[kept], amplitude=found.amplitude[..., kept]
         )
         amplitudes[variant] = line_amplitudes(force, angle, run.spin_speed[late], lines, record_rate=rate)
-    resolved = resolved_lines(transient.models[BENDING], lines, distance)
+    resolved = resolved_lines(model, lines, distance)
     return SpectrumResult(transient, settle, speed, spectra, tracked, lines, amplitudes, distance, resolved)
 
 

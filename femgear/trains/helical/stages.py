@@ -52,9 +52,9 @@ from femgear.trains.protocol import (
     silent,
 )
 from femgear.trains.rigid import driving_torque, gear_set_modes, member_speeds, needed, rotation_sense
-from femgear.trains.static import stages as static_stages
 from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
+from femgear.trains.static.stages import STATIC, mesh_backlash, solve_static
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -68,7 +68,7 @@ def solve_helical_static(
     case: HelicalCase, *, cache: Path | None = None, progress: Progress = silent
 ) -> StaticResult:
     """Solve the spur gears of the transverse section, the whole face width loaded at once."""
-    return static_stages.solve_static(_drive_flanks(case), cache=cache, progress=progress)
+    return solve_static(_drive_flanks(case), cache=cache, progress=progress)
 
 
 def _drive_flanks(case: HelicalCase) -> HelicalCase:
@@ -116,8 +116,7 @@ def solve_helical_modes(
         sense, cycle, beta = rotation_sense(case, gears), static.cycle, case.helical.helix_angle
         overlap = contact_ratios(gears, helix_angle=beta, face_width=case.set.face_width)[0, 1]
         base = profile.base_helix_angle(case.sun.pressure_angle, beta)
-        backlash = static_stages.mesh_backlash(gears)
-        spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, backlash)
+        spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, mesh_backlash(gears))
         record = normal_record(spur, factor, base, reversed_time=sense < 0)
         hand = sense * (1 if case.helical.hand == "right" else -1)
         whole = shared_load(helical_excitation(record, overlap))
@@ -213,7 +212,7 @@ HELICAL = Train(
     section="helical",
     stages=(
         replace(
-            static_stages.STATIC,
+            STATIC,
             solve=solve_helical_static,
             describe=lambda results: describe_helical_static(
                 results.static,

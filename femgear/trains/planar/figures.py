@@ -16,7 +16,6 @@ from femgear.case.gear_set import planetary_set
 from femgear.report.response import MODE_CAPTIONS, harmonics_of, mode_shapes, shown_speeds
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure, runs
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
-from femgear.trains.planar.results import PHASES
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 
@@ -181,7 +180,7 @@ def _weight_bearing_forces(branch: xr.Dataset) -> Figure:
     lines = harmonics_of(branch, "planet_bearing_force")[branch["shown_point"].values[-1]]
     wave = _wave(branch)
     curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
-    return bearing_forces(np.linspace(0.0, 2.0 * np.pi, PHASES), curves, title=_top(branch))
+    return bearing_forces(branch["phase"].values, curves, title=_top(branch))
 
 
 def _top(branch: xr.Dataset) -> str:
@@ -317,8 +316,7 @@ def _contact(data: xr.Dataset, x: np.ndarray, words: str, parts) -> Figure:
 
 def _wave(branch: xr.Dataset) -> np.ndarray:
     """``exp(i h phase)`` (n, H) over one turn."""
-    phase = np.linspace(0.0, 2.0 * np.pi, PHASES)
-    return np.exp(1j * phase[:, None] * branch["harmonic"].values)
+    return np.exp(1j * branch["phase"].values[:, None] * branch["harmonic"].values)
 
 
 def _carrier_frequency(response: xr.Dataset, speed: int) -> float:

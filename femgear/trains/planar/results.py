@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
 
 # instants of a turn of the weight at which forces are stored
-PHASES = 721
+_PHASES = 721
 
 # distance of a multiplier from 1 at a limit point beyond which harmonics are missing
 _TRUNCATED = 0.2
@@ -144,7 +144,7 @@ class BranchResult:
         coords = _coordinates(self.planetary_set) | {
             "point": (point, np.arange(count), "1", "point along the branch"),
             "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
-            "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
+            "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, _PHASES), "rad", "phase of the weight"),
         }
         data = dataset(
             variables,
@@ -219,7 +219,7 @@ def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
     rms = np.array([one.rms[0, 0] for one in result.lines])
     back = np.array([one.back_contact.max() for one in result.lines])
     points = shown_points(rms, back, stable)
-    theta = np.linspace(0.0, 2.0 * np.pi, PHASES)[:, None]
+    theta = np.linspace(0.0, 2.0 * np.pi, _PHASES)[:, None]
     forces = [flank_forces(result.model, result.branch.solutions[point], theta) for point, _ in points]
     drive, behind = (np.array([one[side].T for one in forces]) for side in (0, 1))
     shown, dims = ("shown",), ("shown", "mesh", "phase")
