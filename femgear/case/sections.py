@@ -194,7 +194,7 @@ FORMAT = 1
 """Newest format of the case file."""
 LARGEST_TORQUE = 1e9
 """Largest plausible torque [N m]."""
-CODE = "E-PUBLISHED"
+_CODE = "E-PUBLISHED"
 """Of refusals of published lines."""
 _MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
 
@@ -498,7 +498,7 @@ def check_published(case: Case) -> Iterator[CaseError]:
         if not any(math.isclose(entry.speed, speed, rel_tol=1e-9) for speed in case.operation.speeds):
             yield CaseError(
                 "this speed is not computed",
-                code=CODE,
+                code=_CODE,
                 key=f"{key}.speed",
                 value=SPEED.show(entry.speed),
                 limit=_speeds(case),
@@ -508,7 +508,7 @@ def check_published(case: Case) -> Iterator[CaseError]:
         if computed is not None and entry.harmonic > computed:
             yield CaseError(
                 "this mesh harmonic is not computed",
-                code=CODE,
+                code=_CODE,
                 key=f"{key}.harmonic",
                 value=entry.harmonic,
                 limit=f"1 to {computed}, the harmonics of the response",
@@ -528,7 +528,7 @@ def without_uncomputed(data: dict, error: CaseError) -> Finding | None:
     Says what was left out; None where the error is about other things too.
     """
     problems = getattr(error, "problems", ())
-    if not problems or any(problem.code != CODE for problem in problems):
+    if not problems or any(problem.code != _CODE for problem in problems):
         return None
     numbers = {int(problem.key.split("[")[1].split("]")[0]) for problem in problems}
     published = data["housing"]["published"]

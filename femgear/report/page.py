@@ -37,9 +37,7 @@ def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
     return [figures[name] for name in names if name in figures]
 
 
-def write_pictures(
-    folder: Path, train: Train, drawn: Drawn, *, progress: Progress | None = None
-) -> list[str]:
+def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progress) -> list[str]:
     """Write everything that a run shows; returns the names of the files.
 
     Parameters
@@ -48,20 +46,17 @@ def write_pictures(
     train : Train
         Of the case.
     drawn : Drawn
-    progress : callable, optional
+    progress : callable
         Called with (stage, done, total).
     """
-    written = [w for stage in _drawn(train, drawn) for w in stage.write]
-    steps = [
-        lambda: write_figures(folder, train, drawn), *(lambda w=w: w(drawn, folder) for w in written),
-    ]  # fmt: skip
-    names = []
-    for done, step in enumerate(steps):
-        if progress is not None:
-            progress("pictures", done, len(steps))
-        names += step()
-    if progress is not None:
-        progress("pictures", len(steps), len(steps))
+    others = [write for stage in _drawn(train, drawn) for write in stage.write]
+    names, steps = [], 1 + len(others)
+    progress("pictures", 0, steps)
+    names += write_figures(folder, train, drawn)
+    for done, write in enumerate(others, 1):
+        progress("pictures", done, steps)
+        names += write(drawn, folder)
+    progress("pictures", steps, steps)
     return names
 
 
@@ -96,7 +91,7 @@ pre { font-size: 0.8rem; background: #f5f5f5; padding: 0.8rem; overflow-x: auto;
 
 
 @dataclass(frozen=True)
-class Picture:
+class _Picture:
     """A picture of the page: its section, caption, kind (``"image/png"``) and bytes."""
 
     section: str
@@ -213,7 +208,7 @@ def _table(block: Block, *, heading: bool = True) -> str:
     return title + table + notes
 
 
-def _figure(picture: Picture) -> str:
+def _figure(picture: _Picture) -> str:
     """Embed a picture with its caption."""
     data = base64.b64encode(picture.data).decode("ascii")
     caption = escape(picture.caption)
@@ -223,7 +218,7 @@ def _figure(picture: Picture) -> str:
     )
 
 
-def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]:
+def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[str]]:
     """Read the pictures that the manifest names, in the order of the captions, and what was left out."""
     found, skipped = [], []
     for name, digest in results.manifest.files.items():
@@ -241,7 +236,7 @@ def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]
             continue
         rank, section, caption = caption_of(train, path.stem)
         caption = " ".join((caption, *train.remarks(results, path.stem)))
-        found.append((rank, Picture(section, caption, kind, data)))
+        found.append((rank, _Picture(section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
     return [picture for _, picture in found], skipped
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from femgear.gears.planetary import PlanetarySet
 
-MANY_SPEEDS = 3
+_MANY_SPEEDS = 3
 """More speeds are drawn over the speed, too."""
 _DECADES, _MOST_BARS = 1e-5, 60
 """Spectra end so far below their largest line, and have bars up to so many."""
@@ -366,7 +366,7 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
 def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure]:
     """Spectrum of the transmission error and, over many speeds, its sweep, with others between them."""
     figures = {"dynamic_spectrum": transmission_error_spectrum(dynamics), **others}
-    if dynamics.sizes["speed"] > MANY_SPEEDS:
+    if dynamics.sizes["speed"] > _MANY_SPEEDS:
         figures["speed_sweep"] = speed_sweep(dynamics)
     return figures
 
@@ -440,7 +440,7 @@ def _panels(count: int, *, above: float = 0.8):
 def shown_speeds(data: xr.Dataset) -> list[int]:
     """Choose the speeds that get pictures of their own: all of a few, else first, middle and last."""
     n = data.sizes["speed"]
-    return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
+    return list(range(n)) if n <= _MANY_SPEEDS else [0, n // 2, n - 1]
 
 
 def _some_speeds(count: int) -> list[int]:

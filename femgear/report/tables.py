@@ -96,7 +96,7 @@ def describe_response(data: xr.Dataset) -> Block:
     dte = np.hypot(data.dte_real.values, data.dte_imag.values)  # speed, mesh, harmonic
     rms = np.sqrt(0.5 * (dte[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
     largest = np.abs(data.floquet_multiplier.values)
-    stable = data.stable.values.astype(bool) if "stable" in data else largest < 1.0
+    stable = data.stable.values.astype(bool)
     columns = {
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.2f}",
         "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.2f}",

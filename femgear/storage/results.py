@@ -36,8 +36,6 @@ from femgear.storage.files import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
 
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
@@ -162,10 +160,10 @@ def response_entries(result: Any) -> dict[str, tuple]:
     }
 
 
-FORMAT = 1
+_FORMAT = 1
 MANIFEST = "manifest.json"
-CASE, LOCK = "case.toml", ".lock"
-RUNNING, FINISHED = ".running", ".finished"
+_CASE, _LOCK = "case.toml", ".lock"
+_RUNNING, _FINISHED = ".running", ".finished"
 
 
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
@@ -219,7 +217,7 @@ class Results:
     @cached_property
     def case(self) -> Any:
         """The case as run."""
-        return self.read_case(self._checked(CASE))
+        return self.read_case(self._checked(_CASE))
 
     def __getattr__(self, name: str) -> xr.Dataset:
         """Contents of the file of a stage: ``results.modes``, as ``results["modes"]``."""
@@ -321,23 +319,23 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
     folder = Path(folder)
     _make(folder)
     with folder_lock(folder):
-        if (folder / FINISHED).is_dir():
+        if (folder / _FINISHED).is_dir():
             _publish(folder)  # what a run could not bring to its end because it was killed
-        _remove_tree(folder / RUNNING)
+        _remove_tree(folder / _RUNNING)
         if not (force and _is_complete(folder)):
             yield prepare_output(folder)
             return
         _refuse_changed(folder, read_manifest(folder))
         try:
             with storage_errors(folder):
-                (folder / RUNNING).mkdir()
-            yield prepare_output(folder / RUNNING)
-            if read_manifest(folder / RUNNING).complete:
+                (folder / _RUNNING).mkdir()
+            yield prepare_output(folder / _RUNNING)
+            if read_manifest(folder / _RUNNING).complete:
                 with storage_errors(folder):
-                    os.replace(folder / RUNNING, folder / FINISHED)
+                    os.replace(folder / _RUNNING, folder / _FINISHED)
                 _publish(folder)
         finally:
-            _remove_tree(folder / RUNNING)
+            _remove_tree(folder / _RUNNING)
 
 
 def folder_lock(folder: str | os.PathLike):
@@ -346,7 +344,7 @@ def folder_lock(folder: str | os.PathLike):
     Refuses a folder that another run holds (E-LOCKED), or that is not there (E-RESULTS-MISSING).
     """
     _refuse_missing(Path(folder))
-    return exclusive_lock(Path(folder) / LOCK)
+    return exclusive_lock(Path(folder) / _LOCK)
 
 
 def prepare_output(folder: str | os.PathLike) -> Path:
@@ -426,13 +424,13 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
     try:
         data = json.loads(text)
         written = data.pop("femgear_format")
-        if type(written) is not int or not 1 <= written <= FORMAT:
+        if type(written) is not int or not 1 <= written <= _FORMAT:
             raise StorageError(
                 "written by another version of femgear",
                 code="E-FORMAT",
                 file=str(path),
                 value=written,
-                limit=f"1 to {FORMAT}",
+                limit=f"1 to {_FORMAT}",
             )
         manifest = Manifest(**data)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
@@ -450,7 +448,7 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
 
 def _write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
     """Write ``manifest.json``; the last file of a run."""
-    data = _plain({"femgear_format": FORMAT, **vars(manifest)})
+    data = _plain({"femgear_format": _FORMAT, **vars(manifest)})
     write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
 
 
@@ -476,7 +474,7 @@ def _refuse_incomplete(results: Results) -> None:
     if results.manifest.complete:
         return
     folder = results.folder
-    case = folder / CASE if CASE in results.manifest.files else "CASE"
+    case = folder / _CASE if _CASE in results.manifest.files else "CASE"
     raise StorageError(
         _interrupted(results),
         code="E-RESULTS-INCOMPLETE",
@@ -517,7 +515,7 @@ def _make(folder: Path) -> None:
         if folder.exists() and not folder.is_dir():
             raise StorageError("exists and is not a folder", code="E-OUTPUT", file=str(folder))
         folder.mkdir(parents=True, exist_ok=True)
-        foreign = any(path.name != LOCK for path in folder.iterdir())
+        foreign = any(path.name != _LOCK for path in folder.iterdir())
     if foreign and not (folder / MANIFEST).is_file():
         raise StorageError(
             "the folder holds files but no femgear results",
@@ -529,7 +527,7 @@ def _make(folder: Path) -> None:
 
 def _publish(folder: Path) -> None:
     """Give the new files their places, the manifest last; may be repeated after an interruption."""
-    source = folder / FINISHED
+    source = folder / _FINISHED
     if (source / MANIFEST).is_file():
         new, old = read_manifest(source), read_manifest(folder)
         with storage_errors(folder):

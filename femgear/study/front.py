@@ -172,13 +172,9 @@ def _search(run: Evaluations, second: Quantity, points: int, places) -> None:
 
         def cost(x, weight=float(weight)) -> float:
             run.count(x)
-            names = [quantity.name for quantity in both]
-
-            def value() -> float:
-                found = run.values(x, both)
-                return float(distance(np.array([found[name] for name in names]), weight))
-
-            return run.penalised(x, value)
+            return run.penalised(
+                x, lambda: float(distance(np.array([*run.values(x, both).values()]), weight))
+            )
 
         x, values = _known(run, both)
         polish(run, cost, x[distance(values, float(weight)).argmin()], size=0.1, rounds=1)

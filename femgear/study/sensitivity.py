@@ -121,11 +121,6 @@ class LinearContact:
         return self.solved is not self.original
 
     @property
-    def mesh_rows(self) -> np.ndarray:
-        """Meshes of the solved set in the order of the original, (2N,)."""
-        return _original_rows(self.order)
-
-    @property
     def share(self) -> np.ndarray:
         """Shares in the sun's torque, (N, P)."""
         return self.force[: self.original.n_planets] / self.load
@@ -328,7 +323,7 @@ def _sensitivity(linear: LinearContact, change: np.ndarray) -> Sensitivity:
     N, t = linear.solved.n_planets, linear.touching
     pushed = np.zeros((len(linear.position), 2 * N))
     np.add.at(pushed, t.at, t.weight * change[:, None])
-    rows = linear.mesh_rows
+    rows = _original_rows(linear.order)
     force = np.einsum("pij,pj->ip", linear.force_response, pushed)[rows]
     return Sensitivity(
         sun_arc=np.einsum("pj,pj->p", linear.arc_response, pushed),

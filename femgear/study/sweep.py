@@ -30,7 +30,7 @@ _LARGEST = 100_000
 """Combinations at most."""
 _MANY = 1000
 """Combinations from which their time is estimated and said."""
-JOURNAL, TABLE, FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
+_JOURNAL, _TABLE, _FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 """Files of a sweep."""
 _TIMED = 3
 """Cases that the estimate is made from."""
@@ -244,13 +244,13 @@ def sweep_into(
     _check_sweep(case, values, quantities)
     with storage_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    options = {"journal": folder / JOURNAL, "cache": cache, "progress": progress}
+    options = {"journal": folder / _JOURNAL, "cache": cache, "progress": progress}
     found = sweep(case, values, quantities, **options)
-    write_csv(folder / TABLE, found.header, found.records())
-    names = [TABLE, JOURNAL]
+    write_csv(folder / _TABLE, found.header, found.records())
+    names = [_TABLE, _JOURNAL]
     if np.isfinite(found.values).any():
-        _draw(found, [len(one) for one in values.values()], folder / FIGURE)
-        names.append(FIGURE)
+        _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
+        names.append(_FIGURE)
     return found, names
 
 
