@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def grid_cache() -> Path:
-    """Folder of generated grids: FEMGEAR_MESHES, else meshes/ of a source tree, else the user's cache."""
+    """Find the folder of generated grids: FEMGEAR_MESHES, meshes/ of a source tree, or the user's cache."""
     if given := os.environ.get("FEMGEAR_MESHES"):
         return Path(given)
     beside = Path(__file__).parents[1] / "meshes"

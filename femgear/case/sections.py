@@ -486,13 +486,13 @@ class MeshStiffnessSection(Section):
 
 
 def output_member(case: Case) -> str:
-    """The member that is neither driven nor held."""
+    """Find the member that is neither driven nor held."""
     others = {case.operation.input, case.operation.fixed}
     return next((name for name in ("carrier", "sun", "ring") if name not in others), "carrier")
 
 
 def check_published(case: Case) -> Iterator[CaseError]:
-    """Refusals of published lines that nothing could be compared with."""
+    """Refuse published lines that nothing could be compared with."""
     for i, entry in enumerate(case.housing.published):
         key = f"housing.published[{i}]"
         if not any(math.isclose(entry.speed, speed, rel_tol=1e-9) for speed in case.operation.speeds):

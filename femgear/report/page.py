@@ -126,7 +126,7 @@ def write_report(train: Train, results: Results) -> Path:
 
 
 def page(train: Train, results: Results) -> str:
-    """Make the page as text; see `write_report`."""
+    """Make the page of a run as HTML text: tables, warnings, pictures, provenance; see `write_report`."""
     case = results.case
     pictures, skipped = _pictures(train, results)
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]

@@ -364,7 +364,7 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
 
 
 def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure]:
-    """Spectrum of the transmission error and, over many speeds, its sweep, with others between them."""
+    """Draw the spectrum of the transmission error, `others`, and over many speeds its sweep."""
     figures = {"dynamic_spectrum": transmission_error_spectrum(dynamics), **others}
     if dynamics.sizes["speed"] > _MANY_SPEEDS:
         figures["speed_sweep"] = speed_sweep(dynamics)
@@ -372,7 +372,7 @@ def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure
 
 
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
-    """Complex array of a variable stored as real and imaginary part, in its dimensions and unit."""
+    """Join real and imaginary part of a variable to a complex array, in its dimensions and unit."""
     return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
 
 

@@ -298,9 +298,22 @@ def add_coloured(
     limits=None,
     colours: int = 256,
 ) -> None:
-    """Add a mesh coloured by its point data `text`, with a colour bar of that title under the scene.
+    """Add a mesh coloured by a field on its points, with a colour bar under the scene.
 
-    ``limits`` are those of the colours, in the unit of the data; the picture has ``size`` pixels a side.
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+    mesh : pyvista.PolyData
+    text : str
+        Name of the field with its unit, also the title of the bar.
+    size : int
+        Width and height of the picture [pixels].
+    cmap : str
+        Colour map of Matplotlib.
+    limits : (float, float), optional
+        Of the colours, in the unit of the field; its own range when left out.
+    colours : int
+        Number of colours.
     """
     plotter.add_mesh(
         mesh,
@@ -346,7 +359,7 @@ def _font(size: int) -> float:
 
 
 def rounded(value: float) -> str:
-    """Round to two significant figures, without an exponent."""
+    """Write a number with two significant figures, without an exponent."""
     return f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
 
 

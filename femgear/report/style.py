@@ -134,12 +134,12 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 def family(name: str) -> str:
-    """Kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
+    """Tell the kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
     return "planet-ring" if "ring" in name else "sun-planet"
 
 
 def distinct_lines(names, values, *, partly: bool = False) -> list[tuple[str, int]]:
-    """Rows of `values` to draw: one for a family of meshes whose rows agree, each row otherwise.
+    """Choose the rows of `values` to draw: one for a family of meshes whose rows agree, else each.
 
     Rows agree that differ by less than a millionth of the largest value.
 
@@ -185,7 +185,7 @@ def periodic(position, values):
 
 
 def runs(chosen) -> list[slice]:
-    """Find runs of chosen segments (n - 1,) of a curve as slices of its points."""
+    """Find runs of chosen segments (n - 1,) of a curve, bool, as slices of its n points."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
 
@@ -203,5 +203,5 @@ def rpm(speed: float) -> str:
 
 
 def xy(points):
-    """Split complex points into both coordinates."""
+    """Split complex points (n,) into both coordinates, (n,) each."""
     return points.real, points.imag

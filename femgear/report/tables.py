@@ -67,6 +67,7 @@ def describe_modes(
     Parameters
     ----------
     data : xarray.Dataset
+        With ``frequency`` [Hz] and ``kind`` (mode,).
     more : mapping of str to callable, optional
         Further columns, the text of a mode from its part of the file; nodal diameters when not given.
     digits : int
@@ -92,7 +93,11 @@ def _nodal_diameters(mode: xr.Dataset) -> str:
 
 
 def describe_response(data: xr.Dataset) -> Block:
-    """Tabulate transmission error, convergence and stability at every speed of dynamics.nc."""
+    """Tabulate transmission error [um], convergence and stability at the speeds [rpm] of dynamics.nc.
+
+    The file has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m] and, for every speed, what
+    `femgear.storage.results.response_entries` lists; of many speeds the first and the last are shown.
+    """
     dte = np.hypot(data.dte_real.values, data.dte_imag.values)  # speed, mesh, harmonic
     rms = np.sqrt(0.5 * (dte[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
     largest = np.abs(data.floquet_multiplier.values)
@@ -131,7 +136,7 @@ def chosen(count: int) -> Iterator[int]:
 
 
 def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """What the solver says against the periodic responses of dynamics.nc."""
+    """Name the speeds [rpm] whose periodic responses in dynamics.nc are not converged or not stable."""
     speed = data["speed"].values
     for bad, text in (
         (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),

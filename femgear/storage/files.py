@@ -69,7 +69,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
-    """Read a file that `write_dataset` wrote into memory.
+    """Read a dataset that `write_dataset` wrote: numbers in memory, dimensions, and units as attributes.
 
     The file is walked first: links, data kept in other files, unusual types and declared sizes that the
     file cannot hold are refused before anything is read.
@@ -105,8 +105,13 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
 def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
     """Write a file under a temporary name, force it to the disk, then give it its name.
 
-    ``write`` is given the temporary path, in the same folder and with the same suffix; ``size`` bytes are
-    refused beforehand where the disk has not that much left.
+    Parameters
+    ----------
+    path : path-like
+    write : callable
+        ``(path)`` writes the file under a temporary path, in the same folder and with the same suffix.
+    size : int
+        What the disk must have room for [bytes].
 
     Raises
     ------

@@ -76,7 +76,7 @@ def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
 
 
 def coordinates(**values: Any) -> dict[str, tuple]:
-    """Entries of `dataset` for coordinates by name: axis, harmonic, mesh, speed [rpm] and others."""
+    """Make entries of `dataset` for coordinates by name: axis, harmonic, mesh, speed [rpm] and others."""
     return {name: (name, values[name], *_COORDINATES[name]) for name in values}
 
 
@@ -350,7 +350,10 @@ def folder_lock(folder: str | os.PathLike):
 def prepare_output(folder: str | os.PathLike) -> Path:
     """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
 
-    It then has a manifest that says that the run is not complete.
+    Returns
+    -------
+    Path
+        The folder, created where there is none, with a manifest that says that the run is not complete.
 
     Raises
     ------
@@ -411,7 +414,7 @@ finish = partial(record, complete=True)
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:
-    """Read the manifest of a results folder.
+    """Read the manifest of a results folder: its files with checksums, seconds and verdicts of the stages.
 
     Raises
     ------
