@@ -80,7 +80,7 @@ def pareto_front(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> ParetoFront:
-    """Front between the objective of a problem and a second one.
+    """Find the front between the objective of a problem and a second one.
 
     Both are minimised alone. Between, the augmented weighted Chebyshev distance to the point of both minima,
     ``max_i w_i (f_i - f_i*)/span_i + 0.01 sum_i``, is minimised by the simplex of Nelder and Mead from the
@@ -138,7 +138,7 @@ def pareto_front(
 
 
 def non_dominated(values: np.ndarray) -> np.ndarray:
-    """Row numbers of (m, 2) values that no other row is below in one column and not above in the other."""
+    """Find the rows of (m, 2) values that no other row is below in one column and not above in the other."""
     order = np.lexsort((values[:, 1], values[:, 0]))
     lowest, kept = np.inf, []
     for i in order:

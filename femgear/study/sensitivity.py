@@ -134,7 +134,7 @@ def _original_rows(order) -> np.ndarray:
 
 @one_blas_thread()
 def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=None) -> LinearContact:
-    """Contact of all drive flanks and what it answers to small separations of any cell.
+    """Solve the contact of all drive flanks, and what it answers to small separations [m] of any cell.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ class Sensitivity:
 def sensitivity(
     linear: LinearContact, variant: Callable[[float], SetDeviations], value: float, *, step: float
 ) -> Sensitivity:
-    """Derivatives with respect to one parameter of the deviations.
+    """Differentiate transmission errors, mesh forces and shares by one parameter of the deviations.
 
     Parameters
     ----------
@@ -347,7 +347,7 @@ def _separations(linear: LinearContact, deviations: SetDeviations) -> np.ndarray
 
 
 def pin_sensitivities(linear: LinearContact) -> np.ndarray:
-    """Change of all shares per displacement of every pin, (N shares, N pins, 2, P) [1/m].
+    """Differentiate all shares by the displacements of the pins, (N shares, N pins, 2, P) [1/m].
 
     The third index is radial (outwards), tangential (counter-clockwise). Pin errors separate whole meshes,
     so these derivatives hold beside any other deviations.

@@ -69,7 +69,7 @@ class Sweep:
         return (*self.keys, *(f"{q.name} [{q.dimension.si}]" for q in self.quantities), "error")
 
     def records(self) -> Iterator[tuple[object, ...]]:
-        """Rows of a table."""
+        """Give the rows of a table, quantities in SI units."""
         for point, values, error in zip(self.points, self.values, self.errors, strict=True):
             yield (*point, *(float(value) for value in values), error)
 
@@ -84,7 +84,7 @@ def sweep(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> Sweep:
-    """Quantities of a case over values of entries of its file.
+    """Compute quantities of a case over values of entries of its file.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def _warn_of_time(left: int, seconds: float) -> None:
 
 
 def parse_over(text: str) -> tuple[str, Sequence[object]]:
-    """Key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``; others are refused (E-VARIABLE)."""
+    """Read key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``; E-VARIABLE for others."""
     key, equals, values = (part.strip() for part in text.partition("="))
     if not (key and equals and values):
         raise _not_over(text)
