@@ -153,7 +153,7 @@ class Optimum:
         return tuple(v.name for v, flag in zip(self.problem.variables, near) if flag)
 
     def gain(self, name: str | None = None) -> float:
-        """Compute the share by which a quantity, by default the objective, has become lower; NaN from zero."""
+        """Compute the share by which a quantity, by default the objective, is lower now; NaN from zero."""
         name = self.problem.objective.name if name is None else name
         before = self.before[name]
         return 1.0 - self.after[name] / before if before else math.nan
