@@ -145,7 +145,7 @@ def report_again(folder: Path) -> None:
         manifest, train = results.manifest, train_of(results.case)
         names = [name for name in manifest.files if name != "report.html"]
         if not any(name.endswith(".png") for name in names):
-            data = {stage: results.stage(stage) for stage in results.stages}
+            data = {stage: results[stage] for stage in results.stages}
             names += write_pictures(results.folder, train, Drawn(results.case, data), progress=silent)
             finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
         write_report(train, open_results(folder))

@@ -223,7 +223,7 @@ class Results:
         """Contents of the file of a stage: ``results.modes``, as ``results["modes"]``."""
         if name.startswith("_"):
             raise AttributeError(name)
-        found = self.__dict__[name] = self.stage(name)
+        found = self.__dict__[name] = read_dataset(self._checked(f"{name}.nc"))
         return found
 
     def __getitem__(self, name: str) -> xr.Dataset:
@@ -234,10 +234,6 @@ class Results:
 
     def __len__(self) -> int:
         return len(self.stages)
-
-    def stage(self, name: str) -> xr.Dataset:
-        """Contents of the file of one stage."""
-        return read_dataset(self._checked(f"{name}.nc"))
 
     def __repr__(self) -> str:
         state = "complete" if self.manifest.complete else "not complete"

@@ -116,11 +116,6 @@ class LinearContact:
     residual: float
 
     @property
-    def mirrored(self) -> bool:
-        """Whether the mirror image was solved."""
-        return self.solved is not self.original
-
-    @property
     def share(self) -> np.ndarray:
         """Shares in the sun's torque, (N, P)."""
         return self.force[: self.original.n_planets] / self.load
@@ -309,7 +304,7 @@ def sensitivity(
     if not (np.isfinite(step) and step > 0):
         raise CaseError("a derivative needs a step", code="E-RANGE", value=step, limit="over 0")
     low, high = variant(value - step), variant(value + step)
-    if linear.mirrored:
+    if linear.solved is not linear.original:
         low, high = (
             mirrored_deviations(deviations, linear.original, linear.solved, linear.order)
             for deviations in (low, high)

@@ -284,8 +284,8 @@ def _axis(values: Sequence[object]) -> tuple[Sequence[object], str]:
     try:
         parts = [split(value, "value") for value in values]
     except CaseError:
-        return [str(value) for value in values], ""
+        parts = []
     units = {unit for _, unit in parts}
-    if len(units) > 1:
+    if len(units) != 1:
         return [str(value) for value in values], ""
     return [number for number, _ in parts], units.pop()
