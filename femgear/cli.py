@@ -325,7 +325,6 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
 
     Parameters
     ----------
-    program_app : App
     arguments : sequence of str or None
         As of `main`.
     program : str

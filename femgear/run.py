@@ -98,7 +98,6 @@ def run_case(
 
     Parameters
     ----------
-    case : Case
     folder : path
         From `femgear.storage.results.run_folder`; its manifest says after every stage what is there.
     only : str, optional
@@ -133,13 +132,7 @@ def run_case(
 
 
 def report_again(folder: Path) -> None:
-    """Write report.html anew, with its figures where the run drew none, and bring the manifest up to date.
-
-    Parameters
-    ----------
-    folder : path
-        Results of a complete run.
-    """
+    """Write report.html of a complete run anew, with figures where it drew none; update the manifest."""
     with folder_lock(folder):
         results = open_results(folder, partial=False)
         manifest, train = results.manifest, train_of(results.case)

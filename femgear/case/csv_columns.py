@@ -66,7 +66,6 @@ def read_columns(
 
     Parameters
     ----------
-    path : path-like
     dimensions : mapping of str to Dimension
         By the titles that are known, in small letters.
     least, most : int

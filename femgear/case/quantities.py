@@ -87,7 +87,6 @@ def to_si(
     value : str
         A number and a product of units; radians and degrees count as a dimension, so that neither
         ``"5 Hz"`` passes as a speed of rotation nor ``"20 %"`` as an angle.
-    dimension : Dimension
     low, high : float
         Plausible window, in ``dimension.si``.
 
@@ -255,7 +254,6 @@ def Number(
 
     Parameters
     ----------
-    low, high : float
     open_low, open_high : bool
         Whether the ends themselves are refused.
     note : str
@@ -290,7 +288,7 @@ RIGID = "rigid"
 
 
 def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
-    """Make the reader of a stiffness that may be the text ``"rigid"``, infinite in the model."""
+    """Make the reader of a stiffness that may be ``"rigid"``, infinite in the model; see `Quantity`."""
     stiffness = Quantity(dimension, low, high)
 
     def rigid_too(value: object) -> object:
@@ -304,7 +302,6 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
 
     Parameters
     ----------
-    low, high : int
     note : str
         Why more is refused, for the message.
     signed : bool

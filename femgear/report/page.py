@@ -42,10 +42,8 @@ def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progre
 
     Parameters
     ----------
-    folder : path
     train : Train
         Of the case.
-    drawn : Drawn
     progress : callable
         Called with (stage, done, total).
     """

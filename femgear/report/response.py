@@ -193,7 +193,7 @@ def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str
         Slopes of the lines [Hz per unit of speed].
     order_names : sequence of str
     critical : sequence of (speed, frequency)
-        Intersections to mark.
+        Intersections to mark, in `speed_unit` and [Hz].
     speed_unit : str
     """
     figure, (ax,) = new_figure(height=5.4)
@@ -326,7 +326,8 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     Parameters
     ----------
     dynamics : xarray.Dataset
-        With ``dte_real``, ``dte_imag``, ``spectral_radius``, ``floquet_multiplier`` and ``converged``.
+        With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m], and ``spectral_radius``,
+        ``floquet_multiplier`` and ``converged`` (speed,).
     """
     figure, (top, bottom) = new_figure(rows=2, height=7.0, sharex=True)
     order = np.argsort(dynamics["speed"].values)

@@ -86,7 +86,6 @@ class Body:
 
     Parameters
     ----------
-    name : str
     points : (n, 2) array
         [m], in the frame of the set.
     triangles : (m, 6) int array
@@ -108,7 +107,6 @@ def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, disp
     ----------
     grid : Grid
         Centred on the origin.
-    name : str
     centre : (2,) array
         [m]
     angle : float
@@ -153,7 +151,6 @@ def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> p
 
     Parameters
     ----------
-    sector : Grid
     modes : CyclicModes
         Of that sector; the cosine mode of every pair is shown, largest displacement 1.
     shown : sequence of int
@@ -201,13 +198,7 @@ def whole_field(sectors: np.ndarray, numbers: np.ndarray) -> np.ndarray:
 
 
 def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
-    """Write a grid as compressed VTU; the file is either the old or the new one, whole.
-
-    Raises
-    ------
-    StorageError
-        When the file cannot be written.
-    """
+    """Write a grid as compressed VTU; the file is either the old or the new one, whole."""
     if Path(path).suffix != ".vtu":
         raise CaseError("fields are written as VTU", code="E-CHOICE", value=str(path), limit=".vtu")
     replace_file(
@@ -235,7 +226,6 @@ def deformed_picture(
         PNG file.
     field : str
         Point data of the displacement.
-    title : str
     colour_label : str
         What the colours mean, with the unit.
     colour_factor : float
@@ -302,8 +292,6 @@ def add_coloured(
 
     Parameters
     ----------
-    plotter : pyvista.Plotter
-    mesh : pyvista.PolyData
     text : str
         Name of the field with its unit, also the title of the bar.
     size : int
@@ -420,7 +408,6 @@ def animate_operating_deflection(
     ----------
     path : path-like
         GIF file.
-    planetary_set : PlanetarySet
     radial, tangential : (H + 1, 2 n_max + 1) complex arrays
         Components of the outer surface's displacement [m]:
         ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier.
@@ -428,7 +415,6 @@ def animate_operating_deflection(
         Place of the fixed sensor on the housing [rad].
     clockwise : bool
         Whether the carrier turns clockwise.
-    title : str
     frames : int
         Number of frames wished for.
     size : int
@@ -529,10 +515,6 @@ def _draw(planetary_set, field, carrier, sensor_angle, title, size):
 
 def gear_outline(gear: Gear) -> np.ndarray:
     """Draw the exact outline of all teeth, the first centred on angle 0.
-
-    Parameters
-    ----------
-    gear : Gear
 
     Returns
     -------

@@ -111,18 +111,7 @@ def line_style(index: int) -> dict[str, str]:
 
 
 def save_figure(figure: Figure, path: str | os.PathLike) -> None:
-    """Write a figure as PNG; the file is either the old or the new one, whole.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    path : path-like
-
-    Raises
-    ------
-    StorageError
-        When the file cannot be written.
-    """
+    """Write a figure as PNG; the file is either the old or the new one, whole."""
     write_bytes(png_bytes(figure), path)
 
 
@@ -191,14 +180,14 @@ def runs(chosen) -> list[slice]:
 
 
 def excited_to(data, speed_index: int) -> str:
-    """Write the highest frequency of the excitation at a speed, for a title; empty where it is not known."""
+    """Write the highest frequency of the excitation [kHz] at a speed, for a title; empty if not known."""
     if "excitation_limit" not in data:
         return ""
     return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
 
 
 def rpm(speed: float) -> str:
-    """Write an input speed in a title; speeds in datasets are in rpm."""
+    """Write an input speed [rpm], as datasets have it, in a title."""
     return f"{float(speed):.6g} rpm"
 
 

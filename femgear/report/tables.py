@@ -21,16 +21,7 @@ _MODES = 16
 
 @dataclass(frozen=True)
 class Block:
-    """A titled table with notes under it.
-
-    Parameters
-    ----------
-    title : str
-    header : tuple of str
-        Names of the columns, or empty.
-    rows : tuple of tuple of str
-    notes : tuple of str
-    """
+    """A titled table with notes under it; its header names the columns, or is empty."""
 
     title: str
     header: tuple[str, ...] = ()
@@ -45,11 +36,8 @@ def tabulate(
 
     Parameters
     ----------
-    title : str
-    items : iterable
     columns : mapping of str to callable
         The text of an item in every column, by the name of the column.
-    notes : iterable of str
     """
     rows = tuple(tuple(text(item) for text in columns.values()) for item in items)
     return Block(title, tuple(columns), rows, tuple(notes))

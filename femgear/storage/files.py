@@ -46,7 +46,6 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     dataset : xarray.Dataset
         Real, text or boolean variables, each with attributes ``units`` and ``long_name``; so the numeric
         coordinates. Real numbers are stored as float64.
-    path : path-like
 
     Raises
     ------
@@ -107,7 +106,6 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
 
     Parameters
     ----------
-    path : path-like
     write : callable
         ``(path)`` writes the file under a temporary path, in the same folder and with the same suffix.
     size : int

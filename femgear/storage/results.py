@@ -141,7 +141,7 @@ def complex_entries(entries) -> dict[str, tuple]:
 
 
 def response_entries(result: Any) -> dict[str, tuple]:
-    """List what is known of the periodic response at every speed: frequency, convergence, stability.
+    """List what is known of a periodic response, (speed,) each: frequency [Hz], convergence, stability.
 
     Of any result with a response, its stability and the speeds of the members.
     """
@@ -204,8 +204,6 @@ class Results:
 
     Parameters
     ----------
-    folder : Path
-    manifest : Manifest
     read_case : callable
         ``(path) -> case``.
     """
@@ -387,7 +385,6 @@ def record(
 
     Parameters
     ----------
-    folder : path-like
     names : list of str
         Files that the run wrote, as paths inside the folder.
     timings : mapping of str to float

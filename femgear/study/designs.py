@@ -152,8 +152,7 @@ class Designs:
 
     Attributes
     ----------
-    case : Case
-    journal : Journal
+    case, journal : Case, Journal
     seconds : float
         What the designs computed now took, all together.
     """
@@ -269,7 +268,6 @@ def open_designs(
 
     Parameters
     ----------
-    case : Case
     keys : sequence of tuple of str
         Entries of the case file that every value of a point sets.
     journal, cache, progress
@@ -299,8 +297,7 @@ class Evaluations:
 
     Attributes
     ----------
-    problem : Problem
-    designs : Designs
+    problem, designs : Problem, Designs
     best : (x, cost)
         The best point of the objective so far; infinite cost before any.
     course : list of float
@@ -403,7 +400,6 @@ class Tolerance:
 
     Parameters
     ----------
-    variable : Variable
     tolerance : float
         In the unit of the variable.
     less, more : dict

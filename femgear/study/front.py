@@ -37,7 +37,6 @@ class ParetoFront:
     ----------
     problem : Problem
         Its objective is the first one.
-    second : Quantity
     x : (m, n) array
         In the units of the variables.
     values : (m, 2) array
@@ -90,8 +89,6 @@ def pareto_front(
 
     Parameters
     ----------
-    problem : Problem
-    second : Quantity
     points : int
         Weights, the two ends included.
     start, options, journal, cache, progress

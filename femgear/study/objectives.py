@@ -52,7 +52,6 @@ class Variant:
 
     Parameters
     ----------
-    case : Case
     steps : Steps
         What variants of a case share: flank compliances, static solutions, loaded states, ring models.
     cache : path, optional
@@ -94,7 +93,7 @@ class Variant:
         return self._once("stress", compute=lambda: static_stages.solve_stress(self.case, self.static()))
 
     def response(self, speeds: Range) -> Response:
-        """Compute the periodic response at a range of speeds, without the verdict on its stability."""
+        """Compute the periodic response at a range of speeds [rad/s], without verdict on its stability."""
         return self._once(
             "response", speeds, compute=lambda: elastic_stages.solve_response(*self._modes(speeds))
         )
@@ -162,7 +161,7 @@ class Quantity:
     compute : callable
         ``(Variant) -> float`` in SI units.
     signal : callable, optional
-        Of a transmission error ``(sun_arc, deflection, N) -> (K, P) array``: it is the largest peak to peak.
+        Of a transmission error [m] ``(sun_arc, deflection, N) -> (K, P) array``: its largest peak to peak.
     torque : float, optional
         Of a transmission error: on the input [N m]; None means that of the case.
     """
@@ -268,7 +267,8 @@ def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
 def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     """Define the largest amplitude of any carrier order at the fixed sensor over speeds [m/s^2].
 
-    Of the exact lines (`femgear.housing.fixed_sensor_lines`) of the radial acceleration.
+    Speeds are as for `mesh_force`, lines the exact ones of the radial acceleration, see
+    `femgear.housing.fixed_sensor_lines`.
     """
     at = _range(first, last, speeds)
 

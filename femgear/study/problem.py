@@ -231,7 +231,6 @@ class Limit:
 
     Parameters
     ----------
-    quantity : Quantity
     low, high : float, optional
         At least one of them.
     """
@@ -274,11 +273,8 @@ class Problem:
     ----------
     case : Case
         Its positions, flank elements and harmonics are those of the search; a coarse one is fast.
-    variables : sequence of Variable
-    objective : Quantity
     also : sequence of Quantity
         Reported of the case and of the optimum as well.
-    limits : sequence of Limit
 
     Raises
     ------

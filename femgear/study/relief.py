@@ -46,7 +46,6 @@ class DesignBasis:
 
     Parameters
     ----------
-    gears : PlanetarySet
     bodies : Bodies
         Flank compliances; they serve all mesh cycles.
     supports : Supports

@@ -99,7 +99,6 @@ class Optimum:
 
     Parameters
     ----------
-    problem : Problem
     x : (n,) array
         In the units of the variables.
     case : Case
@@ -189,7 +188,6 @@ def minimise(
 
     Parameters
     ----------
-    problem : Problem
     method : {"auto", "minimax", "global", "simplex", "powell"}
         ``"minimax"``: descents with derivatives of the contact problem (see `descend`) from the best of the
         samples; for transmission errors over deviations of the flanks, where ``"auto"`` takes it.
@@ -340,7 +338,10 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
 
 
 def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
-    """Draw a Latin hypercube of ``count`` points, the middle of the bounds before them, (1 + count, n)."""
+    """Draw a Latin hypercube of ``count`` points, the middle of the bounds before them, (1 + count, n).
+
+    All in the units of the variables; the same ``seed`` gives the same points.
+    """
     from scipy.stats.qmc import LatinHypercube
 
     low, high = problem.bounds.T

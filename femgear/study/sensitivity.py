@@ -91,7 +91,6 @@ class LinearContact:
         Transmission error from sun to ring [m].
     deflection, force : (2N, P) arrays
         Of every mesh, in the original order [m], [N].
-    touching : _TouchingCells
     arc_response : (P, 2N) array
         Of the transmission error to ``v = Z^T d gap`` [m/N].
     deflection_response, force_response : (P, 2N, 2N) arrays
@@ -133,7 +132,6 @@ def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=N
 
     Parameters
     ----------
-    basis : DesignBasis
     sun_torque, periods
         As for `contact.cycle.walk_mesh_cycle`; the torque is not zero.
     only : sequence of int, optional

@@ -235,7 +235,6 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
 
     Parameters
     ----------
-    model : SharingModel
     pins : (S, N, 2) array
         Radial (outwards) and tangential (counter-clockwise) displacements of the planet axes [m].
     max_steps : int

@@ -44,10 +44,8 @@ class Sweep:
 
     Parameters
     ----------
-    keys : tuple of str
     points : tuple of tuple
         Values as the case file holds them; the last key runs fastest.
-    quantities : tuple of Quantity
     values : (points, quantities) array
         [SI]; NaN where a case cannot be computed.
     errors : tuple of str
@@ -88,10 +86,8 @@ def sweep(
 
     Parameters
     ----------
-    case : Case
     over : mapping of str to sequence
         Values of dotted keys, as the case file would hold them; all combinations are computed.
-    quantities : sequence of Quantity
     journal : path-like, optional
         File that keeps every case; an interrupted sweep goes on from it.
     cache, progress
