@@ -43,6 +43,13 @@ MOST_POINTS = 2000
 """Points of a measured profile; machines write some hundreds."""
 ROUNDING = 0.05e-6
 """What the sum of the pitch deviations may miss zero by for every tooth [m]: tenths of micrometres."""
+FORMAT = 1
+"""Newest format of the case file."""
+LARGEST_TORQUE = 1e9
+"""Largest plausible torque [N m]."""
+_CODE = "E-PUBLISHED"
+"""Of refusals of published lines."""
+_MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
 
 Deviation = Annotated[float, Quantity(LENGTH, -0.02, 0.02)]
 Amplitude = Annotated[float, Quantity(LENGTH, 0.0, 0.02)]
@@ -52,6 +59,13 @@ Diameter = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 RollAngle = Annotated[float, Quantity(ANGLE, 0.0, 4 * math.pi)]
 RollLength = Annotated[float, Quantity(LENGTH, 0.0, 10.0)]
 Points = Field(max_length=MOST_POINTS)
+Member = Literal["sun", "ring", "carrier"]
+Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
+Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
+Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
+Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
+Shift = Annotated[float, Number(-5.0, 5.0)]
+_Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
 
 _MEASURED = ("file", "roll_angles", "diameters", "deviations")
 _PLACES = ("diameter", "roll_angle", "roll_length")
@@ -188,23 +202,6 @@ class PinError(Section):
     planet: Annotated[int, Count(1, 1000)]
     radial: Deviation = 0.0
     tangential: Deviation = 0.0
-
-
-FORMAT = 1
-"""Newest format of the case file."""
-LARGEST_TORQUE = 1e9
-"""Largest plausible torque [N m]."""
-_CODE = "E-PUBLISHED"
-"""Of refusals of published lines."""
-_MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
-
-Member = Literal["sun", "ring", "carrier"]
-Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
-Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
-Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
-Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
-Shift = Annotated[float, Number(-5.0, 5.0)]
-_Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
 
 
 class SetSection(Section):

@@ -21,6 +21,36 @@ if TYPE_CHECKING:
     from femgear.trains.protocol import Drawn, Figures, Progress, Train
 
 
+_LARGEST_PICTURE = 8_000_000
+"""Bytes of a picture on the page."""
+_OTHER = "Other pictures"
+"""Section of those that no stage describes."""
+_KINDS = {".png": "image/png", ".gif": "image/gif"}
+_STYLE = """
+body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;
+  max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
+h1 { font-size: 1.7rem; margin-bottom: 0.2rem; }
+h2 { font-size: 1.25rem; margin-top: 2.4rem; border-bottom: 2px solid #0072b2; padding-bottom: 0.15rem; }
+h3 { font-size: 1.05rem; margin: 1.6rem 0 0.4rem; }
+p.lead { color: #555; margin-top: 0; }
+nav a { margin-right: 1rem; color: #0072b2; }
+div.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: 0.86rem; font-variant-numeric: tabular-nums; }
+th, td { padding: 0.2rem 0.7rem; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap; }
+th { border-bottom: 2px solid #888; font-weight: 600; }
+th:first-child, td:first-child { text-align: left; padding-left: 0; }
+p.note { font-size: 0.86rem; color: #444; margin: 0.3rem 0; }
+ul.warnings { border-left: 5px solid #d55e00; background: #fdf3ec; margin: 1rem 0;
+  padding: 0.6rem 1rem 0.6rem 2rem; }
+figure { margin: 1.4rem 0 2rem; }
+figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
+figcaption { font-size: 0.9rem; color: #333; margin-top: 0.4rem; }
+pre { font-size: 0.8rem; background: #f5f5f5; padding: 0.8rem; overflow-x: auto; }
+@media print { body { max-width: none; margin: 0; font-size: 11pt; } nav { display: none; }
+  figure, table { break-inside: avoid; } h2, h3 { break-after: avoid; } pre { white-space: pre-wrap; } }
+"""
+
+
 def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
     """Write the figures of the stages whose data are there, and of the case; returns the file names."""
     figures = {}
@@ -56,36 +86,6 @@ def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progre
         names += write(drawn, folder)
     progress("pictures", steps, steps)
     return names
-
-
-_LARGEST_PICTURE = 8_000_000
-"""Bytes of a picture on the page."""
-_OTHER = "Other pictures"
-"""Section of those that no stage describes."""
-_KINDS = {".png": "image/png", ".gif": "image/gif"}
-_STYLE = """
-body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;
-  max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
-h1 { font-size: 1.7rem; margin-bottom: 0.2rem; }
-h2 { font-size: 1.25rem; margin-top: 2.4rem; border-bottom: 2px solid #0072b2; padding-bottom: 0.15rem; }
-h3 { font-size: 1.05rem; margin: 1.6rem 0 0.4rem; }
-p.lead { color: #555; margin-top: 0; }
-nav a { margin-right: 1rem; color: #0072b2; }
-div.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 0.86rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.2rem 0.7rem; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap; }
-th { border-bottom: 2px solid #888; font-weight: 600; }
-th:first-child, td:first-child { text-align: left; padding-left: 0; }
-p.note { font-size: 0.86rem; color: #444; margin: 0.3rem 0; }
-ul.warnings { border-left: 5px solid #d55e00; background: #fdf3ec; margin: 1rem 0;
-  padding: 0.6rem 1rem 0.6rem 2rem; }
-figure { margin: 1.4rem 0 2rem; }
-figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
-figcaption { font-size: 0.9rem; color: #333; margin-top: 0.4rem; }
-pre { font-size: 0.8rem; background: #f5f5f5; padding: 0.8rem; overflow-x: auto; }
-@media print { body { max-width: none; margin: 0; font-size: 11pt; } nav { display: none; }
-  figure, table { break-inside: avoid; } h2, h3 { break-after: avoid; } pre { white-space: pre-wrap; } }
-"""
 
 
 @dataclass(frozen=True)

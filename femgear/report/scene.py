@@ -42,6 +42,13 @@ _OUTLINE = {
 }
 _LARGEST = 0.03
 """Largest displacement of a picture as a share of the largest radius."""
+_SECONDS = 6.0
+"""Length of an animation."""
+_LARGEST_ANIMATED = 0.09
+"""Largest displacement of an animation as a share of the outer radius."""
+# elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
+_FLANK, _COARSE = 10, 0.4
+_SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
 
 
 def load_pyvista():
@@ -375,15 +382,6 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
     stream = io.BytesIO()
     iio.imwrite(stream, image, extension=".png")
     write_bytes(stream.getvalue(), path)
-
-
-_SECONDS = 6.0
-"""Length of an animation."""
-_LARGEST_ANIMATED = 0.09
-"""Largest displacement of an animation as a share of the outer radius."""
-# elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
-_FLANK, _COARSE = 10, 0.4
-_SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
 
 
 def animate_operating_deflection(

@@ -39,6 +39,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
+_FORMAT = 1
+MANIFEST = "manifest.json"
+_CASE, _LOCK = "case.toml", ".lock"
+_RUNNING, _FINISHED = ".running", ".finished"
+_LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
     "axis": ("1", "axis of the frame of the carrier"),
     "circumferential": ("1", "signed nodal diameter n"),
@@ -158,15 +163,6 @@ def response_entries(result: Any) -> dict[str, tuple]:
         "floquet_multiplier": (speed, np.abs(stability.multiplier), "1", "largest Floquet multiplier"),
         "stable": (speed, stability.stable, "1", "whether no perturbation grows"),
     }
-
-
-_FORMAT = 1
-MANIFEST = "manifest.json"
-_CASE, _LOCK = "case.toml", ".lock"
-_RUNNING, _FINISHED = ".running", ".finished"
-
-
-_LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,8 @@ _WRITTEN = {
     "case": "for another case",
     "keys": "for other design variables",
 }
+OUTSIDE, _REFUSED = 1e6, 1e9
+"""Costs from which designs lie outside the limits, and of those that cannot be computed."""
 
 
 class Journal(dict[str, dict]):
@@ -133,10 +135,6 @@ def _broken(path: Path, number: int) -> StorageError:
         file=str(path),
         remedy="name a new file; this one is not changed",
     )
-
-
-OUTSIDE, _REFUSED = 1e6, 1e9
-"""Costs from which designs lie outside the limits, and of those that cannot be computed."""
 
 
 class Failure(Exception):
