@@ -18,7 +18,6 @@ from pydantic import BaseModel, ValidationError
 from femgear.case import text as case_text
 from femgear.case.quantities import ANGLE, LENGTH
 from femgear.case.sections import Case, RackSection
-from femgear.case.text import described
 from femgear.errors import CaseError, Finding, GeometryError, remark
 
 _DIMENSIONS = {
@@ -73,11 +72,11 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
             "not one of the choices", code="E-CHOICE", key=key, value=value, limit=context["expected"]
         )
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        message = f"a table is needed, not {described(value)}"
+        message = f"a table is needed, not {case_text.described(value)}"
         section = f"[[{key.partition('[')[0]}]]" if key.endswith("]") else f"[{key}]"
         return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section {section}")
     if kind in _WANTED:
-        message = f"{_WANTED[kind]} is needed, not {described(value)}"
+        message = f"{_WANTED[kind]} is needed, not {case_text.described(value)}"
         return CaseError(message, code="E-TYPE", key=key, value=value)
     if kind in ("too_long", "too_short"):
         many = kind == "too_long"

@@ -228,7 +228,7 @@ def transmission_error_period(
         Meshes that differ from planet to planet share axes; otherwise each kind has its own.
     """
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
-    position = _fine_positions(int(h.max()))
+    position = np.linspace(0.0, 1.0, max(256, 16 * int(h.max())) + 1)
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
     errors = 1e6 * np.real(harmonics_of(dynamics, "dte")[speeds][..., h > 0] @ wave)
     curves = [*errors] if static is None else [*errors, 1e6 * static["ste"].values]
@@ -385,11 +385,6 @@ def _excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
     limit = float(dynamics["excitation_limit"].values[speed_index])
     frequency = float(dynamics["mesh_frequency"].values[speed_index])
     return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
-
-
-def _fine_positions(harmonics: int) -> np.ndarray:
-    """Choose positions of one mesh period, enough for a curve of so many harmonics."""
-    return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
 
 
 def _name_kinds(ax, dynamics: xr.Dataset) -> None:

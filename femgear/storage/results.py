@@ -312,7 +312,7 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
         if (folder / _FINISHED).is_dir():
             _publish(folder)  # what a run could not bring to its end because it was killed
         _remove_tree(folder / _RUNNING)
-        if not (force and _is_complete(folder)):
+        if not (force and (folder / MANIFEST).is_file() and read_manifest(folder).complete):
             yield prepare_output(folder)
             return
         _refuse_changed(folder, read_manifest(folder))
@@ -492,11 +492,6 @@ def _interrupted(results: Results) -> str:
     """Tell how far an interrupted run came."""
     stages = f"after: {', '.join(results.stages)}" if results.stages else "before a stage was complete"
     return f"the run was interrupted {stages}"
-
-
-def _is_complete(folder: Path) -> bool:
-    """Tell whether a folder holds the results of a run that came to its end."""
-    return (folder / MANIFEST).is_file() and read_manifest(folder).complete
 
 
 def _make(folder: Path) -> None:

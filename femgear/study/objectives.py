@@ -195,28 +195,24 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
     CaseError
         E-OBJECTIVE: no such mesh; E-TORQUE: no torque.
     """
-    rows = {
+    signals = {
         "largest": lambda arc, deflection, n: np.vstack([arc, deflection]),
         "overall": lambda arc, deflection, n: np.atleast_2d(arc),
         "sun-planet": lambda arc, deflection, n: deflection[:n],
         "planet-ring": lambda arc, deflection, n: deflection[n:],
     }
-    signal = _chosen(mesh, rows, "mesh")
+    signal = _chosen(mesh, signals, "mesh")
     value = None if torque is None else to_si(torque, TORQUE, low=-LARGEST_TORQUE, high=LARGEST_TORQUE)
     if value is not None and abs(value) < LEAST_TORQUE:
         raise CaseError("without torque no tooth bends", code="E-TORQUE", key="torque", value=torque)
 
     def compute(variant: Variant) -> float:
         cycle = variant.static(value).cycle
-        return _peak_to_peak(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2))
+        rows = signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2)
+        return float(np.ptp(rows, axis=1).max())
 
     where = "" if value is None else f" at {TORQUE.show(value)}"
     return Quantity(f"STE peak to peak, {mesh}{where}", _MICROMETRES, "static", compute, signal, value)
-
-
-def _peak_to_peak(signals: np.ndarray) -> float:
-    """Largest peak to peak of the rows."""
-    return float(np.ptp(signals, axis=1).max())
 
 
 def mesh_force(

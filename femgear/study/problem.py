@@ -383,20 +383,15 @@ def tip_reliefs(case: Case) -> tuple[Case, tuple[Variable, ...]]:
     )
     variables: list[Variable] = []
     for gear, side, pitch in flanks:
-        number = len(getattr(case, gear.name).modifications)
+        given = case_text.parse(case.source, case.name)[gear.name].get("modifications", [])
         first, last = pitch, pitch + _LATEST_START * (gear.tip_radius - pitch)
         low, high = (f"{2e3 * radius:.6g} mm" for radius in sorted((first, last)))
         table = {"kind": "tip relief", "amount": "0 um", "start_diameter": f"{1e3 * (first + last):.6g} mm"}
         table |= {"flank": side} if side else {}
-        case = with_values(case, {f"{gear.name}.modifications": [*_tables(case, gear.name), table]})
-        key = f"{gear.name}.modifications[{number}]"
+        case = with_values(case, {f"{gear.name}.modifications": [*given, table]})
+        key = f"{gear.name}.modifications[{len(given)}]"
         variables += [
             Variable(f"{key}.amount", "0 um", f"{1e6 * most:.6g} um", tolerance="1 um"),
             Variable(f"{key}.start_diameter", low, high, tolerance="0.1 mm"),
         ]
     return case, tuple(variables)
-
-
-def _tables(case: Case, gear: str) -> list:
-    """Modifications of a gear as its file holds them."""
-    return case_text.parse(case.source, case.name)[gear].get("modifications", [])
