@@ -78,7 +78,7 @@ class DesignBasis:
         )
 
     def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
-        """Mirror the set where the torque on the sun [N m] is negative; also its planets by number, (N,).
+        """Give the set as solved, mirrored under a negative sun torque [N m], and its planets (N,) by number.
 
         Refuses no torque (E-TORQUE) and bearings with clearance (E-SUPPORT).
         """
