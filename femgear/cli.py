@@ -6,7 +6,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-INTERRUPTED = 130
+_INTERRUPTED = 130
 
 try:
     from pathlib import Path
@@ -19,7 +19,7 @@ try:
     from femgear.storage.files import storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
-    raise SystemExit(INTERRUPTED) from None
+    raise SystemExit(_INTERRUPTED) from None
 
 app = App(
     name="femgear",
@@ -325,7 +325,6 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
 
     Parameters
     ----------
-    program_app : App
     arguments : sequence of str or None
         As of `main`.
     program : str
@@ -348,7 +347,7 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
         return _fail(error)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return _INTERRUPTED
     except BrokenPipeError:
         return 0
     except OSError as error:

@@ -133,7 +133,7 @@ class Finding:
 
 
 def remark(text: str) -> Finding:
-    """A finding without code and entry: what was read in a way that deserves to be said."""
+    """Make a finding without code and entry: what was read in a way that deserves to be said."""
     return Finding("", "", text)
 
 
@@ -243,7 +243,7 @@ class StorageError(FemgearError):
 def checked_numbers(
     value, key: str, *, code: str, unit: str, kind: type[float] | type[complex] = float
 ) -> np.ndarray:
-    """The value as an array of numbers.
+    """Convert a value to an array of numbers of its shape.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ def checked_numbers(
 
 
 def checked_tolerance(value, key: str = "tolerance") -> float:
-    """A tolerance between 0 and 1, both excluded.
+    """Check a relative tolerance: it lies between 0 and 1, both excluded.
 
     Raises
     ------
@@ -297,7 +297,7 @@ def checked_tolerance(value, key: str = "tolerance") -> float:
 
 
 def checked_count(value, key: str, *, code: str, least: int = 1) -> int:
-    """A whole number that is not below ``least``.
+    """Check a whole number: it is not below ``least``.
 
     Raises
     ------

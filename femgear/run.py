@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def grid_cache() -> Path:
-    """Folder of generated grids: FEMGEAR_MESHES, else meshes/ of a source tree, else the user's cache."""
+    """Find the folder of generated grids: FEMGEAR_MESHES, meshes/ of a source tree, or the user's cache."""
     if given := os.environ.get("FEMGEAR_MESHES"):
         return Path(given)
     beside = Path(__file__).parents[1] / "meshes"
@@ -98,7 +98,6 @@ def run_case(
 
     Parameters
     ----------
-    case : Case
     folder : path
         From `femgear.storage.results.run_folder`; its manifest says after every stage what is there.
     only : str, optional
@@ -133,20 +132,14 @@ def run_case(
 
 
 def report_again(folder: Path) -> None:
-    """Write report.html anew, with its figures where the run drew none, and bring the manifest up to date.
-
-    Parameters
-    ----------
-    folder : path
-        Results of a complete run.
-    """
+    """Write report.html of a complete run anew, with figures where it drew none; update the manifest."""
     with folder_lock(folder):
         results = open_results(folder, partial=False)
         manifest, train = results.manifest, train_of(results.case)
         names = [name for name in manifest.files if name != "report.html"]
         if not any(name.endswith(".png") for name in names):
-            data = {stage: results.stage(stage) for stage in results.stages}
-            names += write_pictures(results.folder, train, Drawn(results.case, data))
+            data = {stage: results[stage] for stage in results.stages}
+            names += write_pictures(results.folder, train, Drawn(results.case, data), progress=silent)
             finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
         write_report(train, open_results(folder))
         finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)

@@ -30,7 +30,7 @@ LEAST_TORQUE = 1e-6
 
 
 def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
-    """What no entry shows alone; `more` is what its train adds."""
+    """List the refusals of entries that do not go together; `more` are those of the train."""
     checks = (_check_operation, _check_set, _check_supports, _check_numbers, _check_deviations)
     problems = [problem for check in checks for problem in check(case)] + list(more)
     return problems or list(check_published(case))
@@ -273,9 +273,14 @@ def _largest(value: float | tuple[float, ...] | None) -> float:
 
 
 def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False) -> None:
-    """Refuse members that float though the planets cannot hold them.
+    """Refuse a sun, carrier or ring without support [N/m] that the forces of the planets cannot hold.
 
-    ``dynamic`` is for modes and dynamics, where members move whatever static.members says.
+    Parameters
+    ----------
+    case, planetary : Case, PlanetarySet
+        The case, and its gears with the directions of their meshes.
+    dynamic : bool
+        For modes and dynamics, where members move whatever static.members says.
 
     Raises
     ------

@@ -52,21 +52,20 @@ class Columns:
     heading: int
 
     def problem(self, message: str, line: int, *, value=None, limit=None, remedy: str) -> CaseError:
-        """A refusal (E-FILE) that names the file and its line."""
+        """Make a refusal (E-FILE) that names the file and its line."""
         return _problem(self.name, line, message, value=value, limit=limit, remedy=remedy)
 
 
 def read_columns(
     path: str | os.PathLike, dimensions: Mapping[str, Dimension], *, least: int, most: int, remedy: str
 ) -> Columns:
-    """Two columns, divided by comma, semicolon or tab, under a heading with names and units.
+    """Read two columns, divided by comma, semicolon or tab, under a heading with names and units.
 
     With semicolon or tab the numbers may have decimal commas. Empty lines and those that begin with ``#`` are
     skipped.
 
     Parameters
     ----------
-    path : path-like
     dimensions : mapping of str to Dimension
         By the titles that are known, in small letters.
     least, most : int
@@ -255,7 +254,7 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
 
 
 def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:
-    """Columns of a measured profile in SI units; for the file and refusals see `read_columns`.
+    """Read the columns of a measured profile in SI units; for the file and refusals see `read_columns`.
 
     Its heading is ``roll angle [deg]`` or ``diameter [mm]``, and ``deviation [um]``, or in other units.
     Deviations are positive where there is more material.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from femgear.case.gear_set import planetary_set
@@ -44,7 +44,7 @@ _HELIX = {"helical.helix_angle"}
 
 
 def static_entries(case: Case) -> Entries:
-    """Entries that decide the static solution: flanks, bodies, loads; supports only where members move."""
+    """List the entries that decide the static solution; supports only where members move."""
     left_out, parts = _WORDS | _MACHINES | {"static.stresses", "helical"}, {"mass", "inertia", "density"}
     if case.static.members == "fixed":
         left_out, parts = left_out | _FOUNDATION, parts | _SUPPORTS
@@ -54,29 +54,29 @@ def static_entries(case: Case) -> Entries:
 
 
 def state_entries(case: Case) -> Entries:
-    """Entries that decide the loaded state of the set on its supports: of the modes, but for dynamics."""
+    """List the entries that decide the loaded state on the supports: of the modes, but for dynamics."""
     return _entries(case, _DYNAMIC | {"operation.speeds", "dynamics"})
 
 
 def modal_entries(case: Case) -> Entries:
-    """Entries that decide the modal basis: all but speeds, number of harmonics, tolerance and sensor."""
+    """List the entries that decide the modal basis: all but speeds, harmonics, tolerance and sensor."""
     kept = {"dynamics.damping_ratio", "dynamics.up_to"}
     return _entries(case, _DYNAMIC | {"operation.speeds", "dynamics"}, kept=kept)
 
 
 def dynamic_entries(case: Case) -> Entries:
-    """Entries that decide the periodic response: all but the sensor."""
+    """List the entries that decide the periodic response: all but the sensor."""
     return _entries(case, _DYNAMIC)
 
 
 def compliance_entries(case: Case) -> Entries:
-    """Entries that decide grids and flank compliances: shapes, material, elements, a ring that moves."""
+    """List the entries that decide grids and flank compliances: shapes, material, a ring that moves."""
     fixed = case.static.members == "fixed"
     return {key: value for key, value in ring_entries(case).items() if not (fixed and key in _FOUNDATION)}
 
 
 def ring_entries(case: Case) -> Entries:
-    """Entries that decide modes and compliances of the ring on its foundation, but for their number."""
+    """List the entries that decide modes and compliances of the ring, but for their number."""
     left_out = _WORDS | _SOLUTION | _MACHINES | {"carrier", "helical"}
     return _entries(case, left_out, FLANK_ENTRIES | _SUPPORTS | {"mass", "inertia"}, kept=_HELIX)
 
@@ -140,24 +140,19 @@ class Steps:
     def __init__(self):
         self._found: dict[str, OrderedDict[str, Any]] = {}
 
-    def kept(self, step: str, entries: Entries) -> Any:
-        """Result of a step for these entries, all that decide it; None where it is not kept."""
+    def once(self, step: str, entries: Entries, compute: Callable[[], Result]) -> Result:
+        """Give the result of a step for these entries, all that decide it, computed if it is not kept."""
         key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
-        if key in found:
-            found.move_to_end(key)
-        return found.get(key)
-
-    def keep(self, step: str, entries: Entries, result: Result) -> Result:
-        """Keep the result of a step for these entries, and return it."""
-        found = self._found.setdefault(step, OrderedDict())
-        found[fingerprint(entries)] = result
+        if key not in found:
+            found[key] = compute()
+        found.move_to_end(key)
         if len(found) > _KEPT:
             found.popitem(last=False)
-        return result
+        return found[key]
 
 
 def fingerprint(entries: Entries) -> str:
-    """SHA-256 of entries, whatever their order."""
+    """Compute the SHA-256 of entries, whatever their order, as hexadecimal text."""
     return hashlib.sha256(json.dumps(dict(entries), sort_keys=True, default=str).encode()).hexdigest()
 
 

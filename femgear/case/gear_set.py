@@ -74,9 +74,10 @@ def need_set(case: Any) -> None:
 
 
 def planetary_set(case: Case) -> PlanetarySet:
-    """Gears of a case, closed on their centre distance and checked; of a helical one the transverse section.
+    """Make the gears of a case, closed on their centre distance [m] and checked.
 
-    Profile shifts, or the centre distance, that the case leaves out are found.
+    Profile shifts, or the centre distance, that the case leaves out are found. Gears of a helical case are
+    those of its transverse section.
 
     Raises
     ------
@@ -188,7 +189,7 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
 
 
 def set_deviations(case: Case) -> SetDeviations:
-    """Modifications and errors of a case, as separations of the loaded flanks.
+    """Turn modifications and errors of a case into separations of the loaded flanks [m].
 
     Raises
     ------
@@ -231,7 +232,7 @@ def set_deviations(case: Case) -> SetDeviations:
 
 
 def pin_errors(case: Case, gears: PlanetarySet) -> np.ndarray:
-    """Displacement (N, 2) of the pins of all planets, radial and tangential [m]."""
+    """Collect the displacements of the pins of all planets, radial and tangential, (N, 2) [m]."""
     pins = np.zeros((gears.n_planets, 2))
     for pin in case.set.pin_errors:
         pins[pin.planet - 1] = pin.radial, pin.tangential
@@ -329,7 +330,7 @@ def _range(gear: Gear, low: float, high: float) -> str:
 
 
 def with_shafts(case: Case) -> Case:
-    """The case with the support stiffness of its shafts, held at one end and coupled at the other.
+    """Compute the support stiffness [N/m] that shafts give their members, and set it in the case.
 
     The member stands on the free end of a stepped cantilever, its face rigidly coupled to the axis, which
     may tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft is of the material
@@ -356,7 +357,7 @@ def with_shafts(case: Case) -> Case:
 
 
 def shaft_lines(case: Case) -> tuple[str, ...]:
-    """What the shafts of a case hold, in sentences, with the beam of Timoshenko beside."""
+    """Write the support stiffness [N/um] of every shaft in a sentence, that of Timoshenko's beam beside."""
     lines = []
     for name in _ON_SHAFTS:
         section = getattr(case, name)
@@ -370,7 +371,7 @@ def shaft_lines(case: Case) -> tuple[str, ...]:
 
 
 def material_of(case: Case) -> Material:
-    """Material of the gears of a case."""
+    """Take the material of the gears of a case: elasticity [Pa] and density [kg/m^3]."""
     return Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
 
 

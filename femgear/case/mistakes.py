@@ -18,7 +18,6 @@ from pydantic import BaseModel, ValidationError
 from femgear.case import text as case_text
 from femgear.case.quantities import ANGLE, LENGTH
 from femgear.case.sections import Case, RackSection
-from femgear.case.text import described
 from femgear.errors import CaseError, Finding, GeometryError, remark
 
 _DIMENSIONS = {
@@ -37,7 +36,7 @@ _WANTED |= {"bool_type": "true or false", "string_type": "a text"}
 
 
 def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") -> list[CaseError]:
-    """One `CaseError` for each mistake that pydantic found.
+    """Make a `CaseError` of each mistake that pydantic found.
 
     The field names of ``model`` are the valid keys, ``prefix`` is the key of the table that was validated.
     """
@@ -73,11 +72,11 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
             "not one of the choices", code="E-CHOICE", key=key, value=value, limit=context["expected"]
         )
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        message = f"a table is needed, not {described(value)}"
+        message = f"a table is needed, not {case_text.described(value)}"
         section = f"[[{key.partition('[')[0]}]]" if key.endswith("]") else f"[{key}]"
         return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section {section}")
     if kind in _WANTED:
-        message = f"{_WANTED[kind]} is needed, not {described(value)}"
+        message = f"{_WANTED[kind]} is needed, not {case_text.described(value)}"
         return CaseError(message, code="E-TYPE", key=key, value=value)
     if kind in ("too_long", "too_short"):
         many = kind == "too_long"
@@ -142,7 +141,7 @@ def _dotted(location: tuple, prefix: str) -> str:
 
 
 def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
-    """One error that lists all (at least one); its ``problems`` holds them one by one.
+    """Make one error that lists all (at least one); its ``problems`` holds them one by one.
 
     ``text`` is the file, for line numbers (empty where the text is not the user's), ``name`` its name.
     """
@@ -160,9 +159,10 @@ def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
 
 
 def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
-    """Let a refusal name the entries that the user gave, their values, and keys that exist.
+    """Let a refusal of the gears name the entries that the case gives, with their values and keys that exist.
 
-    The fields of the error are changed, ``file`` (with the line) among them.
+    The fields of the error are changed, ``file`` (with the line) among them; of its values lengths [m] are
+    shown in mm, angles [rad] in degrees.
     """
     if error.code == "E-BACKLASH":
         gear = (error.key or "").partition(".")[0]
@@ -191,7 +191,7 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
 
 
 def rack_at(case: Case, key: str) -> RackSection:
-    """The rack section of a key, that of all gears or of one."""
+    """Find the rack section of a key, that of all gears or of one."""
     gear = key.partition(".")[0]
     return case.rack if gear == "rack" else getattr(case, gear).rack
 
@@ -237,7 +237,7 @@ def _in_transverse_section(error: GeometryError, case: Case) -> None:
 
 
 def added_material(case: Case) -> Iterator[Finding]:
-    """Reliefs and crownings with a negative amount: most are slips of the sign."""
+    """Find reliefs and crownings with a negative amount [m]: most are slips of the sign."""
     for gear in ("sun", "planet", "ring"):
         for i, one in enumerate(getattr(case, gear).modifications):
             if one.kind in ("tip relief", "root relief", "profile crowning") and one.amount < 0.0:
@@ -250,7 +250,7 @@ def added_material(case: Case) -> Iterator[Finding]:
 
 
 def notices(data: dict) -> Iterator[Finding]:
-    """What the tables of a case file that was checked give in a way that deserves to be said."""
+    """Remark on what a case file, its tables checked, gives in a way that deserves to be said."""
     if (teeth := data["ring"]["teeth"]) < 0:
         yield remark(
             f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "

@@ -47,11 +47,11 @@ class Dimension:
     scale: float
 
     def show(self, value: float) -> str:
-        """Text of an SI value in the unit ``shown``."""
+        """Write an SI value in the unit ``shown``."""
         return f"{value / self.scale:.6g} {self.shown}"
 
     def window(self, low: float, high: float) -> str:
-        """Text of a range of SI values."""
+        """Write a range of SI values in the unit ``shown``."""
         return f"{self.show(low)} to {self.show(high)}"
 
 
@@ -80,14 +80,13 @@ def to_si(
     low: float = -math.inf,
     high: float = math.inf,
 ) -> float:
-    """SI value of a quantity such as ``"1.5 mm"``, ``"20 deg"`` or ``"1e-4 kg m^2"``.
+    """Convert to SI a quantity such as ``"1.5 mm"``, ``"20 deg"`` or ``"1e-4 kg m^2"``.
 
     Parameters
     ----------
     value : str
         A number and a product of units; radians and degrees count as a dimension, so that neither
         ``"5 Hz"`` passes as a speed of rotation nor ``"20 %"`` as an angle.
-    dimension : Dimension
     low, high : float
         Plausible window, in ``dimension.si``.
 
@@ -236,7 +235,7 @@ class _Reader:
 
 
 def Quantity(dimension: Dimension, low: float, high: float) -> _Reader:
-    """_Reader of a quantity given with its unit, an SI float in the model.
+    """Make the reader of a quantity given with its unit, an SI float in the model.
 
     ``low`` and ``high`` are the ends of the plausible window in SI units.
     """
@@ -251,11 +250,10 @@ def Quantity(dimension: Dimension, low: float, high: float) -> _Reader:
 def Number(
     low: float, high: float, *, open_low: bool = False, open_high: bool = False, note: str = ""
 ) -> _Reader:
-    """_Reader of a plain number (integer or float, no text, no boolean) within a window.
+    """Make the reader of a plain number (integer or float, no text, no boolean) within a window.
 
     Parameters
     ----------
-    low, high : float
     open_low, open_high : bool
         Whether the ends themselves are refused.
     note : str
@@ -290,7 +288,7 @@ RIGID = "rigid"
 
 
 def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
-    """_Reader of a stiffness that may be the text ``"rigid"``, infinite in the model."""
+    """Make the reader of a stiffness that may be ``"rigid"``, infinite in the model; see `Quantity`."""
     stiffness = Quantity(dimension, low, high)
 
     def rigid_too(value: object) -> object:
@@ -300,11 +298,10 @@ def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
 
 
 def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Reader:
-    """_Reader of a whole number within a window; 27.0, "27" and true are refused.
+    """Make the reader of a whole number within a window; 27.0, "27" and true are refused.
 
     Parameters
     ----------
-    low, high : int
     note : str
         Why more is refused, for the message.
     signed : bool
@@ -333,7 +330,7 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
 
 
 def printable_line(value: object, *, name: str = "title", most: int = 200) -> str:
-    """A text, checked to be printable and of at most so many characters."""
+    """Check that a text is printable and has at most so many characters."""
     if not isinstance(value, str):
         raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
     if len(value) > most or not value.isprintable():

@@ -43,6 +43,13 @@ MOST_POINTS = 2000
 """Points of a measured profile; machines write some hundreds."""
 ROUNDING = 0.05e-6
 """What the sum of the pitch deviations may miss zero by for every tooth [m]: tenths of micrometres."""
+FORMAT = 1
+"""Newest format of the case file."""
+LARGEST_TORQUE = 1e9
+"""Largest plausible torque [N m]."""
+_CODE = "E-PUBLISHED"
+"""Of refusals of published lines."""
+_MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
 
 Deviation = Annotated[float, Quantity(LENGTH, -0.02, 0.02)]
 Amplitude = Annotated[float, Quantity(LENGTH, 0.0, 0.02)]
@@ -52,6 +59,13 @@ Diameter = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 RollAngle = Annotated[float, Quantity(ANGLE, 0.0, 4 * math.pi)]
 RollLength = Annotated[float, Quantity(LENGTH, 0.0, 10.0)]
 Points = Field(max_length=MOST_POINTS)
+Member = Literal["sun", "ring", "carrier"]
+Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
+Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
+Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
+Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
+Shift = Annotated[float, Number(-5.0, 5.0)]
+_Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
 
 _MEASURED = ("file", "roll_angles", "diameters", "deviations")
 _PLACES = ("diameter", "roll_angle", "roll_length")
@@ -188,23 +202,6 @@ class PinError(Section):
     planet: Annotated[int, Count(1, 1000)]
     radial: Deviation = 0.0
     tangential: Deviation = 0.0
-
-
-FORMAT = 1
-"""Newest format of the case file."""
-LARGEST_TORQUE = 1e9
-"""Largest plausible torque [N m]."""
-CODE = "E-PUBLISHED"
-"""Of refusals of published lines."""
-_MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
-
-Member = Literal["sun", "ring", "carrier"]
-Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
-Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
-Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
-Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
-Shift = Annotated[float, Number(-5.0, 5.0)]
-_Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
 
 
 class SetSection(Section):
@@ -486,19 +483,19 @@ class MeshStiffnessSection(Section):
 
 
 def output_member(case: Case) -> str:
-    """The member that is neither driven nor held."""
+    """Find the member that is neither driven nor held."""
     others = {case.operation.input, case.operation.fixed}
     return next((name for name in ("carrier", "sun", "ring") if name not in others), "carrier")
 
 
 def check_published(case: Case) -> Iterator[CaseError]:
-    """Refusals of published lines that nothing could be compared with."""
+    """Refuse published lines that nothing could be compared with."""
     for i, entry in enumerate(case.housing.published):
         key = f"housing.published[{i}]"
         if not any(math.isclose(entry.speed, speed, rel_tol=1e-9) for speed in case.operation.speeds):
             yield CaseError(
                 "this speed is not computed",
-                code=CODE,
+                code=_CODE,
                 key=f"{key}.speed",
                 value=SPEED.show(entry.speed),
                 limit=_speeds(case),
@@ -508,7 +505,7 @@ def check_published(case: Case) -> Iterator[CaseError]:
         if computed is not None and entry.harmonic > computed:
             yield CaseError(
                 "this mesh harmonic is not computed",
-                code=CODE,
+                code=_CODE,
                 key=f"{key}.harmonic",
                 value=entry.harmonic,
                 limit=f"1 to {computed}, the harmonics of the response",
@@ -528,7 +525,7 @@ def without_uncomputed(data: dict, error: CaseError) -> Finding | None:
     Says what was left out; None where the error is about other things too.
     """
     problems = getattr(error, "problems", ())
-    if not problems or any(problem.code != CODE for problem in problems):
+    if not problems or any(problem.code != _CODE for problem in problems):
         return None
     numbers = {int(problem.key.split("[")[1].split("]")[0]) for problem in problems}
     published = data["housing"]["published"]

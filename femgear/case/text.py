@@ -28,12 +28,12 @@ _LONG_KEY = re.compile(
 
 
 def read_text(path: str | os.PathLike) -> str:
-    """Text of a small regular UTF-8 file, without its byte-order mark.
+    """Read the text of a small regular UTF-8 file, without its byte-order mark.
 
     Raises
     ------
     CaseError
-        ``E-FILE``: missing, unreadable, not a regular file, empty or over `_MAX_BYTES`.
+        ``E-FILE``: missing, unreadable, not a regular file, empty or over 1 MB.
         ``E-FILE-ENC``: not UTF-8, with the offset of the first wrong byte.
     """
     name = printable(os.fsdecode(path))
@@ -68,7 +68,7 @@ def read_text(path: str | os.PathLike) -> str:
 
 
 def parse(text: str, name: str) -> dict:
-    """Tables of a TOML text, of limited depth and with finite numbers only.
+    """Read the tables of a TOML text, of limited depth and with finite numbers only.
 
     ``name`` is that of the file, for messages.
 
@@ -170,7 +170,7 @@ def _duplicate(text: str, line: int) -> tuple[str | None, list[int]]:
 
 
 def line_of(text: str, key: str) -> int | None:
-    """Line (from 1) that gives the dotted ``key``, or None where no line starts with it.
+    """Find the line (from 1) that gives the dotted ``key``; None where no line starts with it.
 
     Of an entry of a list it is the line of the entry, of its table, or of the list.
     """
@@ -216,7 +216,7 @@ def _clean(key: str) -> str:
 
 
 def write(data: dict) -> str:
-    """TOML text of nested tables of strings, booleans, integers, floats and lists of these.
+    """Write nested tables of strings, booleans, integers, floats and lists of these as TOML text.
 
     ``parse(write(data), "")`` equals ``data``.
     """
@@ -226,7 +226,9 @@ def write(data: dict) -> str:
 
 
 def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
-    """TOML text of tables that the points of other files were put into.
+    """Write tables that the points of other files were put into as TOML text; see `write`.
+
+    The file's ``name``, what its ``points`` are of, and the ``remedy`` are words of the refusal.
 
     Raises
     ------
@@ -313,7 +315,7 @@ class ReadCase(BaseModel):
         return self._name
 
     def location(self, key: str) -> str | None:
-        """File, and line where the file gives it, of a dotted key; of ``rack.x`` for ``sun.rack.x``."""
+        """Find file, and line where the file gives it, of a dotted key; of ``rack.x`` for ``sun.rack.x``."""
         found = (line_of(self._lines, name) for name in (key, key.partition(".")[2]) if name)
         line = next((number for number in found if number), None)
         return f"{self._name}:{line}" if self._name and line else self._name or None
@@ -330,25 +332,25 @@ class ReadCase(BaseModel):
 
 
 def printable(text: str) -> str:
-    """``text`` with every control character as an escape, fit for one line of a message."""
+    """Write every control character of ``text`` as an escape: it then fits one line of a message."""
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text
     )
 
 
 def shown(number: int) -> str:
-    """Text of an integer of any size (``str`` refuses those of thousands of digits)."""
+    """Write an integer of any size (``str`` refuses those of thousands of digits)."""
     if abs(number) < 10**15:
         return str(number)
     return f"{'-' if number < 0 else ''}about 2^{abs(number).bit_length()}"
 
 
 def found(number: int) -> int | str:
-    """An integer as messages show it: itself, or the size of one of thousands of digits."""
+    """Show an integer in a message: itself, or the size of one of thousands of digits."""
     return number if abs(number) < 10**15 else shown(number)
 
 
 def described(value: object) -> str:
-    """What a TOML value is, in words."""
+    """Tell in words what a TOML value is."""
     names = {bool: "true or false", int: "an integer", float: "a number", str: "a text", list: "a list"}
     return names.get(type(value), "a table" if isinstance(value, dict) else "a date or time")

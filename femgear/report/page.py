@@ -21,50 +21,6 @@ if TYPE_CHECKING:
     from femgear.trains.protocol import Drawn, Figures, Progress, Train
 
 
-def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
-    """Write the figures of the stages whose data are there, and of the case; returns the file names."""
-    figures = {}
-    for stage in _drawn(train, drawn):
-        figures |= stage.draw(drawn)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in figures]
-
-
-def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
-    """List the figures of the stages whose data are there, in their order, and of the case."""
-    figures, names = train.figures, [*(s.name for s in train.stages if s.name in drawn.data), ""]
-    return [figures[name] for name in names if name in figures]
-
-
-def write_pictures(
-    folder: Path, train: Train, drawn: Drawn, *, progress: Progress | None = None
-) -> list[str]:
-    """Write everything that a run shows; returns the names of the files.
-
-    Parameters
-    ----------
-    folder : path
-    train : Train
-        Of the case.
-    drawn : Drawn
-    progress : callable, optional
-        Called with (stage, done, total).
-    """
-    written = [w for stage in _drawn(train, drawn) for w in stage.write]
-    steps = [
-        lambda: write_figures(folder, train, drawn), *(lambda w=w: w(drawn, folder) for w in written),
-    ]  # fmt: skip
-    names = []
-    for done, step in enumerate(steps):
-        if progress is not None:
-            progress("pictures", done, len(steps))
-        names += step()
-    if progress is not None:
-        progress("pictures", len(steps), len(steps))
-    return names
-
-
 _LARGEST_PICTURE = 8_000_000
 """Bytes of a picture on the page."""
 _OTHER = "Other pictures"
@@ -95,8 +51,45 @@ pre { font-size: 0.8rem; background: #f5f5f5; padding: 0.8rem; overflow-x: auto;
 """
 
 
+def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
+    """Write the figures of the stages whose data are there, and of the case; returns the file names."""
+    figures = {}
+    for stage in _drawn(train, drawn):
+        figures |= stage.draw(drawn)
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return [f"{name}.png" for name in figures]
+
+
+def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
+    """List the figures of the stages whose data are there, in their order, and of the case."""
+    figures, names = train.figures, [*(s.name for s in train.stages if s.name in drawn.data), ""]
+    return [figures[name] for name in names if name in figures]
+
+
+def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progress) -> list[str]:
+    """Write everything that a run shows; returns the names of the files.
+
+    Parameters
+    ----------
+    train : Train
+        Of the case.
+    progress : callable
+        Called with (stage, done, total).
+    """
+    others = [write for stage in _drawn(train, drawn) for write in stage.write]
+    names, steps = [], 1 + len(others)
+    progress("pictures", 0, steps)
+    names += write_figures(folder, train, drawn)
+    for done, write in enumerate(others, 1):
+        progress("pictures", done, steps)
+        names += write(drawn, folder)
+    progress("pictures", steps, steps)
+    return names
+
+
 @dataclass(frozen=True)
-class Picture:
+class _Picture:
     """A picture of the page: its section, caption, kind (``"image/png"``) and bytes."""
 
     section: str
@@ -131,7 +124,7 @@ def write_report(train: Train, results: Results) -> Path:
 
 
 def page(train: Train, results: Results) -> str:
-    """Make the page as text; see `write_report`."""
+    """Make the page of a run as HTML text: tables, warnings, pictures, provenance; see `write_report`."""
     case = results.case
     pictures, skipped = _pictures(train, results)
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
@@ -213,7 +206,7 @@ def _table(block: Block, *, heading: bool = True) -> str:
     return title + table + notes
 
 
-def _figure(picture: Picture) -> str:
+def _figure(picture: _Picture) -> str:
     """Embed a picture with its caption."""
     data = base64.b64encode(picture.data).decode("ascii")
     caption = escape(picture.caption)
@@ -223,7 +216,7 @@ def _figure(picture: Picture) -> str:
     )
 
 
-def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]:
+def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[str]]:
     """Read the pictures that the manifest names, in the order of the captions, and what was left out."""
     found, skipped = [], []
     for name, digest in results.manifest.files.items():
@@ -241,7 +234,7 @@ def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]
             continue
         rank, section, caption = caption_of(train, path.stem)
         caption = " ".join((caption, *train.remarks(results, path.stem)))
-        found.append((rank, Picture(section, caption, kind, data)))
+        found.append((rank, _Picture(section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
     return [picture for _, picture in found], skipped
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from femgear.gears.planetary import PlanetarySet
 
-MANY_SPEEDS = 3
+_MANY_SPEEDS = 3
 """More speeds are drawn over the speed, too."""
 _DECADES, _MOST_BARS = 1e-5, 60
 """Spectra end so far below their largest line, and have bars up to so many."""
@@ -193,7 +193,7 @@ def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str
         Slopes of the lines [Hz per unit of speed].
     order_names : sequence of str
     critical : sequence of (speed, frequency)
-        Intersections to mark.
+        Intersections to mark, in `speed_unit` and [Hz].
     speed_unit : str
     """
     figure, (ax,) = new_figure(height=5.4)
@@ -228,7 +228,7 @@ def transmission_error_period(
         Meshes that differ from planet to planet share axes; otherwise each kind has its own.
     """
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
-    position = _fine_positions(int(h.max()))
+    position = np.linspace(0.0, 1.0, max(256, 16 * int(h.max())) + 1)
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
     errors = 1e6 * np.real(harmonics_of(dynamics, "dte")[speeds][..., h > 0] @ wave)
     curves = [*errors] if static is None else [*errors, 1e6 * static["ste"].values]
@@ -326,7 +326,8 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     Parameters
     ----------
     dynamics : xarray.Dataset
-        With ``dte_real``, ``dte_imag``, ``spectral_radius``, ``floquet_multiplier`` and ``converged``.
+        With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m], and ``spectral_radius``,
+        ``floquet_multiplier`` and ``converged`` (speed,).
     """
     figure, (top, bottom) = new_figure(rows=2, height=7.0, sharex=True)
     order = np.argsort(dynamics["speed"].values)
@@ -364,15 +365,15 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
 
 
 def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure]:
-    """Spectrum of the transmission error and, over many speeds, its sweep, with others between them."""
+    """Draw the spectrum of the transmission error, `others`, and over many speeds its sweep."""
     figures = {"dynamic_spectrum": transmission_error_spectrum(dynamics), **others}
-    if dynamics.sizes["speed"] > MANY_SPEEDS:
+    if dynamics.sizes["speed"] > _MANY_SPEEDS:
         figures["speed_sweep"] = speed_sweep(dynamics)
     return figures
 
 
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
-    """Complex array of a variable stored as real and imaginary part, in its dimensions and unit."""
+    """Join real and imaginary part of a variable to a complex array, in its dimensions and unit."""
     return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
 
 
@@ -384,11 +385,6 @@ def _excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
     limit = float(dynamics["excitation_limit"].values[speed_index])
     frequency = float(dynamics["mesh_frequency"].values[speed_index])
     return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
-
-
-def _fine_positions(harmonics: int) -> np.ndarray:
-    """Choose positions of one mesh period, enough for a curve of so many harmonics."""
-    return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
 
 
 def _name_kinds(ax, dynamics: xr.Dataset) -> None:
@@ -440,7 +436,7 @@ def _panels(count: int, *, above: float = 0.8):
 def shown_speeds(data: xr.Dataset) -> list[int]:
     """Choose the speeds that get pictures of their own: all of a few, else first, middle and last."""
     n = data.sizes["speed"]
-    return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
+    return list(range(n)) if n <= _MANY_SPEEDS else [0, n // 2, n - 1]
 
 
 def _some_speeds(count: int) -> list[int]:

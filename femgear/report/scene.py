@@ -42,6 +42,13 @@ _OUTLINE = {
 }
 _LARGEST = 0.03
 """Largest displacement of a picture as a share of the largest radius."""
+_SECONDS = 6.0
+"""Length of an animation."""
+_LARGEST_ANIMATED = 0.09
+"""Largest displacement of an animation as a share of the outer radius."""
+# elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
+_FLANK, _COARSE = 10, 0.4
+_SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
 
 
 def load_pyvista():
@@ -86,7 +93,6 @@ class Body:
 
     Parameters
     ----------
-    name : str
     points : (n, 2) array
         [m], in the frame of the set.
     triangles : (m, 6) int array
@@ -108,7 +114,6 @@ def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, disp
     ----------
     grid : Grid
         Centred on the origin.
-    name : str
     centre : (2,) array
         [m]
     angle : float
@@ -153,7 +158,6 @@ def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> p
 
     Parameters
     ----------
-    sector : Grid
     modes : CyclicModes
         Of that sector; the cosine mode of every pair is shown, largest displacement 1.
     shown : sequence of int
@@ -201,13 +205,7 @@ def whole_field(sectors: np.ndarray, numbers: np.ndarray) -> np.ndarray:
 
 
 def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
-    """Write a grid as compressed VTU; the file is either the old or the new one, whole.
-
-    Raises
-    ------
-    StorageError
-        When the file cannot be written.
-    """
+    """Write a grid as compressed VTU; the file is either the old or the new one, whole."""
     if Path(path).suffix != ".vtu":
         raise CaseError("fields are written as VTU", code="E-CHOICE", value=str(path), limit=".vtu")
     replace_file(
@@ -235,7 +233,6 @@ def deformed_picture(
         PNG file.
     field : str
         Point data of the displacement.
-    title : str
     colour_label : str
         What the colours mean, with the unit.
     colour_factor : float
@@ -298,9 +295,20 @@ def add_coloured(
     limits=None,
     colours: int = 256,
 ) -> None:
-    """Add a mesh coloured by its point data `text`, with a colour bar of that title under the scene.
+    """Add a mesh coloured by a field on its points, with a colour bar under the scene.
 
-    ``limits`` are those of the colours, in the unit of the data; the picture has ``size`` pixels a side.
+    Parameters
+    ----------
+    text : str
+        Name of the field with its unit, also the title of the bar.
+    size : int
+        Width and height of the picture [pixels].
+    cmap : str
+        Colour map of Matplotlib.
+    limits : (float, float), optional
+        Of the colours, in the unit of the field; its own range when left out.
+    colours : int
+        Number of colours.
     """
     plotter.add_mesh(
         mesh,
@@ -346,7 +354,7 @@ def _font(size: int) -> float:
 
 
 def rounded(value: float) -> str:
-    """Round to two significant figures, without an exponent."""
+    """Write a number with two significant figures, without an exponent."""
     return f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
 
 
@@ -376,15 +384,6 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
     write_bytes(stream.getvalue(), path)
 
 
-_SECONDS = 6.0
-"""Length of an animation."""
-_LARGEST_ANIMATED = 0.09
-"""Largest displacement of an animation as a share of the outer radius."""
-# elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
-_FLANK, _COARSE = 10, 0.4
-_SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
-
-
 def animate_operating_deflection(
     path: str | os.PathLike,
     planetary_set: PlanetarySet,
@@ -407,7 +406,6 @@ def animate_operating_deflection(
     ----------
     path : path-like
         GIF file.
-    planetary_set : PlanetarySet
     radial, tangential : (H + 1, 2 n_max + 1) complex arrays
         Components of the outer surface's displacement [m]:
         ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier.
@@ -415,7 +413,6 @@ def animate_operating_deflection(
         Place of the fixed sensor on the housing [rad].
     clockwise : bool
         Whether the carrier turns clockwise.
-    title : str
     frames : int
         Number of frames wished for.
     size : int
@@ -516,10 +513,6 @@ def _draw(planetary_set, field, carrier, sensor_angle, title, size):
 
 def gear_outline(gear: Gear) -> np.ndarray:
     """Draw the exact outline of all teeth, the first centred on angle 0.
-
-    Parameters
-    ----------
-    gear : Gear
 
     Returns
     -------

@@ -111,18 +111,7 @@ def line_style(index: int) -> dict[str, str]:
 
 
 def save_figure(figure: Figure, path: str | os.PathLike) -> None:
-    """Write a figure as PNG; the file is either the old or the new one, whole.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    path : path-like
-
-    Raises
-    ------
-    StorageError
-        When the file cannot be written.
-    """
+    """Write a figure as PNG; the file is either the old or the new one, whole."""
     write_bytes(png_bytes(figure), path)
 
 
@@ -146,12 +135,12 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 def family(name: str) -> str:
-    """Kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
+    """Tell the kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
     return "planet-ring" if "ring" in name else "sun-planet"
 
 
 def distinct_lines(names, values, *, partly: bool = False) -> list[tuple[str, int]]:
-    """Rows of `values` to draw: one for a family of meshes whose rows agree, each row otherwise.
+    """Choose the rows of `values` to draw: one for a family of meshes whose rows agree, else each.
 
     Rows agree that differ by less than a millionth of the largest value.
 
@@ -197,23 +186,23 @@ def periodic(position, values):
 
 
 def runs(chosen) -> list[slice]:
-    """Find runs of chosen segments (n - 1,) of a curve as slices of its points."""
+    """Find runs of chosen segments (n - 1,) of a curve, bool, as slices of its n points."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
 
 
 def excited_to(data, speed_index: int) -> str:
-    """Write the highest frequency of the excitation at a speed, for a title; empty where it is not known."""
+    """Write the highest frequency of the excitation [kHz] at a speed, for a title; empty if not known."""
     if "excitation_limit" not in data:
         return ""
     return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
 
 
 def rpm(speed: float) -> str:
-    """Write an input speed in a title; speeds in datasets are in rpm."""
+    """Write an input speed [rpm], as datasets have it, in a title."""
     return f"{float(speed):.6g} rpm"
 
 
 def xy(points):
-    """Split complex points into both coordinates."""
+    """Split complex points (n,) into both coordinates, (n,) each."""
     return points.real, points.imag

@@ -21,16 +21,7 @@ _MODES = 16
 
 @dataclass(frozen=True)
 class Block:
-    """A titled table with notes under it.
-
-    Parameters
-    ----------
-    title : str
-    header : tuple of str
-        Names of the columns, or empty.
-    rows : tuple of tuple of str
-    notes : tuple of str
-    """
+    """A titled table with notes under it; its header names the columns, or is empty."""
 
     title: str
     header: tuple[str, ...] = ()
@@ -45,11 +36,8 @@ def tabulate(
 
     Parameters
     ----------
-    title : str
-    items : iterable
     columns : mapping of str to callable
         The text of an item in every column, by the name of the column.
-    notes : iterable of str
     """
     rows = tuple(tuple(text(item) for text in columns.values()) for item in items)
     return Block(title, tuple(columns), rows, tuple(notes))
@@ -67,6 +55,7 @@ def describe_modes(
     Parameters
     ----------
     data : xarray.Dataset
+        With ``frequency`` [Hz] and ``kind`` (mode,).
     more : mapping of str to callable, optional
         Further columns, the text of a mode from its part of the file; nodal diameters when not given.
     digits : int
@@ -92,11 +81,15 @@ def _nodal_diameters(mode: xr.Dataset) -> str:
 
 
 def describe_response(data: xr.Dataset) -> Block:
-    """Tabulate transmission error, convergence and stability at every speed of dynamics.nc."""
+    """Tabulate transmission error [um], convergence and stability at the speeds [rpm] of dynamics.nc.
+
+    The file has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m] and, for every speed, what
+    `femgear.storage.results.response_entries` lists; of many speeds the first and the last are shown.
+    """
     dte = np.hypot(data.dte_real.values, data.dte_imag.values)  # speed, mesh, harmonic
     rms = np.sqrt(0.5 * (dte[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
     largest = np.abs(data.floquet_multiplier.values)
-    stable = data.stable.values.astype(bool) if "stable" in data else largest < 1.0
+    stable = data.stable.values.astype(bool)
     columns = {
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.2f}",
         "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.2f}",
@@ -131,7 +124,7 @@ def chosen(count: int) -> Iterator[int]:
 
 
 def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """What the solver says against the periodic responses of dynamics.nc."""
+    """Name the speeds [rpm] whose periodic responses in dynamics.nc are not converged or not stable."""
     speed = data["speed"].values
     for bad, text in (
         (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),

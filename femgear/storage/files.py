@@ -33,7 +33,7 @@ _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
-FORMAT = 1
+_FORMAT = 1
 # bytes that a file may declare beyond four times its size
 _MARGIN = 1_000_000
 
@@ -46,7 +46,6 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     dataset : xarray.Dataset
         Real, text or boolean variables, each with attributes ``units`` and ``long_name``; so the numeric
         coordinates. Real numbers are stored as float64.
-    path : path-like
 
     Raises
     ------
@@ -60,7 +59,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         encoding[name] = {"_FillValue": None} if kind in "OUS" or variable.ndim == 0 else {"fletcher32": True}
         if kind == "f":
             encoding[name] |= {"dtype": "float64", "_FillValue": None}
-    stamped = dataset.assign_attrs(femgear_format=FORMAT, femgear_version=__version__)
+    stamped = dataset.assign_attrs(femgear_format=_FORMAT, femgear_version=__version__)
     replace_file(
         path,
         lambda temporary: stamped.to_netcdf(temporary, engine="h5netcdf", encoding=encoding),
@@ -69,7 +68,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
-    """Read a file that `write_dataset` wrote into memory.
+    """Read a dataset that `write_dataset` wrote: numbers in memory, dimensions, and units as attributes.
 
     The file is walked first: links, data kept in other files, unusual types and declared sizes that the
     file cannot hold are refused before anything is read.
@@ -91,13 +90,13 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
         raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
     version = dataset.attrs.get("femgear_format")
-    if not isinstance(version, int | np.integer) or version > FORMAT:
+    if not isinstance(version, int | np.integer) or version > _FORMAT:
         raise StorageError(
             "not written by this version of femgear",
             code="E-FORMAT",
             file=name,
             value=version,
-            limit=f"femgear_format up to {FORMAT}",
+            limit=f"femgear_format up to {_FORMAT}",
         )
     return dataset
 
@@ -105,8 +104,12 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
 def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
     """Write a file under a temporary name, force it to the disk, then give it its name.
 
-    ``write`` is given the temporary path, in the same folder and with the same suffix; ``size`` bytes are
-    refused beforehand where the disk has not that much left.
+    Parameters
+    ----------
+    write : callable
+        ``(path)`` writes the file under a temporary path, in the same folder and with the same suffix.
+    size : int
+        What the disk must have room for [bytes].
 
     Raises
     ------

@@ -36,11 +36,14 @@ from femgear.storage.files import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
 
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
+_FORMAT = 1
+MANIFEST = "manifest.json"
+_CASE, _LOCK = "case.toml", ".lock"
+_RUNNING, _FINISHED = ".running", ".finished"
+_LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
     "axis": ("1", "axis of the frame of the carrier"),
     "circumferential": ("1", "signed nodal diameter n"),
@@ -78,7 +81,7 @@ def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
 
 
 def coordinates(**values: Any) -> dict[str, tuple]:
-    """Entries of `dataset` for coordinates by name: axis, harmonic, mesh, speed [rpm] and others."""
+    """Make entries of `dataset` for coordinates by name: axis, harmonic, mesh, speed [rpm] and others."""
     return {name: (name, values[name], *_COORDINATES[name]) for name in values}
 
 
@@ -152,7 +155,7 @@ def mode_entries(modes: Any) -> dict[str, tuple]:
 
 
 def response_entries(result: Any) -> dict[str, tuple]:
-    """List what is known of the periodic response at every speed: frequency, convergence, stability.
+    """List what is known of a periodic response, (speed,) each: frequency [Hz], convergence, stability.
 
     Of any result with a response, its stability and the speeds of the members.
     """
@@ -169,15 +172,6 @@ def response_entries(result: Any) -> dict[str, tuple]:
         "floquet_multiplier": (speed, np.abs(stability.multiplier), "1", "largest Floquet multiplier"),
         "stable": (speed, stability.stable, "1", "whether no perturbation grows"),
     }
-
-
-FORMAT = 1
-MANIFEST = "manifest.json"
-CASE, LOCK = "case.toml", ".lock"
-RUNNING, FINISHED = ".running", ".finished"
-
-
-_LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 
 
 @dataclass(frozen=True)
@@ -215,8 +209,6 @@ class Results:
 
     Parameters
     ----------
-    folder : Path
-    manifest : Manifest
     read_case : callable
         ``(path) -> case``.
     """
@@ -228,13 +220,13 @@ class Results:
     @cached_property
     def case(self) -> Any:
         """The case as run."""
-        return self.read_case(self._checked(CASE))
+        return self.read_case(self._checked(_CASE))
 
     def __getattr__(self, name: str) -> xr.Dataset:
         """Contents of the file of a stage: ``results.modes``, as ``results["modes"]``."""
         if name.startswith("_"):
             raise AttributeError(name)
-        found = self.__dict__[name] = self.stage(name)
+        found = self.__dict__[name] = read_dataset(self._checked(f"{name}.nc"))
         return found
 
     def __getitem__(self, name: str) -> xr.Dataset:
@@ -245,10 +237,6 @@ class Results:
 
     def __len__(self) -> int:
         return len(self.stages)
-
-    def stage(self, name: str) -> xr.Dataset:
-        """Contents of the file of one stage."""
-        return read_dataset(self._checked(f"{name}.nc"))
 
     def __repr__(self) -> str:
         state = "complete" if self.manifest.complete else "not complete"
@@ -330,23 +318,23 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
     folder = Path(folder)
     _make(folder)
     with folder_lock(folder):
-        if (folder / FINISHED).is_dir():
+        if (folder / _FINISHED).is_dir():
             _publish(folder)  # what a run could not bring to its end because it was killed
-        _remove_tree(folder / RUNNING)
-        if not (force and _is_complete(folder)):
+        _remove_tree(folder / _RUNNING)
+        if not (force and (folder / MANIFEST).is_file() and read_manifest(folder).complete):
             yield prepare_output(folder)
             return
         _refuse_changed(folder, read_manifest(folder))
         try:
             with storage_errors(folder):
-                (folder / RUNNING).mkdir()
-            yield prepare_output(folder / RUNNING)
-            if read_manifest(folder / RUNNING).complete:
+                (folder / _RUNNING).mkdir()
+            yield prepare_output(folder / _RUNNING)
+            if read_manifest(folder / _RUNNING).complete:
                 with storage_errors(folder):
-                    os.replace(folder / RUNNING, folder / FINISHED)
+                    os.replace(folder / _RUNNING, folder / _FINISHED)
                 _publish(folder)
         finally:
-            _remove_tree(folder / RUNNING)
+            _remove_tree(folder / _RUNNING)
 
 
 def folder_lock(folder: str | os.PathLike):
@@ -355,13 +343,16 @@ def folder_lock(folder: str | os.PathLike):
     Refuses a folder that another run holds (E-LOCKED), or that is not there (E-RESULTS-MISSING).
     """
     _refuse_missing(Path(folder))
-    return exclusive_lock(Path(folder) / LOCK)
+    return exclusive_lock(Path(folder) / _LOCK)
 
 
 def prepare_output(folder: str | os.PathLike) -> Path:
     """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
 
-    It then has a manifest that says that the run is not complete.
+    Returns
+    -------
+    Path
+        The folder, created where there is none, with a manifest that says that the run is not complete.
 
     Raises
     ------
@@ -399,7 +390,6 @@ def record(
 
     Parameters
     ----------
-    folder : path-like
     names : list of str
         Files that the run wrote, as paths inside the folder.
     timings : mapping of str to float
@@ -422,7 +412,7 @@ finish = partial(record, complete=True)
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:
-    """Read the manifest of a results folder.
+    """Read the manifest of a results folder: its files with checksums, seconds and verdicts of the stages.
 
     Raises
     ------
@@ -435,13 +425,13 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
     try:
         data = json.loads(text)
         written = data.pop("femgear_format")
-        if type(written) is not int or not 1 <= written <= FORMAT:
+        if type(written) is not int or not 1 <= written <= _FORMAT:
             raise StorageError(
                 "written by another version of femgear",
                 code="E-FORMAT",
                 file=str(path),
                 value=written,
-                limit=f"1 to {FORMAT}",
+                limit=f"1 to {_FORMAT}",
             )
         manifest = Manifest(**data)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
@@ -459,7 +449,7 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
 
 def _write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
     """Write ``manifest.json``; the last file of a run."""
-    data = _plain({"femgear_format": FORMAT, **vars(manifest)})
+    data = _plain({"femgear_format": _FORMAT, **vars(manifest)})
     write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
 
 
@@ -485,7 +475,7 @@ def _refuse_incomplete(results: Results) -> None:
     if results.manifest.complete:
         return
     folder = results.folder
-    case = folder / CASE if CASE in results.manifest.files else "CASE"
+    case = folder / _CASE if _CASE in results.manifest.files else "CASE"
     raise StorageError(
         _interrupted(results),
         code="E-RESULTS-INCOMPLETE",
@@ -513,11 +503,6 @@ def _interrupted(results: Results) -> str:
     return f"the run was interrupted {stages}"
 
 
-def _is_complete(folder: Path) -> bool:
-    """Tell whether a folder holds the results of a run that came to its end."""
-    return (folder / MANIFEST).is_file() and read_manifest(folder).complete
-
-
 def _make(folder: Path) -> None:
     """Create a folder, or refuse one that is not for results."""
     if not folder.exists():
@@ -526,7 +511,7 @@ def _make(folder: Path) -> None:
         if folder.exists() and not folder.is_dir():
             raise StorageError("exists and is not a folder", code="E-OUTPUT", file=str(folder))
         folder.mkdir(parents=True, exist_ok=True)
-        foreign = any(path.name != LOCK for path in folder.iterdir())
+        foreign = any(path.name != _LOCK for path in folder.iterdir())
     if foreign and not (folder / MANIFEST).is_file():
         raise StorageError(
             "the folder holds files but no femgear results",
@@ -538,7 +523,7 @@ def _make(folder: Path) -> None:
 
 def _publish(folder: Path) -> None:
     """Give the new files their places, the manifest last; may be repeated after an interruption."""
-    source = folder / FINISHED
+    source = folder / _FINISHED
     if (source / MANIFEST).is_file():
         new, old = read_manifest(source), read_manifest(folder)
         with storage_errors(folder):

@@ -41,6 +41,8 @@ _WRITTEN = {
     "case": "for another case",
     "keys": "for other design variables",
 }
+OUTSIDE, _REFUSED = 1e6, 1e9
+"""Costs from which designs lie outside the limits, and of those that cannot be computed."""
 
 
 class Journal(dict[str, dict]):
@@ -135,10 +137,6 @@ def _broken(path: Path, number: int) -> StorageError:
     )
 
 
-OUTSIDE, _REFUSED = 1e6, 1e9
-"""Costs from which designs lie outside the limits, and of those that cannot be computed."""
-
-
 class Failure(Exception):
     """A design that cannot be computed; ``error`` holds code, key and message of the refusal."""
 
@@ -152,8 +150,7 @@ class Designs:
 
     Attributes
     ----------
-    case : Case
-    journal : Journal
+    case, journal : Case, Journal
     seconds : float
         What the designs computed now took, all together.
     """
@@ -189,14 +186,14 @@ class Designs:
         ]
 
     def at(self, point: Point) -> Case:
-        """The case at a point."""
+        """Set the values of a point in the case."""
         if not point:
             return self.case
         pairs = zip(self._keys, point, strict=True)
         return with_values(self.case, {key: value for keys, value in pairs for key in keys})
 
     def variant(self, point: Point) -> Variant:
-        """The stages of a point; those of the last one are kept for further questions."""
+        """Give the stages of a point; those of the last one are kept for further questions."""
         key = json.dumps(point)
         if self._last is None or self._last[0] != key:
             case = self.at(point)
@@ -206,7 +203,7 @@ class Designs:
         return self._last[1]
 
     def values(self, point: Point, quantities: Sequence[Quantity]) -> dict[str, float]:
-        """Quantities at a point, by name, in SI units.
+        """Compute quantities at a point, by name [SI].
 
         Raises
         ------
@@ -265,11 +262,10 @@ def open_designs(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Designs]:
-    """Designs of a case, with a journal on disk where one is named.
+    """Open the designs of a case, with a journal on disk where one is named.
 
     Parameters
     ----------
-    case : Case
     keys : sequence of tuple of str
         Entries of the case file that every value of a point sets.
     journal, cache, progress
@@ -299,8 +295,7 @@ class Evaluations:
 
     Attributes
     ----------
-    problem : Problem
-    designs : Designs
+    problem, designs : Problem, Designs
     best : (x, cost)
         The best point of the objective so far; infinite cost before any.
     course : list of float
@@ -316,7 +311,7 @@ class Evaluations:
         self._most = max_designs
 
     def towards(self, objective: Quantity) -> Evaluations:
-        """The same designs, counted together, under another objective."""
+        """Give the same designs, counted together, another objective."""
         found = Evaluations(replace(self.problem, objective=objective), self.designs, max_designs=self._most)
         found._asked = self._asked
         return found
@@ -332,13 +327,13 @@ class Evaluations:
         return [point for point in self._asked if point]
 
     def values(self, x: Vector | None, quantities: Sequence[Quantity]) -> dict[str, float]:
-        """Quantities at a point in the units of the variables, or of the case as it is; see `Designs`."""
+        """Compute quantities [SI] at a point x (n,), or of the case as it is; see `Designs`."""
         point = () if x is None else self.problem.point(x)
         self._asked[point] = None
         return self.designs.values(point, quantities)
 
     def cost(self, x: Vector) -> float:
-        """The objective over that of the case; designs outside the limits cost a million and more.
+        """Compute the objective over that of the case; designs outside the limits cost a million and more.
 
         Limits are looked at first, those from the fewest stages before the others: the objective of a design
         outside them is not computed (feasible designs before others, by violation: K. Deb, Comput. Methods
@@ -368,7 +363,7 @@ class Evaluations:
         return new
 
     def penalised(self, x: Vector, value) -> float:
-        """``value()`` of a design within the limits, and the costs that `cost` names elsewhere."""
+        """Compute ``value()`` of a design within the limits; elsewhere it has the costs that `cost` names."""
         try:
             outside = self.violation(x)
             return min(OUTSIDE + outside, 0.5 * _REFUSED) if outside else value()
@@ -376,7 +371,7 @@ class Evaluations:
             return _REFUSED
 
     def violation(self, x: Vector) -> float:
-        """Sum of the violations of the limits, of the first stage that breaks any. May raise `Failure`."""
+        """Sum the relative violations of limits of the first stage that breaks any. May raise `Failure`."""
         for stage in STAGES:
             here = [limit for limit in self.problem.limits if limit.quantity.stage == stage]
             values = self.values(x, [limit.quantity for limit in here]) if here else {}
@@ -386,13 +381,13 @@ class Evaluations:
         return 0.0
 
     def scale(self, quantity: Quantity) -> float:
-        """Value of the case as it is, by which costs are divided; 1 where it is zero."""
+        """Find the value [SI] of the case as it is, by which costs are divided; 1 where it is zero."""
         return abs(self.values(None, [quantity])[quantity.name]) or 1.0
 
 
 @contextmanager
 def evaluations(problem: Problem, *, max_designs: int | None = None, **options) -> Iterator[Evaluations]:
-    """Evaluations of a problem, of so many different designs at most; options as for `open_designs`."""
+    """Open the evaluations of a problem, of so many designs at most; options as for `open_designs`."""
     with open_designs(problem.case, [variable.keys for variable in problem.variables], **options) as designs:
         yield Evaluations(problem, designs, max_designs=max_designs)
 
@@ -403,7 +398,6 @@ class Tolerance:
 
     Parameters
     ----------
-    variable : Variable
     tolerance : float
         In the unit of the variable.
     less, more : dict
@@ -417,7 +411,7 @@ class Tolerance:
     more: dict[str, float]
 
     def slope(self, name: str, value: float) -> tuple[float, float]:
-        """Rise of a quantity, from its value [SI], per unit of the variable towards less and towards more.
+        """Compute how a quantity rises from its value [SI] per unit of the variable, towards less and more.
 
         Both are positive at a corner, where a derivative does not exist.
         """
@@ -427,11 +421,20 @@ class Tolerance:
 def tolerances(
     evaluations: Evaluations, x: Vector, quantities: Sequence[Quantity]
 ) -> tuple[tuple[Tolerance, ...], dict[str, float]]:
-    """Every variable off by its tolerance, alone; and all of them at once, each to its worse side.
+    """Compute quantities with every variable off by its tolerance, alone and all at once.
 
-    About the optimum ``x`` (n,) in the units of the variables; points may lie outside the bounds. The first
-    of the quantities says which side is the worse one. With all variables off at once quantities are given
-    by name, NaN where that cannot be computed.
+    Parameters
+    ----------
+    x : (n,) array
+        The optimum, in the units of the variables; points beside it may lie outside the bounds.
+    quantities : sequence of Quantity
+        The first one says which side of a variable is the worse one.
+
+    Returns
+    -------
+    tuple of Tolerance
+    dict
+        Quantities [SI] by name with all variables off to their worse sides; NaN where they have none.
     """
     x, found = np.array(x, float), []
     worse = x.copy()

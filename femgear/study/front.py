@@ -37,7 +37,6 @@ class ParetoFront:
     ----------
     problem : Problem
         Its objective is the first one.
-    second : Quantity
     x : (m, n) array
         In the units of the variables.
     values : (m, 2) array
@@ -80,7 +79,7 @@ def pareto_front(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> ParetoFront:
-    """Front between the objective of a problem and a second one.
+    """Find the front between the objective of a problem and a second one.
 
     Both are minimised alone. Between, the augmented weighted Chebyshev distance to the point of both minima,
     ``max_i w_i (f_i - f_i*)/span_i + 0.01 sum_i``, is minimised by the simplex of Nelder and Mead from the
@@ -90,8 +89,6 @@ def pareto_front(
 
     Parameters
     ----------
-    problem : Problem
-    second : Quantity
     points : int
         Weights, the two ends included.
     start, options, journal, cache, progress
@@ -138,7 +135,7 @@ def pareto_front(
 
 
 def non_dominated(values: np.ndarray) -> np.ndarray:
-    """Row numbers of (m, 2) values that no other row is below in one column and not above in the other."""
+    """Find the rows of (m, 2) values that no other row is below in one column and not above in the other."""
     order = np.lexsort((values[:, 1], values[:, 0]))
     lowest, kept = np.inf, []
     for i in order:
@@ -172,13 +169,9 @@ def _search(run: Evaluations, second: Quantity, points: int, places) -> None:
 
         def cost(x, weight=float(weight)) -> float:
             run.count(x)
-            names = [quantity.name for quantity in both]
-
-            def value() -> float:
-                found = run.values(x, both)
-                return float(distance(np.array([found[name] for name in names]), weight))
-
-            return run.penalised(x, value)
+            return run.penalised(
+                x, lambda: float(distance(np.array([*run.values(x, both).values()]), weight))
+            )
 
         x, values = _known(run, both)
         polish(run, cost, x[distance(values, float(weight)).argmin()], size=0.1, rounds=1)

@@ -52,7 +52,6 @@ class Variant:
 
     Parameters
     ----------
-    case : Case
     steps : Steps
         What variants of a case share: flank compliances, static solutions, loaded states, ring models.
     cache : path, optional
@@ -75,7 +74,7 @@ class Variant:
         return planetary_set(self.case)
 
     def static(self, torque: float | None = None) -> StaticResult:
-        """Static solution under a torque on the input [N m], by default that of the case."""
+        """Solve the static problem under a torque on the input [N m], by default that of the case."""
         case, steps = self.case, self._steps
         if torque is not None:
             operation = case.operation.model_copy(update={"torque": torque})
@@ -83,24 +82,24 @@ class Variant:
 
         def compute():
             known = {**static_entries(case), "static.stresses": case.static.stresses}
-            return steps.kept("static", known) or steps.keep(
-                "static", known, static_stages.solve_static(case, cache=self._cache, steps=steps)
+            return steps.once(
+                "static", known, lambda: static_stages.solve_static(case, cache=self._cache, steps=steps)
             )
 
         return self._once("static", case.operation.torque, compute=compute)
 
     def stress(self) -> StressResult:
-        """Root stresses under the torque of the case."""
+        """Compute root stresses [Pa] under the torque of the case."""
         return self._once("stress", compute=lambda: static_stages.solve_stress(self.case, self.static()))
 
     def response(self, speeds: Range) -> Response:
-        """Periodic response at a range of speeds, without the verdict on its stability."""
+        """Compute the periodic response at a range of speeds [rad/s], without verdict on its stability."""
         return self._once(
             "response", speeds, compute=lambda: elastic_stages.solve_response(*self._modes(speeds))
         )
 
     def housing(self, speeds: Range) -> HousingResult:
-        """What the sensor on the ring hears at a range of speeds."""
+        """Compute the acceleration [m/s^2] at the sensor on the ring at a range of speeds."""
 
         def compute():
             case, modes = self._modes(speeds)
@@ -121,7 +120,7 @@ class Variant:
 
 
 def at_speeds(case: Case, speeds: Range) -> Case:
-    """The case at equidistant speeds of the input, its published lines left out.
+    """Set equidistant speeds of the input [rad/s] in a case, its published lines left out.
 
     Raises
     ------
@@ -162,7 +161,7 @@ class Quantity:
     compute : callable
         ``(Variant) -> float`` in SI units.
     signal : callable, optional
-        Of a transmission error ``(sun_arc, deflection, N) -> (K, P) array``: it is the largest peak to peak.
+        Of a transmission error [m] ``(sun_arc, deflection, N) -> (K, P) array``: its largest peak to peak.
     torque : float, optional
         Of a transmission error: on the input [N m]; None means that of the case.
     """
@@ -175,13 +174,13 @@ class Quantity:
     torque: float | None = None
 
     def show(self, value: float) -> str:
-        """Text of an SI value."""
+        """Write an SI value in the unit of tables."""
         number = f"{value / self.dimension.scale:.5g}"
         return number if self.dimension is NUMBER else f"{number} {self.dimension.shown}"
 
 
 def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> Quantity:
-    """Static transmission error, peak to peak over the record [m].
+    """Define the static transmission error, peak to peak over the record [m].
 
     Parameters
     ----------
@@ -196,28 +195,24 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
     CaseError
         E-OBJECTIVE: no such mesh; E-TORQUE: no torque.
     """
-    rows = {
+    signals = {
         "largest": lambda arc, deflection, n: np.vstack([arc, deflection]),
         "overall": lambda arc, deflection, n: np.atleast_2d(arc),
         "sun-planet": lambda arc, deflection, n: deflection[:n],
         "planet-ring": lambda arc, deflection, n: deflection[n:],
     }
-    signal = _chosen(mesh, rows, "mesh")
+    signal = _chosen(mesh, signals, "mesh")
     value = None if torque is None else to_si(torque, TORQUE, low=-LARGEST_TORQUE, high=LARGEST_TORQUE)
     if value is not None and abs(value) < LEAST_TORQUE:
         raise CaseError("without torque no tooth bends", code="E-TORQUE", key="torque", value=torque)
 
     def compute(variant: Variant) -> float:
         cycle = variant.static(value).cycle
-        return _peak_to_peak(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2))
+        rows = signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2)
+        return float(np.ptp(rows, axis=1).max())
 
     where = "" if value is None else f" at {TORQUE.show(value)}"
     return Quantity(f"STE peak to peak, {mesh}{where}", _MICROMETRES, "static", compute, signal, value)
-
-
-def _peak_to_peak(signals: np.ndarray) -> float:
-    """Largest peak to peak of the rows."""
-    return float(np.ptp(signals, axis=1).max())
 
 
 def mesh_force(
@@ -227,7 +222,7 @@ def mesh_force(
     speeds: int = 51,
     part: Literal["dynamic", "peak"] = "dynamic",
 ) -> Quantity:
-    """Largest mesh force over a range of input speeds, over time and meshes [N].
+    """Define the largest mesh force over a range of input speeds, of all times and meshes [N].
 
     The mean force of a mesh follows from the torque whatever the flanks look like: the dynamic part is the
     largest deviation from it.
@@ -249,7 +244,7 @@ def mesh_force(
 
 
 def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
-    """Largest force, or largest deviation from its mean, of every speed and mesh (speeds, meshes) [N].
+    """Find the largest force, or deviation from its mean, of every speed and mesh (speeds, meshes) [N].
 
     Of the harmonics ``force`` (speeds, meshes, H + 1), ``F(t) = Re sum_h F_h exp(i h omega t)``, from sixteen
     samples a period of the highest one: within 2 % of its amplitude.
@@ -266,9 +261,10 @@ def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
 
 
 def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
-    """Largest amplitude of any carrier order at the fixed sensor over a range of speeds [m/s^2].
+    """Define the largest amplitude of any carrier order at the fixed sensor over speeds [m/s^2].
 
-    Of the exact lines (`femgear.housing.fixed_sensor_lines`) of the radial acceleration.
+    Speeds are as for `mesh_force`, lines the exact ones of the radial acceleration, see
+    `femgear.housing.fixed_sensor_lines`.
     """
     at = _range(first, last, speeds)
 
@@ -279,14 +275,14 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
 
 
 def contact_ratio(mesh: _MeshKind) -> Quantity:
-    """Transverse contact ratio, from the tip circles."""
+    """Define the transverse contact ratio [1] of a mesh, from the tip circles."""
     names = {"sun-planet": "contact_ratio_sun_planet", "planet-ring": "contact_ratio_planet_ring"}
     name = _chosen(mesh, names, "mesh")
     return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", lambda v: float(getattr(v.gears, name)))
 
 
 def tip_thickness(gear: _GearName) -> Quantity:
-    """Thickness of the teeth on the tip circle, in modules."""
+    """Define the thickness of the teeth on the tip circle, over the module [1]."""
     name = _chosen(gear, {g: g for g in get_args(_GearName)}, "gear")
 
     def compute(variant: Variant) -> float:
@@ -297,14 +293,14 @@ def tip_thickness(gear: _GearName) -> Quantity:
 
 
 def contact_pressure() -> Quantity:
-    """Largest contact pressure away from the ends of the flanks [Pa]."""
+    """Define the largest contact pressure away from the ends of the flanks [Pa]."""
     return Quantity(
         "contact pressure", _STRESS, "static", lambda v: float(v.static().cycle.max_pressure.max())
     )
 
 
 def root_stress(gear: _GearName) -> Quantity:
-    """Largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
+    """Define the largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
     places = {"sun": ((0, 0),), "planet": ((0, 1), (1, 0)), "ring": ((1, 1),)}
     wanted = _chosen(gear, places, "gear")
 
@@ -363,7 +359,7 @@ NAMES = tuple(_WORDS)
 
 
 def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
-    """Quantity of some words, one of `NAMES`.
+    """Find the quantity of some words, one of `NAMES`.
 
     Mesh forces and housing levels need the first and the last speed of the input, with units.
 

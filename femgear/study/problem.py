@@ -124,7 +124,7 @@ class Variable:
         return split(self.low, self.name)[0], self.number(self.high)
 
     def number(self, value: object) -> float:
-        """A value as the case file holds it, as a number in `unit`; E-UNIT for another dimension, or none."""
+        """Convert a value of the case file to a number in `unit`; E-UNIT for another dimension, or none."""
         number, unit = split(value, self.name)
         if unit == self.unit:
             return number
@@ -143,14 +143,14 @@ class Variable:
             raise
 
     def text(self, number: float) -> str | float | int:
-        """A number in `unit` as the case file holds it, with nine digits."""
+        """Write a number in `unit` as the case file holds it, with nine digits."""
         if self.integer:
             return round(number)
         rounded = float(f"{number:.{_DIGITS}g}") + 0.0
         return f"{rounded:.{_DIGITS}g} {self.unit}" if self.unit else rounded
 
     def tolerance_at(self, number: float) -> float:
-        """Tolerance in `unit` at a value; 1 of whole numbers."""
+        """Find the tolerance at a value, both in `unit`; 1 of whole numbers."""
         given, (low, high) = self.tolerance, self.bounds
         if self.integer:
             return 1.0
@@ -164,7 +164,7 @@ class Variable:
 
 
 def split(value: object, key: str) -> tuple[float, str]:
-    """Number and unit of a value as the case file holds it; CaseError (E-VARIABLE) where it is no number."""
+    """Split a value of the case file into number and unit; E-VARIABLE (CaseError) where it is no number."""
     if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
         number, unit = float(value), ""
     else:
@@ -193,7 +193,7 @@ def _current(case: Case, variable: Variable) -> float | None:
 
 
 def start_point(case: Case, variables: Sequence[Variable]) -> np.ndarray:
-    """Values that the case has now, within the bounds; the middle for entries that it leaves out."""
+    """Find the values (n,) of the case, within the bounds; the middle for entries that it leaves out."""
     found = []
     for variable in variables:
         low, high = variable.bounds
@@ -231,7 +231,6 @@ class Limit:
 
     Parameters
     ----------
-    quantity : Quantity
     low, high : float, optional
         At least one of them.
     """
@@ -252,7 +251,7 @@ class Limit:
             )
 
     def violation(self, value: float) -> float:
-        """How far a value lies outside, over the size of the bound; 0 inside."""
+        """Compute how far a value [SI] lies outside, over the size of the bound; 0 inside."""
         out = max(self.low - value, value - self.high, 0.0)
         bound = self.low if value < self.low else self.high
         return out / (abs(bound) or 1.0) if out > 0 else 0.0
@@ -274,11 +273,8 @@ class Problem:
     ----------
     case : Case
         Its positions, flank elements and harmonics are those of the search; a coarse one is fast.
-    variables : sequence of Variable
-    objective : Quantity
     also : sequence of Quantity
         Reported of the case and of the optimum as well.
-    limits : sequence of Limit
 
     Raises
     ------
@@ -309,12 +305,12 @@ class Problem:
         return np.array([variable.bounds for variable in self.variables])
 
     def point(self, x: Vector) -> tuple[str | float | int, ...]:
-        """Values of the variables as the case file holds them."""
+        """Write values (n,) of the variables as the case file holds them."""
         return tuple(variable.text(float(value)) for variable, value in zip(self.variables, x, strict=True))
 
 
 def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
-    """Limit of words such as ``"root stress sun <= 300 MPa"``; speeds as for `named_quantity`.
+    """Read a limit in words such as ``"root stress sun <= 300 MPa"``; speeds as for `named_quantity`.
 
     Raises
     ------
@@ -336,7 +332,7 @@ def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
 
 
 def parse_variable(text: str) -> Variable:
-    """Variable of ``KEY=LOW..HIGH`` or ``KEY=LOW..HIGH +- TOLERANCE``; others: E-VARIABLE, E-UNIT."""
+    """Read the variable ``KEY=LOW..HIGH`` or ``KEY=LOW..HIGH +- TOLERANCE``; others: E-VARIABLE, E-UNIT."""
     match = re.fullmatch(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*(?:\+-\s*(.+?)\s*)?", text, re.DOTALL)
     if not match:
         raise CaseError(
@@ -361,12 +357,16 @@ def _number(text: str) -> str | float:
 
 
 def tip_reliefs(case: Case) -> tuple[Case, tuple[Variable, ...]]:
-    """The case with one more linear tip relief on every loaded flank; amounts and starts are the variables.
+    """Add a linear tip relief to every loaded flank of a case; amounts and starts are the variables.
 
-    Sun and ring have one each, planets one for the flank that touches the sun and one for that which touches
-    the ring. The amounts are zero, so that the case computes as before, and reach to a hundredth of the
-    module, with a tolerance of 1 um. Starts lie between the pitch circle and near the tip, with one of
-    0.1 mm. The modifications of the case stay.
+    Returns
+    -------
+    Case
+        With one relief more on sun and ring, and two on the planets, for the flanks that touch sun and ring.
+        Their amounts are zero, so that the case computes as before.
+    tuple of Variable
+        Amounts [um], to a hundredth of the module, with a tolerance of 1 um, and start diameters [mm], from
+        the pitch circle to near the tip, with one of 0.1 mm.
     """
     gears, most = planetary_set(case), 0.01 * case.sun.module
     back = torques(gears, member=case.operation.input, torque=case.operation.torque).sun < 0
@@ -383,20 +383,15 @@ def tip_reliefs(case: Case) -> tuple[Case, tuple[Variable, ...]]:
     )
     variables: list[Variable] = []
     for gear, side, pitch in flanks:
-        number = len(getattr(case, gear.name).modifications)
+        given = case_text.parse(case.source, case.name)[gear.name].get("modifications", [])
         first, last = pitch, pitch + _LATEST_START * (gear.tip_radius - pitch)
         low, high = (f"{2e3 * radius:.6g} mm" for radius in sorted((first, last)))
         table = {"kind": "tip relief", "amount": "0 um", "start_diameter": f"{1e3 * (first + last):.6g} mm"}
         table |= {"flank": side} if side else {}
-        case = with_values(case, {f"{gear.name}.modifications": [*_tables(case, gear.name), table]})
-        key = f"{gear.name}.modifications[{number}]"
+        case = with_values(case, {f"{gear.name}.modifications": [*given, table]})
+        key = f"{gear.name}.modifications[{len(given)}]"
         variables += [
             Variable(f"{key}.amount", "0 um", f"{1e6 * most:.6g} um", tolerance="1 um"),
             Variable(f"{key}.start_diameter", low, high, tolerance="0.1 mm"),
         ]
     return case, tuple(variables)
-
-
-def _tables(case: Case, gear: str) -> list:
-    """Modifications of a gear as its file holds them."""
-    return case_text.parse(case.source, case.name)[gear].get("modifications", [])

@@ -46,7 +46,6 @@ class DesignBasis:
 
     Parameters
     ----------
-    gears : PlanetarySet
     bodies : Bodies
         Flank compliances; they serve all mesh cycles.
     supports : Supports
@@ -65,7 +64,7 @@ class DesignBasis:
     contact: str = "profile"
 
     def walk(self, sun_torque: float, *, periods: int = 1, options: CycleOptions | None = None) -> MeshCycle:
-        """Static solution over the mesh cycle [periods] under a torque on the sun [N m]."""
+        """Solve the static problem over some mesh periods under a torque on the sun [N m]."""
         return walk_mesh_cycle(
             self.gears,
             self.bodies,
@@ -79,7 +78,7 @@ class DesignBasis:
         )
 
     def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
-        """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,).
+        """Give the set as solved, mirrored under a negative sun torque [N m], and its planets (N,) by number.
 
         Refuses no torque (E-TORQUE) and bearings with clearance (E-SUPPORT).
         """
@@ -100,7 +99,7 @@ class DesignBasis:
 
 @one_blas_thread()
 def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
-    """Gears, compliances, deviations, supports and positions as the static problem of a case has them.
+    """Collect gears, compliances, deviations, supports and positions of the static problem of a case.
 
     ``cache`` is the folder of generated grids.
     """
@@ -111,7 +110,7 @@ def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
 
 
 def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
-    """Torque on the sun [N m] under one on the input, by default the case's; refuses none (E-TORQUE)."""
+    """Find the torque on the sun under one on the input [N m], by default the case's; E-TORQUE for none."""
     value = case.operation.torque if torque is None else torque
     if value == 0:
         raise CaseError("without torque no tooth bends", code="E-TORQUE", key="operation.torque")
@@ -119,7 +118,7 @@ def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> 
 
 
 def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
-    """Roll lengths on sun and planet where a tip relief of their mesh starts [m].
+    """Find the roll lengths on sun and planet where a tip relief of their mesh starts [m].
 
     Its length is along the path of contact, in lengths ``(epsilon - 1) p_b`` of two-pair contact at either
     end: 1 starts at the ends of single-pair contact.
@@ -143,7 +142,7 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
 
 
 def two_pair_length(planetary_set: PlanetarySet) -> float:
-    """Length of two-pair contact of sun and planet at either end, ``(epsilon - 1) p_b`` [m]."""
+    """Compute the length of two-pair contact of sun and planet at either end, ``(epsilon - 1) p_b`` [m]."""
     longer, shorter = (relief_starts(planetary_set, length=length)[0] for length in (0.5, 1.0))
     return 2.0 * (longer - shorter)
 
@@ -157,7 +156,7 @@ def with_tip_relief(
     power: float = 1.0,
     back: bool = False,
 ) -> SetDeviations:
-    """Deviations with one more tip relief, on the sun and on the flanks of the planets that touch it.
+    """Add a tip relief to deviations, on the sun and on the flanks of the planets that touch it.
 
     Parameters
     ----------
@@ -210,7 +209,7 @@ def harris_map(
     deviations: Sequence[SetDeviations | None],
     progress: Progress | None = None,
 ) -> HarrisMap:
-    """Transmission error peak to peak over torque for a list of deviations.
+    """Compute the transmission error peak to peak [m] over torque for a list of deviations.
 
     Parameters
     ----------
@@ -288,7 +287,7 @@ def relief_grid(
     power: float = 1.0,
     progress: Progress | None = None,
 ) -> ReliefGrid:
-    """Transmission error of the sun-planet meshes over amount and length of their tip relief.
+    """Compute the transmission error [m] of the sun-planet meshes over amount and length of their relief.
 
     Parameters
     ----------
@@ -313,7 +312,7 @@ def relief_grid(
 
 
 def loads_back(torques: np.ndarray) -> bool:
-    """Whether torques are negative; E-TORQUE (CaseError) where their signs differ."""
+    """Tell whether torques (T,) are negative; E-TORQUE (CaseError) where their signs differ."""
     if (torques > 0).any() and (torques < 0).any():
         raise CaseError("torques of both signs load different flanks", code="E-TORQUE", value=torques)
     return bool((torques < 0).any())
@@ -370,7 +369,7 @@ def optimise_relief(
     power: float = 1.0,
     max_evaluations: int = 240,
 ) -> ReliefOptimum:
-    """Best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
+    """Find the best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
 
     The peak to peak has kinks where another position becomes the extreme one, so no gradient is used. The
     simplex may collapse where the function still falls (K. I. M. McKinnon, SIAM J. Optim. 9, 1998, 148-158),

@@ -83,7 +83,7 @@ class SearchOptions:
             check_count(name, getattr(self, name), least)
 
     def sample_count(self, problem: Problem) -> int:
-        """Samples asked for, or those of the default."""
+        """Count the samples asked for, or those of the default."""
         return 5 * len(problem.variables) if self.samples is None else self.samples
 
 
@@ -99,7 +99,6 @@ class Optimum:
 
     Parameters
     ----------
-    problem : Problem
     x : (n,) array
         In the units of the variables.
     case : Case
@@ -153,13 +152,13 @@ class Optimum:
         return tuple(v.name for v, flag in zip(self.problem.variables, near) if flag)
 
     def gain(self, name: str | None = None) -> float:
-        """Share by which a quantity is lower than before, by default the objective; NaN where it was zero."""
+        """Compute the share by which a quantity, by default the objective, is lower now; NaN from zero."""
         name = self.problem.objective.name if name is None else name
         before = self.before[name]
         return 1.0 - self.after[name] / before if before else math.nan
 
     def summary(self) -> str:
-        """Before and after, values of the variables, what their tolerances cost, and how it was found."""
+        """Write before and after, variables, what their tolerances cost, and how the optimum was found."""
         lines = [
             f"{name}: {before} -> {after} ({change})" for name, before, after, change in comparison_rows(self)
         ]
@@ -182,14 +181,13 @@ def minimise(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> Optimum:
-    """Best design within the bounds and limits of a problem.
+    """Find the best design within the bounds and limits of a problem.
 
     A search repeats itself exactly with the same arguments: with a journal one that was interrupted goes
     through the designs it holds at once and on from there.
 
     Parameters
     ----------
-    problem : Problem
     method : {"auto", "minimax", "global", "simplex", "powell"}
         ``"minimax"``: descents with derivatives of the contact problem (see `descend`) from the best of the
         samples; for transmission errors over deviations of the flanks, where ``"auto"`` takes it.
@@ -324,7 +322,7 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimu
 
 
 def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
-    """A start within the bounds; by default the values of the case. CaseError (E-START) outside them."""
+    """Check a start (n,), by default the values of the case; E-START (CaseError) outside the bounds."""
     if start is None:
         return start_point(problem.case, problem.variables)
     x, (low, high) = np.asarray(start, float), problem.bounds.T
@@ -340,7 +338,10 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
 
 
 def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
-    """Middle of the bounds, and a Latin hypercube of ``count`` points, (1 + count, n)."""
+    """Draw a Latin hypercube of ``count`` points, the middle of the bounds before them, (1 + count, n).
+
+    All in the units of the variables; the same ``seed`` gives the same points.
+    """
     from scipy.stats.qmc import LatinHypercube
 
     low, high = problem.bounds.T
@@ -351,13 +352,27 @@ def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
 def polish(
     run: Evaluations, cost, x0, *, method: str = "simplex", size: float = 0.15, rounds: int = 2
 ) -> tuple[bool, str]:
-    """Local search without derivatives within the bounds.
+    """Minimise a cost without derivatives within the bounds, by simplexes or Powell's method.
 
     The simplex may collapse before it reaches a minimum (K. I. M. McKinnon, SIAM J. Optim. 9, 1998,
     148-158): it begins again, half as large, from where it ended.
 
-    ``cost`` and start ``x0`` (n,) are in the units of the variables, ``size`` is that of the first simplex
-    over the ranges, ``rounds`` the number of simplexes one after the other. The other method is Powell's.
+    Parameters
+    ----------
+    cost : callable
+        ``(x) -> float``.
+    x0 : (n,) array
+        Start, in the units of the variables.
+    method : {"simplex", "powell"}
+    size : float
+        Of the first simplex, over the ranges of the variables.
+    rounds : int
+        Simplexes one after the other.
+
+    Returns
+    -------
+    (bool, str)
+        Whether the last search met its criterion, and how it ended.
     """
     from scipy.optimize import minimize
 
@@ -385,12 +400,12 @@ def polish(
 
 
 def numbers(problem: Problem, point: Point) -> np.ndarray:
-    """Values as the case file holds them, in the units of the variables."""
+    """Convert values of the case file to numbers (n,) in the units of the variables."""
     return np.array([v.number(text) for v, text in zip(problem.variables, point)])
 
 
 def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
-    """What a search ends with that found no design."""
+    """Make the error that a search ends with that found no design."""
     return ConvergenceError(
         f"none of {run.asked} designs can be computed and lies within the limits",
         code="E-INFEASIBLE",
@@ -400,7 +415,7 @@ def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
 
 
 def has_derivatives(problem: Problem) -> bool:
-    """Whether the objective is a transmission error and all variables are deviations of the flanks alone."""
+    """Tell whether a transmission error is minimised and all variables are deviations of flanks alone."""
     case = problem.case
     sided = problem.objective.signal is not None and not case.static.back_flanks
     clear = not (case.static.members == "elastic" and case.planet.bearing_clearance)
@@ -410,11 +425,21 @@ def has_derivatives(problem: Problem) -> bool:
 
 
 def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) -> tuple[bool, str]:
-    """Minimum of a transmission error from a start, by successive linear programs.
+    """Minimise a transmission error from a start by successive linear programs.
 
-    The problem of the evaluations `has_derivatives`, ``start`` (n,) is in the units of the variables, and
-    ``radius`` half the first box over their ranges. Tells whether no step within the smallest box lowers the
-    linearised objective any more, and how the descent ended; its points are those of the evaluations.
+    Parameters
+    ----------
+    evaluations : Evaluations
+        Of a problem that `has_derivatives`; they hold the points of the descent, the best among them.
+    start : (n,) array
+        In the units of the variables.
+    radius : float
+        Half the first box, over the ranges of the variables.
+
+    Returns
+    -------
+    (bool, str)
+        Whether no step within the smallest box lowers the linearised objective, and how the descent ended.
     """
     problem = evaluations.problem
     low, high = problem.bounds.T
@@ -476,7 +501,7 @@ def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndar
 
 
 def signals(evaluations: Evaluations, x: Vector) -> tuple[np.ndarray, np.ndarray]:
-    """Transmission error (K, P) at a point and its derivatives (n, K, P) per unit of the variables.
+    """Compute the transmission error (K, P) [m] at a point and its derivatives by the variables (n, K, P).
 
     Kept in the journal. FemgearError: the point cannot be computed.
     """
@@ -531,7 +556,7 @@ def _deviations(case: Case, variable: Variable):
 
 
 def comparison_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:
-    """Name, before, after and change of every reported quantity."""
+    """Write name, before, after and change of every reported quantity."""
     for quantity in found.problem.reported:
         before, after = found.before[quantity.name], found.after[quantity.name]
         change = f"{after / before - 1.0:+.1%}" if before else ""
@@ -539,7 +564,7 @@ def comparison_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:
 
 
 def tolerance_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:
-    """Variable, tolerance, and the objective with the variable lower and higher."""
+    """Write variable, tolerance, and the objective with the variable lower and higher."""
     objective = found.problem.objective
 
     def show(value: float) -> str:
@@ -554,7 +579,7 @@ def tolerance_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:
 
 
 def verdict(found: Optimum) -> str:
-    """How the optimum was found, and what to think of it."""
+    """Tell how the optimum was found, and what to think of it."""
     each = f" ({found.seconds:.2g} s each)" if found.computed else ""
     text = (
         f"method {found.method}: {found.designs} designs, {found.computed} computed now{each}, "

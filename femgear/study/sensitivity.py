@@ -91,7 +91,6 @@ class LinearContact:
         Transmission error from sun to ring [m].
     deflection, force : (2N, P) arrays
         Of every mesh, in the original order [m], [N].
-    touching : _TouchingCells
     arc_response : (P, 2N) array
         Of the transmission error to ``v = Z^T d gap`` [m/N].
     deflection_response, force_response : (P, 2N, 2N) arrays
@@ -116,16 +115,6 @@ class LinearContact:
     residual: float
 
     @property
-    def mirrored(self) -> bool:
-        """Whether the mirror image was solved."""
-        return self.solved is not self.original
-
-    @property
-    def mesh_rows(self) -> np.ndarray:
-        """Meshes of the solved set in the order of the original, (2N,)."""
-        return _original_rows(self.order)
-
-    @property
     def share(self) -> np.ndarray:
         """Shares in the sun's torque, (N, P)."""
         return self.force[: self.original.n_planets] / self.load
@@ -139,11 +128,10 @@ def _original_rows(order) -> np.ndarray:
 
 @one_blas_thread()
 def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=None) -> LinearContact:
-    """Contact of all drive flanks and what it answers to small separations of any cell.
+    """Solve the contact of all drive flanks, and what it answers to small separations [m] of any cell.
 
     Parameters
     ----------
-    basis : DesignBasis
     sun_torque, periods
         As for `contact.cycle.walk_mesh_cycle`; the torque is not zero.
     only : sequence of int, optional
@@ -294,7 +282,7 @@ class Sensitivity:
 def sensitivity(
     linear: LinearContact, variant: Callable[[float], SetDeviations], value: float, *, step: float
 ) -> Sensitivity:
-    """Derivatives with respect to one parameter of the deviations.
+    """Differentiate transmission errors, mesh forces and shares by one parameter of the deviations.
 
     Parameters
     ----------
@@ -314,7 +302,7 @@ def sensitivity(
     if not (np.isfinite(step) and step > 0):
         raise CaseError("a derivative needs a step", code="E-RANGE", value=step, limit="over 0")
     low, high = variant(value - step), variant(value + step)
-    if linear.mirrored:
+    if linear.solved is not linear.original:
         low, high = (
             mirrored_deviations(deviations, linear.original, linear.solved, linear.order)
             for deviations in (low, high)
@@ -328,7 +316,7 @@ def _sensitivity(linear: LinearContact, change: np.ndarray) -> Sensitivity:
     N, t = linear.solved.n_planets, linear.touching
     pushed = np.zeros((len(linear.position), 2 * N))
     np.add.at(pushed, t.at, t.weight * change[:, None])
-    rows = linear.mesh_rows
+    rows = _original_rows(linear.order)
     force = np.einsum("pij,pj->ip", linear.force_response, pushed)[rows]
     return Sensitivity(
         sun_arc=np.einsum("pj,pj->p", linear.arc_response, pushed),
@@ -352,7 +340,7 @@ def _separations(linear: LinearContact, deviations: SetDeviations) -> np.ndarray
 
 
 def pin_sensitivities(linear: LinearContact) -> np.ndarray:
-    """Change of all shares per displacement of every pin, (N shares, N pins, 2, P) [1/m].
+    """Differentiate all shares by the displacements of the pins, (N shares, N pins, 2, P) [1/m].
 
     The third index is radial (outwards), tangential (counter-clockwise). Pin errors separate whole meshes,
     so these derivatives hold beside any other deviations.

@@ -52,9 +52,9 @@ class SharingModel:
     coupling : (N, N) array
         Compliance between planets through gears and sprung members [m/N].
     approach : (N, 1 + m) array
-        G: approach of each path per unit rotation of the sun (as an arc) and per unit free motion.
+        G: approach of each path per unit rotation of the sun (as an arc) and per unit free motion [1].
     pin : (N, 2) array
-        Separation of the path per unit radial and tangential displacement of the planet's axis.
+        Separation of the path per unit radial and tangential displacement of the planet's axis [1].
     coupling_change : float
         Largest change of the coupling through the gears over the loads of `force`, over the compliance of a
         planet's path under the mean load.
@@ -77,7 +77,7 @@ def sharing_model(
     position: int = 0,
     loads: int = 40,
 ) -> SharingModel:
-    """Load-deflection curves of all planets at one position, from the contact problem at several loads.
+    """Compute load-deflection curves of all planets at one position, by contact problems at several loads.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def _pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
 
 
 def pin_samples(n_planets: int, *, samples: int, radial: float, tangential: float, seed: int) -> np.ndarray:
-    """Normally distributed, independent pin errors (S, N, 2): radial and tangential [m].
+    """Draw normally distributed, independent pin errors (S, N, 2): radial and tangential [m].
 
     Parameters
     ----------
@@ -228,14 +228,13 @@ class Sharing:
 
 @one_blas_thread()
 def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sharing:
-    """Load sharing for many sets of pin errors at once.
+    """Compute the load sharing for many sets of pin errors at once.
 
     Newton's method on all samples together; a planet whose force turns negative opens, one that would
     overlap closes. Samples that have not settled go to `contact.solve.solve_contact` one by one.
 
     Parameters
     ----------
-    model : SharingModel
     pins : (S, N, 2) array
         Radial (outwards) and tangential (counter-clockwise) displacements of the planet axes [m].
     max_steps : int
@@ -354,7 +353,7 @@ def _residual(model, curves, separation, forces, motions) -> float:
 
 @one_blas_thread()
 def walked_shares(basis: DesignBasis, pins, *, sun_torque: float, position: int = 0) -> np.ndarray:
-    """Shares (S, N) of a few samples from the whole contact problem, to check `sharing_of_samples`.
+    """Compute shares (S, N) of a few samples by the whole contact problem, to check `sharing_of_samples`.
 
     Arguments as for `sharing_model`, with the pin errors ``pins`` (S, N, 2) [m].
     """

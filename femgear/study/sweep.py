@@ -30,7 +30,7 @@ _LARGEST = 100_000
 """Combinations at most."""
 _MANY = 1000
 """Combinations from which their time is estimated and said."""
-JOURNAL, TABLE, FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
+_JOURNAL, _TABLE, _FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 """Files of a sweep."""
 _TIMED = 3
 """Cases that the estimate is made from."""
@@ -44,10 +44,8 @@ class Sweep:
 
     Parameters
     ----------
-    keys : tuple of str
     points : tuple of tuple
         Values as the case file holds them; the last key runs fastest.
-    quantities : tuple of Quantity
     values : (points, quantities) array
         [SI]; NaN where a case cannot be computed.
     errors : tuple of str
@@ -69,7 +67,7 @@ class Sweep:
         return (*self.keys, *(f"{q.name} [{q.dimension.si}]" for q in self.quantities), "error")
 
     def records(self) -> Iterator[tuple[object, ...]]:
-        """Rows of a table."""
+        """Give the rows of a table, quantities in SI units."""
         for point, values, error in zip(self.points, self.values, self.errors, strict=True):
             yield (*point, *(float(value) for value in values), error)
 
@@ -84,14 +82,12 @@ def sweep(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> Sweep:
-    """Quantities of a case over values of entries of its file.
+    """Compute quantities of a case over values of entries of its file.
 
     Parameters
     ----------
-    case : Case
     over : mapping of str to sequence
         Values of dotted keys, as the case file would hold them; all combinations are computed.
-    quantities : sequence of Quantity
     journal : path-like, optional
         File that keeps every case; an interrupted sweep goes on from it.
     cache, progress
@@ -168,7 +164,7 @@ def _warn_of_time(left: int, seconds: float) -> None:
 
 
 def parse_over(text: str) -> tuple[str, Sequence[object]]:
-    """Key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``; others are refused (E-VARIABLE)."""
+    """Read key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``; E-VARIABLE for others."""
     key, equals, values = (part.strip() for part in text.partition("="))
     if not (key and equals and values):
         raise _not_over(text)
@@ -244,13 +240,13 @@ def sweep_into(
     _check_sweep(case, values, quantities)
     with storage_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    options = {"journal": folder / JOURNAL, "cache": cache, "progress": progress}
+    options = {"journal": folder / _JOURNAL, "cache": cache, "progress": progress}
     found = sweep(case, values, quantities, **options)
-    write_csv(folder / TABLE, found.header, found.records())
-    names = [TABLE, JOURNAL]
+    write_csv(folder / _TABLE, found.header, found.records())
+    names = [_TABLE, _JOURNAL]
     if np.isfinite(found.values).any():
-        _draw(found, [len(one) for one in values.values()], folder / FIGURE)
-        names.append(FIGURE)
+        _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
+        names.append(_FIGURE)
     return found, names
 
 
@@ -284,8 +280,8 @@ def _axis(values: Sequence[object]) -> tuple[Sequence[object], str]:
     try:
         parts = [split(value, "value") for value in values]
     except CaseError:
-        return [str(value) for value in values], ""
+        parts = []
     units = {unit for _, unit in parts}
-    if len(units) > 1:
+    if len(units) != 1:
         return [str(value) for value in values], ""
     return [number for number, _ in parts], units.pop()

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import eigh, eigvals
-from validation.timoshenko import Disc, Support, free_bending, shaft_system
+from validation.timoshenko import Disc, Support, free_bending, shaft_system, simply_supported
 
 from femgear.errors import CaseError
 from femgear.fe.shaft import RoundSection, beam_element, joint_deflections
@@ -59,16 +59,10 @@ def test_free_shaft_against_the_characteristic_equation(discs, top):
 
 
 def test_simply_supported_shaft_against_its_closed_form():
-    """``rho^2 I / (kappa G) w^4 - (rho A + rho I (1 + E / (kappa G)) k^2) w^2 + E I k^4 = 0``."""
-    s, count = SECTION, 96
+    count = 96
     ours = natural(shaft(count, supports=(Support(0, math.inf), Support(count, math.inf))))
-    slide = s.shear_coefficient * s.shear_modulus
     for number in (1, 2, 3):
-        k = number * math.pi / LENGTH
-        a = s.density**2 * s.second_moment / slide
-        b = s.density * (s.area + s.second_moment * (1.0 + s.young / slide) * k**2)
-        square = (b - math.sqrt(b * b - 4.0 * a * s.young * s.second_moment * k**4)) / (2.0 * a)
-        wanted = math.sqrt(square) / (2.0 * math.pi)
+        wanted = simply_supported(SECTION, LENGTH, number)
         assert np.min(np.abs(ours / wanted - 1.0)) < 2e-4
 
 

@@ -66,7 +66,7 @@ FIRST = {"readme_images.py": (*CLI, "run", REFERENCE, "--output", "results_0")}
 OTHERS = {
     "schema": ((*CLI, "schema"), (*CLI, "schema", "--model", "drivetrain")),
     "sweep": ((*CLI, "sweep", REFERENCE, "--over", "operation.torque=50 N m,100 N m", "-o", "results"),),
-    "validate": ((*CLI, "validate", "--quick", "-o", "validation.md"),),
+    "validate": (("../tree/tests/validation", "--quick", "-o", "validation.md"),),
 }
 PICTURES, DATA = (".png", ".gif"), (".vtu", ".vtp", ".msh")
 VERSION_ATTRIBUTES = {"femgear_version"}

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import ast
 import re
-import sys
 from collections import defaultdict
 from pathlib import Path
 
@@ -94,20 +93,14 @@ def _cell(text: str) -> str:
     return " ".join(text.replace("|", "\\|").split()).replace("<", "&lt;")
 
 
-def main() -> int:
-    """Write the page, or print it."""
+def main() -> None:
+    """Write the page."""
     from femgear.errors import CODES
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path)
-    output = parser.parse_args().output
-    text = page(CODES)
-    if output is None:
-        print(text)
-    else:
-        output.write_text(text, encoding="utf-8")
-    return 0
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.parse_args().output.write_text(page(CODES), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

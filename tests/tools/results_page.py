@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -139,18 +138,13 @@ def page(text: str, found: Mapping[tuple[str, str], Variables]) -> str:
     return TABLE.sub(written, text)
 
 
-def main() -> int:
-    """Write the page, or print it."""
+def main() -> None:
+    """Write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
     output = parser.parse_args().output
-    text = page(PAGE.read_text(encoding="utf-8"), variables())
-    if output is None:
-        print(text)
-    else:
-        output.write_text(text, encoding="utf-8")
-    return 0
+    output.write_text(page(PAGE.read_text(encoding="utf-8"), variables()), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

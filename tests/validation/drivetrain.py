@@ -36,7 +36,7 @@ from femgear.trains.drivetrain.parts import (
 )
 from femgear.trains.drivetrain.simulation import Records, march_drivetrain
 from validation.rows import Row, at_most, information, printed, within
-from validation.timoshenko import Disc, Support, free_bending, shaft_system
+from validation.timoshenko import Disc, Support, free_bending, shaft_system, simply_supported
 
 PAPER = "Dynamic analysis of the wind turbine drivetrain considering shaft bending effect"
 TRANSFER = "zeros of the exact transfer matrix"
@@ -59,15 +59,10 @@ def _shaft(count=COUNT, **options):
 
 def shafts() -> tuple[Row, ...]:
     """Timoshenko shafts."""
-    s, rows = SECTION, []
+    rows = []
     ours = _shaft(96, supports=(Support(0, math.inf), Support(96, math.inf)))
-    slide = s.shear_coefficient * s.shear_modulus
     for number in (1, 2, 3):
-        k = number * math.pi / LENGTH
-        a = s.density**2 * s.second_moment / slide
-        b = s.density * (s.area + s.second_moment * (1.0 + s.young / slide) * k**2)
-        square = (b - math.sqrt(b * b - 4.0 * a * s.young * s.second_moment * k**4)) / (2.0 * a)
-        wanted = math.sqrt(square) / (2.0 * math.pi)
+        wanted = simply_supported(SECTION, LENGTH, number)
         text = f"simply supported Timoshenko shaft, 96 elements, mode {number} [Hz]"
         rows.append(within("shaft", "closed form", text, wanted, _nearest(ours, wanted), 1e-3))
     for words, discs, top in (("", (), 2500.0), (" with two discs", DISCS, 1400.0)):

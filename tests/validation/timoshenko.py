@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -29,6 +30,19 @@ class Support:
     station: int
     radial: float
     tilt: float = 0.0
+
+
+def simply_supported(section: RoundSection, length: float, number: int) -> float:
+    """Bending frequency [Hz] of a shaft on two hinges, by the number of its half waves, from 1.
+
+    The lower root of ``rho^2 I / (kappa G) w^4 - (rho A + rho I (1 + E / (kappa G)) k^2) w^2 + E I k^4 = 0``.
+    """
+    s, k = section, number * math.pi / length
+    slide = s.shear_coefficient * s.shear_modulus
+    a = s.density**2 * s.second_moment / slide
+    b = s.density * (s.area + s.second_moment * (1.0 + s.young / slide) * k**2)
+    square = (b - math.sqrt(b * b - 4.0 * a * s.young * s.second_moment * k**4)) / (2.0 * a)
+    return math.sqrt(square) / (2.0 * math.pi)
 
 
 def free_bending(

@@ -285,10 +285,10 @@ def solve_modes(
     check_dynamic_case(case, static.planetary_set)
     steps, gears, torque = steps or Steps(), static.planetary_set, static.sun_torque
     bodies, deviations, known = _ring_bodies(case, static, steps), set_deviations(case), state_entries(case)
-    state = steps.kept("loaded state", known) or steps.keep(
+    state = steps.once(
         "loaded state",
         known,
-        loaded_period(
+        lambda: loaded_period(
             gears,
             *bodies,
             sun_torque=torque,
@@ -327,10 +327,10 @@ def solve_modes(
 def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
     """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
     fixed, known = case.static.members == "fixed", ring_entries(case)
-    other = steps.kept("ring compliances", known) or steps.keep(
+    other = steps.once(
         "ring compliances",
         known,
-        with_ring(
+        lambda: with_ring(
             static.bodies,
             static.sectors,
             depth=case.static.depth,
@@ -349,10 +349,10 @@ def _ring_of_case(case: Case, static: StaticResult, steps: Steps, reach: float) 
     """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz]."""
     gears, sector, side = static.planetary_set, static.sectors.ring, 1.0 if static.sun_torque >= 0 else -1.0
     known = {**ring_entries(case), "reach": reach, "side": side}
-    return steps.kept("ring model", known) or steps.keep(
+    return steps.once(
         "ring model",
         known,
-        ring_model(
+        lambda: ring_model(
             gears,
             sector.grid,
             sector.stiffness,

@@ -499,7 +499,7 @@ def doubts(results: Results, stem: str) -> Iterator[str]:
     stage = "branch" if stem in _OF_BRANCH else "response" if stem.startswith(_OF_RESPONSE) else None
     if stage is None or stage not in results.stages:
         return
-    data = results.stage(stage)
+    data = results[stage]
     motion, force = (float(data[name].max()) for name in ("tail", "force_tail"))
     tail = motion if stem.startswith(_OF_MOTION) else max(motion, force)
     if tail > TAIL_LIMIT:

@@ -424,6 +424,6 @@ def test_page_names_every_key_and_its_example_runs():
     ],
 )
 def test_results_page_names_every_attribute(results, heading, stage):
-    section, data = section_of("results.md", heading), results.stage(stage)
+    section, data = section_of("results.md", heading), results[stage]
     for attribute in set(data.attrs) - {"title", "unknowns", "femgear_format", "femgear_version"}:
         assert f"`{attribute}`" in section, attribute

@@ -75,7 +75,7 @@ def results(tmp_path_factory, pgb):
 def test_a_run_computes_modes_branch_and_response(results):
     assert results.stages == ("modes", "branch", "response")
     assert results.manifest.complete and results.manifest.convergence["branch"]["converged"]
-    assert results.stage("modes").equals(results.modes)
+    assert results["modes"].equals(results.modes)
 
 
 def test_natural_frequencies_of_set_b(results):
