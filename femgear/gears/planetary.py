@@ -69,8 +69,7 @@ class PlanetarySet:
     @property
     def mesh_names(self) -> tuple[str, ...]:
         """Labels of the 2N meshes in order."""
-        numbers = range(1, self.n_planets + 1)
-        return tuple(f"sun-planet {n}" for n in numbers) + tuple(f"planet {n}-ring" for n in numbers)
+        return mesh_names(self.n_planets)
 
     @property
     def working_pressure_angle_sun_planet(self) -> float:
@@ -176,6 +175,12 @@ class PlanetarySet:
                 if np.abs(np.mod(away + math.pi, 2.0 * math.pi) - math.pi).max() < 1e-9:
                     return turns
         return 1
+
+
+def mesh_names(n_planets: int) -> tuple[str, ...]:
+    """Names of the 2N meshes of N planets, in the order of all their arrays."""
+    planets = range(1, n_planets + 1)
+    return (*(f"sun-planet {n}" for n in planets), *(f"planet {n}-ring" for n in planets))
 
 
 def close_set(

@@ -174,12 +174,6 @@ def dof_names(data: RigidSet) -> tuple[str, ...]:
     return tuple(f"{body}: {names[axis]}" for body, names in bodies for axis in data.axes)
 
 
-def mesh_names(n_planets: int) -> list[str]:
-    """Names of the 2N meshes, in the order of their columns."""
-    planets = range(1, n_planets + 1)
-    return [f"sun-planet {n}" for n in planets] + [f"planet {n}-ring" for n in planets]
-
-
 def mesh_elements(
     data: RigidSet,
     *,

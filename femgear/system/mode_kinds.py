@@ -249,12 +249,6 @@ def named_kinds(share, frequency) -> tuple[str, ...]:
     )
 
 
-def equally_spaced(planet_angles) -> bool:
-    """Whether planet n is at ``psi_1 + 2 pi (n - 1) / N``."""
-    psi, N = np.asarray(planet_angles, float), len(planet_angles)
-    return bool(np.abs(np.exp(1j * (psi - psi[0])) - np.exp(2j * np.pi * np.arange(N) / N)).max() < 1e-6)
-
-
 def _harmonic(planet_angles: np.ndarray, j: int) -> np.ndarray:
     """Orthonormal basis of the patterns ``cos j psi_n`` and ``sin j psi_n`` over the planets."""
     return _orthonormal(np.column_stack([np.cos(j * planet_angles), np.sin(j * planet_angles)]))
