@@ -78,12 +78,10 @@ def modal_response(system: MechanicalSystem, modes: Modes, frequency, inputs, ou
         An undamped resonance (E-RESONANCE).
     """
     omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
-    natural = 2.0 * np.pi * modes.frequency
-    w = omega[:, None]
-    below = natural**2 - w**2 + 2j * modes.damping_ratio * natural * w
-    gain = _gain(below, np.maximum(natural**2, w**2), modes)
     left, right = outputs @ modes.shape, modes.shape.T @ inputs
-    result = (gain @ _pairs(left, right)).reshape(len(below), len(left), -1)
+    gain = _gain(modes, slice(None), omega)
+    result = (gain @ _pairs(left, right)).reshape(len(omega), len(left), -1)
+    natural = 2.0 * np.pi * modes.frequency
     if len(natural) < len(system.M):
         elastic = natural > 0.0
         static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
@@ -138,7 +136,6 @@ def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None)
         )  # fmt: skip
     frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
     elastic = np.flatnonzero(modes.frequency > 0.0)
-    natural, ratio = 2.0 * np.pi * modes.frequency[elastic], modes.damping_ratio[elastic]
     left = modes.mesh_deflection[:, elastic]
     push = k[:, None] * error
     modal = np.einsum("jm,cjh->chm", left, push)
@@ -147,9 +144,7 @@ def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None)
     static = np.einsum("oj,cjh->cho", rest, push)
     deflection = np.empty((len(error), len(frequency), len(harmonics), len(k)), complex)
     for place, harmonic in enumerate(harmonics):
-        w = _angular(harmonic * frequency)[:, None]
-        below = natural**2 - w**2 + 2j * ratio * natural * w
-        gain = _gain(below, np.maximum(natural**2, w**2), modes, elastic)
+        gain = _gain(modes, elastic, _angular(harmonic * frequency))
         deflection[:, :, place] = (gain * modal[:, None, place]) @ left.T + static[:, None, place]
     force = k * (deflection - error.transpose(0, 2, 1)[:, None])
     return MeshErrorResponse(frequency, harmonics, deflection, force)
@@ -412,11 +407,11 @@ def _angular(frequency) -> np.ndarray:
     return 2.0 * np.pi * frequency
 
 
-def _gain(
-    below: np.ndarray, size: np.ndarray, modes: Modes, kept: np.ndarray | slice = slice(None)
-) -> np.ndarray:
-    """``1 / below`` (F, m) of all modes, or of those that are kept."""
-    bad = np.abs(below) <= _RESONANT * size
+def _gain(modes: Modes, kept: np.ndarray | slice, omega: np.ndarray) -> np.ndarray:
+    """``1 / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega)`` (F, m) [s^2] of the modes kept."""
+    natural, w = 2.0 * np.pi * modes.frequency[kept], omega[:, None]
+    below = natural**2 - w**2 + 2j * modes.damping_ratio[kept] * natural * w
+    bad = np.abs(below) <= _RESONANT * np.maximum(natural**2, w**2)
     if np.any(bad):
         mode = int(np.arange(len(modes.frequency))[kept][np.argwhere(bad)[0, 1]])
         raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
