@@ -446,8 +446,7 @@ def _largest_rounding(gear: Gear) -> float:
 
 def _check_flank(gear: Gear) -> None:
     """A tooth with a top land and a flank."""
-    involute = inv(pressure_angle_at(gear.tip_radius, gear.base_radius))
-    half = gear.base_half_angle + (involute if gear.internal else -involute)
+    half = half_thickness_angle(gear, gear.tip_radius)
     if half <= 0.0:
         _refuse(
             gear,

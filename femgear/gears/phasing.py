@@ -569,10 +569,8 @@ def _check(wanted, distance, ratio_tolerance, closure, harmonics) -> None:
     numbers |= {f"{name} teeth": (z, *TEETH_RANGE) for name, z in zip(("sun", "planet", "ring"), wanted)}
     for name, (value, least, most) in numbers.items():
         if not is_whole(value) or not least <= value <= most:
-            message, limit = (
-                f"neighbouring tooth numbers with {name} {value!r}",
-                f"a whole number, {least} to {most}",
-            )
+            message = f"neighbouring tooth numbers with {name} {value!r}"
+            limit = f"a whole number, {least} to {most}"
             raise GeometryError(message, code="E-CHOICE", key=name, limit=limit)
     if not (math.isfinite(ratio_tolerance) and ratio_tolerance >= 0.0):
         raise GeometryError(f"a ratio tolerance of {ratio_tolerance}", code="E-CHOICE", limit=">= 0")
