@@ -17,9 +17,9 @@ from femgear.errors import CaseError
 from femgear.system.mesh_directions import free_motions
 from femgear.system.rigid_bodies import RigidSet, body_masses
 
-PURE = 0.99
-CLASSES = ("rotational", "translational", "planet")
-CENTRAL = ("carrier", "ring", "sun", "motor", "brake")
+_PURE = 0.99
+_CLASSES = ("rotational", "translational", "planet")
+_CENTRAL = ("carrier", "ring", "sun", "motor", "brake")
 # motions of a central member that turn into each other with the frame, the third one alone
 _PLANES = ((0, 1, 5), (3, 4, 2))
 _IN_SPACE = {"rotational": "rotational-axial", "translational": "translational-tilting"}
@@ -125,7 +125,7 @@ def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
 
     planets = [f"planet {n + 1}" for n in range(len(planet_angles))]
     turn = ("rotation", "u")
-    central, central_mass = rows(CENTRAL, ("x",), ("y",), turn)
+    central, central_mass = rows(_CENTRAL, ("x",), ("y",), turn)
     if f"{planets[0]}: x" in place:
         moved, planet_mass = rows(planets, ("x",), ("y",), turn)
         c, s = np.cos(planet_angles)[:, None], np.sin(planet_angles)[:, None]
@@ -196,7 +196,7 @@ def phasing(motions: SetMotions) -> tuple[str, ...]:
             found.append("at rest")
             continue
         best = int(one.argmax())
-        pure = one[best] >= PURE and np.all(np.delete(one, best) <= 1.0 - PURE)
+        pure = one[best] >= _PURE and np.all(np.delete(one, best) <= 1.0 - _PURE)
         found.append(names[best] if pure else "mixed")
     return tuple(found)
 
@@ -244,7 +244,7 @@ def named_kinds(share, frequency) -> tuple[str, ...]:
     """
     best, most = share.argmax(axis=0), share.max(axis=0)
     return tuple(
-        "rigid" if f == 0.0 else CLASSES[i] if value >= PURE else "mixed"
+        "rigid" if f == 0.0 else _CLASSES[i] if value >= _PURE else "mixed"
         for f, i, value in zip(np.asarray(frequency), best, most)
     )
 

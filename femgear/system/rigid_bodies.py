@@ -121,7 +121,7 @@ class RigidSet(ABC):
     stiffness_planet_ring: float | np.ndarray
 
     def __post_init__(self):
-        self._keep("planet_angles", np.atleast_1d(self._numbers("planet_angles")))
+        self._keep("planet_angles", np.atleast_1d(numbers("planet_angles", self.planet_angles)))
         for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
             self._keep(name, self._per_planet(name))
         for name in (*CENTRAL, "planet"):
@@ -181,16 +181,13 @@ class RigidSet(ABC):
             (self.ring_radius - self.planet_radius) / (a * math.cos(self.pressure_angle_planet_ring)) - 1.0,
         )
 
-    def _numbers(self, key: str, dimensions: int | None = None) -> np.ndarray:
-        return numbers(key, getattr(self, key), dimensions)
-
     def _keep(self, name: str, array: np.ndarray) -> None:
         array.setflags(write=False)
         object.__setattr__(self, name, array)
 
     def _per_planet(self, name: str) -> np.ndarray:
         """Values (N,) from one number or one a planet."""
-        values = self._numbers(name)
+        values = numbers(name, getattr(self, name))
         values = np.full(self.n_planets, values.item()) if values.size == 1 else values
         if values.shape != (self.n_planets,):
             refuse(name, f"{values.size} values", "", f"one number, or {self.n_planets}")

@@ -22,14 +22,15 @@ Law = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]
 _HELD, _BALANCED = 1e-12, 1e-6
 
 
-def freeze(obj, *names):
-    """Turn array fields of a frozen dataclass, the named ones or all, into read-only contiguous arrays."""
-    for name in names or [one.name for one in fields(obj) if "np.ndarray" in str(one.type)]:
-        value = getattr(obj, name)
-        if value is not None:
+def freeze(obj):
+    """Turn the array fields of a frozen dataclass into read-only arrays of its own."""
+    for one in fields(obj):
+        value = getattr(obj, one.name)
+        # the annotations np.ndarray and NDArray[...]
+        if value is not None and "ndarray" in str(one.type).lower():
             array = np.array(value)
             array.setflags(write=False)
-            object.__setattr__(obj, name, array)
+            object.__setattr__(obj, one.name, array)
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class ComplexModes:
     dofs: tuple[str, ...]
 
     def __post_init__(self):
-        freeze(self, "eigenvalue", "shape", "drift", "left", "paired")
+        freeze(self)
 
     @property
     def rigid(self) -> np.ndarray:

@@ -56,7 +56,7 @@ class TrackedModes:
     unresolved: tuple[tuple[float, float], ...]
 
     def __post_init__(self):
-        freeze(self, "value", "given", "eigenvalue", "shape", "agreement")
+        freeze(self)
 
     @property
     def frequency(self) -> np.ndarray:

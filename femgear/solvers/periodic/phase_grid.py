@@ -31,10 +31,9 @@ class _GridSeries:
         """The stored values; theta must be the grid."""
         if len(theta) != len(self.values):
             raise CaseError(
-                f"{len(theta)} phases on a grid of {len(self.values)}",
-                code="E-SHAPE",
+                f"{len(theta)} phases on a grid of {len(self.values)}", code="E-SHAPE",
                 limit="the grid itself",
-            )
+            )  # fmt: skip
         return self.values
 
 
@@ -205,12 +204,10 @@ def _add(total: np.ndarray, places: list[int], parts: np.ndarray) -> None:
 
 def _places(orders: np.ndarray, samples: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Flat places of orders (..., n_bases) in the transform of real signals, and where to conjugate."""
-    flipped = np.asarray(orders).copy()
     count = np.array(samples)
-    wrapped = (flipped[..., -1] + count[-1] // 2) % count[-1] - count[-1] // 2
+    wrapped = (orders[..., -1] + count[-1] // 2) % count[-1] - count[-1] // 2
     mirrored = wrapped < 0
-    flipped = np.where(mirrored[..., None], -flipped, flipped)
-    index = flipped % count
+    index = np.where(mirrored[..., None], -orders, orders) % count
     shape = (*samples[:-1], samples[-1] // 2 + 1)
     return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), shape)), mirrored
 

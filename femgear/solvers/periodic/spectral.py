@@ -186,10 +186,10 @@ def _apply(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
 def _harmonic_residual(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
     """Size of ``E + T G E - S`` relative to that of E, per speed."""
     error = deflection + _apply(problem, deflection) - problem.source
-    return norm(error) / np.maximum(norm(deflection), np.finfo(float).tiny)
+    return _norm(error) / np.maximum(_norm(deflection), np.finfo(float).tiny)
 
 
-def norm(deflection: np.ndarray) -> np.ndarray:
+def _norm(deflection: np.ndarray) -> np.ndarray:
     """Euclidean norm over meshes and harmonics, per speed."""
     return np.sqrt(np.einsum("jsh,jsh->s", deflection, deflection.conj()).real)
 
@@ -316,7 +316,7 @@ def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np
     start.imag[..., 0] = 0.0
     basis = np.empty((speeds, steps + 1, 2 * n * size))
     hessenberg = np.zeros((speeds, steps + 1, steps))
-    basis[:, 0] = _rows(start / norm(start)[None, :, None])
+    basis[:, 0] = _rows(start / _norm(start)[None, :, None])
     for k in range(steps):
         vector = basis[:, k].reshape(speeds, n, 2 * size).transpose(1, 0, 2)
         image = _rows(_apply(problem, np.ascontiguousarray(vector).view(complex)))[..., None]
@@ -472,13 +472,13 @@ def _fixed_point(problem: HarmonicProblem, tolerance: float, max_iterations: int
     value = problem.source.copy()
     iterations = np.zeros(value.shape[1], dtype=int)
     change = np.full(value.shape[1], np.inf)
-    limit = 1e8 * np.maximum(norm(value), np.finfo(float).tiny)
+    limit = 1e8 * np.maximum(_norm(value), np.finfo(float).tiny)
     active = np.arange(value.shape[1])
     for _ in range(max_iterations):
         old = value[:, active]
         new = problem.source[:, active] - _apply(problem.take(active), old)
-        size = np.maximum(norm(new), np.finfo(float).tiny)
-        change[active] = norm(new - old) / size
+        size = np.maximum(_norm(new), np.finfo(float).tiny)
+        change[active] = _norm(new - old) / size
         value[:, active] = new
         iterations[active] += 1
         active = active[(change[active] > tolerance) & (size < limit[active])]

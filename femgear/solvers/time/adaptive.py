@@ -21,7 +21,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error, state_matrix
 from femgear.system.force_laws import Element, coefficients_of, has_corners, with_coefficients
 from femgear.system.fourier import StepSeries, constant, phase_of
-from femgear.system.system import NonlinearSystem
+from femgear.system.system import NonlinearSystem, element_forces
 
 METHODS = ("DOP853", "Radau", "LSODA")
 # Instants inside a step at which contact changes are looked for.
@@ -248,10 +248,7 @@ def motion_scale(motion: Flow, start) -> float | None:
     """
     q, v = start
     system, rate = motion.problem.system, motion.rate
-    columns = np.zeros(system.W.shape[1])
-    at_rest, _ = Contacts(motion.problem.elements, len(columns)).forces(
-        columns, np.zeros(motion.problem.bases)
-    )
+    at_rest, _ = element_forces(motion.problem, np.zeros(system.W.shape[1]), np.zeros(motion.problem.bases))
     pushes = [system.load, system.W @ at_rest, *(np.abs(f.force) for f in motion.problem.forces)]
     carrying = motion.problem.stiffness + rate * rate * system.M
     try:

@@ -85,7 +85,7 @@ class TransientResponse:
     message: str
 
     def __post_init__(self):
-        freeze(self, "time", "displacement", "velocity", "deflection", "force")
+        freeze(self)
 
 
 def solve_transient(
@@ -192,7 +192,7 @@ def step_scheme(
     return RuleScheme(problem, rule, step), number
 
 
-def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
+def _column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
     """Largest stiffness (n_columns,) [N/m] of every column over the phases of the base frequencies.
 
     Elements count with what they call steepest, meshes with the top of k(t), others as their reference.
@@ -208,7 +208,7 @@ def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
 
 def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
     """Number and length of the steps; refuses a length beyond the stability limit of the rule."""
-    highest = highest_frequency(problem, column_stiffness(problem, frequency))
+    highest = highest_frequency(problem, _column_stiffness(problem, frequency))
     period = 2.0 * np.pi / highest if highest else np.inf
     if step is None:
         fastest = max(highest, np.abs(frequency).max(initial=0.0))
