@@ -74,7 +74,7 @@ class MeshPhasing:
 
     @property
     def n_planets(self) -> int:
-        """N"""
+        """Number N of planets."""
         return len(self.positions)
 
     @property
@@ -89,6 +89,7 @@ class MeshPhasing:
 
     @property
     def equally_spaced(self) -> bool:
+        """Whether the planets stand ``2 pi / N`` apart."""
         return all(m * self.n_planets == n * self.teeth_sum for n, m in enumerate(self.positions))
 
     @property
@@ -121,7 +122,7 @@ def mesh_phasing(
     convention: str = "rotation",
     lag: float = 0.0,
 ) -> MeshPhasing:
-    """Find the phases of planets at given angles.
+    """Find the phases of the meshes of planets at given angles [rad].
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ def mesh_phasing(
 def phasing_of_set(
     planetary_set: PlanetarySet, *, rotation: int = 1, flank: int = 1, convention: str = "rotation"
 ) -> MeshPhasing:
-    """Find the phases of a geared set, the lag of its planets from the real thickness of their teeth.
+    """Find the phases of the meshes of a geared set, the lag of its planets from their tooth thickness.
 
     ``rotation``, ``flank`` and ``convention`` are those of `MeshPhasing`.
     """
@@ -157,7 +158,7 @@ def phasing_of_set(
 
 
 def standard_lag(planet_teeth: int) -> float:
-    """Lag of a planet whose teeth are half a pitch thick, in [0, 1).
+    """Compute the lag [mesh periods] of a planet whose teeth are half a pitch thick, 0 or 1/2.
 
     Its working flanks are ``z_p / 2 - 1 / 2`` pitches apart: an odd planet touches sun and ring at their
     pitch points at the same time, an even one half a period apart (Parker and Lin, 2004).
@@ -174,7 +175,7 @@ def standard_lag(planet_teeth: int) -> float:
 
 
 def phase_factors(phasing: MeshPhasing, harmonics) -> np.ndarray:
-    """``exp(2 pi i h gamma_j)``, (H, 2N), for whole harmonics h."""
+    """Compute the phase factors ``exp(2 pi i h gamma_j)`` (H, 2N) of the meshes in whole harmonics h (H,)."""
     return np.exp(2j * np.pi * np.outer(check_harmonics(harmonics), phasing.phases))
 
 
@@ -221,7 +222,7 @@ def _phase_kinds(turns, positions, teeth_sum, harmonics) -> np.ndarray:
 
 
 def cyclic_harmonic(phasing: MeshPhasing, harmonics) -> np.ndarray:
-    """``k = mod(h z_s, N)`` of equally spaced planets, (H,) int; -1 for unequal spacing.
+    """Find ``k = mod(h z_s, N)`` (H,) of equally spaced planets in harmonics h (H,); -1 for unequal spacing.
 
     The rule of Parker (2000): k = 0 rotational, k = 1 or N - 1 translational, other k planet modes only.
     """
@@ -283,7 +284,7 @@ class PhasingTable:
 
 
 def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) -> PhasingTable:
-    """Cancellation of resultants and excitation of modes for harmonics of the mesh frequency.
+    """Tell which resultants cancel and which modes are excited in harmonics (H,) of the mesh frequency.
 
     The mesh forces of one harmonic act on sun and ring along directions that turn with psi_n, and at points
     that do. Torque and thrust are their plain sum (q = 0); lateral forces, and tilting moments of the axial
@@ -317,7 +318,7 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
 
 
 def check_harmonics(harmonics) -> np.ndarray:
-    """Harmonics as whole numbers from 1, (H,); refuses others (E-HARMONICS)."""
+    """Check harmonics (H,) of the mesh frequency: whole numbers from 1, others are refused (E-HARMONICS)."""
     found = np.atleast_1d(np.asarray(harmonics))
     if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
         message = f"harmonics {harmonics!r} of the mesh frequency"
@@ -437,7 +438,7 @@ class ToothChoices:
         return np.array(KINDS)[self.kind]
 
     def only(self, chosen) -> ToothChoices:
-        """The choices of a mask (C,) or of indices, in their order."""
+        """Take the choices of a mask (C,) or of indices, in their order."""
         return ToothChoices(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
 
 
@@ -495,7 +496,7 @@ def neighbouring_teeth(
 
 
 def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
-    """Refuse tooth numbers that make no set, and remark on those that shifts must help to one.
+    """Check the tooth numbers of a set, and remark on those that profile shifts must help to one.
 
     Raises
     ------
