@@ -106,11 +106,13 @@ def displacements(
     *,
     reduction: Reduction | None = None,
 ) -> np.ndarray:
-    """Lines of the outputs ``L q``; velocities are ``i omega_l`` times, accelerations ``-omega_l^2`` times.
+    """Compute the lines of the outputs ``L q`` [m per unit of L] of a solution.
+
+    Velocities are ``i omega_l`` times, accelerations ``-omega_l^2`` times these.
 
     Parameters
     ----------
-    problem, solution
+    problem, solution : NonlinearSystem, PeriodicSolution
     outputs : (n_outputs, n) array, optional
         ``L``; all degrees of freedom when not given.
     reduction : Reduction, optional
@@ -146,7 +148,10 @@ class PeriodicResponse:
 
 
 def periodic_response(problem: NonlinearSystem, frequency, **options) -> PeriodicResponse:
-    """`solve_harmonic_balance` with the verdict at hand; refuses the single base frequency zero (E-RANGE)."""
+    """Find a periodic motion at base frequencies (n_bases,) [rad/s] with its verdict at hand.
+
+    As `solve_harmonic_balance`, but the single base frequency zero is refused (E-RANGE).
+    """
     require_period(frequency)
     return PeriodicResponse(solve_harmonic_balance(problem, frequency, **options))
 

@@ -111,7 +111,7 @@ class HarmonicProblem:
     source: np.ndarray
 
     def take(self, speeds) -> HarmonicProblem:
-        """The same problem at some of the speeds."""
+        """Take the problem at some of the speeds, indices or a mask."""
         return HarmonicProblem(self.receptance[:, :, speeds], self.product, self.source[:, speeds])
 
 
@@ -171,7 +171,7 @@ def _modal_receptance(modes: Modes, modal: np.ndarray) -> np.ndarray:
 
 
 def transfer(receptances: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """``T_h f_h``: (n, n, n_speeds, H + 1) times (n, n_speeds, H + 1)."""
+    """Compute ``T_h f_h`` (n, n_speeds, H + 1) [m] of receptances (n, n, n_speeds, H + 1) and forces [N]."""
     out = np.empty((receptances.shape[0], *force.shape[1:]), dtype=complex)
     for i, row in enumerate(receptances):
         np.einsum("jsh,jsh->sh", row, force, out=out[i])
@@ -195,7 +195,7 @@ def _norm(deflection: np.ndarray) -> np.ndarray:
 
 
 def matrices(problem: HarmonicProblem) -> np.ndarray:
-    """``T G`` as matrices (n_speeds, n L, n L) on interleaved real and imaginary parts, L = 2 (H + 1)."""
+    """Make ``T G`` as matrices (n_speeds, n L, n L) on real and imaginary parts in turn, L = 2 (H + 1)."""
     n, _, speeds, size = problem.receptance.shape
     product = problem.product.matrix.reshape(n, size, 2, 2 * size)
     columns = product[:, :, 0] + 1j * product[:, :, 1]
@@ -284,7 +284,7 @@ def find_twins(signals: tuple[np.ndarray, ...]) -> Twins:
 
 
 def reduce_twins(problem: HarmonicProblem, twins: Twins) -> HarmonicProblem | None:
-    """The problem of the group leaders alone; ``None`` when the receptances do not share the symmetry."""
+    """Reduce a problem to the group leaders; ``None`` when the receptances do not share the symmetry."""
     shifted = problem.receptance * twins.shift[None, :, None, :]
     folded = np.stack([shifted[:, twins.group == g].sum(axis=1) for g in range(len(twins.leaders))], axis=1)
     reduced = folded[twins.leaders]
@@ -302,7 +302,7 @@ def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
 
 
 def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np.ndarray:
-    """Compute the spectral radius (n_speeds,) of ``T G``, a number without unit.
+    """Compute the spectral radius (n_speeds,) of the fixed point, that of ``T G``, without unit.
 
     Eigenvalues of the full matrices while their number of entries cubed, times the speeds, stays below
     `exact_limit`; otherwise the largest Ritz value of 20 Arnoldi steps from one random vector (Saad,

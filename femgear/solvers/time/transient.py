@@ -51,7 +51,7 @@ class TransientResponse:
     time : (n_times,) array
         [s].
     displacement, velocity : (n_times, n) arrays
-        Not a number after a step that did not converge.
+        [m, m/s]; not a number after a step that did not converge.
     deflection, force : (n_times, n_columns) arrays
         ``W^T q`` [m] and the forces of the elements [N].
     method : str
@@ -110,7 +110,7 @@ def solve_transient(
     times : (n_times,) array
         Ascending instants at which the motion is wanted [s]; the first is the start.
     start : pair of (n,) arrays, optional
-        Displacement and velocity at the start; at rest without deflection when not given.
+        Displacement [m] and velocity [m/s] at the start; at rest without deflection when not given.
     method : str
         "average acceleration", "linear acceleration", "Fox-Goodwin", "central difference", "newmark",
         "generalised alpha", "modal" (exact linear part), see `steps`, or SciPy's "DOP853", "Radau", "LSODA".
@@ -162,7 +162,7 @@ def step_scheme(
     radius: float = 0.8,
     count: int | None = None,
 ) -> tuple[Scheme, int]:
-    """Scheme of a fixed-step method with its matrices factorised, and how many of its steps make a span.
+    """Make the scheme of a fixed-step method, and count its steps [s] that make a span [s].
 
     Parameters
     ----------
