@@ -133,8 +133,8 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
         Contact ratio outside the range of the method, or a tooth that has no such section (E-ISO6336).
     """
     _check_contact_ratio(contact_ratio)
-    chord, fillet, (theta, G, rounding) = _critical_section(gear)
-    arm, angle, radius = _load(gear, contact_ratio, theta, G, rounding)
+    chord, fillet, direction, offset = _critical_section(gear)
+    arm, angle, radius = _load(gear, contact_ratio, direction, offset)
     if not (chord > 0.0 and arm > 0.0 and fillet > 0.0):
         raise GeometryError(
             "the tooth has no critical section: "
@@ -175,8 +175,12 @@ def _standard_signs(gear: Gear) -> tuple[float, float, float]:
     return sign * gear.teeth, shift, depth + shift
 
 
-def _critical_section(gear: Gear):
-    """Chord s_Fn, radius rho_F [modules]; auxiliaries theta, G, rho_fPv (ISO 6336-3, section 6.2)."""
+def _critical_section(gear: Gear) -> tuple[float, float, float, float]:
+    """Chord s_Fn and radius rho_F [modules] (ISO 6336-3, section 6.2).
+
+    With them what the moment arm follows from: ``pi/3 - theta`` (internal ``pi/6 - theta``) and
+    ``G / cos(theta) - rho_fPv``.
+    """
     z, shift, dedendum = _standard_signs(gear)
     alpha, rounding, limit = gear.pressure_angle, gear.rack.root_radius, math.pi / 3.0
     if gear.internal:
@@ -188,14 +192,11 @@ def _critical_section(gear: Gear):
     G = rounding - dedendum + shift
     theta = _solve_theta(z, G, 2.0 / z * (0.5 * math.pi - E) - limit, limit)
     offset = G / math.cos(theta) - rounding
-    if gear.internal:
-        chord = z * math.sin(limit - theta) + offset
-    else:
-        chord = z * math.sin(limit - theta) + math.sqrt(3.0) * offset
+    chord = z * math.sin(limit - theta) + (1.0 if gear.internal else math.sqrt(3.0)) * offset
     # published calculations after the corrected text of 2007 take the teeth of internal gears as positive in
     # this term alone, which makes the radius larger than that of the generated fillet
     growth = 2.0 * G**2 / (math.cos(theta) * (abs(z) * math.cos(theta) ** 2 - 2.0 * G))
-    return chord, rounding + growth, (theta, G, rounding)
+    return chord, rounding + growth, limit - theta, offset
 
 
 def _solve_theta(z: float, G: float, H: float, start: float) -> float:
@@ -214,7 +215,7 @@ def _solve_theta(z: float, G: float, H: float, start: float) -> float:
     )
 
 
-def _load(gear: Gear, contact_ratio: float, theta: float, G: float, rounding: float):
+def _load(gear: Gear, contact_ratio: float, direction: float, offset: float):
     """Arm h_Fe [modules], load angle alpha_Fen and radius [m] of the outer single contact."""
     z, shift, _ = _standard_signs(gear)
     sign = math.copysign(1.0, z)
@@ -224,12 +225,8 @@ def _load(gear: Gear, contact_ratio: float, theta: float, G: float, rounding: fl
     half = (0.5 * math.pi + 2.0 * shift * math.tan(gear.pressure_angle)) / z
     gamma = half + inv(gear.pressure_angle) - inv(alpha)
     angle = alpha - gamma
-    offset = G / math.cos(theta) - rounding
     reach = (math.cos(gamma) - math.sin(gamma) * math.tan(angle)) * sign * 2.0 * radius / gear.module
-    if gear.internal:
-        arm = 0.5 * (reach - z * math.cos(math.pi / 6.0 - theta) - math.sqrt(3.0) * offset)
-    else:
-        arm = 0.5 * (reach - z * math.cos(math.pi / 3.0 - theta) - offset)
+    arm = 0.5 * (reach - z * math.cos(direction) - (math.sqrt(3.0) if gear.internal else 1.0) * offset)
     return arm, angle, radius
 
 

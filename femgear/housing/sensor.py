@@ -116,12 +116,7 @@ class HousingSignal(ReadOnlyArrays):
     acceleration: np.ndarray
 
 
-def fixed_sensor_lines(
-    field,
-    z_ring: int,
-    carrier_speed,
-    sensor_angle: float,
-) -> SensorLines:
+def fixed_sensor_lines(field, z_ring: int, carrier_speed, sensor_angle: float) -> SensorLines:
     """Compute the lines of a fixed sensor: component (h, n) at order ``h z_ring - sign(carrier_speed) n``.
 
     Components that fall on the same order add with their phases; negative orders are folded to

@@ -195,18 +195,16 @@ class HarmonicBalance:
         frequency = np.atleast_1d(np.asarray(frequency, float))
         lines = self.lines(y)
         beyond, products = self.forces(lines)
+
+        def residual() -> np.ndarray:
+            return self.residual(lines, beyond, self.receptance(frequency)[0])
+
         if "residual" not in what_happened:
-            error = self.unknowns(self.residual(lines, beyond, self.receptance(frequency)[0]))
-            what_happened["residual"] = relative_residual(self, error, y)
+            what_happened["residual"] = relative_residual(self, self.unknowns(residual()), y)
         if radius:
             what_happened["spectral_radius"] = self.spectral_radius(y, frequency, products)
         told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
-        if note := _uncarried_note(
-            self,
-            lines,
-            lambda: self.residual(lines, beyond, self.receptance(frequency)[0]),
-            told["converged"],
-        ):
+        if note := _uncarried_note(self, lines, residual, told["converged"]):
             # the whole mean load is out of balance, whatever its ratio to a deflection that runs away
             told |= {"converged": False, "message": f"Not converged: {note}."}
             told["residual"] = max(told["residual"], 1.0)

@@ -16,20 +16,8 @@ import numpy as np
 from scipy import linalg
 
 from femgear.errors import CaseError, checked_count, checked_tolerance
-from femgear.solvers.periodic.solution import (
-    PeriodicSolution,
-    of_solution,
-    open_verdict,
-    verdict_of,
-)
-from femgear.solvers.time.adaptive import (
-    Flow,
-    checked_start,
-    flow,
-    motion_scale,
-    sampled,
-    trajectory,
-)
+from femgear.solvers.periodic.solution import PeriodicSolution, of_solution, open_verdict, verdict_of
+from femgear.solvers.time.adaptive import Flow, checked_start, flow, motion_scale, sampled, trajectory
 from femgear.solvers.time.stroboscopic import common_period
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import harmonics_of, line_tail

@@ -19,12 +19,7 @@ from scipy.linalg import expm
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.linear.modal import state_matrix
-from femgear.solvers.periodic.solution import (
-    FloquetVerdict,
-    PeriodicSolution,
-    open_verdict,
-    verdict_of,
-)
+from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
 from femgear.system.force_laws import tangent_jumps
 from femgear.system.system import Modes, NonlinearSystem, element_forces
 
