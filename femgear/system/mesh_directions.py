@@ -209,16 +209,19 @@ def mesh_elements(
     mean = data.column_stiffness
     columns = np.arange(len(mean))
     if not isinstance(stiffness, MeshExcitation):
-        made = GearMeshes(columns, constant(mean) if stiffness is None else stiffness)
+        series = constant(mean) if stiffness is None else stiffness
+        made = GearMeshes(columns, series, separates=separates, smoothing=smoothing)
     elif harmonics is None:
         raise CaseError(
             "the mesh harmonics of the static record are not said", code="E-HARMONICS", key="harmonics",
             limit="a whole number of 1 or more",
         )  # fmt: skip
     else:
-        made = gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
-    backlash = made.backlash if backlash is None else backlash
-    return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
+        made = gear_meshes(
+            stiffness, harmonics=harmonics, columns=columns, separates=separates, smoothing=smoothing,
+            orders=orders,
+        )  # fmt: skip
+    return made if backlash is None else replace(made, backlash=backlash)
 
 
 def check_mesh_columns(data: RigidSet, meshes: GearMeshes) -> None:
