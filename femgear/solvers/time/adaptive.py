@@ -361,13 +361,9 @@ class Contacts:
                 force, slope = element.frozen(own, theta, self.closed[number])
             else:
                 force, slope = element.evaluate(own, theta)
-            if element.columns.shape[1] == 1:
-                np.add.at(total, element.columns, force)
-                np.add.at(tangent, (element.columns[:, 0], element.columns[:, 0]), slope[:, 0, 0])
-                continue
-            for columns, f, t in zip(element.columns, force, slope):
-                total[columns] += f
-                tangent[columns[:, None], columns] += t
+            columns = element.columns
+            np.add.at(total, columns, force)
+            np.add.at(tangent, (columns[:, :, None], columns[:, None, :]), slope)
         return total, tangent
 
     def gaps(self, x, theta) -> np.ndarray:
