@@ -27,7 +27,7 @@ import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import TEETH_RANGE, is_whole
-from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angles, equal_planet_angles
+from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angles, check_planets
 
 CONVENTIONS = ("rotation", "printed")
 KINDS = ("in-phase", "counter-phased", "sequentially phased", "unequally phased")
@@ -293,6 +293,11 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
     Des. 116, 1994, 713-720, Table 1) has the case of four equal planets, R. G. Parker (J. Sound Vib. 236,
     2000, 561-573) the sums for equal spacing.
 
+    Parameters
+    ----------
+    phasing : MeshPhasing
+    harmonics : (H,) sequence of int
+
     Raises
     ------
     GeometryError
@@ -479,7 +484,7 @@ def neighbouring_teeth(
     GeometryError
         Numbers out of range (E-CHOICE, E-RANGE).
     """
-    equal_planet_angles(planets)
+    check_planets(planets)
     wanted = (sun_teeth, planet_teeth, ring_teeth)
     _check(wanted, distance, ratio_tolerance, closure, harmonics)
     steps = np.arange(-distance, distance + 1)
@@ -497,6 +502,17 @@ def neighbouring_teeth(
 
 def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     """Check the tooth numbers of a set, and remark on those that profile shifts must help to one.
+
+    Parameters
+    ----------
+    phasing : MeshPhasing
+        With the teeth of sun and ring and the positions of the planets.
+    planet_teeth : int
+
+    Returns
+    -------
+    tuple of str
+        Remarks in words: the shifts that are needed, tips of unshifted planets that overlap [modules].
 
     Raises
     ------

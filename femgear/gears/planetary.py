@@ -357,13 +357,13 @@ def zero_backlash_shift(one: Gear, two: Gear, centre_distance: float) -> float:
 
 
 def equal_planet_angles(planets: int) -> tuple[float, ...]:
-    """List the angles ``2 pi n / N`` [rad] of N equally spaced planets.
+    """List the angles ``2 pi n / N`` (N,) [rad] of equally spaced planets, see `check_planets`."""
+    check_planets(planets)
+    return tuple(2.0 * math.pi * n / int(planets) for n in range(int(planets)))
 
-    Raises
-    ------
-    GeometryError
-        Not a whole number of at least one planet (E-RANGE).
-    """
+
+def check_planets(planets: int) -> None:
+    """Refuse what is no whole number of at least one planet (E-RANGE)."""
     if not is_whole(planets) or not 1 <= planets <= 1000:
         raise GeometryError(
             f"a planetary set with {planets!r} planets",
@@ -373,13 +373,11 @@ def equal_planet_angles(planets: int) -> tuple[float, ...]:
             limit="a whole number, 1 to 1000",
             remedy="three planets share the load of a set best",
         )
-    return tuple(2.0 * math.pi * n / int(planets) for n in range(int(planets)))
 
 
 def check_angles(angles: tuple[float, ...]) -> None:
-    """Refuse planet angles [rad] that are none, unordered or in the wrong unit (E-RANGE)."""
-    if not 1 <= len(angles) <= 1000:
-        equal_planet_angles(len(angles))
+    """Refuse planet angles (N,) [rad] that are none, unordered or in the wrong unit (E-RANGE)."""
+    check_planets(len(angles))
     problem = None
     if not all(math.isfinite(a) for a in angles):
         problem = "contain a value that is not finite"

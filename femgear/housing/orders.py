@@ -230,12 +230,7 @@ def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: i
 
 
 def analyse_band(
-    spectrum: OrderSpectrum,
-    z_ring: int,
-    harmonic: int,
-    *,
-    half_width: int | None = None,
-    count: int = 6,
+    spectrum: OrderSpectrum, z_ring: int, harmonic: int, *, half_width: int | None = None, count: int = 6
 ) -> BandAnalysis:
     """Analyse the band around a mesh harmonic: dominant lines, envelope and lobes of the signal.
 

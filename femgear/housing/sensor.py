@@ -150,13 +150,7 @@ def fixed_sensor_lines(field, z_ring: int, carrier_speed, sensor_angle: float) -
 
 
 def heaviside_linear_lines(
-    field,
-    z_ring: int,
-    carrier_speed,
-    sensor_angle: float,
-    *,
-    points: int = 54,
-    max_order: int | None = None,
+    field, z_ring: int, carrier_speed, sensor_angle: float, *, points: int = 54, max_order: int | None = None
 ) -> SensorLines:
     """Compute the lines of the Heaviside/linear form over P points of the ring (paper Eqs. (13)-(16)).
 

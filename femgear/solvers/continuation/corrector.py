@@ -249,10 +249,22 @@ def step_effort(
 ) -> float:
     """Compare a step between two points with the angle [rad] and contraction aimed at: 1 on target.
 
-    The result is a ratio: above one the next step has to be shorter. On one smooth curve a chord makes the
-    same angle with the tangents at both ends (exactly so on a circle); a jump from curve to curve turns the
-    chord but not the tangents. A step may be so short that the curve may turn in a ``corner``, or that any
-    turn is one of a ``sharp`` corner, between whose sides the chord lies.
+    On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
+    a jump from curve to curve turns the chord but not the tangents.
+
+    Parameters
+    ----------
+    options : StepOptions
+    point, new : CurvePoint
+        Both ends of the step.
+    corner, sharp : bool
+        The step is so short that the curve may turn in a corner, or that any turn is one of a sharp corner,
+        between whose sides the chord lies.
+
+    Returns
+    -------
+    float
+        A ratio without unit: above one the next step has to be shorter.
 
     Raises
     ------
@@ -412,7 +424,7 @@ def _steepest(segment: Segment) -> float | None:
 
 
 def branch_point(segment: Segment) -> tuple[float, CurvePoint]:
-    """Locate the branch point of a segment: its scaled plane distance and the point.
+    """Locate the branch point of a segment: its scaled plane distance and the point, see `CurvePoint`.
 
     For ends of different orientation. Root of ``tau = 1 / (c^T B^-1 b)`` with the singular vectors b, c of
     the bordered matrix B (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, 3.3).

@@ -129,11 +129,7 @@ class CampbellData:
 
 
 def track_modes(
-    family: Callable[[float], tuple[np.ndarray, np.ndarray]],
-    values,
-    mass,
-    *,
-    count: int | None = None,
+    family: Callable[[float], tuple[np.ndarray, np.ndarray]], values, mass, *, count: int | None = None
 ) -> TrackedModes:
     """Follow eigenvalues [1/s] and modes from one parameter value to the next.
 

@@ -110,13 +110,7 @@ class ShootingOptions:
 
 
 def solve_shooting(
-    problem: NonlinearSystem,
-    frequency,
-    *,
-    start=None,
-    periods: int = 1,
-    settle: int = 20,
-    **options,
+    problem: NonlinearSystem, frequency, *, start=None, periods: int = 1, settle: int = 20, **options
 ) -> ShootingSolution:
     """Find a forced periodic motion by Newton iterations on its displacement [m] and velocity [m/s].
 

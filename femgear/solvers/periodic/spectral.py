@@ -131,8 +131,13 @@ class Twins:
 def compliance(modes: Modes, omega: np.ndarray) -> np.ndarray:
     """Compute modal receptances ``1 / (w_k^2 - omega^2 + 2 i zeta w_k omega)`` (..., n_modes) [s^2].
 
-    Zero for rigid modes, which no self-equilibrated force moves. ``omega`` (...) are angular frequencies
-    [rad/s].
+    Zero for rigid modes, which no self-equilibrated force moves.
+
+    Parameters
+    ----------
+    modes : Modes
+    omega : (...) array
+        Angular frequencies [rad/s].
 
     Raises
     ------
@@ -304,7 +309,7 @@ def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
 def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np.ndarray:
     """Compute the spectral radius (n_speeds,) of the fixed point, that of ``T G``, without unit.
 
-    Eigenvalues of the full matrices while their number of entries cubed, times the speeds, stays below
+    Eigenvalues of the full matrices while their number of rows cubed, times the speeds, stays below
     `exact_limit`; otherwise the largest Ritz value of 20 Arnoldi steps from one random vector (Saad,
     Numerical Methods for Large Eigenvalue Problems, algorithm 6.1), all speeds together.
     """

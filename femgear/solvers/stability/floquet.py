@@ -163,9 +163,20 @@ class Frame:
 def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
     """Compute the modal coordinates of small motions about the reference stiffness of a problem.
 
-    At most so many modes are kept, lowest first, see `Frame` for shapes and units. Free motions that no
-    column and no coupling of the damping feels are left out: the multipliers of their positions are one,
-    those of their velocities follow from `Frame.drift`. Modes left out leave their static flexibility.
+    Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
+    positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static
+    flexibility.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    modes : int
+        Most modes kept, lowest first; all where there are no more.
+
+    Returns
+    -------
+    Frame
+        Squared frequencies (n,) [1/s^2], damping (n, n) [1/s] and the rest.
     """
     system, reference = problem.system, np.maximum(problem.reference, 0.0)
     stiffness = system.K + (system.W * reference) @ system.W.T

@@ -208,8 +208,17 @@ def exponents_of(
 ) -> LyapunovExponents:
     """Compute Lyapunov exponents (count,) [1/s] of a run, and their error from a coarser one beside it.
 
-    ``finer`` and ``coarser`` integrate the problem and its tangents from passage to passage, ``start`` is the
-    first displacement [m] and velocity [m/s], (n,) each; the coarser run covers the first ``beside`` points.
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    finer, coarser
+        Integrators of the problem and its tangents from passage to passage, with ``size``, ``period`` [s],
+        ``divergence`` [1/s] and ``passages(start)``.
+    start : pair of (n,) arrays
+        Displacement [m] and velocity [m/s] at the first passage.
+    chosen : LyapunovOptions
+    beside : int
+        Points that the coarser run covers.
     """
     count, points = chosen.count, chosen.points
     if count > finer.size:
