@@ -152,7 +152,7 @@ def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarr
 
 
 def rotation_approach(n_planets: int) -> np.ndarray:
-    """Make the approach of the drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
+    """Compute the approach of drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
     N = n_planets
     return np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
 

@@ -69,12 +69,8 @@ class PeriodicSolution:
     verdict: FloquetVerdict = field(default_factory=lambda: open_verdict("not asked for"))
 
     def __post_init__(self):
-        for name, kind in (
-            ("frequency", float),
-            ("orders", int),
-            ("deflection", complex),
-            ("force", complex),
-        ):
+        kinds = {"frequency": float, "orders": int, "deflection": complex, "force": complex}
+        for name, kind in kinds.items():
             array = np.array(getattr(self, name), kind)
             array.setflags(write=False)
             object.__setattr__(self, name, array)

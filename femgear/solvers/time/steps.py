@@ -340,14 +340,15 @@ def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
 
 
 class Scheme(Protocol):
-    """A rule for one step of a given length, with its matrices factorised.
+    """A rule for one step of a given length [s], with its matrices factorised.
 
-    ``flexibility`` (n_c, n_c): ``A``. ``start(q, v, theta, law)``: first state and g. ``table(theta)``: from
-    phases (n + 1, n_bases) what the loads do in n steps, first axis n. ``free(state, g, load)``: state after
-    the step without ``g_1``, ``deflection(state, load)`` its columns, ``finish(state, g_1)`` state with it.
-    ``columns(states, g, theta)`` (..., n_c), ``motion(states, g, theta)``: displacements, velocities and,
-    where the rule knows them, accelerations (n + 1, n). ``local_error(states, g)`` (n,): estimated error of
-    the displacements in the steps, in the norm of the mass matrix.
+    ``flexibility`` (n_c, n_c) [m/N]: ``A``. ``start(q, v, theta, law)``: first state and g (n_c,) [N] of a
+    motion (dofs,) [m, m/s]. ``table(theta)``: from phases (n + 1, n_bases) [rad] what the loads do in n
+    steps, first axis n. ``free(state, g, load)``: state after the step without ``g_1``,
+    ``deflection(state, load)`` its columns (n_c,) [m], ``finish(state, g_1)`` state with it.
+    ``columns(states, g, theta)`` (..., n_c) [m], ``motion(states, g, theta)``: displacements, velocities and,
+    where the rule knows them, accelerations (n + 1, dofs) [m, m/s, m/s^2]. ``local_error(states, g)`` (n,):
+    estimated error of the displacements in the steps, in the norm of the mass matrix [m kg^1/2].
     """
 
     step: float
@@ -375,7 +376,7 @@ class Scheme(Protocol):
 class Marched:
     """States of a block of steps, the one before the first included.
 
-    ``states`` (n + 1, ...), ``excess`` (n + 1, n_c) column forces beyond the reference, ``steps`` done,
+    ``states`` (n + 1, ...), ``excess`` (n + 1, n_c) [N] column forces beyond the reference, ``steps`` done,
     ``residual`` the largest violation of the column equations relative to the deflections, ``iterations``.
     """
 

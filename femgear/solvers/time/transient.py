@@ -162,7 +162,7 @@ def step_scheme(
     radius: float = 0.8,
     count: int | None = None,
 ) -> tuple[Scheme, int]:
-    """Make the scheme of a fixed-step method, and count its steps [s] that make a span [s].
+    """Make the scheme of a fixed-step method, factorised, and count its steps in a span [s].
 
     Parameters
     ----------
