@@ -28,7 +28,6 @@ from femgear.fe.compliance import (
     interpolation,
     mirror_nodes,
     mirrored_columns,
-    split_sector,
     tooth_compliance,
 )
 from femgear.fe.elasticity import BoundaryStress, Material, stiffness, tangential_stress
@@ -77,7 +76,7 @@ class ObservedRoot:
 
     along: BoundaryStress  # functionals of the tangential stress along the root of the left flank
     stations: _FlankStations  # where the loads act
-    schur: SectorSchur  # sector with these loads and observations, those of the cuts themselves included
+    schur: SectorSchur  # sector with these loads and observations
 
 
 @dataclass(frozen=True)
@@ -214,7 +213,7 @@ def flank_compliance(
     root = None
     if along is not None:
         schur, seen = _split_observations(schur, 2 * len(stations.roll))
-        root = ObservedRoot(along, stations, with_cut(seen, grid, held, along))
+        root = ObservedRoot(along, stations, seen)
     found = _without_half_plane(gear, material, stations, depths, tooth_compliance(schur), len(grid.points))
     return replace(found, root=root)
 
@@ -275,13 +274,6 @@ def root_functionals(grid: Grid, gear: Gear, material: Material, *, state: str) 
     return tangential_stress(grid, material, names[::-1] if gear.internal else names, state=state)
 
 
-def with_cut(schur: SectorSchur, grid: Grid, held: str | None, along: BoundaryStress) -> SectorSchur:
-    """Add what the root functionals see of the cut itself: the last edge of the root ends on it."""
-    _, right, left = split_sector(grid, held)
-    both = np.hstack([along.columns, mirrored_columns(along.columns, mirror_nodes(grid))])
-    return replace(schur, observation_cut=schur.observation_cut + np.stack([both[right], both[left]]))
-
-
 def station_weights(roll, stations):
     """Compute indices and cubic Lagrange weights (..., 4) on equidistant stations (n,) [m].
 
@@ -334,13 +326,12 @@ def _condensed(grid, gear, stiffness, held, depth, along=None):
 
 
 def _split_observations(schur: SectorSchur, first: int) -> tuple[SectorSchur, SectorSchur]:
-    """The first observations of either half of the sector, and the others."""
-    rows = np.arange(len(schur.C)).reshape(2, -1)
-
-    def part(some) -> SectorSchur:
-        return replace(schur, C=schur.C[some], observation_cut=schur.observation_cut[..., some])
-
-    return part(rows[:, :first].ravel()), part(rows[:, first:].ravel())
+    """The first observations, and the others."""
+    compliance, cut = schur.compliance, schur.observation_cut
+    return (
+        replace(schur, compliance=compliance[:, :first], observation_cut=cut[..., :first]),
+        replace(schur, compliance=compliance[:, first:], observation_cut=cut[..., first:]),
+    )
 
 
 def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:

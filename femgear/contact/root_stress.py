@@ -24,7 +24,6 @@ from femgear.contact.bodies import (
     flank_stations,
     root_functionals,
     station_weights,
-    with_cut,
 )
 from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks
@@ -225,7 +224,7 @@ def root_stress(
         loads=flank_load_columns(grid, stations),
         observations=along.columns,
     )
-    return observed_root_stress(gear, ObservedRoot(along, stations, with_cut(schur, grid, held, along)))
+    return observed_root_stress(gear, ObservedRoot(along, stations, schur))
 
 
 def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:

@@ -1,15 +1,17 @@
 """Compliance and static displacement of a cyclic body from one tooth sector, factored once.
 
-The body is ``count`` copies of one mirror-symmetric sector. In the frame of each sector the cut
-displacements are tied by ``u_L(k) = Q u_R(k + 1)``, ``Q`` being the rotation by the sector angle
-``a``. A discrete Fourier transform over the sectors (Thomas, "Dynamics of rotationally periodic
-structures", Int. J. Numer. Meth. Eng. 14, 1979) decouples the body into one small problem for each
-harmonic ``n``; for static loads on the interior of the sector these are
+The body is ``count`` copies of one mirror-symmetric sector, whose cut displacements are tied by
+``u_L(k) = u_R(k + 1)`` in polar components. A discrete Fourier transform over the sectors (Thomas, "Dynamics
+of rotationally periodic structures", Int. J. Numer. Meth. Eng. 14, 1979) decouples the body into one small
+problem for each harmonic ``n``. Every field of a sector is the sum of one that is symmetric about its centre
+line and of one that is antisymmetric; with ``S`` and ``A`` those of unit displacements of the left cut, the
+tie makes ``a_r = i tan(n a / 2) s_r`` and ``s_t = i tan(n a / 2) a_t``. For static loads both follow from one
+vector ``w``, with ``s = D_s w``, ``a = i D_a w``, ``D_s = diag(cos, -sin)``, ``D_a = diag(sin, cos)`` of
+``n a / 2``, and from real matrices,
 
-    A_n = S_RR + Q^T S_LL Q + e^{i n a} S_RL Q + e^{-i n a} Q^T S_LR
-    H_n = C + Pd_n^H A_n^{-1} Pf_n,      H(k - l) = (1/count) sum_n e^{i n a (k - l)} H_n
+    (D_s S_S D_s + D_a S_A D_a) w = D_s P_S f_S - i D_a P_A f_A
 
-with ``S`` the Schur complement of the sector on its two cuts.
+with ``S`` the Schur complements of the half sector on its cut and ``P`` what loads exert on it.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from femgear.errors import GridError
@@ -26,32 +28,31 @@ from femgear.fe.grid import Grid, shape_functions
 
 @dataclass(frozen=True)
 class SectorSchur:
-    """A sector condensed on its two cuts, with loads and observations on its interior.
+    """A sector condensed on its cut, with loads and observations; symmetric fields first, then the others.
 
     Parameters
     ----------
     count : int
         Number of sectors in the body.
-    S : (2, 2, nb, nb) array
-        Schur complement [N/m]; the leading indices are the cut (0 right, 1 left).
-    C : (n_observations, n_loads) array
-        Interior compliance with both cuts held [m/N].
-    load_cut, observation_cut : (2, nb, n) arrays
-        Forces on the held cuts per unit load and per unit adjoint load.
-    rotation : (nb, nb) array
-        Block rotation by the sector angle.
+    stiffness : (2, nb, nb) array
+        Schur complements for displacements of the left cut, radial and tangential node by node [N/m].
+    compliance : (2, n_observations, n_loads) array
+        With the cut held [m/N].
+    load_cut : (2, nb, n_loads) array
+        Forces on the held cut per unit load.
+    observation_cut : (2, nb, n_observations) array
+        Observations per unit displacement of the cut.
     """
 
     count: int
-    S: np.ndarray
-    C: np.ndarray
+    stiffness: np.ndarray
+    compliance: np.ndarray
     load_cut: np.ndarray
     observation_cut: np.ndarray
-    rotation: np.ndarray
 
 
-def symmetric_factor(matrix) -> SuperLU:
-    """Factor a sparse symmetric stiffness matrix (SuperLU in symmetric mode).
+def symmetric_factor(matrix, *, ordering: str = "MMD_AT_PLUS_A") -> SuperLU:
+    """Factor a sparse symmetric stiffness matrix [N/m] (SuperLU in symmetric mode).
 
     Raises
     ------
@@ -60,7 +61,7 @@ def symmetric_factor(matrix) -> SuperLU:
     """
     options = {"SymmetricMode": True}
     try:
-        return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        return splu(matrix.tocsc(), permc_spec=ordering, diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise GridError(
             f"the stiffness matrix of a sector is singular ({error})",
@@ -187,10 +188,11 @@ def cut_rotation(count: int, size: int) -> np.ndarray:
 def condense_sector(
     grid: Grid, stiffness, *, count: int, held: str | None, loads: np.ndarray, observations: np.ndarray
 ) -> SectorSchur:
-    """Condense a mirror-symmetric sector on its cuts.
+    """Condense a mirror-symmetric sector on its cut.
 
-    Loads and observations are given for the left half (y > 0) only; their mirror images are appended, so
-    that the result has twice the number of columns.
+    Loads and observations are unknowns behind those of the cut: one factor holds the Schur complement of all.
+    The signs on its diagonal make it quasidefinite, which needs no pivoting (Vanderbei, SIAM J. Optim. 5,
+    1995).
 
     Parameters
     ----------
@@ -203,26 +205,99 @@ def condense_sector(
     held : str or None
         Boundary that cannot move; None when a foundation is part of `stiffness`.
     loads : (2n, m) array
-        Nodal forces of the left loads.
+        Nodal forces, none on the cuts; the images of these loads are understood.
     observations : (2n, mo) array
-        Displacement functionals of the left observations.
+        Displacement functionals; the images of these are understood.
+
+    Raises
+    ------
+    GridError
+        A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
-    interior, _, left = parts = split_sector(grid, held)
-    image = mirror_nodes(grid)
-    adjoint = np.hstack([observations, mirrored_columns(observations, image)])[interior]
-    solution = solve_interior(grid, stiffness, parts, loads)
-    full = np.zeros((stiffness.shape[0], loads.shape[1]))
-    full[interior] = solution.loads
-    X_f = np.hstack([solution.loads, mirrored_columns(full, image)[interior]])
-    nl = len(left)
-    return SectorSchur(
-        count=count,
-        S=solution.schur.reshape(2, nl, 2, nl).transpose(0, 2, 1, 3),
-        C=adjoint.T @ X_f,
-        load_cut=-(solution.coupling.T @ X_f).reshape(2, nl, -1),
-        observation_cut=-(solution.cut.T @ adjoint).reshape(2, nl, -1),
-        rotation=cut_rotation(count, nl),
-    )
+    cut = np.concatenate([boundary_nodes(grid, name) for name in ("cut_right", "cut_left")])
+    if np.any(loads[dof_pairs(cut)]):
+        raise GridError("a load acts on a cut of the sector", code="E-GRID")
+    columns = csc_array(np.hstack([loads, observations]))
+    f, d = np.split(np.arange(loads.shape[1] + observations.shape[1]), [loads.shape[1]])
+    parts = []
+    for fields, inner in _half_sector_fields(grid, held):
+        schur = _schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner)
+        size = len(schur) - len(f) - len(d)
+        K, P, C = schur[:size, :size], schur[:size, size:], -schur[size:, size:]
+        parts.append((0.5 * (K + K.T), C[np.ix_(d, f)], P[:, f], P[:, d]))
+    return SectorSchur(count, *(np.stack(part) for part in zip(*parts, strict=True)))
+
+
+def _half_sector_fields(grid: Grid, held: str | None) -> list[tuple[csc_array, int]]:
+    """Symmetric and antisymmetric displacements of a sector from those of its left half.
+
+    Matrices (2n, m) from the unknowns of the half sector, in an order that keeps their factor sparse and the
+    radial and tangential displacements of the cut last, and the number of those before the cut.
+    """
+    image, points = mirror_nodes(grid), np.asarray(grid.points)
+    fixed = boundary_nodes(grid, held) if held else np.zeros(0, int)
+    cut = np.setdiff1d(boundary_nodes(grid, "cut_left"), fixed)
+    cut = cut[np.argsort(np.hypot(*points[cut].T))]
+    on_axis = image == np.arange(len(points))
+    left = on_axis | (points[:, 1] > 0)
+    left[np.concatenate([fixed, cut])] = False
+    inner = np.flatnonzero(left)
+    inner = inner[_sparse_order(grid.triangles, inner, len(points))]
+    cos, sin = points[cut].T / np.hypot(*points[cut].T)
+    # unknowns of the inner nodes, then radial and tangential ones of the cut
+    rows = [dof_pairs(inner), *(np.repeat(2 * cut + c, 2) for c in (0, 1))]
+    at, on_cut = np.split(np.arange(2 * len(inner) + 2 * len(cut)), [2 * len(inner)])
+    values = [np.ones(len(at)), np.column_stack([cos, -sin]).ravel(), np.column_stack([sin, cos]).ravel()]
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate([at, on_cut, on_cut]))
+    half = csr_array(entries, shape=(2 * len(points), len(at) + len(on_cut)))
+    # of a node on the centre line both are one displacement, and the other one is zero
+    once = diags_array(1.0 / np.repeat(1.0 + on_axis, 2))
+    found = []
+    for sign in (1.0, -1.0):
+        reflected = diags_array(np.tile([sign, -sign], len(points))) @ half[dof_pairs(image)]
+        fields = csc_array(once @ (half + reflected))
+        moved = np.flatnonzero(abs(fields).sum(axis=0))
+        found.append((fields[:, moved], len(moved) - len(on_cut)))
+    return found
+
+
+def _sparse_order(triangles, nodes, count: int) -> np.ndarray:
+    """Order of some of `count` nodes in which their stiffness has a sparse factor (minimum degree)."""
+    at = np.repeat(np.arange(len(triangles)), triangles.shape[1])
+    incidence = csr_array((np.ones(triangles.size), (at, triangles.ravel())), shape=(len(triangles), count))
+    incidence = incidence[:, nodes]
+    graph = incidence.T @ incidence + triangles.size * eye_array(len(nodes))
+    return np.argsort(symmetric_factor(graph).perm_c)
+
+
+def _schur_complement(matrix, columns, inner: int) -> np.ndarray:
+    """Schur complement of ``[[matrix, columns], [columns^T, 0]]`` on all but the first `inner` unknowns."""
+    size, count = columns.shape
+    diagonal = matrix.diagonal()[:inner].mean()
+    length = np.sqrt((columns * columns).sum(axis=0))
+    scale = diagonal / np.where(length > 0, length, 1.0)
+    columns = columns @ diags_array(scale)
+    shift = np.where(np.arange(size + count) < size, diagonal, -diagonal)
+    shift[:inner] = 0.0
+    whole = block_array([[matrix, columns], [columns.T, None]], format="csc") + diags_array(shift)
+    factor = symmetric_factor(whole, ordering="NATURAL")
+    last = slice(inner, None)
+    schur = factor.L[:, last][last].toarray() @ factor.U[:, last][last].toarray()
+    # by the factor and by its last part alone
+    right = np.zeros(size + count)
+    right[last] = np.random.default_rng(0).standard_normal(size + count - inner)
+    solution = factor.solve(right)
+    residual = max(np.abs(whole @ solution - right).max(), np.abs(schur @ solution[last] - right[last]).max())
+    if not residual < 1e-8:
+        raise GridError(
+            f"the sector solution has a relative residual of {residual:.1e}",
+            code="E-RESIDUAL",
+            limit="1e-8",
+            remedy="the body is not held, or its grid is distorted",
+        )
+    schur -= np.diag(shift[last])
+    unscale = np.append(np.ones(size - inner), 1.0 / scale)
+    return unscale[:, None] * schur * unscale
 
 
 @dataclass(frozen=True)
@@ -283,14 +358,27 @@ def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> _Interior
 
 
 def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
-    """Compliance ``H_n`` of each cyclic harmonic, shape (len(harmonics), n_observations, n_loads)."""
-    Q, S = schur.rotation, schur.S
-    RL, own = S[0, 1] @ Q, S[0, 0] + Q.T @ S[1, 1] @ Q
-    tied_load, tied_observation = (Q.T @ part[1] for part in (schur.load_cut, schur.observation_cut))
-    result = np.empty((len(harmonics), *schur.C.shape), complex)
+    """Compute the compliance [m/N] of each cyclic harmonic.
+
+    Returns
+    -------
+    (len(harmonics), 2 n_observations, 2 n_loads) complex array
+        The images of all observations behind them, and those of all loads.
+
+    Raises
+    ------
+    GridError
+        E-GRID-FREE: the body can move freely.
+    """
+    observed, loaded = schur.compliance.shape[1:]
+    result = np.empty((len(harmonics), 2, observed, 2, loaded), complex)
+    # the image of an observation or a load takes antisymmetric fields the other way
+    seen, acting = np.array([1.0, -1.0])[:, None, None, None], np.array([1.0, -1.0])[:, None]
     for row, n in enumerate(harmonics):  # one at a time: all the matrices of a deep body would take gigabytes
-        phase = np.exp(2j * np.pi * n / schur.count)
-        A = own + phase * RL + np.conj(phase) * RL.T
+        turn = np.pi * n / schur.count
+        ties = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        ties = np.tile(ties, schur.stiffness.shape[1] // 2)[..., None]
+        A = (ties * schur.stiffness * ties.transpose(0, 2, 1)).sum(axis=0)
         if n % schur.count in (0, 1, schur.count - 1):  # rotation is the harmonic 0, translation the first
             values = np.linalg.eigvalsh(A)
             if values[0] < 1e-13 * values[-1]:
@@ -299,10 +387,14 @@ def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
                     code="E-GRID-FREE",
                     remedy="hold its bore or its rim, or put it on a foundation",
                 )
-        P_f = schur.load_cut[0] + np.conj(phase) * tied_load
-        P_d = schur.observation_cut[0] + np.conj(phase) * tied_observation
-        result[row] = schur.C + P_d.conj().T @ np.linalg.solve(A, P_f)
-    return result
+        loads, observations = (
+            np.concatenate(ties * cut, axis=1) for cut in (schur.load_cut, schur.observation_cut)
+        )
+        tied = (observations.T @ np.linalg.solve(A, loads)).reshape(2, observed, 1, 2, loaded)
+        symmetric, antisymmetric = (schur.compliance[i, :, None] + tied[i, :, :, i] for i in (0, 1))
+        result[row] = symmetric + seen * acting * antisymmetric
+        result[row] += 1j * (seen * tied[1, :, :, 0] - acting * tied[0, :, :, 1])
+    return result.reshape(len(harmonics), 2 * observed, 2 * loaded)
 
 
 def tooth_compliance(schur: SectorSchur) -> np.ndarray:

@@ -128,8 +128,20 @@ def save_figure(figure: Figure, path: str | os.PathLike) -> None:
 
 def png_bytes(figure: Figure) -> bytes:
     """Draw the figure as PNG; the same figure gives the same bytes."""
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=_DPI, metadata={"Software": None})
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    stream, engine, dpi = io.BytesIO(), figure.get_layout_engine(), figure.dpi
+    canvas = FigureCanvasAgg(figure)
+    figure.dpi = _DPI
+    if engine is not None:
+        # `savefig` would draw everything once to find the layout
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    try:
+        canvas.print_png(stream, metadata={"Software": None})
+    finally:
+        figure.dpi = dpi
+        figure.set_layout_engine(engine)
     return stream.getvalue()
 
 

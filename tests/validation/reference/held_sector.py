@@ -1,5 +1,7 @@
 """Flank compliance of a body that is one sector of a gear."""
 
+import numpy as np
+
 from femgear.contact.bodies import FlankCompliance, _condensed, _without_half_plane
 from femgear.fe.elasticity import Material
 from femgear.fe.grid import Grid
@@ -14,4 +16,6 @@ def held_sector_compliance(
     Parameters and errors are those of `femgear.contact.bodies.flank_compliance`; the result counts one tooth.
     """
     stations, depths, schur = _condensed(grid, gear, stiffness, held, depth)
-    return _without_half_plane(gear, material, stations, depths, schur.C[None], len(grid.points))
+    even, odd = schur.compliance
+    held_compliance = np.block([[even + odd, even - odd], [even - odd, even + odd]])[None]
+    return _without_half_plane(gear, material, stations, depths, held_compliance, len(grid.points))
