@@ -29,7 +29,7 @@ _SEEN = 1e-9
 
 
 def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
-    """Refuse a set that cannot be assembled or run, and list what deserves a warning.
+    """Check the assembly and the meshes of a planetary set, and list what deserves a warning.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
 
 
 def tip_clearances(planetary: PlanetarySet) -> dict[str, float]:
-    """Radial clearances [m] between tip and root circles, named by the gear whose tip it is and the mesh."""
+    """Compute the radial clearances [m] between tip and root circles, by the gears of tip and root."""
     s, a = planetary, planetary.centre_distance
     return {
         "sun tip to planet root": a - s.sun.tip_radius - s.planet.root_radius,
@@ -326,7 +326,7 @@ def _fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
 
 
 def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
-    """Angle [rad] at the ring by which the tip corners of a planet in a ring miss each other.
+    """Compute the angle [rad] at the ring by which the tip corners of a planet in a ring miss each other.
 
     ``z1/z2 (phi1 + inv(aa1) - inv(aw)) + inv(aw) - inv(aa2) - phi2`` with the angles phi1, phi2 of the
     crossing of both tip circles at the two centres (Colbourne, The Geometry of Involute Gears, ch. 8):
@@ -345,7 +345,10 @@ def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
 
 
 def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None:
-    """Refuse tips that strike each other outside the path of contact (E-INTERFERENCE), see `tip_margin`."""
+    """Refuse tips that strike each other outside the path of contact (E-INTERFERENCE).
+
+    The centre distance is in m, as for `tip_margin`.
+    """
     margin = tip_margin(planet, ring, centre_distance)
     if margin < 0.0:
         raise GeometryError(

@@ -120,7 +120,7 @@ class SetDeviations:
             object.__setattr__(self, name, array)
 
     def mesh_forms(self, kind: int, back: bool) -> tuple[FlankForm, FlankForm]:
-        """Modifications of gear 1 and gear 2 in the sun-planet (0) or planet-ring (1) meshes.
+        """Find the modifications of gear 1 and gear 2 in the sun-planet (0) or planet-ring (1) meshes.
 
         On the back side a planet meets sun and ring with its other flanks.
         """
@@ -144,7 +144,7 @@ class SetDeviations:
 
 
 def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:
-    """Deviations of ideal gears: none. `dataclasses.replace` puts in what there is."""
+    """Make the deviations of ideal gears: none. `dataclasses.replace` puts in what there is."""
     s, N = planetary_set, planetary_set.n_planets
     return SetDeviations(
         sun=FlankForm(),
@@ -184,10 +184,11 @@ def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarr
 def profile_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, kind: int, roll_1, roll_2, *, back: bool = False
 ):
-    """Compute the separation [m] of two flanks by their modifications.
+    """Compute the separation [m] of two flanks by their modifications, of the shape of both roll lengths.
 
     Parameters
     ----------
+    deviations, planetary_set : SetDeviations, PlanetarySet
     kind : int
         0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
     roll_1, roll_2 : arrays that broadcast
@@ -202,10 +203,11 @@ def profile_separation(
 
 
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):
-    """Compute the separation [m] of the loaded flanks of two teeth by their pitch deviations.
+    """Compute the separation [m] of the loaded flanks of teeth by pitch deviations, of the teeth's shape.
 
     Parameters
     ----------
+    deviations : SetDeviations
     mesh : int
         0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring.
     tooth_1, tooth_2 : integer arrays that broadcast
@@ -280,7 +282,7 @@ def _oval(ovality: Ovality, psi: np.ndarray, ring_angle: np.ndarray) -> np.ndarr
 def common_period(
     deviations: SetDeviations, planetary_set: PlanetarySet, *, limit: int = LONGEST_RECORD
 ) -> tuple[int, str]:
-    """Find the number of mesh periods after which everything repeats.
+    """Find the number of mesh periods after which a set with deviations repeats.
 
     A member whose teeth or whose axis deviate repeats after the mesh periods of its own turn against the
     carrier, one a tooth, or after an integer part of it if the deviations repeat earlier; all together after
@@ -396,7 +398,7 @@ def _reflected(runout: Runout, axis: float) -> Runout:
 
 
 def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[GeometryWarning, ...]:
-    """Refuse modifications that together are not plausible, and list what deserves a warning.
+    """Check the deviations of a planetary set, and list what deserves a warning.
 
     Returns
     -------

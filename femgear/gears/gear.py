@@ -192,7 +192,7 @@ class Gear:
 
 
 def half_thickness_angle(gear: Gear, radius):
-    """Angle [rad] between tooth centreline and flank at a radius [m] (float or array).
+    """Compute the angle [rad] between tooth centreline and flank at a radius [m] (float or array).
 
     External ``eta_b - inv(alpha_r)``, internal ``eta_b + inv(alpha_r)``, ``cos(alpha_r) = r_b / r``
     (ISO 21771, eq. 42); ``radius`` must lie on the involute, at or outside the base circle.
@@ -202,17 +202,20 @@ def half_thickness_angle(gear: Gear, radius):
 
 
 def tooth_thickness(gear: Gear, radius):
-    """Arc [m] of the tooth at a radius [m] (float or array), ``2 r eta(r)``."""
+    """Compute the arc [m] of the tooth at a radius [m] (float or array), ``2 r eta(r)``."""
     return 2.0 * radius * half_thickness_angle(gear, radius)
 
 
 def roll_length(gear: Gear, radius):
-    """Roll length ``sqrt(r^2 - r_b^2)`` [m] of flank points at a radius [m] (float or array)."""
+    """Compute the roll length ``sqrt(r^2 - r_b^2)`` [m] of flank points at a radius [m] (float or array)."""
     return roll(radius, gear.base_radius)
 
 
 def working_half_angles(one: Gear, two: Gear, angle: float) -> tuple[float, float]:
-    """Half-thickness angles [rad] of two gears on their working pitch circles, ``r_w = r_b / cos(angle)``."""
+    """Compute the half-thickness angles [rad] of two gears on their working pitch circles.
+
+    The circles have the radii ``r_b / cos(angle)``, with the working pressure angle [rad].
+    """
     cosine = math.cos(angle)
     return (
         float(half_thickness_angle(one, one.base_radius / cosine)),
@@ -221,7 +224,7 @@ def working_half_angles(one: Gear, two: Gear, angle: float) -> tuple[float, floa
 
 
 def flank_points(gear: Gear, roll_lengths) -> np.ndarray:
-    """Points (n, 2) [m] of the left flank (y > 0, tooth on the x axis) at roll lengths (n,) [m]."""
+    """Compute points (n, 2) [m] of the left flank (y > 0, tooth on the x axis) at roll lengths (n,) [m]."""
     s = np.asarray(roll_lengths, dtype=float)
     radius = np.hypot(gear.base_radius, s)
     involute = inv(np.arctan2(s, gear.base_radius))
@@ -230,7 +233,7 @@ def flank_points(gear: Gear, roll_lengths) -> np.ndarray:
 
 
 def cutter_of(gear: Gear) -> PinionCutter:
-    """Pinion cutter of an internal gear, by default of 30 unshifted teeth, or 12 fewer than the gear's."""
+    """Choose the cutter of an internal gear, by default of 30 unshifted teeth or 12 fewer than the gear."""
     return gear.cutter or PinionCutter(teeth=max(5, min(30, gear.teeth - 12)))
 
 
@@ -446,8 +449,7 @@ def _largest_rounding(gear: Gear) -> float:
 
 def _check_flank(gear: Gear) -> None:
     """A tooth with a top land and a flank."""
-    involute = inv(pressure_angle_at(gear.tip_radius, gear.base_radius))
-    half = gear.base_half_angle + (involute if gear.internal else -involute)
+    half = half_thickness_angle(gear, gear.tip_radius)
     if half <= 0.0:
         _refuse(
             gear,

@@ -52,20 +52,20 @@ class NominalRootStress:
 
 
 def zone_factor(pressure_angle: float, working_angle: float) -> float:
-    """Z_H = ``sqrt(2 cos(alpha_w) / (cos^2(alpha) sin(alpha_w)))`` of spur gears (ISO 6336-2, section 6).
+    """Compute the zone factor Z_H of spur gears (ISO 6336-2, section 6).
 
-    Pressure angle alpha and working pressure angle alpha_w are in rad.
+    ``sqrt(2 cos(alpha_w) / (cos^2(alpha) sin(alpha_w)))``, pressure angle and working pressure angle in rad.
     """
     return math.sqrt(2.0 / math.tan(working_angle)) / math.cos(pressure_angle)
 
 
 def elasticity_factor(youngs_modulus: float, poisson_ratio: float) -> float:
-    """Z_E = ``sqrt(E / (2 pi (1 - nu^2)))`` [Pa^0.5] of one material, E in Pa (ISO 6336-2, section 7)."""
+    """Compute Z_E = ``sqrt(E / (2 pi (1 - nu^2)))`` [Pa^0.5] of one material, E in Pa (ISO 6336-2, 7)."""
     return math.sqrt(youngs_modulus / (2.0 * math.pi * (1.0 - poisson_ratio**2)))
 
 
 def contact_ratio_factor(contact_ratio: float) -> float:
-    """Z_eps = ``sqrt((4 - eps_alpha)/3)`` of spur gears (ISO 6336-2, section 8)."""
+    """Compute the contact ratio factor Z_eps = ``sqrt((4 - eps_alpha)/3)`` (ISO 6336-2, section 8)."""
     _check_contact_ratio(contact_ratio)
     return math.sqrt((4.0 - contact_ratio) / 3.0)
 
@@ -80,7 +80,9 @@ def nominal_contact_stress(
     youngs_modulus: float,
     poisson_ratio: float,
 ) -> float:
-    """Contact stress sigma_H0 [Pa] = ``Z_H Z_E Z_eps sqrt(F_t/(d_1 b) (u + 1)/u)`` (ISO 6336-2, section 5).
+    """Compute the nominal contact stress sigma_H0 [Pa] of a gear pair (ISO 6336-2, section 5).
+
+    ``Z_H Z_E Z_eps sqrt(F_t/(d_1 b) (u + 1)/u)``
 
     Parameters
     ----------
@@ -112,17 +114,18 @@ def nominal_contact_stress(
 
 
 def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: float) -> NominalRootStress:
-    """Root stress sigma_F0 = ``F_t/(b m) Y_F Y_S`` with the load at the outer point of single pair contact.
+    """Compute the nominal root stress sigma_F0 [Pa] of a gear, ``F_t/(b m) Y_F Y_S``.
 
-    Rim, deep-tooth and helix factors are 1. The critical section is where the tangent of the fillet stands at
-    30 deg (internal gears 60 deg) to the centreline of the tooth; the fillet of an internal gear enters
-    through the equivalent rack radius rho_fPv of its pinion cutter (ISO 6336-3, section 6.2).
+    The load acts at the outer point of single pair contact; rim, deep-tooth and helix factors are 1. The
+    critical section is where the tangent of the fillet stands at 30 deg (internal gears 60 deg) to the
+    centreline of the tooth; the fillet of an internal gear enters through the equivalent rack radius rho_fPv
+    of its pinion cutter (ISO 6336-3, section 6.2).
 
     Parameters
     ----------
     gear : Gear
     contact_ratio, tangential_force : float
-        As for `nominal_contact_stress`, with its mate.
+        As for `nominal_contact_stress`, with its mate [1, N].
 
     Raises
     ------
@@ -130,8 +133,8 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
         Contact ratio outside the range of the method, or a tooth that has no such section (E-ISO6336).
     """
     _check_contact_ratio(contact_ratio)
-    chord, fillet, (theta, G, rounding) = _critical_section(gear)
-    arm, angle, radius = _load(gear, contact_ratio, theta, G, rounding)
+    chord, fillet, direction, offset = _critical_section(gear)
+    arm, angle, radius = _load(gear, contact_ratio, direction, offset)
     if not (chord > 0.0 and arm > 0.0 and fillet > 0.0):
         raise GeometryError(
             "the tooth has no critical section: "
@@ -157,9 +160,9 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
 
 
 def stress_correction(slenderness: float, notch: float) -> float:
-    """Y_S = ``(1.2 + 0.13 L) q_s^(1/(1.21 + 2.3/L))`` of ISO 6336-3, made for 1 <= q_s < 8.
+    """Compute the stress correction factor Y_S (ISO 6336-3), made for 1 <= q_s < 8.
 
-    ``slenderness`` is L = s_Fn/h_Fe, ``notch`` is q_s = s_Fn/(2 rho_F).
+    ``(1.2 + 0.13 L) q_s^(1/(1.21 + 2.3/L))``; slenderness L = s_Fn/h_Fe, notch q_s = s_Fn/(2 rho_F).
     """
     return (1.2 + 0.13 * slenderness) * notch ** (1.0 / (1.21 + 2.3 / slenderness))
 
@@ -172,8 +175,12 @@ def _standard_signs(gear: Gear) -> tuple[float, float, float]:
     return sign * gear.teeth, shift, depth + shift
 
 
-def _critical_section(gear: Gear):
-    """Chord s_Fn, radius rho_F [modules]; auxiliaries theta, G, rho_fPv (ISO 6336-3, section 6.2)."""
+def _critical_section(gear: Gear) -> tuple[float, float, float, float]:
+    """Chord s_Fn and radius rho_F [modules] (ISO 6336-3, section 6.2).
+
+    With them what the moment arm follows from: ``pi/3 - theta`` (internal ``pi/6 - theta``) and
+    ``G / cos(theta) - rho_fPv``.
+    """
     z, shift, dedendum = _standard_signs(gear)
     alpha, rounding, limit = gear.pressure_angle, gear.rack.root_radius, math.pi / 3.0
     if gear.internal:
@@ -185,14 +192,11 @@ def _critical_section(gear: Gear):
     G = rounding - dedendum + shift
     theta = _solve_theta(z, G, 2.0 / z * (0.5 * math.pi - E) - limit, limit)
     offset = G / math.cos(theta) - rounding
-    if gear.internal:
-        chord = z * math.sin(limit - theta) + offset
-    else:
-        chord = z * math.sin(limit - theta) + math.sqrt(3.0) * offset
+    chord = z * math.sin(limit - theta) + (1.0 if gear.internal else math.sqrt(3.0)) * offset
     # published calculations after the corrected text of 2007 take the teeth of internal gears as positive in
     # this term alone, which makes the radius larger than that of the generated fillet
     growth = 2.0 * G**2 / (math.cos(theta) * (abs(z) * math.cos(theta) ** 2 - 2.0 * G))
-    return chord, rounding + growth, (theta, G, rounding)
+    return chord, rounding + growth, limit - theta, offset
 
 
 def _solve_theta(z: float, G: float, H: float, start: float) -> float:
@@ -211,7 +215,7 @@ def _solve_theta(z: float, G: float, H: float, start: float) -> float:
     )
 
 
-def _load(gear: Gear, contact_ratio: float, theta: float, G: float, rounding: float):
+def _load(gear: Gear, contact_ratio: float, direction: float, offset: float):
     """Arm h_Fe [modules], load angle alpha_Fen and radius [m] of the outer single contact."""
     z, shift, _ = _standard_signs(gear)
     sign = math.copysign(1.0, z)
@@ -221,12 +225,8 @@ def _load(gear: Gear, contact_ratio: float, theta: float, G: float, rounding: fl
     half = (0.5 * math.pi + 2.0 * shift * math.tan(gear.pressure_angle)) / z
     gamma = half + inv(gear.pressure_angle) - inv(alpha)
     angle = alpha - gamma
-    offset = G / math.cos(theta) - rounding
     reach = (math.cos(gamma) - math.sin(gamma) * math.tan(angle)) * sign * 2.0 * radius / gear.module
-    if gear.internal:
-        arm = 0.5 * (reach - z * math.cos(math.pi / 6.0 - theta) - math.sqrt(3.0) * offset)
-    else:
-        arm = 0.5 * (reach - z * math.cos(math.pi / 3.0 - theta) - offset)
+    arm = 0.5 * (reach - z * math.cos(direction) - (math.sqrt(3.0) if gear.internal else 1.0) * offset)
     return arm, angle, radius
 
 
@@ -244,7 +244,7 @@ def _check_contact_ratio(contact_ratio: float) -> None:
 def theoretical_single_stiffness(
     teeth_1: int, teeth_2: float, shift_1: float, shift_2: float, *, helix_angle: float = 0.0
 ) -> float:
-    """Theoretical single tooth-pair stiffness c'_th [N/m^2], per unit face width, of solid steel discs.
+    """Compute the theoretical stiffness c'_th [N/m^2] of a tooth pair of solid steel discs, per face width.
 
     ``1/c'_th = C1 + C2/z_n1 + C3/z_n2 + C4 x1 + C5 x1/z_n1 + C6 x2 + C7 x2/z_n2 + C8 x1^2 + C9 x2^2`` in
     mm um/N (ISO 6336-1, method B), fitted to x1 >= x2, -0.5 <= x1 + x2 <= 2 and 100 <= F_bt/b <= 1600 N/mm.
@@ -280,9 +280,10 @@ def theoretical_single_stiffness(
 
 
 def basic_rack_factor(*, dedendum: float, pressure_angle: float) -> float:
-    """C_B = ``[1 + 0.5 (1.2 - h_fP/m)] [1 - 0.02 (20 deg - alpha_n)]`` (ISO 6336-1, method B).
+    """Compute the basic rack factor C_B (ISO 6336-1, method B).
 
-    ``dedendum`` in modules (the mean of both gears when they differ), ``pressure_angle`` [rad].
+    ``[1 + 0.5 (1.2 - h_fP/m)] [1 - 0.02 (20 deg - alpha_n)]``; ``dedendum`` in modules (the mean of both
+    gears when they differ), ``pressure_angle`` [rad].
     """
     return (1.0 + 0.5 * (1.2 - dedendum)) * (1.0 - 0.02 * (20.0 - math.degrees(pressure_angle)))
 
@@ -298,7 +299,7 @@ def mesh_stiffness_method_b(
     pressure_angle: float = math.radians(20.0),
     helix_angle: float = 0.0,
 ) -> tuple[float, float]:
-    """Single stiffness c' and mean mesh stiffness c_gamma_alpha after ISO 6336-1, method B.
+    """Compute single stiffness c' and mean mesh stiffness c_gamma_alpha [N/m^2] after ISO 6336-1, method B.
 
     ``c' = c'_th C_M C_R C_B cos(beta)`` with C_M = 0.8, and ``c_gamma_alpha = c' (0.75 eps_alpha + 0.25)``,
     given for eps_alpha >= 1.2; under it the standard lets c' of spur gears be up to 10 % lower, not applied

@@ -53,7 +53,7 @@ class Torques:
 
 
 def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations:
-    """Rotations of all bodies at a position tau, loaded flanks touching.
+    """Compute the rotations [rad] of all bodies at a position tau, loaded flanks touching.
 
     tau is a fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
     ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``.
@@ -71,7 +71,7 @@ def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations
 
 
 def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> Speeds:
-    """Speeds of every body from one driven and one held member (Willis).
+    """Compute the speeds [rad/s] of every body from one driven and one held member (Willis).
 
     ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)``; the mesh frequency is
     ``|w_s - w_c| z_s / (2 pi)``.
@@ -109,7 +109,7 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
 
 
 def planet_motion(sun: Any, carrier: Any, sun_teeth: Any, planet_teeth: Any) -> tuple[Any, Any]:
-    """Speed of the planets about their own axes [rad/s] and mesh frequency [Hz].
+    """Compute the speed of the planets about their own axes [rad/s] and the mesh frequency [Hz].
 
     From the speeds of sun and carrier [rad/s] and the teeth, all numbers or arrays (S,) of several sets.
     """
@@ -118,9 +118,9 @@ def planet_motion(sun: Any, carrier: Any, sun_teeth: Any, planet_teeth: Any) -> 
 
 
 def torque_ratios(sun_teeth: int, ring_teeth: int) -> dict[str, float]:
-    """Torques of the members over that of the sun, which are the weights of their speeds (Willis), too.
+    """Compute the torques of sun, ring and carrier over that of the sun, the weights of their speeds, too.
 
-    Without losses ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``, and
+    Willis: without losses ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``, and
     ``T_s w_s + T_r w_r + T_c w_c = 0``.
     """
     ratio = ring_teeth / sun_teeth
@@ -128,17 +128,17 @@ def torque_ratios(sun_teeth: int, ring_teeth: int) -> dict[str, float]:
 
 
 def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
-    """External torques [N m] on sun, ring and carrier from that on one `member`, see `torque_ratios`."""
+    """Compute the external torques [N m] on sun, ring and carrier from that on one `member` [N m]."""
     share = torque_ratios(planetary.sun.teeth, planetary.ring.teeth)
     sun = torque / share[member]
     return Torques(sun=sun, ring=sun * share["ring"], carrier=sun * share["carrier"])
 
 
 def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarray:
-    """Unit vectors, (2N, 2), of the force of gear 1 on gear 2 in every mesh: its line of action.
+    """Compute the unit vectors (2N, 2) of the force of gear 1 on gear 2 in every mesh.
 
-    Sun on planet at ``psi + pi/2 - alpha_w``, planet on ring at ``psi - pi/2 + alpha_w`` (carrier frame); the
-    back flanks, with `back`, at ``psi - pi/2 + alpha_w`` and ``psi + pi/2 - alpha_w``.
+    Its line of action: sun on planet at ``psi + pi/2 - alpha_w``, planet on ring at ``psi - pi/2 + alpha_w``
+    (carrier frame); the back flanks, with `back`, at ``psi - pi/2 + alpha_w`` and ``psi + pi/2 - alpha_w``.
     """
     s = planetary_set
     psi, side = np.asarray(s.planet_angles), -1.0 if back else 1.0
@@ -152,15 +152,15 @@ def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarr
 
 
 def rotation_approach(n_planets: int) -> np.ndarray:
-    """Approach of the drive flanks per unit base-circle arc of each planet and of the sun, (2N, N + 1)."""
+    """Compute the approach of drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
     N = n_planets
     return np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
 
 
 def member_approach(planetary_set: PlanetarySet, *, back: bool = False) -> dict[str, np.ndarray]:
-    """Approach (2N, 2) of the flanks of every mesh per unit motion of sun, carrier and ring along x and y.
+    """Compute the approach (2N, 2) of all flanks per unit motion of sun, carrier and ring along x and y.
 
-    `back` is for the back flanks, as in `mesh_normals`.
+    A number without unit; `back` is for the back flanks, as in `mesh_normals`.
     """
     on_planet, on_ring = np.split(mesh_normals(planetary_set, back=back), 2)
     zero = np.zeros(on_planet.shape)

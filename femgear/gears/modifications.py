@@ -115,9 +115,9 @@ class FlankForm:
 
 
 def form_deviation(form: FlankForm, gear: Gear, roll):
-    """Compute the material removed from a flank at roll lengths (array of any shape) [m].
+    """Compute the material removed from a flank [m] at roll lengths [m], arrays of any one shape.
 
-    It is the separation along the flank normal [m], positive where material is missing; beyond the ends of
+    It is the separation along the flank normal, positive where material is missing; beyond the ends of
     the involute flank the value of that end holds.
     """
     low, high = sorted((gear.form_roll, gear.tip_roll))
@@ -154,7 +154,7 @@ def _modification_range(modification: Modification, gear: Gear) -> tuple[float, 
 def roll_at(
     gear: Gear, *, diameter: float | None = None, roll_angle: float | None = None, length: float | None = None
 ) -> float | None:
-    """Roll length [m] of a place on the flank from its diameter [m], roll angle [rad] or roll length [m].
+    """Find the roll length [m] of a place on the flank by its diameter [m], roll angle [rad] or itself [m].
 
     ``r_b xi`` and ``sqrt(d^2/4 - r_b^2)`` (ISO 21771-1); None when nothing is given.
 
@@ -219,7 +219,7 @@ def _place(gear: Gear, roll: float) -> str:
 
 
 def check_flank(flank: str, form: FlankForm, gear: Gear) -> Iterator[GeometryWarning]:
-    """Refuse modifications of a named flank that together are not plausible, and warn of short profiles.
+    """Check the modifications of a named flank together, and warn of short profiles.
 
     E-MODIFICATION: together they exceed `LARGEST_DEVIATION` modules; W-PROFILE: a measured profile covers
     less than `LEAST_COVERAGE` of its flank.

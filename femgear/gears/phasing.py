@@ -27,7 +27,7 @@ import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import TEETH_RANGE, is_whole
-from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angles, equal_planet_angles
+from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angles, check_planets
 
 CONVENTIONS = ("rotation", "printed")
 KINDS = ("in-phase", "counter-phased", "sequentially phased", "unequally phased")
@@ -74,7 +74,7 @@ class MeshPhasing:
 
     @property
     def n_planets(self) -> int:
-        """N"""
+        """Number N of planets."""
         return len(self.positions)
 
     @property
@@ -89,6 +89,7 @@ class MeshPhasing:
 
     @property
     def equally_spaced(self) -> bool:
+        """Whether the planets stand ``2 pi / N`` apart."""
         return all(m * self.n_planets == n * self.teeth_sum for n, m in enumerate(self.positions))
 
     @property
@@ -121,7 +122,7 @@ def mesh_phasing(
     convention: str = "rotation",
     lag: float = 0.0,
 ) -> MeshPhasing:
-    """Find the phases of planets at given angles.
+    """Find the phases of the meshes of planets at given angles [rad].
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ def mesh_phasing(
 def phasing_of_set(
     planetary_set: PlanetarySet, *, rotation: int = 1, flank: int = 1, convention: str = "rotation"
 ) -> MeshPhasing:
-    """Find the phases of a geared set, the lag of its planets from the real thickness of their teeth.
+    """Find the phases of the meshes of a geared set, the lag of its planets from their tooth thickness.
 
     ``rotation``, ``flank`` and ``convention`` are those of `MeshPhasing`.
     """
@@ -157,7 +158,7 @@ def phasing_of_set(
 
 
 def standard_lag(planet_teeth: int) -> float:
-    """Lag of a planet whose teeth are half a pitch thick, in [0, 1).
+    """Compute the lag [mesh periods] of a planet whose teeth are half a pitch thick, 0 or 1/2.
 
     Its working flanks are ``z_p / 2 - 1 / 2`` pitches apart: an odd planet touches sun and ring at their
     pitch points at the same time, an even one half a period apart (Parker and Lin, 2004).
@@ -174,7 +175,7 @@ def standard_lag(planet_teeth: int) -> float:
 
 
 def phase_factors(phasing: MeshPhasing, harmonics) -> np.ndarray:
-    """``exp(2 pi i h gamma_j)``, (H, 2N), for whole harmonics h."""
+    """Compute the phase factors ``exp(2 pi i h gamma_j)`` (H, 2N) of the meshes in whole harmonics h (H,)."""
     return np.exp(2j * np.pi * np.outer(check_harmonics(harmonics), phasing.phases))
 
 
@@ -221,7 +222,7 @@ def _phase_kinds(turns, positions, teeth_sum, harmonics) -> np.ndarray:
 
 
 def cyclic_harmonic(phasing: MeshPhasing, harmonics) -> np.ndarray:
-    """``k = mod(h z_s, N)`` of equally spaced planets, (H,) int; -1 for unequal spacing.
+    """Find ``k = mod(h z_s, N)`` (H,) of equally spaced planets in harmonics h (H,); -1 for unequal spacing.
 
     The rule of Parker (2000): k = 0 rotational, k = 1 or N - 1 translational, other k planet modes only.
     """
@@ -283,7 +284,7 @@ class PhasingTable:
 
 
 def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) -> PhasingTable:
-    """Cancellation of resultants and excitation of modes for harmonics of the mesh frequency.
+    """Tell which resultants cancel and which modes are excited in harmonics (H,) of the mesh frequency.
 
     The mesh forces of one harmonic act on sun and ring along directions that turn with psi_n, and at points
     that do. Torque and thrust are their plain sum (q = 0); lateral forces, and tilting moments of the axial
@@ -291,6 +292,11 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
     meshes, so that its resultant is sure to vanish where those of sun and ring both do. A. Kahraman (J. Mech.
     Des. 116, 1994, 713-720, Table 1) has the case of four equal planets, R. G. Parker (J. Sound Vib. 236,
     2000, 561-573) the sums for equal spacing.
+
+    Parameters
+    ----------
+    phasing : MeshPhasing
+    harmonics : (H,) sequence of int
 
     Raises
     ------
@@ -317,7 +323,7 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
 
 
 def check_harmonics(harmonics) -> np.ndarray:
-    """Harmonics as whole numbers from 1, (H,); refuses others (E-HARMONICS)."""
+    """Check harmonics (H,) of the mesh frequency: whole numbers from 1, others are refused (E-HARMONICS)."""
     found = np.atleast_1d(np.asarray(harmonics))
     if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
         message = f"harmonics {harmonics!r} of the mesh frequency"
@@ -437,7 +443,7 @@ class ToothChoices:
         return np.array(KINDS)[self.kind]
 
     def only(self, chosen) -> ToothChoices:
-        """The choices of a mask (C,) or of indices, in their order."""
+        """Take the choices of a mask (C,) or of indices, in their order."""
         return ToothChoices(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
 
 
@@ -478,7 +484,7 @@ def neighbouring_teeth(
     GeometryError
         Numbers out of range (E-CHOICE, E-RANGE).
     """
-    equal_planet_angles(planets)
+    check_planets(planets)
     wanted = (sun_teeth, planet_teeth, ring_teeth)
     _check(wanted, distance, ratio_tolerance, closure, harmonics)
     steps = np.arange(-distance, distance + 1)
@@ -495,7 +501,18 @@ def neighbouring_teeth(
 
 
 def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
-    """Refuse tooth numbers that make no set, and remark on those that shifts must help to one.
+    """Check the tooth numbers of a set, and remark on those that profile shifts must help to one.
+
+    Parameters
+    ----------
+    phasing : MeshPhasing
+        With the teeth of sun and ring and the positions of the planets.
+    planet_teeth : int
+
+    Returns
+    -------
+    tuple of str
+        Remarks in words: the shifts that are needed, tips of unshifted planets that overlap [modules].
 
     Raises
     ------
@@ -569,10 +586,8 @@ def _check(wanted, distance, ratio_tolerance, closure, harmonics) -> None:
     numbers |= {f"{name} teeth": (z, *TEETH_RANGE) for name, z in zip(("sun", "planet", "ring"), wanted)}
     for name, (value, least, most) in numbers.items():
         if not is_whole(value) or not least <= value <= most:
-            message, limit = (
-                f"neighbouring tooth numbers with {name} {value!r}",
-                f"a whole number, {least} to {most}",
-            )
+            message = f"neighbouring tooth numbers with {name} {value!r}"
+            limit = f"a whole number, {least} to {most}"
             raise GeometryError(message, code="E-CHOICE", key=name, limit=limit)
     if not (math.isfinite(ratio_tolerance) and ratio_tolerance >= 0.0):
         raise GeometryError(f"a ratio tolerance of {ratio_tolerance}", code="E-CHOICE", limit=">= 0")

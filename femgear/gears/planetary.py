@@ -63,23 +63,22 @@ class PlanetarySet:
 
     @property
     def n_planets(self) -> int:
-        """N"""
+        """Number N of planets."""
         return len(self.planet_angles)
 
     @property
     def mesh_names(self) -> tuple[str, ...]:
-        """Labels of the 2N meshes in order."""
-        numbers = range(1, self.n_planets + 1)
-        return tuple(f"sun-planet {n}" for n in numbers) + tuple(f"planet {n}-ring" for n in numbers)
+        """Names of the 2N meshes in order."""
+        return mesh_names(self.n_planets)
 
     @property
     def working_pressure_angle_sun_planet(self) -> float:
-        """[rad]"""
+        """Working pressure angle of the meshes with the sun [rad]."""
         return working_pressure_angle(self.sun, self.planet, self.centre_distance)
 
     @property
     def working_pressure_angle_planet_ring(self) -> float:
-        """[rad]"""
+        """Working pressure angle of the meshes with the ring [rad]."""
         return working_pressure_angle(self.planet, self.ring, self.centre_distance)
 
     @property
@@ -96,7 +95,7 @@ class PlanetarySet:
 
     @property
     def base_pitch(self) -> float:
-        """[m], common to all gears."""
+        """Pitch along the line of action [m], common to all gears."""
         return self.sun.base_pitch
 
     @property
@@ -151,11 +150,11 @@ class PlanetarySet:
         return _fraction(np.concatenate([sun_planet, planet_ring]))
 
     def equal_positions(self, wanted: int) -> int:
-        """Number of equidistant positions of a mesh period, `wanted` at least, that meet all planets alike.
+        """Find the number of equidistant positions of a mesh period that meet all planets alike.
 
-        A multiple of the common denominator of their phases: every planet then passes the same places of its
-        own mesh period. Where that would be more than four times `wanted`, planets that a rotation maps onto
-        one another alone are met alike.
+        At least `wanted`, and a multiple of the common denominator of their phases: every planet then passes
+        the same places of its own mesh period. Where that would be more than four times `wanted`, planets
+        that a rotation maps onto one another alone are met alike.
         """
         teeth = self.sun.teeth + self.ring.teeth
         away = np.asarray(self.planet_angles) - self.planet_angles[0]
@@ -176,6 +175,12 @@ class PlanetarySet:
                 if np.abs(np.mod(away + math.pi, 2.0 * math.pi) - math.pi).max() < 1e-9:
                     return turns
         return 1
+
+
+def mesh_names(n_planets: int) -> tuple[str, ...]:
+    """Name the 2N meshes of N planets, in the order of all their arrays."""
+    planets = range(1, n_planets + 1)
+    return (*(f"sun-planet {n}" for n in planets), *(f"planet {n}-ring" for n in planets))
 
 
 def close_set(
@@ -217,7 +222,7 @@ def close_set(
 
 
 def mirrored_set(planetary_set: PlanetarySet) -> tuple[PlanetarySet, np.ndarray]:
-    """Mirror a set: as it is seen from behind, and the places ``order`` of its planets in the original one.
+    """Mirror a set, as it is seen from behind, and tell the places ``order`` (N,) of its planets.
 
     Planet angles are counted the other way round, ascending from the first planet; mirrored planet ``i`` is
     original planet ``order[i]``.
@@ -229,7 +234,7 @@ def mirrored_set(planetary_set: PlanetarySet) -> tuple[PlanetarySet, np.ndarray]
 
 
 def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:
-    """Whole tooth numbers next to ``z / cos^3(beta)`` of sun, planet and ring, helix angle beta in rad."""
+    """Find whole tooth numbers next to ``z / cos^3(beta)`` of sun, planet and ring, helix angle in rad."""
     cube = math.cos(helix_angle) ** 3
     return round(gears.sun.teeth / cube), round(gears.planet.teeth / cube), round(gears.ring.teeth / cube)
 
@@ -289,7 +294,9 @@ def _tooth_sum(one: Gear, two: Gear) -> int:
 
 
 def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> float:
-    """Working pressure angle [rad] of two gears at a centre distance [m], ``cos(aw) = a0 cos(alpha) / a``.
+    """Compute the working pressure angle [rad] of two gears at a centre distance [m].
+
+    ``cos(aw) = a0 cos(alpha) / a``
 
     Raises
     ------
@@ -311,7 +318,7 @@ def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> floa
 
 
 def zero_backlash_distance(one: Gear, two: Gear) -> float:
-    """Centre distance [m] at which two gears run without play, allowances left aside.
+    """Compute the centre distance [m] at which two gears run without play, allowances left aside.
 
     External: ``inv(aw) = inv(a) + 2 tan(a) (x1 + x2)/(z1 + z2)`` (ISO 21771, eq. 60); internal (gear 2):
     ``inv(aw) = inv(a) + 2 tan(a) (x2 - x1)/(z2 - z1)``, shifts positive outwards.
@@ -340,22 +347,23 @@ def zero_backlash_distance(one: Gear, two: Gear) -> float:
 
 
 def zero_backlash_shift(one: Gear, two: Gear, centre_distance: float) -> float:
-    """Sum (external) or difference ``x2 - x1`` (internal) of shifts without play at a centre distance [m].
+    """Compute the sum or difference of profile shifts [modules] without play at a centre distance [m].
 
-    Inverse of `zero_backlash_distance` (ISO 21771, eq. 60).
+    The sum of external gears, ``x2 - x1`` where gear 2 is internal: inverse of `zero_backlash_distance`
+    (ISO 21771, eq. 60).
     """
     alpha, working = one.pressure_angle, working_pressure_angle(one, two, centre_distance)
     return _tooth_sum(one, two) * (inv(working) - inv(alpha)) / (2.0 * math.tan(alpha))
 
 
 def equal_planet_angles(planets: int) -> tuple[float, ...]:
-    """Angles ``2 pi n / N`` [rad] of N equally spaced planets.
+    """List the angles ``2 pi n / N`` (N,) [rad] of equally spaced planets, see `check_planets`."""
+    check_planets(planets)
+    return tuple(2.0 * math.pi * n / int(planets) for n in range(int(planets)))
 
-    Raises
-    ------
-    GeometryError
-        Not a whole number of at least one planet (E-RANGE).
-    """
+
+def check_planets(planets: int) -> None:
+    """Refuse what is no whole number of at least one planet (E-RANGE)."""
     if not is_whole(planets) or not 1 <= planets <= 1000:
         raise GeometryError(
             f"a planetary set with {planets!r} planets",
@@ -365,13 +373,11 @@ def equal_planet_angles(planets: int) -> tuple[float, ...]:
             limit="a whole number, 1 to 1000",
             remedy="three planets share the load of a set best",
         )
-    return tuple(2.0 * math.pi * n / int(planets) for n in range(int(planets)))
 
 
 def check_angles(angles: tuple[float, ...]) -> None:
-    """Refuse planet angles [rad] that are none, unordered or in the wrong unit (E-RANGE)."""
-    if not 1 <= len(angles) <= 1000:
-        equal_planet_angles(len(angles))
+    """Refuse planet angles (N,) [rad] that are none, unordered or in the wrong unit (E-RANGE)."""
+    check_planets(len(angles))
     problem = None
     if not all(math.isfinite(a) for a in angles):
         problem = "contain a value that is not finite"
@@ -392,7 +398,7 @@ def check_angles(angles: tuple[float, ...]) -> None:
 
 
 def feasible_angles(teeth_sum: int, angles: tuple[float, ...]) -> tuple[float, ...]:
-    """Assembly positions [rad] nearest to wanted planet angles, counted from the first planet.
+    """Find the assembly positions [rad] nearest to wanted planet angles [rad], from the first planet on.
 
     Planets fit at multiples of ``2 pi / (z_s + z_r)`` from each other (Mueller, Epicyclic Drive Trains);
     ``teeth_sum`` is z_s + z_r.
@@ -402,7 +408,7 @@ def feasible_angles(teeth_sum: int, angles: tuple[float, ...]) -> tuple[float, .
 
 
 def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...]) -> tuple[int, ...]:
-    """Assembly positions of planets at given angles [rad], whole multiples of ``2 pi / (z_s + z_r)``.
+    """Find the assembly positions of planets at angles [rad], whole multiples of ``2 pi / (z_s + z_r)``.
 
     Raises
     ------

@@ -37,7 +37,7 @@ _TANGENT_SERIES = (
 
 
 def inv(angle) -> Any:
-    """Involute function ``tan(angle) - angle`` [rad] (ISO 21771, eq. 9).
+    """Compute the involute function ``tan(angle) - angle`` [rad] (ISO 21771, eq. 9).
 
     The pressure angle [rad], float or array, lies between ``-pi/2`` and ``pi/2``.
     """
@@ -52,7 +52,7 @@ def _plain(value: np.ndarray) -> Any:
 
 
 def arcinv(value) -> Any:
-    """Pressure angle [rad] in [0, pi/2) whose involute is `value` [rad] (float or array), inverse of `inv`.
+    """Find the pressure angle [rad] in [0, pi/2) of an involute [rad] (array of any shape), inverse of `inv`.
 
     Raises
     ------
@@ -80,37 +80,37 @@ def arcinv(value) -> Any:
 
 
 def pressure_angle_at(radius, base_radius: float) -> Any:
-    """Pressure angle [rad] of an involute at a radius, ``cos(alpha) = r_b / r``.
+    """Compute the pressure angle [rad] of an involute at a radius [m], ``cos(alpha) = r_b / r``.
 
-    ``radius`` (float or array) must not be smaller than ``base_radius``.
+    ``radius`` (float or array) must not be smaller than ``base_radius`` [m].
     """
     return _plain(np.arctan2(roll(radius, base_radius), base_radius))
 
 
 def roll(radius, base_radius: float) -> Any:
-    """Roll length ``sqrt(r^2 - rb^2)``: distance from the base tangent point to the flank point.
+    """Compute the roll length ``sqrt(r^2 - rb^2)`` [m] from the base tangent point to the flank point.
 
-    Float or array; ``radius >= base_radius``, in the unit of the radii.
+    At a radius [m], float or array, of the base radius [m] or more.
     """
     r = np.asarray(radius, dtype=float)
     return _plain(np.sqrt(np.maximum((r - base_radius) * (r + base_radius), 0.0)))
 
 
 def undercut_shift(teeth: int, pressure_angle: float) -> float:
-    """Least profile shift [modules] without undercut by a rack one module deep, ``1 - z sin^2(alpha)/2``.
+    """Compute the least profile shift [modules] without undercut, ``1 - z sin^2(alpha)/2``.
 
-    The pressure angle alpha is in rad.
+    For a rack one module deep, the pressure angle alpha in rad.
     """
     return 1.0 - 0.5 * teeth * math.sin(pressure_angle) ** 2
 
 
 def transverse_angle(normal_pressure_angle: float, helix_angle: float) -> float:
-    """Transverse pressure angle, ``tan(alpha_t) = tan(alpha_n) / cos(beta)``, all in rad."""
+    """Compute the transverse pressure angle, ``tan(alpha_t) = tan(alpha_n) / cos(beta)``, all in rad."""
     return math.atan(math.tan(normal_pressure_angle) / math.cos(helix_angle))
 
 
 def transverse_tool(module: float, pressure_angle: float, helix_angle: float) -> tuple[float, float]:
-    """Transverse module [m] and pressure angle [rad] of normal ones under a helix angle [rad].
+    """Compute the transverse module [m] and pressure angle [rad] of normal ones under a helix angle [rad].
 
     ``m_t = m_n / cos(beta)``, ``tan(alpha_t) = tan(alpha_n) / cos(beta)`` (ISO 21771, section 4.2).
     """
@@ -118,12 +118,12 @@ def transverse_tool(module: float, pressure_angle: float, helix_angle: float) ->
 
 
 def base_helix_angle(normal_pressure_angle: float, helix_angle: float) -> float:
-    """Helix angle on the base cylinder, ``sin(beta_b) = sin(beta) cos(alpha_n)``, all in rad."""
+    """Compute the helix angle on the base cylinder, ``sin(beta_b) = sin(beta) cos(alpha_n)``, all in rad."""
     return math.asin(math.sin(helix_angle) * math.cos(normal_pressure_angle))
 
 
 def overlap_ratio(face_width: float, normal_module: float, helix_angle: float) -> float:
-    """Overlap ratio ``b sin(beta) / (pi m_n)`` of face width and normal module [m] and helix angle [rad]."""
+    """Compute the overlap ratio ``b sin|beta| / (pi m_n)``, width and module in m, helix angle in rad."""
     return face_width * math.sin(abs(helix_angle)) / (math.pi * normal_module)
 
 
@@ -158,7 +158,7 @@ class PinionCutter:
 
 
 def transverse_rack(rack: BasicRack, helix_angle: float) -> BasicRack:
-    """Basic rack in transverse modules of one in normal modules: coefficients times cos(beta), beta in rad.
+    """Make the transverse basic rack of a normal one: coefficients times cos(beta), beta in rad.
 
     Heights are the same lengths in both sections (ISO 21771, section 4.2). The tool's tip is an ellipse in
     the transverse section; the circle in its place keeps the radius of the normal section.
@@ -189,7 +189,7 @@ class RackTip:
         return self.centre_offset
 
     def fillet_point(self, theta) -> tuple[np.ndarray, np.ndarray]:
-        """Radius [m] and angle [rad] in the gear frame of fillet points; see `CutterTip.fillet_point`."""
+        """Compute radius [m] and angle [rad] of fillet points at theta [rad], as `CutterTip.fillet_point`."""
         theta = np.asarray(theta, dtype=float)
         # tool centreline at tangential travel s from the pitch point; the gear has turned by s / r
         lateral = -self.centre_depth * np.tan(theta)
@@ -208,10 +208,10 @@ class RackTip:
         return self.pitch_radius * sine - self.centre_depth / sine - self.rounding
 
     def undercut_end(self, base_radius: float, base_half_angle: float) -> float:
-        """Direction ``theta`` [rad] where the fillet of an undercut tooth crosses the involute.
+        """Find the direction ``theta`` [rad] where the fillet of an undercut tooth crosses the involute.
 
-        The crossing is bracketed on the part of the fillet outside the base circle and refined by bisection
-        to the last bit.
+        From the base radius [m] and the half-thickness angle there [rad]. The crossing is bracketed on the
+        part of the fillet outside the base circle and refined by bisection to the last bit.
         """
 
         def excess(theta):
@@ -254,9 +254,9 @@ class CutterTip:
         return self.centre_angle if self.centre_radius > self.cutter_base_radius else -1.0
 
     def fillet_point(self, theta) -> tuple[np.ndarray, np.ndarray]:
-        """Radius [m] and angle [rad] in the gear frame of fillet points, from the law of gearing.
+        """Compute radius [m] and angle [rad] in the gear frame of fillet points, from the law of gearing.
 
-        The direction `theta` [rad] of the normal, float or array, is 0 at the root circle and `end_angle` at
+        The direction `theta` [rad] of the normal, of any shape, is 0 at the root circle and `end_angle` at
         the flank (Litvin, Gear Geometry and Applied Theory, ch. 6).
         """
         theta = np.asarray(theta, dtype=float)

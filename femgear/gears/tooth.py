@@ -52,7 +52,7 @@ class HalfSector:
     flank_roll: np.ndarray
 
     def curve(self, name: str) -> np.ndarray:
-        """Points of one boundary curve by name (KeyError when it is absent)."""
+        """Find the points (2 k + 1, 2) [m] of one boundary curve by name (KeyError when it is absent)."""
         return dict(self.curves)[name]
 
 

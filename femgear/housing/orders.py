@@ -52,7 +52,7 @@ class Lobes(ReadOnlyArrays):
     position : (n_lobes,) array
         Places of the maxima as fractions of the revolution, ascending.
     height : (n_lobes,) array
-        Envelope there.
+        Envelope there, in its unit.
     threshold : float
         Prominence from which a maximum was counted, as a share of the largest envelope value.
     """
@@ -95,7 +95,7 @@ def order_spectrum(signal) -> OrderSpectrum:
     Parameters
     ----------
     signal : (..., n_samples) array
-        Equidistant samples, end point excluded.
+        Equidistant samples in any unit, end point excluded; the spectrum has the same unit.
 
     Raises
     ------
@@ -196,9 +196,15 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
 
 
 def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6) -> tuple[Line, ...]:
-    """List the strongest lines with orders low..high of one spectrum, strongest first, down to -60 dB.
+    """List the strongest lines of one spectrum (n_orders,), strongest first, down to -60 dB.
 
-    There are ``count`` lines at most, none where the band is silent.
+    Parameters
+    ----------
+    spectrum : OrderSpectrum
+    low, high : float
+        Carrier orders, both included.
+    count : int
+        Largest number of lines; none are listed where the band is silent.
 
     Raises
     ------
@@ -224,12 +230,7 @@ def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: i
 
 
 def analyse_band(
-    spectrum: OrderSpectrum,
-    z_ring: int,
-    harmonic: int,
-    *,
-    half_width: int | None = None,
-    count: int = 6,
+    spectrum: OrderSpectrum, z_ring: int, harmonic: int, *, half_width: int | None = None, count: int = 6
 ) -> BandAnalysis:
     """Analyse the band around a mesh harmonic: dominant lines, envelope and lobes of the signal.
 

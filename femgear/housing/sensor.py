@@ -116,12 +116,7 @@ class HousingSignal(ReadOnlyArrays):
     acceleration: np.ndarray
 
 
-def fixed_sensor_lines(
-    field,
-    z_ring: int,
-    carrier_speed,
-    sensor_angle: float,
-) -> SensorLines:
+def fixed_sensor_lines(field, z_ring: int, carrier_speed, sensor_angle: float) -> SensorLines:
     """Compute the lines of a fixed sensor: component (h, n) at order ``h z_ring - sign(carrier_speed) n``.
 
     Components that fall on the same order add with their phases; negative orders are folded to
@@ -155,13 +150,7 @@ def fixed_sensor_lines(
 
 
 def heaviside_linear_lines(
-    field,
-    z_ring: int,
-    carrier_speed,
-    sensor_angle: float,
-    *,
-    points: int = 54,
-    max_order: int | None = None,
+    field, z_ring: int, carrier_speed, sensor_angle: float, *, points: int = 54, max_order: int | None = None
 ) -> SensorLines:
     """Compute the lines of the Heaviside/linear form over P points of the ring (paper Eqs. (13)-(16)).
 

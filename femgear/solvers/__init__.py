@@ -22,10 +22,7 @@ if TYPE_CHECKING:
     from femgear.solvers.stability.floquet import floquet_verdict
     from femgear.solvers.stability.lyapunov import lyapunov_exponents
     from femgear.solvers.stability.parametric import stability_chart
-    from femgear.solvers.time.stroboscopic import (
-        sweep_response,
-        sweep_up_and_down,
-    )
+    from femgear.solvers.time.stroboscopic import sweep_response, sweep_up_and_down
     from femgear.solvers.time.transient import solve_transient
 
 

@@ -64,14 +64,15 @@ class CorneredElement(Element, Protocol):
 
 
 def has_corners(element: Element) -> TypeGuard[CorneredElement]:
-    """Whether an element can tell where its law has corners."""
+    """Tell whether an element knows where its law has corners."""
     return hasattr(element, "switches")
 
 
 def positive_part(x, smoothing: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """``max(x, 0)`` and its slope; with a smoothing length s, ``(x + sqrt(x^2 + s^2)) / 2``.
+    """Compute ``max(x, 0)`` and its slope, arrays of the shape and unit of x.
 
-    The smooth form differs by at most s / 2, at the corner (NREL/CP-5000-55355 smooths its contacts so).
+    With a smoothing length s ``(x + sqrt(x^2 + s^2)) / 2``. The smooth form differs by at most s / 2, at the
+    corner (NREL/CP-5000-55355 smooths its contacts so).
     """
     if not np.any(smoothing):
         closed = x > 0.0
@@ -147,7 +148,7 @@ class GearMeshes:
 
     @property
     def degree(self) -> int | None:
-        """Of the law in the deflections; None where flanks part."""
+        """Degree of the law in the deflections; None where flanks part."""
         return None if self.separates else 1
 
     @property
@@ -156,11 +157,11 @@ class GearMeshes:
         return self.stiffness.mean[:, None]
 
     def steepest(self, theta) -> np.ndarray:
-        """Largest stiffness over the phases, (g, 1) [N/m]."""
+        """Find the largest stiffness (g, 1) [N/m] over the phases theta (n, n_bases) [rad]."""
         return self.stiffness.at(theta).max(axis=0)[:, None]
 
     def flank_forces(self, x, theta):
-        """Stiffness [N/m], forces of drive and of back flanks (..., g) [N], and which have a back side.
+        """Compute stiffness [N/m], forces of drive and back flanks (..., g) [N], and which have a back side.
 
         Drive flanks are closed where their force is positive, back flanks where theirs is negative.
         """
@@ -171,21 +172,21 @@ class GearMeshes:
         return k, line, line + k * np.where(has_back, self.backlash, 0.0), has_back
 
     def switches(self, x, theta):
-        """Forces (..., m) of drive flanks, then of back flanks where there are some."""
+        """Compute the forces (..., m) [N] of drive flanks, then of back flanks where there are some."""
         if not self.separates or self.smoothing:
             return np.zeros((*x.shape[:-2], 0))
         _, line, behind, has_back = self.flank_forces(x, theta)
         return np.concatenate([line, -behind[..., has_back]], axis=-1)
 
     def frozen(self, x, theta, closed):
-        """Forces (g, 1) and tangents (g, 1, 1) with the flanks closed as given."""
+        """Compute forces (g, 1) [N] and tangents (g, 1, 1) [N/m] with the flanks closed (m,) as given."""
         k, line, behind, has_back = self.flank_forces(x, theta)
         drive, back = closed[: len(k)].astype(float), np.zeros(len(k))
         back[has_back] = closed[len(k) :]
         return (line * drive + behind * back)[:, None], (k * (drive + back))[:, None, None]
 
     def evaluate(self, x, theta):
-        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        """Compute forces (..., g, 1) [N] and tangents (..., g, 1, 1) [N/m], see `Element`."""
         k, line, behind, has_back = self.flank_forces(x, theta)
         if not self.separates:
             return line[..., None], np.broadcast_to(k, line.shape)[..., None, None]
@@ -233,7 +234,7 @@ class RadialBearings:
         return np.repeat(np.asarray(self.stiffness)[:, None], 2, axis=1)
 
     def evaluate(self, x, theta):
-        """Forces (..., g, 2) and tangents (..., g, 2, 2)."""
+        """Compute forces (..., g, 2) [N] and tangents (..., g, 2, 2) [N/m]; the phases do not count."""
         r = np.hypot(x[..., 0], x[..., 1])
         touching = (r > self.clearance) & (r > 0.0)
         safe = np.where(touching, r, 1.0)
@@ -282,7 +283,7 @@ class PolynomialSprings:
 
     @property
     def degree(self) -> int:
-        """Of the law in the deflections."""
+        """Degree of the law in the deflections."""
         return self.coefficients.shape[1]
 
     @property
@@ -291,7 +292,7 @@ class PolynomialSprings:
         return self.coefficients[:, :1]
 
     def evaluate(self, x, theta):
-        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        """Compute forces (..., g, 1) [N] and tangents (..., g, 1, 1) [N/m], see `Element`."""
         x = x[..., 0]
         force: np.ndarray = np.zeros_like(x)
         slope: np.ndarray = np.zeros_like(x)
@@ -352,7 +353,7 @@ class TurningSprings:
         return np.repeat(self.stiffness[:, None], 4, axis=1)
 
     def evaluate(self, x, theta):
-        """Forces (..., g, 4) and tangents (..., g, 4, 4)."""
+        """Compute forces (..., g, 4) [N] and tangents (..., g, 4, 4) [N/m] at phases (..., n_bases) [rad]."""
         c, s = np.moveaxis(self.wave.at(theta), -1, 0)
         # d = D x with x = (x_1, y_1, x_2, y_2)
         D = np.zeros((*c.shape, 2, 4))
@@ -366,7 +367,7 @@ class TurningSprings:
 
 
 def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSeries:
-    """Cosine and sine of ``phi = phase + orders . theta``.
+    """Make the cosine and sine of ``phi = phase + orders . theta`` as two coefficients.
 
     Parameters
     ----------
@@ -382,7 +383,7 @@ def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSerie
 
 
 def coefficients_of(element: Element) -> dict[str, Series]:
-    """Coefficients of an element that repeat with the phases, by the names of its fields."""
+    """Collect the coefficients of an element that repeat with the phases, by the names of its fields."""
     return {
         name: series
         for name, series in vars(element).items()
@@ -391,13 +392,13 @@ def coefficients_of(element: Element) -> dict[str, Series]:
 
 
 def with_coefficients(element: Element, change: Callable[[Series], Any]) -> Element:
-    """The element with its periodic coefficients as ``change`` makes them."""
+    """Make an element with its periodic coefficients as ``change`` makes them."""
     changed = {name: change(series) for name, series in coefficients_of(element).items()}
     return replace(element, **changed) if changed and is_dataclass(element) else element
 
 
 def tangent_jumps(tangents: Callable[..., np.ndarray], states: np.ndarray) -> list[np.ndarray]:
-    """Fractions of the period, for every state, at which its tangents jump; ascending, zero left out.
+    """Find the fractions of the period at which the tangents of states jump; ascending, zero left out.
 
     Tangents at equidistant instants; an interval whose change is unlike that of its neighbours is halved
     towards the larger change. A smooth change shrinks with the interval, a jump stays. Two jumps that undo
@@ -406,7 +407,7 @@ def tangent_jumps(tangents: Callable[..., np.ndarray], states: np.ndarray) -> li
     Parameters
     ----------
     tangents : callable
-        ``(fraction (m, s), states (m,)) -> (m, s, n, n)``, periodic in the fraction.
+        ``(fraction (m, s), states (m,)) -> (m, s, n, n)`` [N/m], periodic in the fraction.
     states : (m,) int array
     """
     states = np.asarray(states)
@@ -463,18 +464,9 @@ def _sorted(fractions) -> np.ndarray:
 
 
 def tabulated_element(element: Element, theta: np.ndarray) -> Callable:
-    """Law of an element on single columns at known instants.
+    """Tabulate the law of an element on single columns at instants with phases (n_times, n_bases) [rad].
 
-    Parameters
-    ----------
-    element : Element
-    theta : (n_times, n_bases) array
-        Phases of the instants [rad].
-
-    Returns
-    -------
-    callable
-        ``law(i, x (g,)) -> (forces (g,), slopes (g,))`` at instant i.
+    The result is ``law(i, x (g,) [m]) -> (forces (g,) [N], slopes (g,) [N/m])`` at instant i.
     """
     if type(element) is GearMeshes:
         return _mesh_law(element, theta)

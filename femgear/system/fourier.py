@@ -25,18 +25,19 @@ _FEW = 100
 
 
 def harmonics_of(samples, count: int) -> np.ndarray:
-    """Harmonics 0 to ``count`` of equidistant samples of one period (end point excluded).
+    """Compute harmonics 0 to ``count`` of equidistant samples of one period (end point excluded).
 
     Parameters
     ----------
     samples : (..., n_positions) array
+        In any unit.
     count : int
         Highest harmonic kept.
 
     Returns
     -------
     (..., count + 1) complex array
-        One-sided amplitudes: the mean, then twice the discrete Fourier coefficients.
+        One-sided amplitudes in that unit: the mean, then twice the discrete Fourier coefficients.
 
     Raises
     ------
@@ -57,7 +58,7 @@ def harmonics_of(samples, count: int) -> np.ndarray:
 
 
 def sample(amplitudes, positions: int) -> np.ndarray:
-    """Values at ``positions`` equidistant instants of one period of (..., H + 1) one-sided harmonics."""
+    """Compute values (..., positions) at equidistant instants of a period from harmonics (..., H + 1)."""
     amplitudes = np.asarray(amplitudes)
     spectrum = np.zeros((*amplitudes.shape[:-1], positions // 2 + 1), dtype=complex)
     if amplitudes.shape[-1] > (positions + 1) // 2:
@@ -72,7 +73,7 @@ def sample(amplitudes, positions: int) -> np.ndarray:
 
 
 def pad(amplitudes: np.ndarray, count: int) -> np.ndarray:
-    """The harmonics ``amplitudes`` (..., h + 1) filled up with zeros, or cut, to (..., count + 1)."""
+    """Fill the harmonics ``amplitudes`` (..., h + 1) up with zeros, or cut them, to (..., count + 1)."""
     out = np.zeros((*amplitudes.shape[:-1], count + 1), dtype=complex)
     kept = min(count + 1, amplitudes.shape[-1])
     out[..., :kept] = amplitudes[..., :kept]
@@ -157,11 +158,11 @@ class FourierSeries:
 
     @property
     def mean(self) -> np.ndarray:
-        """(n,) array."""
+        """Mean coefficients (n,)."""
         return np.real(self.amplitudes[:, 0])
 
     def at(self, theta) -> np.ndarray:
-        """Values (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
+        """Compute the coefficients (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
         count = self.amplitudes.shape[1]
         if count == 1:
             return np.broadcast_to(self.mean, (*np.shape(theta)[:-1], len(self.mean)))
@@ -208,17 +209,17 @@ class StepSeries:
 
     @property
     def mean(self) -> np.ndarray:
-        """(n,) array."""
+        """Mean coefficients (n,)."""
         return self.values @ np.diff(self.breaks, append=1.0)
 
     def at(self, theta) -> np.ndarray:
-        """Values (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
+        """Compute the coefficients (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
         turn = (phase_of(theta, self.orders) / (2.0 * np.pi)) % 1.0
         return np.moveaxis(self.values[:, np.searchsorted(self.breaks, turn, side="right") - 1], 0, -1)
 
 
 def phase_of(theta, orders) -> np.ndarray:
-    """``orders . theta`` (...) [rad]; a base that theta lacks must have order zero."""
+    """Compute the phase ``orders . theta`` (...) [rad]; a base that theta lacks must have order zero."""
     theta = np.asarray(theta, float)
     known = theta.shape[-1]
     if any(orders[known:]):
@@ -231,17 +232,17 @@ def phase_of(theta, orders) -> np.ndarray:
 
 
 def constant(values) -> FourierSeries:
-    """Coefficients (n,) that do not change."""
+    """Make a series of coefficients (n,) that do not change."""
     return FourierSeries(np.atleast_1d(np.asarray(values, float))[:, None])
 
 
 def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> FourierSeries:
-    """Fourier series with ``count`` harmonics of the samples (n, P) of one period."""
+    """Make the Fourier series with ``count`` harmonics of samples (n, P) of one period."""
     return FourierSeries(harmonics_of(np.atleast_2d(samples), count), orders)
 
 
 def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
-    """Tooth errors (2N, H) of one wave of each kind, shifted by the mesh phases.
+    """Make the tooth errors (2N, H) [m] of one wave of each kind, shifted by the mesh phases.
 
     Parameters
     ----------
@@ -294,18 +295,18 @@ class SummedSeries:
 
     @property
     def orders(self) -> tuple[int, ...]:
-        """1 for every base frequency that a part names."""
+        """Orders (n_bases,): 1 for every base frequency that a part names."""
         changing = [part.orders for part in self.parts if part.amplitudes.shape[1] > 1]
         count = max(map(len, changing), default=1)
         return tuple(int(any(o[b] for o in changing if len(o) > b)) for b in range(count))
 
     @property
     def mean(self) -> np.ndarray:
-        """(n,) array."""
+        """Mean coefficients (n,)."""
         return np.sum([part.mean for part in self.parts], axis=0)
 
     def at(self, theta) -> np.ndarray:
-        """Values (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
+        """Compute the coefficients (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
         first, *others = (part.at(theta) for part in self.parts)
         return sum(others, first)
 
@@ -315,7 +316,7 @@ Series = FourierSeries | StepSeries | SummedSeries
 
 
 def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
-    """Mean and all combinations with ``sum_b |orders_b| <= harmonics``, no line twice.
+    """List the mean and all lines with ``sum_b |orders_b| <= harmonics``, none of them twice.
 
     Parameters
     ----------
@@ -341,7 +342,7 @@ def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
 
 
 def side_bands(carrier: int, mesh: int, bands: int) -> np.ndarray:
-    """Lines of the extended harmonic balance: carrier harmonics, mesh harmonics and their side bands.
+    """List the lines of the extended harmonic balance: carrier and mesh harmonics with side bands.
 
     ``m omega_1`` (m <= carrier), ``n omega_2`` (n <= mesh) and ``n omega_2 +- q omega_1`` (q <= bands), with
     the carrier frequency first and the mesh frequency second (Guo, Keller and Parker, NREL/CP-5000-55355,
@@ -362,7 +363,7 @@ def side_bands(carrier: int, mesh: int, bands: int) -> np.ndarray:
 
 
 def distinct_lines(orders) -> np.ndarray:
-    """The lines without mirror images and repetitions, the mean first, sorted by their size.
+    """Sort lines by their size, the mean first, without mirror images and repetitions.
 
     Parameters
     ----------
@@ -388,7 +389,7 @@ def _mirror_sign(orders: np.ndarray) -> np.ndarray:
 
 
 def checked_lines(orders) -> np.ndarray:
-    """The lines as an (L, n_bases) integer array.
+    """Check lines, and return their orders (L, n_bases) as whole numbers.
 
     Raises
     ------
@@ -415,9 +416,9 @@ def checked_lines(orders) -> np.ndarray:
 
 
 def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _ROUNDING) -> float:
-    """Share of the fluctuating amplitude in the upper half of the lines (root of the energy ratio).
+    """Compute the share of the fluctuating amplitude in the upper half of the lines, 0 to 1.
 
-    ``amplitudes`` (n, L) complex, ``orders`` (L, n_bases).
+    The root of the energy ratio, of ``amplitudes`` (n, L) complex at ``orders`` (L, n_bases).
     A line is in the upper half when ``sum_b |orders_b| / max |orders_b|`` is above half its largest value.
     With a single line the share is one: nothing is known about the truncation. A fluctuation below
     ``rounding`` of the mean is none, and its share is zero.
@@ -431,7 +432,7 @@ def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _
 
 
 def coincidence_note(orders: np.ndarray, frequency) -> str:
-    """What to know of a solution in which two lines have one frequency; empty where none have.
+    """Write what to know of a solution in which two lines have one frequency; empty where none have.
 
     Parameters
     ----------

@@ -68,6 +68,7 @@ def assemble(
     dofs : (m,) sequence of str
         Names of the free coordinates.
     gyroscopic : (n, n) array, optional
+        [kg]
 
     Returns
     -------
@@ -87,7 +88,7 @@ def assemble(
 
 
 def stiffness_matrix(columns: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Stiffness (n, n) of springs, the sum of ``k w w^T`` over columns w (n, g) and stiffnesses k (g,).
+    """Sum ``k w w^T`` (n, n) [N/m, ...] over springs with columns w (n, g) and stiffnesses k (g,) [N/m].
 
     Infinite ones hold motions and are not in it.
     """
@@ -168,16 +169,10 @@ def gear_set_system(
 
 
 def dof_names(data: RigidSet) -> tuple[str, ...]:
-    """Names of all coordinates, held ones included, in the order of Lin and Parker, Eq. (2)."""
+    """Name all coordinates, held ones included, in the order of Lin and Parker, Eq. (2)."""
     bodies = [(body, CENTRAL_AXES) for body in CENTRAL]
     bodies += [(f"planet {n + 1}", PLANET_AXES) for n in range(data.n_planets)]
     return tuple(f"{body}: {names[axis]}" for body, names in bodies for axis in data.axes)
-
-
-def mesh_names(n_planets: int) -> list[str]:
-    """Names of the 2N meshes, in the order of their columns."""
-    planets = range(1, n_planets + 1)
-    return [f"sun-planet {n}" for n in planets] + [f"planet {n}-ring" for n in planets]
 
 
 def mesh_elements(
@@ -214,16 +209,19 @@ def mesh_elements(
     mean = data.column_stiffness
     columns = np.arange(len(mean))
     if not isinstance(stiffness, MeshExcitation):
-        made = GearMeshes(columns, constant(mean) if stiffness is None else stiffness)
+        series = constant(mean) if stiffness is None else stiffness
+        made = GearMeshes(columns, series, separates=separates, smoothing=smoothing)
     elif harmonics is None:
         raise CaseError(
             "the mesh harmonics of the static record are not said", code="E-HARMONICS", key="harmonics",
             limit="a whole number of 1 or more",
         )  # fmt: skip
     else:
-        made = gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
-    backlash = made.backlash if backlash is None else backlash
-    return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
+        made = gear_meshes(
+            stiffness, harmonics=harmonics, columns=columns, separates=separates, smoothing=smoothing,
+            orders=orders,
+        )  # fmt: skip
+    return made if backlash is None else replace(made, backlash=backlash)
 
 
 def check_mesh_columns(data: RigidSet, meshes: GearMeshes) -> None:
@@ -237,7 +235,9 @@ def check_mesh_columns(data: RigidSet, meshes: GearMeshes) -> None:
 
 
 def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
-    """Mesh columns (n, 2N S): approach of the flanks along their common normal.
+    """Make the mesh columns (n, 2N S): approach of the flanks [m] per unit of the coordinates.
+
+    Along the common normal, of S slices each, n in all coordinates.
 
     A rigid body whose centre moves by v and which rotates by phi moves its point c by ``v + phi x c``, so
     that the flanks of gears 1 and 2 approach by ``n . (v_1 + phi_1 x c_1) - n . (v_2 + phi_2 x c_2)`` with
@@ -267,7 +267,7 @@ def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
 
 
 def pin_directions(data: RigidSet) -> np.ndarray:
-    """Bearing columns (n, N, d): motion of each planet less that of its pin, as many as `pin_stiffness`.
+    """Make the bearing columns (n, N, d): motion of each planet less that of its pin, as `pin_stiffness`.
 
     Radial and tangential, of bodies in space also axial [m], tilt about the radial and the tangential axis
     and rotation [rad]. A carrier that tilts by phi moves the pin along z by ``phi x a e_n``.
@@ -285,7 +285,7 @@ def pin_directions(data: RigidSet) -> np.ndarray:
 
 
 def free_motions(data: RigidSet) -> np.ndarray:
-    """All coordinates (n_all, n) per unit of those that infinite stiffnesses leave free."""
+    """Make all coordinates (n_all, n) per unit of those that infinite stiffnesses leave free."""
     pins, axes = pin_directions(data), len(data.axes)
     T, central = np.eye(len(pins)), 3 * axes
     for n, axis in zip(*np.nonzero(np.isinf(data.pin_stiffness))):
@@ -295,7 +295,7 @@ def free_motions(data: RigidSet) -> np.ndarray:
 
 
 def support_diagonal(data: RigidSet) -> np.ndarray:
-    """Finite stiffnesses (N + 3, axes) of the supports in all coordinates, zero of the planets [N/m]."""
+    """Collect the finite stiffnesses (N + 3, axes) [N/m] of the supports in all coordinates."""
     diagonal = np.zeros((data.n_planets + 3, len(data.axes)))
     diagonal[:3] = data.support_stiffness / _arcs(data)[:3] ** 2
     return np.where(np.isfinite(diagonal), diagonal, 0.0)

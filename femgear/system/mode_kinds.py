@@ -17,9 +17,9 @@ from femgear.errors import CaseError
 from femgear.system.mesh_directions import free_motions
 from femgear.system.rigid_bodies import RigidSet, body_masses
 
-PURE = 0.99
-CLASSES = ("rotational", "translational", "planet")
-CENTRAL = ("carrier", "ring", "sun", "motor", "brake")
+_PURE = 0.99
+_CLASSES = ("rotational", "translational", "planet")
+_CENTRAL = ("carrier", "ring", "sun", "motor", "brake")
 # motions of a central member that turn into each other with the frame, the third one alone
 _PLANES = ((0, 1, 5), (3, 4, 2))
 _IN_SPACE = {"rotational": "rotational-axial", "translational": "translational-tilting"}
@@ -32,11 +32,13 @@ class SetMotions:
     Parameters
     ----------
     central : (b, 3, m) array
-        x, y and rotation of the bodies on the axis.
+        x, y and rotation of the bodies on the axis, in the units of the shapes.
     central_mass : (b, 3) array
+        [kg, kg m^2]
     planets : (N, 3, m) array
-        Radial, tangential and rotation.
+        Radial, tangential and rotation, or all motions (N, axes, m).
     planet_mass : (N, 3) array
+        [kg, kg m^2]
     planet_angles : (N,) array
         [rad]
     """
@@ -54,20 +56,21 @@ class SetMotions:
 
 
 def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, planet_angles):
-    """Kind and nodal diameter of every mode.
+    """Find the kind and the nodal diameter of every mode by its kinetic energy.
 
     Parameters
     ----------
     shape : (n, m) array
         Mode shapes.
     mass : (n,) array
-        Diagonal mass matrix.
+        Diagonal mass matrix [kg, kg m^2].
     dofs : tuple of str
     frequency : (m,) array
         [Hz], zero for rigid-body modes.
-    ring_diameter : int array
+    ring_diameter : (n_ring,) int array
         Nodal diameter of every ring coordinate.
     ring_slice : slice
+        Of the ring's n_ring coordinates.
     planet_angles : (N,) array
         [rad].
 
@@ -98,13 +101,13 @@ def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, plane
 
 
 def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
-    """Motions of the bodies by the names of their coordinates.
+    """Collect the motions of the bodies by the names of their coordinates.
 
     Parameters
     ----------
     shape : (n, m) array
     mass : (n,) array
-        Diagonal mass matrix.
+        Diagonal mass matrix [kg, kg m^2].
     dofs : sequence of str
         ``"sun: x"``, ``"carrier: rotation"`` or ``"ring: u"``, ``"planet 1: x"`` or ``"planet 1: radial"``;
         other names and names that are missing do not count.
@@ -125,7 +128,7 @@ def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
 
     planets = [f"planet {n + 1}" for n in range(len(planet_angles))]
     turn = ("rotation", "u")
-    central, central_mass = rows(CENTRAL, ("x",), ("y",), turn)
+    central, central_mass = rows(_CENTRAL, ("x",), ("y",), turn)
     if f"{planets[0]}: x" in place:
         moved, planet_mass = rows(planets, ("x",), ("y",), turn)
         c, s = np.cos(planet_angles)[:, None], np.sin(planet_angles)[:, None]
@@ -137,13 +140,14 @@ def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
 
 
 def class_energies(motions: SetMotions) -> np.ndarray:
-    """Twice the kinetic energy (3, m) of rotational, translational and planet motion, without units of time.
+    """Compute twice the kinetic energy (3, m) of rotational, translational and planet motion.
 
-    Lin and Parker (1999, section 4) for equal spacing: in a rotational mode the central members only turn and
-    all planets move alike; in a translational one they only translate, and the motion of planet n is ``p cos
-    psi_n + p' sin psi_n``; in a planet mode they rest, and the planets' motion is free of both patterns. The
-    same patterns are looked for at unequal spacing, where they are not independent: the classes then need not
-    add up to the whole, and a motion that no class explains reaches 99 % of it in none.
+    Masses times squared motions, without units of time. Lin and Parker (1999, section 4) for equal spacing:
+    in a rotational mode the central members only turn and all planets move alike; in a translational one they
+    only translate, and the motion of planet n is ``p cos psi_n + p' sin psi_n``; in a planet mode they rest,
+    and the planets' motion is free of both patterns. The same patterns are looked for at unequal spacing,
+    where they are not independent: the classes then need not add up to the whole, and a motion that no class
+    explains reaches 99 % of it in none.
     """
     energy = motions.central_mass[:, :, None] * np.abs(motions.central) ** 2
     psi, weighted = motions.planet_angles, motions.weighted
@@ -156,7 +160,7 @@ def class_energies(motions: SetMotions) -> np.ndarray:
 
 
 def phase_shares(motions: SetMotions) -> np.ndarray:
-    """Shares of the cyclic harmonics in the planets' kinetic energy.
+    """Compute the shares of the cyclic harmonics in the planets' kinetic energy, 0 to 1.
 
     Parameters
     ----------
@@ -180,7 +184,7 @@ def phase_shares(motions: SetMotions) -> np.ndarray:
 
 
 def phasing(motions: SetMotions) -> tuple[str, ...]:
-    """Phasing of the planets in every mode.
+    """Name the phasing of the planets in every mode (m,).
 
     A. Kahraman (J. Mech. Des. 116, 1994, 713-720): ``in phase``, ``sequentially phased j`` and
     ``counter-phased`` where one harmonic of `phase_shares` holds 99 % and no other more than 1 %; ``mixed``
@@ -196,13 +200,13 @@ def phasing(motions: SetMotions) -> tuple[str, ...]:
             found.append("at rest")
             continue
         best = int(one.argmax())
-        pure = one[best] >= PURE and np.all(np.delete(one, best) <= 1.0 - PURE)
+        pure = one[best] >= _PURE and np.all(np.delete(one, best) <= 1.0 - _PURE)
         found.append(names[best] if pure else "mixed")
     return tuple(found)
 
 
 def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> np.ndarray:
-    """Orthogonal matrix Q (m, m): the modes ``shape @ Q`` have one phasing each, as far as they can.
+    """Find the orthogonal matrix Q (m, m) that gives modes ``shape @ Q`` one phasing each, where it can.
 
     Modes of one frequency may be mixed at will; with six planets and more the planet modes of several
     harmonics coincide on a rigid ring. Within each frequency Q diagonalises ``sum_j j E_j``, E_j the planets'
@@ -233,18 +237,18 @@ def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> n
 
 
 def named_kinds(share, frequency) -> tuple[str, ...]:
-    """``rigid``, the class with at least 99 % of the kinetic energy, or ``mixed``.
+    """Name modes ``rigid``, by the class with at least 99 % of the kinetic energy, or ``mixed``.
 
     Parameters
     ----------
     share : (3, m) array
         `class_energies` over the whole kinetic energy.
     frequency : (m,) array
-        Zero for rigid-body modes.
+        [Hz], zero for rigid-body modes.
     """
     best, most = share.argmax(axis=0), share.max(axis=0)
     return tuple(
-        "rigid" if f == 0.0 else CLASSES[i] if value >= PURE else "mixed"
+        "rigid" if f == 0.0 else _CLASSES[i] if value >= _PURE else "mixed"
         for f, i, value in zip(np.asarray(frequency), best, most)
     )
 
@@ -266,10 +270,10 @@ def _inside(pattern: np.ndarray, weighted: np.ndarray) -> np.ndarray:
 
 
 def class_shares(data: RigidSet, shape) -> np.ndarray:
-    """Shares (3, m) of rotational, translational and planet motion in the kinetic energy of every mode.
+    """Compute the shares (3, m) of rotational, translational and planet motion in the kinetic energy.
 
-    In space rotational-axial, translational-tilting and planet motion; see `class_energies`, also for unequal
-    spacing.
+    ``shape`` (n, m) is in the coordinates of `gear_set_system`. In space rotational-axial,
+    translational-tilting and planet motion; see `class_energies`, also for unequal spacing.
     """
     motions = gear_set_motions(data, shape)
     central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
@@ -277,7 +281,7 @@ def class_shares(data: RigidSet, shape) -> np.ndarray:
 
 
 def gear_set_motions(data: RigidSet, shape) -> SetMotions:
-    """Motions of all bodies in every mode, held ones and planets tied to their pins included.
+    """Collect the motions of all bodies in every mode, held ones and planets tied to pins included.
 
     The central members of bodies that move in space stand twice: x, y and rotation, then tilt about x, tilt
     about y and z, which turn with the frame as those do. Planets have all their motions.
@@ -306,7 +310,7 @@ def gear_set_motions(data: RigidSet, shape) -> SetMotions:
 
 
 def gear_set_kinds(data: RigidSet, shape, *, frequency) -> tuple[str, ...]:
-    """Kind of every mode from its shape.
+    """Find the kind of every mode from its shape.
 
     T. Eritenel and R. G. Parker (J. Sound Vib. 325, 2009, 397-420) for bodies that move in space, equal
     planets at equal angles: in a rotational-axial mode the central members rotate and move along z, and all
@@ -320,7 +324,7 @@ def gear_set_kinds(data: RigidSet, shape, *, frequency) -> tuple[str, ...]:
     shape : (n, m) array
         In the coordinates of `gear_set_system`.
     frequency : (m,) array
-        Zero for rigid-body modes.
+        [Hz], zero for rigid-body modes.
 
     Returns
     -------

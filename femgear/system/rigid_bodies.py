@@ -50,7 +50,7 @@ class PlanarBody:
         return np.array([self.support, self.support, self.torsional_support], float)
 
     def masses(self, radius: float) -> list[float]:
-        """m, m and I / r^2 [kg] of x, y and ``u`` on a radius [m]."""
+        """List m, m and I / r^2 [kg] of x, y and ``u`` on a radius [m]."""
         return [self.mass, self.mass, self.inertia / radius**2]
 
 
@@ -121,7 +121,7 @@ class RigidSet(ABC):
     stiffness_planet_ring: float | np.ndarray
 
     def __post_init__(self):
-        self._keep("planet_angles", np.atleast_1d(self._numbers("planet_angles")))
+        self._keep("planet_angles", np.atleast_1d(numbers("planet_angles", self.planet_angles)))
         for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
             self._keep(name, self._per_planet(name))
         for name in (*CENTRAL, "planet"):
@@ -130,6 +130,7 @@ class RigidSet(ABC):
 
     @property
     def n_planets(self) -> int:
+        """Number N of planets."""
         return len(self.planet_angles)
 
     @property
@@ -146,12 +147,12 @@ class RigidSet(ABC):
 
     @property
     def mesh_stiffness(self) -> np.ndarray:
-        """Mean stiffness of the 2N meshes [N/m]."""
+        """Mean stiffnesses (2N,) of the meshes [N/m]."""
         return np.concatenate([np.asarray(self.stiffness_sun_planet), np.asarray(self.stiffness_planet_ring)])
 
     @property
     def column_stiffness(self) -> np.ndarray:
-        """Mean stiffness of the mesh columns of ``W`` [N/m]."""
+        """Mean stiffnesses (n_columns,) of the mesh columns of ``W`` [N/m]."""
         return self.mesh_stiffness
 
     @property
@@ -181,16 +182,13 @@ class RigidSet(ABC):
             (self.ring_radius - self.planet_radius) / (a * math.cos(self.pressure_angle_planet_ring)) - 1.0,
         )
 
-    def _numbers(self, key: str, dimensions: int | None = None) -> np.ndarray:
-        return numbers(key, getattr(self, key), dimensions)
-
     def _keep(self, name: str, array: np.ndarray) -> None:
         array.setflags(write=False)
         object.__setattr__(self, name, array)
 
     def _per_planet(self, name: str) -> np.ndarray:
         """Values (N,) from one number or one a planet."""
-        values = self._numbers(name)
+        values = numbers(name, getattr(self, name))
         values = np.full(self.n_planets, values.item()) if values.size == 1 else values
         if values.shape != (self.n_planets,):
             refuse(name, f"{values.size} values", "", f"one number, or {self.n_planets}")
@@ -289,7 +287,7 @@ class HelicalSupport:
 
     @property
     def stiffness(self) -> np.ndarray:
-        """Of the six directions, (6,) or (N, 6): two radial, axial, two tilts, torsional."""
+        """Of the directions, (6,) or (N, 6): two radial, axial [N/m], two tilts, torsional [N m/rad]."""
         r, z, w, u = np.broadcast_arrays(self.radial, self.axial, self.tilt, self.torsional)
         return np.stack([r, r, z, w, w, u], axis=-1).astype(float)
 
@@ -329,7 +327,7 @@ class HelicalBody:
         return self.support.stiffness
 
     def masses(self, radius: float) -> list[float]:
-        """m three times, I / r^2 twice and J / r^2 [kg] of the six motions on a radius [m]."""
+        """List m three times, I / r^2 twice and J / r^2 [kg] of the six motions on a radius [m]."""
         diametral, polar = self.diametral_inertia / radius**2, self.inertia / radius**2
         return [self.mass, self.mass, self.mass, diametral, diametral, polar]
 
@@ -347,7 +345,7 @@ def planar_from_set(planetary_set: PlanetarySet, **data: Any) -> PlanarSet:
 
 
 def gear_geometry(s: PlanetarySet) -> dict[str, Any]:
-    """Base radii, centre distance, planet angles and working pressure angles of a `RigidSet`."""
+    """Collect base radii, centre distance [m], planet and working pressure angles [rad] for a `RigidSet`."""
     return {
         "sun_radius": s.sun.base_radius,
         "ring_radius": s.ring.base_radius,
@@ -360,7 +358,7 @@ def gear_geometry(s: PlanetarySet) -> dict[str, Any]:
 
 
 def torque_shares(data: RigidSet) -> dict[str, float]:
-    """Forces on ``u`` of the members in static balance, that on the sun being one.
+    """Compute the forces on ``u`` of the members in static balance, over that on the sun.
 
     Power balance over the rotations that strain no mesh, ``u_s + u_r = (cos alpha_sp + cos alpha_pr) u_c``
     (add the deflections of both meshes of one planet). With radii that close these are the torques of
@@ -371,7 +369,9 @@ def torque_shares(data: RigidSet) -> dict[str, float]:
 
 
 def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -> np.ndarray:
-    """Forces on ``u`` of the driven member and the output, in static balance by `torque_shares`.
+    """Compute the load (n,) [N] on ``u`` of the driven member and the output, in static balance.
+
+    The balance is that of `torque_shares`.
 
     Parameters
     ----------
@@ -402,19 +402,19 @@ def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -
 
 
 def flank_sign(data: RigidSet, torque: PlanarTorque | None) -> int:
-    """1 where the loaded flanks are those of a sun that drives counter-clockwise, else -1."""
+    """Tell the loaded flanks: 1 for those of a sun that drives counter-clockwise, else -1."""
     if torque is None:
         return 1
     return -1 if torque.torque * torque_shares(data)[torque.member] < 0.0 else 1
 
 
 def member_radius(data: RigidSet, member: str) -> float:
-    """Radius [m] of ``u = r theta`` of the carrier, ring or sun."""
+    """Return the radius [m] of ``u = r theta`` of the carrier, ring or sun."""
     return data.centre_distance if member == "carrier" else getattr(data, f"{member}_radius")
 
 
 def body_masses(data: RigidSet) -> np.ndarray:
-    """Masses and reduced inertias (N + 3, axes) [kg] of carrier, ring, sun and planets."""
+    """Collect masses and reduced inertias (N + 3, axes) [kg] of carrier, ring, sun and planets."""
     bodies = [getattr(data, name) for name in CENTRAL] + [data.planet] * data.n_planets
     return np.array([body.masses(radius) for body, radius in zip(bodies, data.radii.tolist())])
 
@@ -475,7 +475,7 @@ def check_support(key: str, support: HelicalSupport, *, count: int | None = None
 
 
 def numbers(key: str, values, dimensions: int | None = None) -> np.ndarray:
-    """Values as an array of floats, of so many dimensions where they are given."""
+    """Check values: an array of floats, of so many dimensions where they are given."""
     try:
         found = np.array(values, float)
     except (TypeError, ValueError):

@@ -22,14 +22,15 @@ Law = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]
 _HELD, _BALANCED = 1e-12, 1e-6
 
 
-def freeze(obj, *names):
-    """Turn array fields of a frozen dataclass, the named ones or all, into read-only contiguous arrays."""
-    for name in names or [one.name for one in fields(obj) if "np.ndarray" in str(one.type)]:
-        value = getattr(obj, name)
-        if value is not None:
+def freeze(obj):
+    """Turn the array fields of a frozen dataclass into read-only arrays of its own."""
+    for one in fields(obj):
+        value = getattr(obj, one.name)
+        # the annotations np.ndarray and NDArray[...]
+        if value is not None and "ndarray" in str(one.type).lower():
             array = np.array(value)
             array.setflags(write=False)
-            object.__setattr__(obj, name, array)
+            object.__setattr__(obj, one.name, array)
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class MechanicalSystem:
     dofs : tuple of str
         One name a degree of freedom, such as ``"planet 2: x"``.
     gyroscopic : (n, n) array, optional
-        Skew-symmetric matrix that multiplies the speed of rotation [rad/s].
+        Skew-symmetric matrix G [kg, kg m^2] that multiplies the speed of rotation [rad/s].
     flexibility : (n_meshes, n_meshes) array, optional
         Static compliance of bodies that are rigid in the coordinates, from the force of every mesh to the
         deflection of every other [m/N]: the spring deflections are then ``W^T q - flexibility f``.
@@ -203,7 +204,7 @@ def gear_meshes(
     smoothing: float = 0.0,
     orders: tuple[int, ...] = (1,),
 ) -> GearMeshes:
-    """The meshes of a static record, each series cut to ``harmonics`` mesh harmonics.
+    """Make the meshes of a static record, each series cut to ``harmonics`` mesh harmonics.
 
     Parameters
     ----------
@@ -228,7 +229,7 @@ def gear_meshes(
 
 
 def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Stiffness, deflection and force of the meshes, each cut to ``count`` mesh harmonics.
+    """Compute the harmonics of stiffness, deflection and force of the meshes, ``count`` mesh harmonics each.
 
     Parameters
     ----------
@@ -325,7 +326,7 @@ class NonlinearSystem:
 
     @property
     def damping(self) -> np.ndarray:
-        """``C + speed G`` (n, n)."""
+        """``C + speed G`` (n, n) [N s/m, ...]."""
         return damping_matrix(self.system, self.speed)
 
     @property
@@ -338,7 +339,7 @@ class NonlinearSystem:
 
     @property
     def stiffness(self) -> np.ndarray:
-        """``K + W c W^T`` (n, n) with the reference c of the columns [N/m]."""
+        """``K + W c W^T`` (n, n) [N/m, ...] with the reference c of the columns [N/m]."""
         return self.system.K + (self.system.W * self.reference) @ self.system.W.T
 
     @property
@@ -351,14 +352,14 @@ class NonlinearSystem:
 
 
 def damping_matrix(system: MechanicalSystem, speed: float) -> np.ndarray:
-    """``C + speed G`` (n, n) at a speed of rotation [rad/s]."""
+    """Compute the damping ``C + speed G`` (n, n) [N s/m, ...] at a speed of rotation [rad/s]."""
     if system.gyroscopic is None or not speed:
         return system.C
     return system.C + speed * system.gyroscopic
 
 
 def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
-    """Base frequencies as an array (n_bases,), finite and no more than elements and forces name.
+    """Check base frequencies (n_bases,) [rad/s]: finite and no more than elements and forces name.
 
     Raises
     ------
@@ -378,7 +379,7 @@ def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
 
 
 def element_forces(problem: NonlinearSystem, x, theta) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (..., n_columns) and tangents (..., n_columns, n_columns) of all elements.
+    """Compute forces (..., n_columns) [N] and tangents (..., n_columns, n_columns) [N/m] of all elements.
 
     Parameters
     ----------
@@ -400,7 +401,7 @@ def element_forces(problem: NonlinearSystem, x, theta) -> tuple[np.ndarray, np.n
 
 
 def external_force(problem: NonlinearSystem, theta) -> np.ndarray:
-    """Constant load and harmonic forces (..., n) at the phases theta (..., n_bases)."""
+    """Compute constant load and harmonic forces (..., n) [N, N m] at phases theta (..., n_bases) [rad]."""
     theta = np.asarray(theta, float)
     total = np.broadcast_to(problem.system.load, (*theta.shape[:-1], len(problem.system.load))).copy()
     for force in problem.forces:
@@ -409,7 +410,7 @@ def external_force(problem: NonlinearSystem, theta) -> np.ndarray:
 
 
 def tabulated_law(problem: NonlinearSystem, theta) -> Law:
-    """A function of instant number and deflections: forces and tangents beyond the reference stiffness.
+    """Tabulate the forces and tangents of all elements beyond the reference stiffness, at known instants.
 
     Parameters
     ----------
@@ -420,9 +421,9 @@ def tabulated_law(problem: NonlinearSystem, theta) -> Law:
     Returns
     -------
     callable
-        ``law(i, x (n_columns,)) -> (f - c x (n_columns,), df/dx - c)`` with ``c`` the
-        reference of the problem; the second is (n_columns,) where every element acts on single
-        columns, else (n_columns, n_columns).
+        ``law(i, x (n_columns,) [m]) -> (f - c x (n_columns,) [N], df/dx - c [N/m])`` with ``c`` the reference
+        of the problem; the second is (n_columns,) where every element acts on single columns, else
+        (n_columns, n_columns).
     """
     theta, reference = np.asarray(theta, float), problem.reference
     every = np.arange(len(reference))
@@ -454,7 +455,7 @@ def tabulated_law(problem: NonlinearSystem, theta) -> Law:
 
 
 def drift_note(problem: NonlinearSystem) -> str:
-    """What to know of a constant load out of balance; empty where supports and elements take it up.
+    """Write what to know of a constant load out of balance; empty where supports and elements take it up.
 
     Free motions are held by ``e M``: of ``(K' + e M) u = load`` the part ``e M u`` tends to the load on the
     free motions as e falls. Every column counts as held, by contact if need be.

@@ -5,11 +5,7 @@ import pytest
 from phase_patterns import cyclic_shares, mesh_loads
 from validation.reference.frequency_response import mesh_error_response
 
-from femgear.gears.phasing import (
-    mesh_phasing,
-    phase_factors,
-    phasing_table,
-)
+from femgear.gears.phasing import mesh_phasing, phase_factors, phasing_table
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
 from femgear.system.mesh_directions import gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import gear_set_motions, phase_basis, phase_shares

@@ -7,11 +7,6 @@ __all__, __getattr__ = lazy_names(
     {
         "arclength": ["continue_curve"],
         "corrector": ["StepOptions"],
-        "branches": [
-            "Branch",
-            "CurveOptions",
-            "frequency_response_curve",
-            "parameter_curve",
-        ],
+        "branches": ["Branch", "CurveOptions", "frequency_response_curve", "parameter_curve"],
     },
 )

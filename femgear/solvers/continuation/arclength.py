@@ -50,7 +50,7 @@ class Curve:
     Parameters
     ----------
     points : (p, n) array
-        Unknowns, in order along the curve.
+        Unknowns, in order along the curve, in their own units as the parameter.
     parameter : (p,) array
     folds, branch_points : int arrays
         Indices of the points that are limit points and branch points.
@@ -68,6 +68,7 @@ class Curve:
         Last Newton step relative to ``1 + |z|``.
     scale : (n,) array
     unit : float
+        Typical sizes of the unknowns and of a change of the parameter.
     """
 
     points: np.ndarray

@@ -62,8 +62,8 @@ class Branch:
     stability: bool = True
 
     parameter = _of_curve("parameter", "Frequency [rad/s] or whatever was varied, (p,), along the curve.")
-    folds = _of_curve("folds", "Indices of the limit points.")
-    branch_points = _of_curve("branch_points", "Indices of the points where another branch crosses.")
+    folds = _of_curve("folds", "Indices (n_folds,) of the limit points.")
+    branch_points = _of_curve("branch_points", "Indices (n_points,) where another branch crosses.")
     closed = _of_curve("closed", "The last solution is the first one again.")
     complete = _of_curve("complete", "The branch reached an end of the range or closed.")
     converged = _of_solutions("converged", "(p,) bool.")
@@ -155,7 +155,7 @@ class CurveOptions:
         object.__setattr__(self, "tolerance", checked_tolerance(self.tolerance))
 
     def balance(self, problem: NonlinearSystem) -> HarmonicBalance:
-        """The harmonic equations of a problem on these lines."""
+        """Make the harmonic equations of a problem on these lines."""
         return harmonic_balance(
             problem, harmonics=self.harmonics, orders=self.orders, samples=self.samples,
             reduction=self.reduction,
@@ -269,20 +269,20 @@ class ContinuationProblem:
         return max(self.balance_at(parameter).scale for parameter in self.limits)
 
     def describe(self, parameter: float) -> str:
-        """The parameter in words."""
+        """Write the parameter in words."""
         if self.family is not None:
             return describe_value(parameter)
         return f"frequency {parameter:.6g} rad/s ({parameter / (2.0 * np.pi):.6g} Hz)"
 
     def frequency_at(self, parameter: float) -> np.ndarray:
-        """All base frequencies (n_bases,) [rad/s]."""
+        """List all base frequencies (n_bases,) [rad/s] at a parameter."""
         out = np.array(self.frequency)
         if self.family is None:
             out[self.base] = parameter
         return out
 
     def balance_at(self, parameter: float) -> HarmonicBalance:
-        """The equations; modes are computed again only where masses, stiffnesses or loads change."""
+        """Make the equations at a parameter; modes stay where masses, stiffnesses and loads do."""
         known = self.balance
         if self.family is None:
             return known
@@ -293,7 +293,7 @@ class ContinuationProblem:
         )  # fmt: skip
 
     def evaluate(self, y, parameter: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residual (n_y,), derivatives by the unknowns (n_y, n_y) and by the parameter (n_y,)."""
+        """Compute the residual (n_y,) [m], its derivatives by unknowns (n_y, n_y) and parameter (n_y,)."""
         residual, jacobian, slope = self.balance_at(parameter).evaluate(y, self.frequency_at(parameter))
         if self.family is None:
             return residual, jacobian, slope[:, self.base]
@@ -315,7 +315,7 @@ class ContinuationProblem:
         return balance.unknowns(balance.residual(lines, balance.forces(lines)[0], value))
 
     def first(self, parameter: float, start) -> PeriodicSolution:
-        """Solution at the start of the curve, near a given one."""
+        """Solve for the start of the curve, near a given solution or lines (n_columns, L) [m]."""
         balance = self.balance
         return solve_harmonic_balance(
             balance.problem, self.frequency_at(parameter), orders=balance.orders, start=start,
@@ -323,7 +323,7 @@ class ContinuationProblem:
         )  # fmt: skip
 
     def solution(self, y, parameter: float, error: float, iterations: int = 0) -> PeriodicSolution:
-        """Solution at a corrected point."""
+        """Make the solution of a corrected point, unknowns y (n_y,) [m], with its last Newton step."""
         frequency = self.frequency_at(parameter)
         message = f"Point of a branch; last Newton step {error:.1e} of the scaled unknowns."
         message += coincidence_note(self.balance.orders, frequency)
@@ -333,7 +333,7 @@ class ContinuationProblem:
         )  # fmt: skip
 
     def judged(self, parameters, solutions, tolerance: float) -> tuple[PeriodicSolution, ...]:
-        """The solutions with their Floquet verdicts, each of its own system."""
+        """Judge the stability of solutions at parameters (p,), each of its own system."""
         if self.family is None:
             return judged(self.balance.problem, solutions, tolerance=tolerance)
         return tuple(

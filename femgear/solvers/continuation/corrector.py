@@ -46,7 +46,7 @@ class _RoundingError(LostError):
 
 
 def describe_value(parameter: float) -> str:
-    """A parameter without a name or a unit of its own, in words."""
+    """Write a parameter without a name or a unit of its own in words."""
     return f"parameter = {parameter:.9g}"
 
 
@@ -126,15 +126,15 @@ class ScaledCurve:
         return np.asarray(self.limits, float) / self.unit
 
     def scaled(self, u, parameter: float) -> np.ndarray:
-        """``z`` (n + 1,)."""
+        """Scale ``u`` (n,) and the parameter to ``z`` (n + 1,)."""
         return np.append(np.asarray(u, float) / self.scale, parameter / self.unit)
 
     def physical(self, z: np.ndarray) -> tuple[np.ndarray, float]:
-        """``u`` and the parameter."""
+        """Return ``u`` (n,) and the parameter of ``z`` (n + 1,)."""
         return z[:-1] * self.scale, float(z[-1] * self.unit)
 
     def equations(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Residual (n,) and derivative (n, n + 1) with respect to z, both over ``rows``."""
+        """Compute residual (n,) and derivative (n, n + 1) by z (n + 1,), both over ``rows``."""
         try:
             residual, jacobian, slope = self.evaluate(*self.physical(z))
         except (FemgearError, np.linalg.LinAlgError) as error:
@@ -247,11 +247,24 @@ def _factored(matrix: np.ndarray):
 def step_effort(
     options: StepOptions, point: CurvePoint, new: CurvePoint, *, corner: bool, sharp: bool
 ) -> float:
-    """How far a step between two points was from the angle and the contraction aimed at: 1 on target.
+    """Compare a step between two points with the angle [rad] and contraction aimed at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
-    a jump from curve to curve turns the chord but not the tangents. A step may be so short that the curve may
-    turn in a ``corner``, or that any turn is one of a ``sharp`` corner, between whose sides the chord lies.
+    a jump from curve to curve turns the chord but not the tangents.
+
+    Parameters
+    ----------
+    options : StepOptions
+    point, new : CurvePoint
+        Both ends of the step.
+    corner, sharp : bool
+        The step is so short that the curve may turn in a corner, or that any turn is one of a sharp corner,
+        between whose sides the chord lies.
+
+    Returns
+    -------
+    float
+        A ratio without unit: above one the next step has to be shorter.
 
     Raises
     ------
@@ -276,7 +289,7 @@ def step_effort(
 
 
 def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
-    """Look at a step from its other end and at its middle, one evaluation each.
+    """Check a step from its other end and at its middle, one evaluation each.
 
     Raises
     ------
@@ -362,7 +375,7 @@ class Segment:
         return float(self.first.tangent @ (self.last.z - self.first.z))
 
     def at(self, h: float) -> CurvePoint:
-        """Point of the curve in the plane at distance h."""
+        """Find the point of the curve in the plane at the scaled distance h."""
         if h == 0.0:
             return self.first
         guess = self.first.z + h * self._hermite(h)
@@ -378,7 +391,7 @@ class Segment:
 
 
 def folds(segment: Segment) -> list[tuple[float, CurvePoint]]:
-    """Locate the limit points of the segment: plane distances and points, ascending.
+    """Locate the limit points of a segment: scaled plane distances and points, ascending.
 
     Roots of the last component of the tangent; two in one segment are found where the cubic between both ends
     shows an extreme slope between them.
@@ -411,10 +424,10 @@ def _steepest(segment: Segment) -> float | None:
 
 
 def branch_point(segment: Segment) -> tuple[float, CurvePoint]:
-    """Locate the branch point of a segment at whose ends the orientations differ: plane distance and point.
+    """Locate the branch point of a segment: its scaled plane distance and the point, see `CurvePoint`.
 
-    Root of ``tau = 1 / (c^T B^-1 b)`` with the singular vectors b, c of the bordered matrix B (Govaerts,
-    Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, section 3.3).
+    For ends of different orientation. Root of ``tau = 1 / (c^T B^-1 b)`` with the singular vectors b, c of
+    the bordered matrix B (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, 3.3).
 
     Raises
     ------
@@ -493,9 +506,9 @@ def _on_both(segment: Segment, h: float) -> CurvePoint:
 
 
 def bracketed_root(function: Callable[[float], float], known: dict[float, float], *, xtol: float) -> float:
-    """Zero of a function, to ``xtol``, between two places with ``known`` values of different sign (Brent).
+    """Find the zero of a function to ``xtol`` between two places of different sign (Brent).
 
-    ``known`` collects all values.
+    ``known`` has the values at both places and collects all others.
     """
     from scipy.optimize import root_scalar
 

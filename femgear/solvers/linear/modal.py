@@ -65,7 +65,7 @@ class ComplexModes:
     dofs: tuple[str, ...]
 
     def __post_init__(self):
-        freeze(self, "eigenvalue", "shape", "drift", "left", "paired")
+        freeze(self)
 
     @property
     def rigid(self) -> np.ndarray:
@@ -100,7 +100,7 @@ def solve_modes(
     count: int | None = None,
     max_frequency: float | None = None,
 ) -> Modes:
-    """Solve for the modes of ``K + W diag(k) W^T`` and ``M``, with the static flexibility of those left out.
+    """Solve for the modes of ``K + W diag(k) W^T`` and ``M``, with the flexibility [m/N] of those left out.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def _residual_flexibility(system, mesh_stiffness, static, rows, omega) -> np.nda
 
 
 def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
-    """Static flexibility of the modes left out, from the mesh forces to the outputs ``L q``.
+    """Compute the static flexibility [m/N] of the modes left out, from mesh forces to outputs ``L q``.
 
     Parameters
     ----------
@@ -196,24 +196,27 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
 
 
 def output_load(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
-    """Static outputs ``L K^+ load`` (n_outputs,) under the constant external load, all modes included."""
+    """Compute the static outputs ``L K^+ load`` (n_outputs,) [m per unit of L] under the constant load.
+
+    All modes count, also those left out; ``outputs`` (n_outputs, n) are ``L``.
+    """
     outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
     return outputs @ pseudo_solve(*rigid_basis(system, modes), system.load[:, None])[:, 0]
 
 
 def output_response(modes: Modes, response: Response, rows, *, residual, load) -> np.ndarray:
-    """Harmonics of the outputs ``L q`` of a periodic response.
+    """Compute the harmonics of the outputs ``L q`` [m per unit of L] of a periodic response.
 
     Parameters
     ----------
     modes, response
         The response computed with those modes.
     rows : (n_outputs, n_modes) array
-        ``L @ modes.shape``.
+        ``L @ modes.shape`` [kg^-1/2].
     residual : (n_outputs, n_meshes) array
-        From :func:`residual_output`.
+        From :func:`residual_output` [m/N].
     load : (n_outputs,) array
-        From :func:`output_load`.
+        From :func:`output_load` [m].
 
     Returns
     -------
@@ -228,7 +231,7 @@ def output_response(modes: Modes, response: Response, rows, *, residual, load) -
 
 
 def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.0) -> ComplexModes:
-    """Solve for all modes of the damped, rotating system.
+    """Solve for all poles [1/s] and complex modes of the damped, rotating system.
 
     Parameters
     ----------
@@ -294,7 +297,7 @@ def whirl(shape, mass, planes) -> np.ndarray:
     ----------
     shape : (n, m) complex array
     mass : (n,) array
-        Diagonal of the mass matrix.
+        Diagonal of the mass matrix [kg, kg m^2].
     planes : (k, 2) int array
         Rows of x and y, or of radial and tangential, of one body each.
 
@@ -313,7 +316,7 @@ def whirl(shape, mass, planes) -> np.ndarray:
 
 
 def state_matrix(stiffness: np.ndarray, damping: np.ndarray, scale: float) -> np.ndarray:
-    """``A`` (..., 2 m + r, 2 m + r) of the first-order form ``y' = A y``, ``y = (q, q' / scale)``.
+    """Make ``A`` (..., 2 m + r, 2 m + r) [1/s] of the first-order form ``y' = A y``, ``y = (q, q' / scale)``.
 
     Parameters
     ----------
@@ -334,10 +337,10 @@ def state_matrix(stiffness: np.ndarray, damping: np.ndarray, scale: float) -> np
 
 
 def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray:
-    """Make viscous damping ``M Phi diag(2 zeta omega) Phi^T M`` (n, n) of modal damping ratios.
+    """Make viscous damping ``M Phi diag(2 zeta omega) Phi^T M`` (n, n) [N s/m, ...] of damping ratios.
 
     Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 3.1: all modes of the system whose columns have
-    the stiffnesses ``mesh_stiffness`` (n_columns,) get ``ratio``, a number or one a mode; rigid ones none.
+    stiffnesses ``mesh_stiffness`` (n_columns,) [N/m] get ``ratio``, a number or one a mode; rigid ones none.
     """
     modes = solve_modes(system, mesh_stiffness, damping_ratio=ratio)
     carried = system.M @ modes.shape
@@ -345,7 +348,7 @@ def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray
 
 
 def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
-    """Make the viscous damping (n, n) of a system at rest: its own ``C``, a matrix, or modal ratios.
+    """Make the viscous damping (n, n) [N s/m, ...] of a system at rest: its ``C``, a matrix or modal ratios.
 
     ``reference`` (n_columns,) are the stiffnesses of the columns in the modes [N/m]; ``damping`` is None, a
     ratio, one ratio a mode or a matrix (n, n) [N s/m, ...].
@@ -364,9 +367,9 @@ def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> 
 
 
 def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
-    """``K + W diag(mesh_stiffness) W^T`` (n, n) [N/m], with the flexibility between the meshes, checked.
+    """Add the meshes to the stiffness: ``K + W diag(mesh_stiffness) W^T`` (n, n) [N/m, ...], checked.
 
-    ``mesh_stiffness`` (n_meshes,) [N/m].
+    ``mesh_stiffness`` (n_meshes,) [N/m]; the flexibility between the meshes stands in series with them.
     """
     meshes = np.asarray(mesh_stiffness, dtype=float)
     check_matrices(system, symmetric=("M", "K"), columns=len(meshes))
@@ -393,14 +396,14 @@ def _spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
 
 
 def rigid_basis(system: MechanicalSystem, modes: Modes):
-    """Mass, total stiffness and rigid modes, the first arguments of `pseudo_solve`."""
+    """Collect mass (n, n), total stiffness (n, n) and rigid modes (n, r), as `pseudo_solve` takes them."""
     return system.M, total_stiffness(system, modes.mesh_stiffness), modes.shape[:, modes.frequency == 0.0]
 
 
 def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
-    """``K^+ loads``: elastic displacement, mass-orthogonal to the rigid modes, of self-equilibrated loads.
+    """Solve for the elastic displacements ``K^+ loads`` (n, n_loads) [m] of self-equilibrated loads [N].
 
-    Mass and stiffness (n, n), mass-normalised rigid modes (n, r), loads and displacements (n, n_loads).
+    Mass and stiffness (n, n), mass-normalised rigid modes (n, r), to which they are mass-orthogonal.
     ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
     """
     carried = mass @ rigid
@@ -410,7 +413,7 @@ def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
 
 
 def mass_error() -> ConvergenceError:
-    """The refusal of a mass matrix that is not positive definite (E-MASS)."""
+    """Make the refusal of a mass matrix that is not positive definite (E-MASS)."""
     return ConvergenceError(
         "the mass matrix is not positive definite", code="E-MASS",
         remedy="give every degree of freedom some mass or condense it",

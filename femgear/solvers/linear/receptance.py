@@ -47,7 +47,7 @@ class MeshErrorResponse:
 
 
 def modal_response(system: MechanicalSystem, modes: Modes, frequency, inputs, outputs) -> np.ndarray:
-    """``L (K' + i omega C - omega^2 M)^-1 B`` as a sum over real modes and the static rest.
+    """Compute receptances ``L (K' + i omega C - omega^2 M)^-1 B`` [m/N] by modes and their static rest.
 
     ``sum (L phi) (phi^T B) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega) + R``, R = ``L K^+ B`` less the
     static part of the sum (D. J. Ewins, Modal Testing, 2nd ed., 2000, section 2.4; Geradin and Rixen,
@@ -78,12 +78,10 @@ def modal_response(system: MechanicalSystem, modes: Modes, frequency, inputs, ou
         An undamped resonance (E-RESONANCE).
     """
     omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
-    natural = 2.0 * np.pi * modes.frequency
-    w = omega[:, None]
-    below = natural**2 - w**2 + 2j * modes.damping_ratio * natural * w
-    gain = _gain(below, np.maximum(natural**2, w**2), modes)
     left, right = outputs @ modes.shape, modes.shape.T @ inputs
-    result = (gain @ _pairs(left, right)).reshape(len(below), len(left), -1)
+    gain = _gain(modes, slice(None), omega)
+    result = (gain @ _pairs(left, right)).reshape(len(omega), len(left), -1)
+    natural = 2.0 * np.pi * modes.frequency
     if len(natural) < len(system.M):
         elastic = natural > 0.0
         static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
@@ -92,7 +90,7 @@ def modal_response(system: MechanicalSystem, modes: Modes, frequency, inputs, ou
 
 
 def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None) -> MeshErrorResponse:
-    """Respond to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` by summing modes.
+    """Compute mesh deflections [m] and forces [N] by errors ``e_j = Re sum_h error_jh exp(i h omega_m t)``.
 
     ``q = sum phi (phi^T W k e) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega)``, with the static
     flexibility of modes that were left out (Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 2.9;
@@ -138,7 +136,6 @@ def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None)
         )  # fmt: skip
     frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
     elastic = np.flatnonzero(modes.frequency > 0.0)
-    natural, ratio = 2.0 * np.pi * modes.frequency[elastic], modes.damping_ratio[elastic]
     left = modes.mesh_deflection[:, elastic]
     push = k[:, None] * error
     modal = np.einsum("jm,cjh->chm", left, push)
@@ -147,9 +144,7 @@ def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None)
     static = np.einsum("oj,cjh->cho", rest, push)
     deflection = np.empty((len(error), len(frequency), len(harmonics), len(k)), complex)
     for place, harmonic in enumerate(harmonics):
-        w = _angular(harmonic * frequency)[:, None]
-        below = natural**2 - w**2 + 2j * ratio * natural * w
-        gain = _gain(below, np.maximum(natural**2, w**2), modes, elastic)
+        gain = _gain(modes, elastic, _angular(harmonic * frequency))
         deflection[:, :, place] = (gain * modal[:, None, place]) @ left.T + static[:, None, place]
     force = k * (deflection - error.transpose(0, 2, 1)[:, None])
     return MeshErrorResponse(frequency, harmonics, deflection, force)
@@ -196,7 +191,7 @@ class Reduction:
     drift: np.ndarray | None = None
 
     def gain(self, omega) -> tuple[np.ndarray, np.ndarray]:
-        """``h`` and ``dh/domega`` (..., m) at the angular frequencies omega (...) [rad/s].
+        """Compute ``h`` and ``dh/domega`` (..., m) at the angular frequencies omega (...) [rad/s].
 
         Motions without stiffness do not answer at frequency zero: their mean position is free.
 
@@ -221,7 +216,10 @@ class Reduction:
         return gain, change * gain * gain
 
     def at(self, omega) -> tuple[np.ndarray, np.ndarray]:
-        """``W^T Z^-1 [W, loads]`` (..., n_columns, n_columns + n_loads) [m/N] and its derivative."""
+        """Compute ``W^T Z^-1 [W, loads]`` (..., n_columns, n_columns + n_loads) [m/N] and its derivative.
+
+        At the angular frequencies omega (...) [rad/s], by which the derivative is.
+        """
         omega = np.asarray(omega, float)
         gain, change = self.gain(omega)
         shape = (*omega.shape, *self.static.shape)
@@ -231,7 +229,7 @@ class Reduction:
 
 
 def reduce_problem(problem: NonlinearSystem, *, reference=None) -> Reduction:
-    """All modes of the linear part, with the elements replaced by springs.
+    """Reduce the linear part of a problem to all its modes, with the elements replaced by springs.
 
     Damping that the real modes make diagonal keeps them; any other damping and gyroscopic terms give complex
     modes of the state form of the real modes (Ewins, Modal Testing, 2nd ed., sections 2.7 and 2.8).
@@ -294,11 +292,10 @@ def _modes_with_loads(problem: NonlinearSystem, reference: np.ndarray) -> Modes:
 
 
 def respond(reduction: Reduction, outputs, omega, inputs) -> np.ndarray:
-    """Outputs ``L Z^-1 [W, loads] inputs`` (n_outputs, L) complex at every line, ``outputs`` (n_outputs, n) =
-    ``L``.
+    """Compute the outputs ``L Z^-1 [W, loads] inputs`` (n_outputs, L) [m per unit of L] at every line.
 
-    ``omega`` (L,) [rad/s]; ``inputs`` (n_columns + n_loads, L) are forces on the columns [N] and amplitudes
-    of the loads.
+    ``outputs`` (n_outputs, n) are ``L``, ``omega`` (L,) [rad/s]; ``inputs`` (n_columns + n_loads, L) are
+    complex forces on the columns [N] and amplitudes of the loads.
     """
     gain, _ = reduction.gain(omega)
     coordinates = (reduction.inputs @ inputs) * gain.T
@@ -364,10 +361,10 @@ def _times(gain: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 
 
 def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
-    """Amplitudes (1 + 2 n_forces, L) of the load columns of a reduction on the lines ``orders``.
+    """Make the amplitudes (1 + 2 n_forces, L) of a reduction's load columns on lines (L, n_bases).
 
-    The first column holds the constant load with the forces of order zero. A harmonic force on a line that is
-    not there is refused (E-HARMONICS).
+    Factors without unit; the first column holds the constant load with the forces of order zero. A harmonic
+    force on a line that is not there is refused (E-HARMONICS).
     """
     out = np.zeros((1 + 2 * len(problem.forces), len(orders)), complex)
     out[0, 0] = 1.0
@@ -412,11 +409,11 @@ def _angular(frequency) -> np.ndarray:
     return 2.0 * np.pi * frequency
 
 
-def _gain(
-    below: np.ndarray, size: np.ndarray, modes: Modes, kept: np.ndarray | slice = slice(None)
-) -> np.ndarray:
-    """``1 / below`` (F, m) of all modes, or of those that are kept."""
-    bad = np.abs(below) <= _RESONANT * size
+def _gain(modes: Modes, kept: np.ndarray | slice, omega: np.ndarray) -> np.ndarray:
+    """``1 / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega)`` (F, m) [s^2] of the modes kept."""
+    natural, w = 2.0 * np.pi * modes.frequency[kept], omega[:, None]
+    below = natural**2 - w**2 + 2j * modes.damping_ratio[kept] * natural * w
+    bad = np.abs(below) <= _RESONANT * np.maximum(natural**2, w**2)
     if np.any(bad):
         mode = int(np.arange(len(modes.frequency))[kept][np.argwhere(bad)[0, 1]])
         raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")

@@ -56,7 +56,7 @@ class TrackedModes:
     unresolved: tuple[tuple[float, float], ...]
 
     def __post_init__(self):
-        freeze(self, "value", "given", "eigenvalue", "shape", "agreement")
+        freeze(self)
 
     @property
     def frequency(self) -> np.ndarray:
@@ -114,28 +114,24 @@ class CampbellData:
 
     @property
     def speed(self) -> np.ndarray:
-        """(p,) [rad/s]."""
+        """Speeds (p,) [rad/s]."""
         return self.tracked.value
 
     @property
     def frequency(self) -> np.ndarray:
-        """(p, m) [Hz], those of free damped motion."""
+        """Natural frequencies (p, m) [Hz], those of free damped motion."""
         return self.tracked.eigenvalue.imag / (2.0 * np.pi)
 
     @property
     def damping_ratio(self) -> np.ndarray:
-        """(p, m)."""
+        """Damping ratios (p, m)."""
         return self.tracked.damping_ratio
 
 
 def track_modes(
-    family: Callable[[float], tuple[np.ndarray, np.ndarray]],
-    values,
-    mass,
-    *,
-    count: int | None = None,
+    family: Callable[[float], tuple[np.ndarray, np.ndarray]], values, mass, *, count: int | None = None
 ) -> TrackedModes:
-    """Follow modes from one parameter value to the next.
+    """Follow eigenvalues [1/s] and modes from one parameter value to the next.
 
     Each step assigns modes by ``1 - MAC`` and the distance to the extrapolated eigenvalue
     (`scipy.optimize.linear_sum_assignment`). A step is refined where a branch agrees less than asked, and
@@ -149,6 +145,7 @@ def track_modes(
     values : (k,) array
         Ascending or descending.
     mass : (n, n) array
+        [kg, kg m^2]
     count : int, optional
         Lowest modes of the first value to follow; all when not given.
 
@@ -190,7 +187,7 @@ def track_modes(
 
 
 def oscillating(modes: ComplexModes) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues and right vectors of the modes with a frequency: what `track_modes` follows."""
+    """Take eigenvalues (m,) [1/s] and right vectors (n, m) of the modes with a frequency."""
     return modes.eigenvalue[modes.paired], modes.right[:, modes.paired]
 
 
@@ -203,7 +200,7 @@ def campbell_data(
     planes=None,
     count: int | None = None,
 ) -> CampbellData:
-    """Natural frequencies over the speed, followed as branches, with their critical speeds.
+    """Follow the natural frequencies [Hz] over the speed [rad/s], and find the critical speeds.
 
     Parameters
     ----------

@@ -95,23 +95,24 @@ class HarmonicBalance:
         return len(self.reduction.reference) * (2 * len(self.orders) - 1)
 
     def unknowns(self, lines) -> np.ndarray:
-        """Real vector ``Re X_0, Re X_1, Im X_1, ...`` column by column, of lines (n_columns, L)."""
+        """Make the real vector ``Re X_0, Re X_1, Im X_1, ...`` (n_y,) [m] of lines (n_columns, L) [m]."""
         lines = np.asarray(lines, np.complex128)
         out = np.empty((len(lines), 2 * lines.shape[1] - 1))
         out[:, 0], out[:, 1::2], out[:, 2::2] = lines[:, 0].real, lines[:, 1:].real, lines[:, 1:].imag
         return out.ravel()
 
     def lines(self, y) -> np.ndarray:
-        """Lines (n_columns, L) of the unknowns."""
+        """Make the lines (n_columns, L) [m] of the unknowns y (n_y,) [m]."""
         table = np.asarray(y, float).reshape(len(self.reduction.reference), -1)
         out = np.empty((len(table), len(self.orders)), complex)
         out[:, 0], out[:, 1:] = table[:, 0], table[:, 1::2] + 1j * table[:, 2::2]
         return out
 
     def forces(self, lines) -> tuple[np.ndarray, np.ndarray]:
-        """What the elements do beyond their reference springs, at lines (n_columns, L): lines of the forces
-        (n_columns, L) [N], and for every coupled pair their derivative (n_pairs, L, 2 L - 1) [N/m] by the
-        unknowns of one column.
+        """Compute the element forces beyond the reference springs (n_columns, L) [N] at lines of that shape.
+
+        With them for every coupled pair their derivative (n_pairs, L, 2 L - 1) [N/m] by the unknowns of one
+        column.
         """
         # one transform for forces and tangents; columns without elements keep their reference spring
         both = self.grid.transform(np.hstack(self.beyond_reference(lines)))
@@ -119,7 +120,7 @@ class HarmonicBalance:
         return self.grid.amplitudes(both[:n]), self.grid.products(both[n:])
 
     def beyond_reference(self, lines) -> tuple[np.ndarray, np.ndarray]:
-        """Forces (N, n_columns) and tangents (N, n_pairs) less the reference springs, on the grid."""
+        """Compute forces (N, n_columns) [N] and tangents (N, n_pairs) [N/m] less the reference springs."""
         reference, x = self.reduction.reference, self.grid.values(lines)
         force, tangent = forces_on_grid(self.elements, self.pairs, x, self.grid.theta)
         own = self.pairs[:, 0] == self.pairs[:, 1]
@@ -127,16 +128,16 @@ class HarmonicBalance:
         return force - reference * x, tangent
 
     def receptance(self, frequency) -> tuple[np.ndarray, np.ndarray]:
-        """Receptance and its derivative (L, n_columns, n_columns + n_loads) at all lines."""
+        """Compute receptance [m/N] and derivative (L, n_columns, n_columns + n_loads) at bases [rad/s]."""
         frequency = np.atleast_1d(np.asarray(frequency, float))
         return self.reduction.at(self.orders @ frequency)
 
     def residual(self, lines, force, receptance) -> np.ndarray:
-        """``X + T (F - reference X) - T_load S`` (n_columns, L) [m]."""
+        """Compute the residual ``X + T (F - reference X) - T_load S`` (n_columns, L) [m]."""
         return lines + self._respond(receptance, force)
 
     def jacobian(self, products, receptance) -> np.ndarray:
-        """Derivative (n_y, n_y) of the residual by the unknowns."""
+        """Compute the derivative (n_y, n_y) of the residual by the unknowns, from `forces` and receptance."""
         n, width = len(self.reduction.reference), 2 * len(self.orders) - 1
         columns = np.zeros((n, len(self.orders), n, width), np.complex128)
         transfer = receptance[:, :, :n].transpose(1, 0, 2)
@@ -150,8 +151,9 @@ class HarmonicBalance:
         return out
 
     def evaluate(self, y, frequency) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residual (n_y,) [m] at the unknowns y, its derivatives (n_y, n_y) by y and (n_y, n_bases) by the
-        base frequencies [rad/s].
+        """Compute the residual (n_y,) [m] at unknowns y (n_y,) [m] and base frequencies (n_bases,) [rad/s].
+
+        With its derivatives (n_y, n_y) by y and (n_y, n_bases) by the base frequencies.
         """
         lines = self.lines(y)
         force, products = self.forces(lines)
@@ -162,7 +164,7 @@ class HarmonicBalance:
         return residual, self.jacobian(products, value), slope
 
     def spectral_radius(self, y, frequency, products: np.ndarray | None = None) -> float:
-        """Spectral radius of the fixed point ``X <- T_load S - T (F - reference X)`` at the unknowns y.
+        """Compute the spectral radius of the fixed point ``X <- T_load S - T (F - reference X)`` at y (n_y,).
 
         Largest modulus of the eigenvalues of ``T d(F - reference X)/dX``, the Jacobian of the residual less
         one; all are computed up to 600 unknowns. Beyond, Arnoldi's method finds it to 1 %.
@@ -178,7 +180,7 @@ class HarmonicBalance:
         return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
 
     def linear_start(self, frequency) -> np.ndarray:
-        """Unknowns of the response with reference springs, forced by what the elements do at its mean."""
+        """Compute the unknowns (n_y,) [m] of the response with reference springs, forced as at its mean."""
         value, _ = self.receptance(frequency)
         static = -self._respond(value, np.zeros((len(self.reduction.reference), len(self.orders))))
         mean = np.zeros_like(static)
@@ -186,25 +188,23 @@ class HarmonicBalance:
         return self.unknowns(-self._respond(value, self.forces(mean)[0]))
 
     def solution(self, y, frequency, *, radius: bool = False, **what_happened) -> PeriodicSolution:
-        """The unknowns as a solution; keywords are the fields of `PeriodicSolution` that say how it came.
+        """Make a solution of unknowns (n_y,) [m]; keywords are fields of `PeriodicSolution` on how it came.
 
         With ``radius`` the spectral radius of the fixed point is among them.
         """
         frequency = np.atleast_1d(np.asarray(frequency, float))
         lines = self.lines(y)
         beyond, products = self.forces(lines)
+
+        def residual() -> np.ndarray:
+            return self.residual(lines, beyond, self.receptance(frequency)[0])
+
         if "residual" not in what_happened:
-            error = self.unknowns(self.residual(lines, beyond, self.receptance(frequency)[0]))
-            what_happened["residual"] = relative_residual(self, error, y)
+            what_happened["residual"] = relative_residual(self, self.unknowns(residual()), y)
         if radius:
             what_happened["spectral_radius"] = self.spectral_radius(y, frequency, products)
         told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
-        if note := _uncarried_note(
-            self,
-            lines,
-            lambda: self.residual(lines, beyond, self.receptance(frequency)[0]),
-            told["converged"],
-        ):
+        if note := _uncarried_note(self, lines, residual, told["converged"]):
             # the whole mean load is out of balance, whatever its ratio to a deflection that runs away
             told |= {"converged": False, "message": f"Not converged: {note}."}
             told["residual"] = max(told["residual"], 1.0)
@@ -227,7 +227,7 @@ def harmonic_balance(
     samples=None,
     reduction: Reduction | None = None,
 ) -> HarmonicBalance:
-    """The harmonic equations of a problem.
+    """Make the harmonic equations of a problem.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def harmonic_balance(
 
 
 def reduced(problem: NonlinearSystem) -> Reduction:
-    """`reduce_problem` at the elements' own reference; a refusal names the element without stiffness there.
+    """Reduce a problem at its elements' own reference; a refusal names the element without stiffness there.
 
     Raises
     ------
@@ -329,7 +329,7 @@ class LineTangent:
     stiffness: np.ndarray
 
     def fixed_point(self, y) -> np.ndarray:
-        """``T d(F - reference X)`` for a change y (n_y,) of the unknowns."""
+        """Compute ``T d(F - reference X)`` (n_y,) [m] for a change y (n_y,) [m] of the unknowns."""
         balance = self.balance
         lines = balance.lines(y)
         n, pairs = len(lines), balance.pairs
@@ -341,14 +341,14 @@ class LineTangent:
         return balance.unknowns((self.receptance[:, :, :n] @ moved.T[..., None])[..., 0].T)
 
     def solve(self, error) -> np.ndarray | None:
-        """``dR/dX^-1 error`` to three digits; None where GMRES does not get there."""
+        """Solve for ``dR/dX^-1 error`` (n_y,) [m] to three digits; None where GMRES does not get there."""
         operator = _operator(len(error), lambda y: y + self.fixed_point(y))
         step, state = gmres(operator, error, rtol=_ACCURACY, restart=_PRODUCTS, maxiter=1)
         return None if state else step
 
 
 def linearised(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineTangent]:
-    """Residual (n_y,) [m] of the harmonic equations at the unknowns y (n_y,) [m], and its derivative.
+    """Compute the residual (n_y,) [m] of the harmonic equations at y (n_y,) [m], and its derivative.
 
     ``receptance`` as `LineTangent` has it.
     """
@@ -360,7 +360,7 @@ def linearised(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, Lin
 
 
 def krylov_radius(tangent: LineTangent) -> float | None:
-    """Largest modulus of the eigenvalues of the fixed point, to 1 %; None where Arnoldi's method fails.
+    """Find the spectral radius of the fixed point to 1 %; None where Arnoldi's method fails.
 
     Hundreds of lines far from any resonance have eigenvalues of nearly the same modulus: more digits would
     take ten times as many products.
@@ -384,7 +384,7 @@ def _operator(size: int, product: Callable[[np.ndarray], np.ndarray]):
 
 
 def relative_residual(balance: HarmonicBalance, error, y) -> float:
-    """Violation ``error`` [m] over the largest deflection at y, of which the mean counts up to `far` only."""
+    """Divide a violation (n_y,) [m] by the largest deflection at y (n_y,), whose mean counts up to `far`."""
     table = np.abs(np.reshape(y, (len(balance.reduction.reference), -1)))
     mean = min(float(table[:, 0].max()), far(balance))
     size = max(mean, float(table[:, 1:].max(initial=0.0)), 1e-9 * balance.scale)
@@ -393,7 +393,7 @@ def relative_residual(balance: HarmonicBalance, error, y) -> float:
 
 
 def far(balance: HarmonicBalance) -> float:
-    """Mean deflection [m] beyond which no element takes up more: a size that cannot run away."""
+    """Choose the mean deflection [m] beyond which no element takes up more: a size that cannot run away."""
     return max(_FAR * balance.scale, _LENGTHS * balance.longest)
 
 

@@ -1,6 +1,6 @@
 """Harmonic balance of systems with gear meshes, bearings and other springs between motions.
 
-The harmonic equations are solved by Newton's method (`newton`), where it fails after an embedding that leads
+The harmonic equations are solved by Newton's method, where it fails after an embedding that leads
 to a start. `periodic_response` checks the period first and has the verdict at hand.
 """
 
@@ -89,28 +89,26 @@ def solve_harmonic_balance(
     frequency = _checked_frequency(balance, frequency)
     tolerance = checked_tolerance(tolerance)
     max_iterations = checked_count(max_iterations, "max_iterations", code="E-RANGE")
-    found = newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
+    found = _newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
     if start is None and not found.converged:
         found = _embed(balance, frequency, found, tolerance, max_iterations)
     if note := coincidence_note(balance.orders, frequency):
         found = replace(found, message=found.message + note)
     if stability if radius is None else radius:
-        found = with_radius(balance, found)
+        found = _with_radius(balance, found)
     return judged(problem, [found], tolerance=stability_tolerance)[0] if stability else found
 
 
 def displacements(
-    problem: NonlinearSystem,
-    solution: PeriodicSolution,
-    outputs=None,
-    *,
-    reduction: Reduction | None = None,
+    problem: NonlinearSystem, solution: PeriodicSolution, outputs=None, *, reduction: Reduction | None = None
 ) -> np.ndarray:
-    """Lines of the outputs ``L q``; velocities are ``i omega_l`` times, accelerations ``-omega_l^2`` times.
+    """Compute the lines of the outputs ``L q`` [m per unit of L] of a solution.
+
+    Velocities are ``i omega_l`` times, accelerations ``-omega_l^2`` times these.
 
     Parameters
     ----------
-    problem, solution
+    problem, solution : NonlinearSystem, PeriodicSolution
     outputs : (n_outputs, n) array, optional
         ``L``; all degrees of freedom when not given.
     reduction : Reduction, optional
@@ -146,25 +144,18 @@ class PeriodicResponse:
 
 
 def periodic_response(problem: NonlinearSystem, frequency, **options) -> PeriodicResponse:
-    """`solve_harmonic_balance` with the verdict at hand; refuses the single base frequency zero (E-RANGE)."""
+    """Find a periodic motion at base frequencies (n_bases,) [rad/s] with its verdict at hand.
+
+    As `solve_harmonic_balance`, but the single base frequency zero is refused (E-RANGE).
+    """
     require_period(frequency)
     return PeriodicResponse(solve_harmonic_balance(problem, frequency, **options))
 
 
-def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int) -> PeriodicSolution:
-    """Solve harmonic equations by Newton's method with backtracking on the size of the residual.
-
-    Parameters
-    ----------
-    balance : HarmonicBalance
-    frequency : (n_bases,) array
-        [rad/s]
-    y : (size,) array
-        First unknowns: harmonics of the nonlinear deflections, real and imaginary parts [m].
-    tolerance : float
-        Of the residual over the largest deflection.
-    max_iterations : int
-    """
+def _newton(
+    balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int
+) -> PeriodicSolution:
+    """Solve harmonic equations by Newton's method with backtracking, from the unknowns y (n_y,) [m] on."""
     receptance = balance.receptance(frequency)[0]
     evaluate = linearised if balance.size > MANY else _with_matrix
     error, tangent = evaluate(balance, receptance, y)
@@ -227,7 +218,7 @@ def _embed(
     if curve is None or curve.parameter[-1] != 1.0:
         note = " The embedding of the reference springs was lost."
         return replace(failed, message=failed.message + note)
-    found = newton(balance, frequency, curve.points[-1], tolerance, max_iterations)
+    found = _newton(balance, frequency, curve.points[-1], tolerance, max_iterations)
     note = f" Newton's method alone failed; started from {len(curve.points) - 1} steps of embedding."
     work = failed.factorisations + int(curve.iterations.sum()) + found.factorisations
     return replace(
@@ -236,7 +227,7 @@ def _embed(
     )  # fmt: skip
 
 
-def with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSolution:
+def _with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSolution:
     """The solution with the spectral radius of its fixed point; lines that are not finite have none."""
     if not np.all(np.isfinite(found.deflection)):
         return found

@@ -31,10 +31,9 @@ class _GridSeries:
         """The stored values; theta must be the grid."""
         if len(theta) != len(self.values):
             raise CaseError(
-                f"{len(theta)} phases on a grid of {len(self.values)}",
-                code="E-SHAPE",
+                f"{len(theta)} phases on a grid of {len(self.values)}", code="E-SHAPE",
                 limit="the grid itself",
-            )
+            )  # fmt: skip
         return self.values
 
 
@@ -65,7 +64,7 @@ class PhaseGrid:
     flat: tuple[np.ndarray, np.ndarray]
 
     def values(self, lines: np.ndarray) -> np.ndarray:
-        """Signals (N, n) of one-sided lines (n, L)."""
+        """Compute the signals (N, n) of one-sided lines (n, L), in their unit."""
         from scipy.fft import irfftn
 
         shape = (*self.samples[:-1], self.samples[-1] // 2 + 1)
@@ -80,7 +79,7 @@ class PhaseGrid:
         return np.ascontiguousarray(signal.reshape(len(lines), -1).T)
 
     def transform(self, signals: np.ndarray) -> np.ndarray:
-        """Two-sided coefficients (n, M) of signals (N, n), the last base half."""
+        """Compute the two-sided coefficients (n, M) of signals (N, n), the last base half."""
         from scipy.fft import rfftn
 
         grid = np.ascontiguousarray(signals.T).reshape(-1, *self.samples)
@@ -88,13 +87,13 @@ class PhaseGrid:
         return np.asarray(rfftn(grid, axes=axes)).reshape(len(grid), -1) / len(self.theta)
 
     def amplitudes(self, coefficients: np.ndarray) -> np.ndarray:
-        """One-sided lines (n, L) of the coefficients of `transform`."""
+        """Take the one-sided lines (n, L) out of the coefficients (n, M) of `transform`."""
         out = 2.0 * _pick(coefficients, self.lines)
         out[:, 0] = 0.5 * out[:, 0].real
         return out
 
     def products(self, coefficients: np.ndarray) -> np.ndarray:
-        """Matrices (n, L, 2 L - 1) that give the lines of a product from ``Re X_0, Re X_1, Im X_1, ...``.
+        """Make matrices (n, L, 2 L - 1) from ``Re X_0, Re X_1, Im X_1, ...`` to the lines of a product.
 
         Toeplitz and Hankel parts as in `fourier.Product`; they are the exact derivatives of the
         sampled transform, aliasing included.
@@ -109,7 +108,7 @@ class PhaseGrid:
 
 
 def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
-    """Grid of ``samples`` points along every base for the lines ``orders`` (L, n_bases).
+    """Make the grid of ``samples`` points along every base for the lines ``orders`` (L, n_bases).
 
     Raises
     ------
@@ -134,7 +133,7 @@ def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
 
 
 def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ...]:
-    """Samples along every base that keep aliasing out of the lines ``orders`` (L, n_bases).
+    """Choose the samples along every base that keep aliasing out of the lines ``orders`` (L, n_bases).
 
     Products of the lines with polynomials of degree p and with Fourier series of n harmonics are exact with
     ``(p + 1) H + 2 n + 1`` samples, H the highest order along the base. Where contact opens and closes, or a
@@ -160,14 +159,14 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
 
 
 def on_grid(element: Element, theta: np.ndarray) -> Element:
-    """The element with its periodic coefficients evaluated once at the phases ``theta`` (N, n_bases)."""
+    """Evaluate the periodic coefficients of an element once, at phases ``theta`` (N, n_bases) [rad]."""
     return with_coefficients(
         element, lambda one: _GridSeries(np.ascontiguousarray(one.at(theta)), one.mean, one.orders)
     )
 
 
 def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:
-    """Pairs (n_pairs, 2) of columns that some element couples, each once."""
+    """List the pairs (n_pairs, 2) of columns that some element couples, each once."""
     pairs = [
         np.stack([np.repeat(columns, len(columns)), np.tile(columns, len(columns))], axis=1)
         for element in elements
@@ -177,7 +176,7 @@ def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:
 
 
 def forces_on_grid(elements, pairs, x, theta) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (N, n_columns) [N] and tangents (N, n_pairs) [N/m] of the coupled pairs (n_pairs, 2).
+    """Compute forces (N, n_columns) [N] and tangents (N, n_pairs) [N/m] of coupled pairs (n_pairs, 2).
 
     At deflections x (N, n_columns) [m] and phases theta (N, n_bases) [rad].
     """
@@ -205,12 +204,10 @@ def _add(total: np.ndarray, places: list[int], parts: np.ndarray) -> None:
 
 def _places(orders: np.ndarray, samples: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Flat places of orders (..., n_bases) in the transform of real signals, and where to conjugate."""
-    flipped = np.asarray(orders).copy()
     count = np.array(samples)
-    wrapped = (flipped[..., -1] + count[-1] // 2) % count[-1] - count[-1] // 2
+    wrapped = (orders[..., -1] + count[-1] // 2) % count[-1] - count[-1] // 2
     mirrored = wrapped < 0
-    flipped = np.where(mirrored[..., None], -flipped, flipped)
-    index = flipped % count
+    index = np.where(mirrored[..., None], -orders, orders) % count
     shape = (*samples[:-1], samples[-1] // 2 + 1)
     return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), shape)), mirrored
 

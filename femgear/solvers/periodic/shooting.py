@@ -16,20 +16,8 @@ import numpy as np
 from scipy import linalg
 
 from femgear.errors import CaseError, checked_count, checked_tolerance
-from femgear.solvers.periodic.solution import (
-    PeriodicSolution,
-    of_solution,
-    open_verdict,
-    verdict_of,
-)
-from femgear.solvers.time.adaptive import (
-    Flow,
-    checked_start,
-    flow,
-    motion_scale,
-    sampled,
-    trajectory,
-)
+from femgear.solvers.periodic.solution import PeriodicSolution, of_solution, open_verdict, verdict_of
+from femgear.solvers.time.adaptive import Flow, checked_start, flow, motion_scale, sampled, trajectory
 from femgear.solvers.time.stroboscopic import common_period
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import harmonics_of, line_tail
@@ -57,15 +45,15 @@ class ShootingSolution:
     period : float
         [s].
     displacement, velocity : (n,) arrays
-        At the start of the period.
+        At the start of the period [m, m/s].
     monodromy : (2n, 2n) array
         Derivatives of (q, v / rate) after the period by those at its start.
     multipliers : (2n,) complex array
         Its eigenvalues, the largest modulus first; those of free motions are among them.
     time : (n_samples,) array
-        Equidistant instants of one period.
+        Equidistant instants of one period [s].
     motion : (n_samples, n) array
-        Displacements there.
+        Displacements there [m].
     """
 
     solution: PeriodicSolution
@@ -116,21 +104,15 @@ class ShootingOptions:
             )  # fmt: skip
 
     def integrator(self, moving: Flow, start) -> dict[str, Any]:
-        """Options of `trajectory` for motions of the size of a start."""
+        """Make the options of `trajectory` for motions of the size of a start, (n,) [m] and (n,) [m/s]."""
         scale = motion_scale(moving, start)
         return {"tolerance": self.integration, "events": True, "max_steps": _MOST_STEPS, "scale": scale}
 
 
 def solve_shooting(
-    problem: NonlinearSystem,
-    frequency,
-    *,
-    start=None,
-    periods: int = 1,
-    settle: int = 20,
-    **options,
+    problem: NonlinearSystem, frequency, *, start=None, periods: int = 1, settle: int = 20, **options
 ) -> ShootingSolution:
-    """Find a forced periodic motion by Newton iterations on its start.
+    """Find a forced periodic motion by Newton iterations on its displacement [m] and velocity [m/s].
 
     Parameters
     ----------
@@ -138,7 +120,7 @@ def solve_shooting(
     frequency : float or (n_bases,) array
         Base frequencies [rad/s]; all must be multiples of the first over ``periods``.
     start : pair of (n,) arrays, optional
-        First guess; without one the motion ``settle`` periods after rest.
+        First guess [m, m/s]; without one the motion ``settle`` periods after rest.
     periods : int
         Periods of the first base frequency that make one period of the motion.
     settle : int
@@ -222,7 +204,7 @@ def _settled(problem, frequency, period, settle):
 
 
 def shoot(moving: Flow, y, period: float, options) -> tuple[np.ndarray, np.ndarray | None]:
-    """End (2n,) of a period from the state y (2n,), and its derivatives (2n, 2n) where they are followed."""
+    """Integrate a period [s] from the state y (2n,): its end (2n,), and derivatives (2n, 2n) if followed."""
     state = np.column_stack([y, np.eye(len(y))]).ravel() if moving.variational else y
     times = np.array([period])
     end = sampled(trajectory(moving, state, 0.0, period, **options), times, state)[0][0]

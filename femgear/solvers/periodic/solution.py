@@ -69,12 +69,8 @@ class PeriodicSolution:
     verdict: FloquetVerdict = field(default_factory=lambda: open_verdict("not asked for"))
 
     def __post_init__(self):
-        for name, kind in (
-            ("frequency", float),
-            ("orders", int),
-            ("deflection", complex),
-            ("force", complex),
-        ):
+        kinds = {"frequency": float, "orders": int, "deflection": complex, "force": complex}
+        for name, kind in kinds.items():
             array = np.array(getattr(self, name), kind)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -90,7 +86,7 @@ class PeriodicSolution:
         return self.orders @ self.frequency
 
     def at(self, time) -> np.ndarray:
-        """Deflections (..., n_columns) at the instants ``time`` (...) [s]."""
+        """Compute the deflections (..., n_columns) [m] at the instants ``time`` (...) [s]."""
         wave = np.exp(1j * np.asarray(time, float)[..., None] * self.line_frequency)
         return np.real(wave @ self.deflection.T)
 
@@ -129,12 +125,12 @@ class FloquetVerdict:
 
 
 def of_solution(name: str, text: str) -> property:
-    """Property of a result that its ``solution`` has, with its text."""
+    """Make a property of a result that its ``solution`` has, with its text."""
     return property(lambda result: getattr(result.solution, name), doc=text)
 
 
 def open_verdict(reason: str) -> FloquetVerdict:
-    """No verdict, for the reason given."""
+    """Make the verdict that stays open for a reason."""
     return FloquetVerdict(np.zeros(0, complex), np.zeros(0, complex), None, "", "", reason, np.nan)
 
 
@@ -149,7 +145,7 @@ def verdict_of(
     velocities: int = 0,
     drift=(),
 ) -> FloquetVerdict:
-    """Verdict on the multipliers of one period.
+    """Judge stability by the multipliers of one period.
 
     Parameters
     ----------
@@ -196,7 +192,7 @@ def verdict_of(
 
 
 def loss_of(multiplier: complex) -> str:
-    """How a multiplier outside the unit circle left it: "fold", "flip" or "Neimark-Sacker"."""
+    """Tell how a multiplier outside the unit circle left it: "fold", "flip" or "Neimark-Sacker"."""
     if abs(multiplier.imag) > _REAL * abs(multiplier):
         return "Neimark-Sacker"
     return "fold" if multiplier.real > 0.0 else "flip"

@@ -111,7 +111,7 @@ class HarmonicProblem:
     source: np.ndarray
 
     def take(self, speeds) -> HarmonicProblem:
-        """The same problem at some of the speeds."""
+        """Take the problem at some of the speeds, indices or a mask."""
         return HarmonicProblem(self.receptance[:, :, speeds], self.product, self.source[:, speeds])
 
 
@@ -131,8 +131,13 @@ class Twins:
 def compliance(modes: Modes, omega: np.ndarray) -> np.ndarray:
     """Compute modal receptances ``1 / (w_k^2 - omega^2 + 2 i zeta w_k omega)`` (..., n_modes) [s^2].
 
-    Zero for rigid modes, which no self-equilibrated force moves. ``omega`` (...) are angular frequencies
-    [rad/s].
+    Zero for rigid modes, which no self-equilibrated force moves.
+
+    Parameters
+    ----------
+    modes : Modes
+    omega : (...) array
+        Angular frequencies [rad/s].
 
     Raises
     ------
@@ -171,7 +176,7 @@ def _modal_receptance(modes: Modes, modal: np.ndarray) -> np.ndarray:
 
 
 def transfer(receptances: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """``T_h f_h``: (n, n, n_speeds, H + 1) times (n, n_speeds, H + 1)."""
+    """Compute ``T_h f_h`` (n, n_speeds, H + 1) [m] of receptances (n, n, n_speeds, H + 1) and forces [N]."""
     out = np.empty((receptances.shape[0], *force.shape[1:]), dtype=complex)
     for i, row in enumerate(receptances):
         np.einsum("jsh,jsh->sh", row, force, out=out[i])
@@ -186,16 +191,16 @@ def _apply(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
 def _harmonic_residual(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
     """Size of ``E + T G E - S`` relative to that of E, per speed."""
     error = deflection + _apply(problem, deflection) - problem.source
-    return norm(error) / np.maximum(norm(deflection), np.finfo(float).tiny)
+    return _norm(error) / np.maximum(_norm(deflection), np.finfo(float).tiny)
 
 
-def norm(deflection: np.ndarray) -> np.ndarray:
+def _norm(deflection: np.ndarray) -> np.ndarray:
     """Euclidean norm over meshes and harmonics, per speed."""
     return np.sqrt(np.einsum("jsh,jsh->s", deflection, deflection.conj()).real)
 
 
 def matrices(problem: HarmonicProblem) -> np.ndarray:
-    """``T G`` as matrices (n_speeds, n L, n L) on interleaved real and imaginary parts, L = 2 (H + 1)."""
+    """Make ``T G`` as matrices (n_speeds, n L, n L) on real and imaginary parts in turn, L = 2 (H + 1)."""
     n, _, speeds, size = problem.receptance.shape
     product = problem.product.matrix.reshape(n, size, 2, 2 * size)
     columns = product[:, :, 0] + 1j * product[:, :, 1]
@@ -284,7 +289,7 @@ def find_twins(signals: tuple[np.ndarray, ...]) -> Twins:
 
 
 def reduce_twins(problem: HarmonicProblem, twins: Twins) -> HarmonicProblem | None:
-    """The problem of the group leaders alone; ``None`` when the receptances do not share the symmetry."""
+    """Reduce a problem to the group leaders; ``None`` when the receptances do not share the symmetry."""
     shifted = problem.receptance * twins.shift[None, :, None, :]
     folded = np.stack([shifted[:, twins.group == g].sum(axis=1) for g in range(len(twins.leaders))], axis=1)
     reduced = folded[twins.leaders]
@@ -302,9 +307,9 @@ def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
 
 
 def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np.ndarray:
-    """Compute the spectral radius (n_speeds,) of ``T G``, a number without unit.
+    """Compute the spectral radius (n_speeds,) of the fixed point, that of ``T G``, without unit.
 
-    Eigenvalues of the full matrices while their number of entries cubed, times the speeds, stays below
+    Eigenvalues of the full matrices while their number of rows cubed, times the speeds, stays below
     `exact_limit`; otherwise the largest Ritz value of 20 Arnoldi steps from one random vector (Saad,
     Numerical Methods for Large Eigenvalue Problems, algorithm 6.1), all speeds together.
     """
@@ -316,7 +321,7 @@ def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np
     start.imag[..., 0] = 0.0
     basis = np.empty((speeds, steps + 1, 2 * n * size))
     hessenberg = np.zeros((speeds, steps + 1, steps))
-    basis[:, 0] = _rows(start / norm(start)[None, :, None])
+    basis[:, 0] = _rows(start / _norm(start)[None, :, None])
     for k in range(steps):
         vector = basis[:, k].reshape(speeds, n, 2 * size).transpose(1, 0, 2)
         image = _rows(_apply(problem, np.ascontiguousarray(vector).view(complex)))[..., None]
@@ -472,13 +477,13 @@ def _fixed_point(problem: HarmonicProblem, tolerance: float, max_iterations: int
     value = problem.source.copy()
     iterations = np.zeros(value.shape[1], dtype=int)
     change = np.full(value.shape[1], np.inf)
-    limit = 1e8 * np.maximum(norm(value), np.finfo(float).tiny)
+    limit = 1e8 * np.maximum(_norm(value), np.finfo(float).tiny)
     active = np.arange(value.shape[1])
     for _ in range(max_iterations):
         old = value[:, active]
         new = problem.source[:, active] - _apply(problem.take(active), old)
-        size = np.maximum(norm(new), np.finfo(float).tiny)
-        change[active] = norm(new - old) / size
+        size = np.maximum(_norm(new), np.finfo(float).tiny)
+        change[active] = _norm(new - old) / size
         value[:, active] = new
         iterations[active] += 1
         active = active[(change[active] > tolerance) & (size < limit[active])]

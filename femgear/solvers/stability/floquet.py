@@ -19,12 +19,7 @@ from scipy.linalg import expm
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.linear.modal import state_matrix
-from femgear.solvers.periodic.solution import (
-    FloquetVerdict,
-    PeriodicSolution,
-    open_verdict,
-    verdict_of,
-)
+from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
 from femgear.system.force_laws import tangent_jumps
 from femgear.system.system import Modes, NonlinearSystem, element_forces
 
@@ -50,12 +45,12 @@ _MOST_ENTRIES = 4_000_000
 
 
 def monodromy(matrices, durations) -> np.ndarray:
-    """Transition matrix over one period of ``x' = A x`` with A constant in pieces, by matrix exponentials.
+    """Compute the transition matrix over one period of ``x' = A x``, A constant in pieces, by exponentials.
 
     Parameters
     ----------
     matrices : (..., n_pieces, n, n) array
-        ``A`` in order of time.
+        ``A`` in order of time [1/s].
     durations : (..., n_pieces) array
         [s], positive.
 
@@ -131,7 +126,7 @@ class Frame:
         return not np.any(np.abs(off) > 1e-12 * max(np.abs(self.damping).max(initial=0.0), 1e-300))
 
     def steps(self, period):
-        """Steps of the first sequence over a period [s], as floats: they may be beyond all bounds."""
+        """Count the steps of the first sequence over periods (...) [s], as floats: they may be unbounded."""
         return np.ceil(np.maximum(8.0, self.fastest * np.asarray(period, float) / _STEP_ANGLE))
 
     @property
@@ -140,16 +135,19 @@ class Frame:
         return float(np.sqrt(np.abs(self.square).max(initial=0.0)))
 
     def kappa(self, tangent: np.ndarray) -> np.ndarray:
-        """Change of stiffness (..., n_c, n_c) of tangents [N/m], the modes left out in series."""
+        """Compute the change of stiffness (..., n_c, n_c) [N/m] of tangents, the modes left out in series."""
         change = tangent - np.diag(self.reference)
         return stiffness_in_series(change, self.residual) if np.any(self.residual) else change
 
     def state_matrices(self, kappa: np.ndarray) -> np.ndarray:
-        """``A`` (..., 2 n, 2 n) of ``(eta, eta')' = A (eta, eta')`` with kappa (..., n_c, n_c)."""
+        """Make ``A`` (..., 2 n, 2 n) of ``(eta, eta')' = A (eta, eta')`` with kappa (..., n_c, n_c) [N/m]."""
         return state_matrix(np.diag(self.square) + self.rows.T @ kappa @ self.rows, self.damping, 1.0)
 
     def exact_monodromy(self, tangents: np.ndarray, durations) -> np.ndarray:
-        """Monodromy matrices of tangents (..., pieces, n_c, n_c) that are constant over durations [s]."""
+        """Compute monodromy matrices (..., 2 n, 2 n) of tangents (..., pieces, n_c, n_c) [N/m].
+
+        They are constant over the durations (..., pieces) [s].
+        """
         n = len(self.square)
         both = np.concatenate([np.ones(n), np.full(n, self.fastest or 1.0)])
         return monodromy(self.state_matrices(self.kappa(tangents)) * both / both[:, None], durations)
@@ -157,17 +155,28 @@ class Frame:
     def verdict(
         self, multipliers, period: float, method: str, error: float, tolerance: float
     ) -> FloquetVerdict:
-        """`verdict_of` with what it has to know of free motions."""
+        """Judge multipliers (m,) of a period [s] as `verdict_of`, which has to know of free motions."""
         free = {"positions": self.positions, "velocities": self.positions, "drift": self.drift}
         return verdict_of(multipliers, period, method, error, tolerance, **free)
 
 
 def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
-    """Compute the modes [rad/s] of a problem about its reference stiffness, at most so many, lowest first.
+    """Compute the modal coordinates of small motions about the reference stiffness of a problem.
 
     Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
     positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static
     flexibility.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    modes : int
+        Most modes kept, lowest first; all where there are no more.
+
+    Returns
+    -------
+    Frame
+        Squared frequencies (n,) [1/s^2], damping (n, n) [1/s] and the rest.
     """
     system, reference = problem.system, np.maximum(problem.reference, 0.0)
     stiffness = system.K + (system.W * reference) @ system.W.T
@@ -196,7 +205,7 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
 
 
 def frame_of_modes(modes: Modes) -> Frame:
-    """The moving modes of a modal basis with their damping ratios."""
+    """Make the modal coordinates of small motions from the moving modes of a basis with their damping."""
     moving = modes.frequency > 0.0
     omega = 2.0 * np.pi * modes.frequency[moving]
     damping = np.diag(2.0 * modes.damping_ratio[moving] * omega)
@@ -414,7 +423,7 @@ def floquet_verdict(problem: NonlinearSystem, solution: PeriodicSolution, **opti
 def judged(
     problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], **options
 ) -> tuple[PeriodicSolution, ...]:
-    """The solutions with their verdicts; options as for :func:`floquet_verdicts`.
+    """Join solutions with their verdicts; options as for :func:`floquet_verdicts`.
 
     Where the modes kept do not carry the motion the verdict says "not determined".
     """
@@ -438,7 +447,7 @@ def require_period(frequency) -> None:
 
 
 def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution]):
-    """Function ``(fraction (m, s), states (m,)) -> tangents (m, s, n_c, n_c)`` [N/m] along the solutions."""
+    """Make a function ``(fraction (m, s), states (m,)) -> tangents (m, s, n_c, n_c)`` [N/m] of solutions."""
     lines = np.stack([solution.deflection for solution in solutions])
     orders = solutions[0].orders[:, 0]
 

@@ -84,7 +84,7 @@ class LyapunovExponents:
 
     @property
     def largest(self) -> float:
-        """[1/s]"""
+        """Largest exponent [1/s]."""
         return float(self.exponents[0])
 
     @property
@@ -177,7 +177,7 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
     frequency : float or (n_bases,) array
         Base frequencies [rad/s] with a common period, see `stroboscopic_map`.
     start : pair of (n,) arrays, optional
-        Displacement and velocity at phase zero; at rest when not given.
+        Displacement [m] and velocity [m/s] at phase zero; at rest when not given.
     options
         Fields of `LyapunovOptions`.
 
@@ -206,10 +206,19 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
 def exponents_of(
     problem: NonlinearSystem, finer, coarser, start, chosen: LyapunovOptions, *, beside: int
 ) -> LyapunovExponents:
-    """Compute Lyapunov exponents [1/s] of a run, and their error from a coarser one beside it.
+    """Compute Lyapunov exponents (count,) [1/s] of a run, and their error from a coarser one beside it.
 
-    ``finer`` and ``coarser`` integrate the problem and its tangents from passage to passage, ``start`` is the
-    first position and velocity (n,) each; the coarser run covers the first ``beside`` of the points.
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    finer, coarser
+        Integrators of the problem and its tangents from passage to passage, with ``size``, ``period`` [s],
+        ``divergence`` [1/s] and ``passages(start)``.
+    start : pair of (n,) arrays
+        Displacement [m] and velocity [m/s] at the first passage.
+    chosen : LyapunovOptions
+    beside : int
+        Points that the coarser run covers.
     """
     count, points = chosen.count, chosen.points
     if count > finer.size:
@@ -272,7 +281,7 @@ def _check_sum(exponents, scatter, run) -> None:
 
 
 def check_bounded(q, v) -> None:
-    """Refuse displacements q (n,) and velocities v (n,) beyond all bounds (E-DIVERGED)."""
+    """Refuse displacements q (n,) [m] and velocities v (n,) [m/s] beyond all bounds (E-DIVERGED)."""
     if not (np.abs(q).max(initial=0.0) < _BEYOND and np.abs(v).max(initial=0.0) < _BEYOND):
         raise ConvergenceError(
             "the motion grows beyond all bounds and has no attractor", code="E-DIVERGED",
@@ -282,7 +291,7 @@ def check_bounded(q, v) -> None:
 
 
 def pieces(damping, period: float) -> int:
-    """Parts of a period [s] after which small motions are made orthogonal, by the damping (n, n)."""
+    """Count the parts of a period [s] after which small motions are made orthogonal, by damping [1/s]."""
     fading = float(np.linalg.norm(damping, 2)) if len(damping) else 0.0
     return int(min(max(_PIECES, np.ceil(fading * period / _FADED)), _MOST_PIECES))
 

@@ -132,7 +132,7 @@ def stability(
 
 
 def decisive_harmonics(modes: Modes, excitation: MeshExcitation, kept: int) -> int:
-    """Highest mesh harmonic of the stiffness that could by itself make the response unstable.
+    """Find the highest mesh harmonic of the stiffness that could by itself make the response unstable.
 
     ``q'' + 2 zeta w q' + w^2 (1 + eps cos 2 w t) q = 0`` is stable below ``eps = 4 zeta`` (Nayfeh and Mook,
     Nonlinear Oscillations, 1979, section 5.3), and a mode whose strain is all in the mesh has

@@ -5,11 +5,7 @@ from femgear.solvers import lazy_names
 __all__, __getattr__ = lazy_names(
     __name__,
     {
-        "stroboscopic": [
-            "stroboscopic_map",
-            "sweep_response",
-            "sweep_up_and_down",
-        ],
+        "stroboscopic": ["stroboscopic_map", "sweep_response", "sweep_up_and_down"],
         "transient": ["solve_transient"],
     },
 )

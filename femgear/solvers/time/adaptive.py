@@ -21,7 +21,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error, state_matrix
 from femgear.system.force_laws import Element, coefficients_of, has_corners, with_coefficients
 from femgear.system.fourier import StepSeries, constant, phase_of
-from femgear.system.system import NonlinearSystem
+from femgear.system.system import NonlinearSystem, element_forces
 
 METHODS = ("DOP853", "Radau", "LSODA")
 # Instants inside a step at which contact changes are looked for.
@@ -73,23 +73,23 @@ class Flow:
         return len(self.problem.system.M)
 
     def state(self, q, v) -> np.ndarray:
-        """State at the start; the derivatives are the unit matrix."""
+        """Make the state of a start q (n,) [m] and v (n,) [m/s]; the derivatives are the unit matrix."""
         y = np.concatenate([np.asarray(q, float), np.asarray(v, float) / self.rate])
         return np.column_stack([y, np.eye(len(y))]).ravel() if self.variational else y
 
     def split(self, y):
-        """Displacement, velocity and deflection of states y (size, ...)."""
+        """Split states y (size, ...) into displacement [m], velocity [m/s] and deflection [m]."""
         width = 2 * self.size + 1 if self.variational else 1
         y = y.reshape(2 * self.size, width, *y.shape[1:])[:, 0]
         q = y[: self.size]
         return q, y[self.size :] * self.rate, np.tensordot(self.rows, q, 1)
 
     def tangents(self, y) -> np.ndarray:
-        """Derivatives (2n, 2n) of the scaled state by the scaled state at the start."""
+        """Take the derivatives (2n, 2n) of the scaled state by that at the start out of a state y."""
         return y.reshape(2 * self.size, -1)[:, 1:]
 
     def derivative(self, law: Contacts):
-        """``dy/dt`` as a function of time and state, with the contact state of ``law``."""
+        """Make ``dy/dt`` as a function of time [s] and state, with the contact state of ``law``."""
         n, constant, harmonic = self.size, self.loads[0].real, self.loads[1:]
 
         def motion(t, y):
@@ -105,7 +105,7 @@ class Flow:
         return motion
 
     def jacobian(self, law: Contacts):
-        """Derivative of the motion by the state, (2n, 2n)."""
+        """Make the derivative (2n, 2n) [1/s] of the motion by the state as a function of time and state."""
         n = self.size
 
         def slope(t, y):
@@ -118,7 +118,7 @@ class Flow:
 
 
 def flow(problem: NonlinearSystem, frequency, *, variational=False) -> Flow:
-    """First-order form of a problem at base frequencies (n_bases,) [rad/s]; M is factorised once."""
+    """Make the first-order form of a problem at base frequencies (n_bases,) [rad/s]; factorises M once."""
     system, n = problem.system, len(problem.system.M)
     frequency = np.atleast_1d(np.asarray(frequency, float))
     loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
@@ -142,7 +142,7 @@ def trajectory(
     motion: Flow, start, begin: float, end: float, *, method="DOP853", tolerance=1e-10, scale=None,
     events=False, max_steps=1_000_000,
 ) -> Iterator[tuple]:  # fmt: skip
-    """Integrate from a state of ``Flow.state``; yields accepted steps (from, to [s], interpolation of y).
+    """Integrate the motion from a state; yields accepted steps (from, to [s], interpolation of y).
 
     Parameters
     ----------
@@ -194,9 +194,9 @@ def trajectory(
 
 
 def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
-    """States (n_times, size) of an adaptive integration at ascending instants, and the number of its steps.
+    """Sample an adaptive integration: states (n_times, size) at times (n_times,) [s], number of its steps.
 
-    ``times`` (n_times,) [s]; ``pieces`` comes from `trajectory`; instants before its first step have the
+    Times ascend; ``pieces`` comes from `trajectory`; instants before its first step have the
     state ``start``.
     """
     found, filled, steps = np.empty((len(times), len(start))), 0, 0
@@ -214,7 +214,7 @@ def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
 
 
 def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement and velocity (n,) of a start; rest without deflection when none is given.
+    """Check displacement (n,) [m] and velocity (n,) [m/s] of a start; rest when none is given.
 
     Raises
     ------
@@ -241,17 +241,14 @@ def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.
 
 
 def motion_scale(motion: Flow, start) -> float | None:
-    """Size of the motion [m] to which an integration tolerance refers; None leaves it to the integrator.
+    """Estimate the size of the motion [m] to which a tolerance refers; None leaves it to the integrator.
 
     The start, and the static answer to loads and element forces at rest, held by the stiffness there plus
     inertia. That is singular at an unstable rest such as the top between two wells: inertia alone holds then.
     """
     q, v = start
     system, rate = motion.problem.system, motion.rate
-    columns = np.zeros(system.W.shape[1])
-    at_rest, _ = Contacts(motion.problem.elements, len(columns)).forces(
-        columns, np.zeros(motion.problem.bases)
-    )
+    at_rest, _ = element_forces(motion.problem, np.zeros(system.W.shape[1]), np.zeros(motion.problem.bases))
     pushes = [system.load, system.W @ at_rest, *(np.abs(f.force) for f in motion.problem.forces)]
     carrying = motion.problem.stiffness + rate * rate * system.M
     try:
@@ -356,7 +353,7 @@ class Contacts:
     closed: tuple[np.ndarray, ...] = ()
 
     def forces(self, x, theta):
-        """Forces (n_c,) and tangents (n_c, n_c) of one instant."""
+        """Compute forces (n_c,) [N] and tangents (n_c, n_c) [N/m] of one instant, x (n_c,) in m."""
         total, tangent = np.zeros(self.columns), np.zeros((self.columns, self.columns))
         for number, element in enumerate(self.elements):
             own = x[element.columns]
@@ -364,17 +361,13 @@ class Contacts:
                 force, slope = element.frozen(own, theta, self.closed[number])
             else:
                 force, slope = element.evaluate(own, theta)
-            if element.columns.shape[1] == 1:
-                np.add.at(total, element.columns, force)
-                np.add.at(tangent, (element.columns[:, 0], element.columns[:, 0]), slope[:, 0, 0])
-                continue
-            for columns, f, t in zip(element.columns, force, slope):
-                total[columns] += f
-                tangent[columns[:, None], columns] += t
+            columns = element.columns
+            np.add.at(total, columns, force)
+            np.add.at(tangent, (columns[:, :, None], columns[:, None, :]), slope)
         return total, tangent
 
     def gaps(self, x, theta) -> np.ndarray:
-        """All switches (..., m) at deflections x (..., n_c), positive where they are on their side.
+        """Compute all switches (..., m) at deflections x (..., n_c) [m], positive on their side.
 
         Closed switches are ``u``, open ones ``-u``: a negative value says that the state has to change.
         """
@@ -382,7 +375,7 @@ class Contacts:
         return np.concatenate(sides, axis=-1) * np.where(np.concatenate(self.closed), 1.0, -1.0)
 
     def flipped(self, which) -> Contacts:
-        """With the switches ``which`` (m,) bool changed."""
+        """Change the switches ``which`` (m,) bool."""
         state = np.concatenate(self.closed) ^ which
         parts = np.split(state, np.cumsum([len(c) for c in self.closed])[:-1])
         return replace(self, closed=tuple(parts))

@@ -68,7 +68,10 @@ class StepRule:
             )  # fmt: skip
 
     def predictor(self, h: float) -> np.ndarray:
-        """Rows (6, 3) on (q, v, a): q, v, a without ``a_1``; then q, v and inertia of the force balance."""
+        """Make rows (6, 3) on (q, v, a) for a step h [s].
+
+        q, v and a without ``a_1``, then q, v and inertia of the force balance.
+        """
         predict = np.array(
             [[1.0, h, h * h * (0.5 - self.beta)], [0.0, 1.0, h * (1.0 - self.gamma)], [0.0] * 3]
         )
@@ -89,7 +92,7 @@ RULES = {
 
 
 def generalised_alpha(radius: float) -> StepRule:
-    """The rule whose spectral radius at infinite frequency is ``radius`` (Chung and Hulbert 1993).
+    """Make the rule whose spectral radius at infinite frequency is ``radius`` (Chung and Hulbert 1993).
 
     Unconditionally stable and of second order; 1 loses no energy, 0 kills the highest modes in one step.
     """
@@ -102,7 +105,7 @@ def generalised_alpha(radius: float) -> StepRule:
 
 
 def stability_limit(rule: StepRule) -> float:
-    """Largest ``h / T`` of a rule for an undamped mode of period T; infinite for unconditionally stable ones.
+    """Find the largest stable ``h / T`` of a rule for an undamped mode of period T; infinite where any is.
 
     T. J. R. Hughes, The Finite Element Method (2000), Eq. 9.1.22, for Newmark's family: linear acceleration
     0.5513, central difference 0.3183, Fox-Goodwin 0.3898.
@@ -152,7 +155,7 @@ class RuleScheme:
         self.forces = linalg.lu_solve(factor, loads.T).T
 
     def start(self, q, v, theta, law):
-        """State with the acceleration that the equation of motion asks for, and the column forces."""
+        """Make the state, with the acceleration that the equation of motion asks for, and column forces."""
         system = self.problem.system
         g, _ = law(0, self.rows @ q)
         force = (
@@ -164,7 +167,7 @@ class RuleScheme:
         return np.stack([q, v, linalg.solve(system.M, force, assume_a="pos")]), g
 
     def table(self, theta):
-        """Accelerations (n, dofs) that the loads give in n steps."""
+        """Compute the accelerations (n, dofs) [m/s^2] that the loads give in n steps."""
         wave = _load_waves(self.problem, theta)
         mixed = (1.0 - self.rule.force) * wave[:, 1:] + self.rule.force * wave[:, :-1]
         return np.real(mixed.T @ self.forces)
@@ -189,7 +192,7 @@ class RuleScheme:
         return states[:, 0], states[:, 1], states[:, 2]
 
     def local_error(self, states, g):
-        """Error of q in every step: ``h^2 (beta - 1/6) da + h^2 (beta / 2 - 1/24) d(da)``.
+        """Estimate the error of q in every step: ``h^2 (beta - 1/6) da + h^2 (beta / 2 - 1/24) d(da)``.
 
         The Taylor series of the step against the exact one (Zienkiewicz and Xie, Earthquake Eng. Struct. Dyn.
         20 (1991) 871-887, have its first term).
@@ -246,7 +249,7 @@ class ModalScheme:
         self.static_columns = self.static @ system.W
 
     def start(self, q, v, theta, law):
-        """Modal state of the motion; the part of modes that are left out is dropped."""
+        """Make the modal state of a motion; the part of modes that are left out is dropped."""
         carried = self.problem.system.M @ self.modes.shape
         state = np.stack([q @ carried, v @ carried])
         x = self.rows @ state[0] + np.real(self._waves(theta[:1]) @ self.static_columns)[0]
@@ -257,7 +260,7 @@ class ModalScheme:
         return _load_waves(self.problem, theta).T
 
     def table(self, theta):
-        """What the loads add in n steps, (n, 2 m + n_c): to y and v, then to the columns at the ends."""
+        """Compute what loads add in n steps, (n, 2 m + n_c): to y and v, then to the columns at the ends."""
         wave = self._waves(theta)
         modal = np.real(wave @ self.loads)
         push = modal[:-1, None] * self.first + modal[1:, None] * self.last
@@ -271,7 +274,7 @@ class ModalScheme:
         return out
 
     def deflection(self, state, load):
-        """Columns (n_c,) but for the static flexibility under their own forces."""
+        """Compute the columns (n_c,) [m] but for the static flexibility under their own forces."""
         return self.rows @ state[0] + load[state.size :]
 
     def finish(self, state, g):
@@ -282,12 +285,12 @@ class ModalScheme:
         return states[..., 0, :] @ self.rows.T - g @ own + np.real(self._waves(theta) @ self.static_columns)
 
     def motion(self, states, g, theta):
-        """Displacements and velocities (n, dofs); modes left out count in the displacements only."""
+        """Compute displacements and velocities (n, dofs); modes left out count in displacements only."""
         static = np.real(self._waves(theta) @ self.static) - g @ self.residual.T
         return states[:, 0] @ self.modes.shape.T + static, states[:, 1] @ self.modes.shape.T, None
 
     def local_error(self, states, g):
-        """Modal norm of what a parabola through three column forces would add: ``drawn d(dg) / 12``.
+        """Estimate by modal norm what a parabola through three column forces would add: ``drawn d(dg) / 12``.
 
         The linear interpolation misses ``g'' t (h - t) / 2``, whose mean is ``h^2 g'' / 12``.
         """
@@ -299,7 +302,7 @@ class ModalScheme:
 
 
 def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Exact step of ``y'' + 2 zeta w y' + w^2 y = p`` with p linear in the step, state ``(y, v)``.
+    """Compute the exact step of ``y'' + 2 zeta w y' + w^2 y = p`` with p linear in it, state ``(y, v)``.
 
     Parameters
     ----------
@@ -326,7 +329,7 @@ def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.n
 
 
 def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
-    """Largest undamped natural frequency [rad/s] with stiffnesses (n_columns,) [N/m] of the columns."""
+    """Find the largest undamped natural frequency [rad/s] with column stiffnesses (n_columns,) [N/m]."""
     system, n = problem.system, len(problem.system.M)
     total = system.K + (system.W * mesh_stiffness) @ system.W.T
     try:
@@ -337,14 +340,15 @@ def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
 
 
 class Scheme(Protocol):
-    """A rule for one step of a given length, with its matrices factorised.
+    """A rule for one step of a given length [s], with its matrices factorised.
 
-    ``flexibility`` (n_c, n_c): ``A``. ``start(q, v, theta, law)``: first state and g. ``table(theta)``: from
-    phases (n + 1, n_bases) what the loads do in n steps, first axis n. ``free(state, g, load)``: state after
-    the step without ``g_1``, ``deflection(state, load)`` its columns, ``finish(state, g_1)`` state with it.
-    ``columns(states, g, theta)`` (..., n_c), ``motion(states, g, theta)``: displacements, velocities and,
-    where the rule knows them, accelerations (n + 1, n). ``local_error(states, g)`` (n,): estimated error of
-    the displacements in the steps, in the norm of the mass matrix.
+    ``flexibility`` (n_c, n_c) [m/N]: ``A``. ``start(q, v, theta, law)``: first state and g (n_c,) [N] of a
+    motion (dofs,) [m, m/s]. ``table(theta)``: from phases (n + 1, n_bases) [rad] what the loads do in n
+    steps, first axis n. ``free(state, g, load)``: state after the step without ``g_1``,
+    ``deflection(state, load)`` its columns (n_c,) [m], ``finish(state, g_1)`` state with it.
+    ``columns(states, g, theta)`` (..., n_c) [m], ``motion(states, g, theta)``: displacements, velocities and,
+    where the rule knows them, accelerations (n + 1, dofs) [m, m/s, m/s^2]. ``local_error(states, g)`` (n,):
+    estimated error of the displacements in the steps, in the norm of the mass matrix [m kg^1/2].
     """
 
     step: float
@@ -372,7 +376,7 @@ class Scheme(Protocol):
 class Marched:
     """States of a block of steps, the one before the first included.
 
-    ``states`` (n + 1, ...), ``excess`` (n + 1, n_c) column forces beyond the reference, ``steps`` done,
+    ``states`` (n + 1, ...), ``excess`` (n + 1, n_c) [N] column forces beyond the reference, ``steps`` done,
     ``residual`` the largest violation of the column equations relative to the deflections, ``iterations``.
     """
 
@@ -390,18 +394,19 @@ def march(
 
     Parameters
     ----------
+    scheme : Scheme
     law : callable
         Of the instants 0 .. count, from `tabulated_law`; instant 0 is the start.
     loads : (count, ...) array
         From ``scheme.table``.
-    state, g : arrays
-        At the start.
+    state, g : (...), (n_c,) arrays
+        State of the scheme and column forces beyond the reference [N] at the start.
     tolerance : float
         Of the column equations, relative to the largest free deflection so far.
     max_iterations : int
         Newton iterations a step.
     size : float
-        Square of the largest free deflection before this block.
+        Square of the largest free deflection before this block [m^2].
     """
     states, excess = np.empty((count + 1, *state.shape)), np.empty((count + 1, len(g)))
     states[0], excess[0] = state, g

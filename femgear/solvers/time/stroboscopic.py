@@ -42,12 +42,12 @@ class StroboscopicMap:
     theta: np.ndarray
 
     def enter(self, start):
-        """State of the scheme and column forces for displacement and velocity (n,); rest for None."""
+        """Make state and column forces of displacement (n,) [m] and velocity (n,) [m/s]; rest for None."""
         q, v = checked_start(self.problem, start)
         return self.scheme.start(q, v, self.theta[:1], self.law)
 
     def run(self, state, g) -> Marched:
-        """One period of motion from a state at phase zero."""
+        """Integrate one period of motion from a state at phase zero and its column forces g (n_c,) [N]."""
         block = march(
             self.scheme, self.law, self.loads, state, g, len(self.loads), tolerance=1e-10, max_iterations=30
         )
@@ -59,11 +59,11 @@ class StroboscopicMap:
         return block
 
     def columns(self, block: Marched) -> np.ndarray:
-        """Deflections (steps + 1, n_c)."""
+        """Compute the deflections (steps + 1, n_c) [m] of a period."""
         return self.scheme.columns(block.states, block.excess, self.theta)
 
     def motion(self, block: Marched, index):
-        """Displacement and velocity (k, n) at instants of the period."""
+        """Compute displacement [m] and velocity [m/s], (k, n) each, at instants (k,) of the period."""
         part = self.scheme.motion(block.states[index], block.excess[index], self.theta[index])
         return part[0], part[1]
 
@@ -76,7 +76,7 @@ def stroboscopic_map(
     periods: int = 1,
     method: str = "average acceleration",
 ) -> StroboscopicMap:
-    """Prepare the map of one period of the motion.
+    """Make the map of one period [s] of the motion.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def stroboscopic_map(
 
 
 def common_period(frequency, periods: int) -> float:
-    """``periods`` periods of the first base frequency [s]; all others must repeat then."""
+    """Compute the length [s] of ``periods`` periods of the first base frequency; others must repeat then."""
     periods = checked_count(periods, "periods", code="E-RANGE")
     if not np.all(np.isfinite(frequency)) or not frequency[0] > 0.0:
         raise CaseError(
@@ -137,6 +137,7 @@ class PoincareSection:
     time : (n_points,) array
         [s].
     displacement, velocity : (n_points, n) arrays
+        [m, m/s]
     deflection : (n_points, n_columns) array
         ``W^T q`` [m].
     """
@@ -147,7 +148,7 @@ class PoincareSection:
     deflection: np.ndarray
 
     def repeats_after(self, tolerance: float = 1e-4) -> int:
-        """Smallest number p of points after which all displacements repeat; 0 when none up to a half does.
+        """Find the number p of points after which all displacements repeat; 0 when none up to a half does.
 
         The tolerance is relative to the largest displacement. A motion of period p times that of the section.
         """
@@ -177,7 +178,7 @@ class SweepResponse:
     periods : (n_frequencies,) int array
         Periods of the map until then.
     displacement, velocity : (n_frequencies, n) arrays
-        At phase zero of the settled motion.
+        At phase zero of the settled motion [m, m/s].
     """
 
     frequency: np.ndarray
@@ -191,7 +192,7 @@ class SweepResponse:
     velocity: np.ndarray
 
     def jumps(self, share: float = 0.2) -> np.ndarray:
-        """Indices i where some amplitude changes by more than ``share`` of the largest from i to i + 1."""
+        """Find the indices i from which to i + 1 some amplitude changes by over ``share`` of the largest."""
         change = np.abs(np.diff(self.amplitude, axis=0)) / self.amplitude.max(axis=0, initial=1e-300)
         return np.flatnonzero(np.any(change > share, axis=1))
 
@@ -207,7 +208,7 @@ def sweep_response(
     harmonics: int = 5,
     **steps,
 ) -> SweepResponse:
-    """Sweep the base frequency in the order given, the motion carried along.
+    """Compute the settled motion at base frequencies [rad/s] in their order, the motion carried along.
 
     Parameters
     ----------
@@ -216,7 +217,7 @@ def sweep_response(
     frequencies : (n_frequencies,) array
         [rad/s], positive.
     start : pair of (n,) arrays, optional
-        Displacement and velocity at phase zero of the first frequency; at rest when not given.
+        Displacement [m] and velocity [m/s] at phase zero of the first frequency; at rest when not given.
     least, most : int
         Periods of the map for settling.
     tolerance : float
@@ -258,7 +259,7 @@ def sweep_response(
 
 
 def sweep_up_and_down(problem, frequencies, **options) -> tuple[SweepResponse, SweepResponse]:
-    """A sweep over ascending frequencies and, from its end, back; arguments as for `sweep_response`."""
+    """Sweep over ascending frequencies [rad/s] and, from the end, back; as `sweep_response`."""
     given = checked_numbers(frequencies, "frequencies", code="E-RANGE", unit="rad/s")
     frequencies = np.sort(np.atleast_1d(given))
     up = sweep_response(problem, frequencies, **options)

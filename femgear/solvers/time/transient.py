@@ -51,7 +51,7 @@ class TransientResponse:
     time : (n_times,) array
         [s].
     displacement, velocity : (n_times, n) arrays
-        Not a number after a step that did not converge.
+        [m, m/s]; not a number after a step that did not converge.
     deflection, force : (n_times, n_columns) arrays
         ``W^T q`` [m] and the forces of the elements [N].
     method : str
@@ -85,7 +85,7 @@ class TransientResponse:
     message: str
 
     def __post_init__(self):
-        freeze(self, "time", "displacement", "velocity", "deflection", "force")
+        freeze(self)
 
 
 def solve_transient(
@@ -110,7 +110,7 @@ def solve_transient(
     times : (n_times,) array
         Ascending instants at which the motion is wanted [s]; the first is the start.
     start : pair of (n,) arrays, optional
-        Displacement and velocity at the start; at rest without deflection when not given.
+        Displacement [m] and velocity [m/s] at the start; at rest without deflection when not given.
     method : str
         "average acceleration", "linear acceleration", "Fox-Goodwin", "central difference", "newmark",
         "generalised alpha", "modal" (exact linear part), see `steps`, or SciPy's "DOP853", "Radau", "LSODA".
@@ -162,7 +162,7 @@ def step_scheme(
     radius: float = 0.8,
     count: int | None = None,
 ) -> tuple[Scheme, int]:
-    """Scheme of a fixed-step method with its matrices factorised, and how many of its steps make a span.
+    """Make the scheme of a fixed-step method, factorised, and count its steps in a span [s].
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def step_scheme(
     return RuleScheme(problem, rule, step), number
 
 
-def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
+def _column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
     """Largest stiffness (n_columns,) [N/m] of every column over the phases of the base frequencies.
 
     Elements count with what they call steepest, meshes with the top of k(t), others as their reference.
@@ -208,7 +208,7 @@ def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
 
 def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
     """Number and length of the steps; refuses a length beyond the stability limit of the rule."""
-    highest = highest_frequency(problem, column_stiffness(problem, frequency))
+    highest = highest_frequency(problem, _column_stiffness(problem, frequency))
     period = 2.0 * np.pi / highest if highest else np.inf
     if step is None:
         fastest = max(highest, np.abs(frequency).max(initial=0.0))

@@ -15,6 +15,7 @@ from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
+from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import analyse_band, order_level, order_spectrum
 from femgear.housing.sensor import (
     HousingSignal,
@@ -32,7 +33,6 @@ from femgear.storage.results import (
     mode_entries,
     response_entries,
 )
-from femgear.system.mesh_directions import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 

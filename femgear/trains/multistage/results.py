@@ -13,9 +13,9 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
+from femgear.gears.planetary import mesh_names
 from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
 from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, mode_entries
-from femgear.system.mesh_directions import mesh_names
 from femgear.trains.multistage.case_file import MultistageCase, multistage_of
 from femgear.trains.multistage.model import (
     MultistageSet,

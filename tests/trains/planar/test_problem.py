@@ -301,6 +301,17 @@ def test_pin_deflections_are_the_approach_of_the_flanks():
                                   + mesh_directions(data).T @ np.eye(18)[:, 13] * 1e-6)  # fmt: skip
 
 
+def test_only_meshes_that_part_must_press_at_every_instant():
+    wave = FourierSeries(np.tile([5e8, 6e8], (6, 1)))
+    sampled = np.tile(5e8 + 6e8 * np.cos(2.0 * np.pi * np.arange(8) / 8), (6, 1))
+    record = MeshExcitation(sampled, np.zeros((6, 8)), np.zeros((6, 8)), np.zeros(6))
+    for stiffness in (wave, record):
+        made = mesh_elements(supported(), stiffness=stiffness, harmonics=1, separates=False)
+        assert made.stiffness.at(np.array([np.pi])) == pytest.approx(np.full(6, -1e8))
+        with pytest.raises(CaseError, match="E-STIFFNESS"):
+            mesh_elements(supported(), stiffness=stiffness, harmonics=1)
+
+
 def test_impossible_requests_are_refused():
     data = supported()
     steps = StepSeries(np.full((6, 2), 5e8), [0.0, 0.5])

@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.mesh_directions import free_motions, mesh_directions, mesh_names, pin_directions
+from femgear.gears.planetary import mesh_names
+from femgear.system.mesh_directions import free_motions, mesh_directions, pin_directions
 from femgear.system.mode_kinds import SetMotions
 from femgear.system.rigid_bodies import CENTRAL, ROTATIONS, RigidSet
 
