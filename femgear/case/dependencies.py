@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from femgear.case.gear_set import planetary_set
@@ -140,15 +140,20 @@ class Steps:
     def __init__(self):
         self._found: dict[str, OrderedDict[str, Any]] = {}
 
-    def once(self, step: str, entries: Entries, compute: Callable[[], Result]) -> Result:
-        """Give the result of a step for these entries, all that decide it, computed if it is not kept."""
+    def kept(self, step: str, entries: Entries) -> Any:
+        """Give the result of a step for these entries, all that decide it; None where it is not kept."""
         key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
-        if key not in found:
-            found[key] = compute()
-        found.move_to_end(key)
+        if key in found:
+            found.move_to_end(key)
+        return found.get(key)
+
+    def keep(self, step: str, entries: Entries, result: Result) -> Result:
+        """Keep the result of a step for these entries, and return it."""
+        found = self._found.setdefault(step, OrderedDict())
+        found[fingerprint(entries)] = result
         if len(found) > _KEPT:
             found.popitem(last=False)
-        return found[key]
+        return result
 
 
 def fingerprint(entries: Entries) -> str:

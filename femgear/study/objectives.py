@@ -82,8 +82,8 @@ class Variant:
 
         def compute():
             known = {**static_entries(case), "static.stresses": case.static.stresses}
-            return steps.once(
-                "static", known, lambda: static_stages.solve_static(case, cache=self._cache, steps=steps)
+            return steps.kept("static", known) or steps.keep(
+                "static", known, static_stages.solve_static(case, cache=self._cache, steps=steps)
             )
 
         return self._once("static", case.operation.torque, compute=compute)

@@ -285,10 +285,10 @@ def solve_modes(
     check_dynamic_case(case, static.planetary_set)
     steps, gears, torque = steps or Steps(), static.planetary_set, static.sun_torque
     bodies, deviations, known = _ring_bodies(case, static, steps), set_deviations(case), state_entries(case)
-    state = steps.once(
+    state = steps.kept("loaded state", known) or steps.keep(
         "loaded state",
         known,
-        lambda: loaded_period(
+        loaded_period(
             gears,
             *bodies,
             sun_torque=torque,
@@ -327,10 +327,10 @@ def solve_modes(
 def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
     """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
     fixed, known = case.static.members == "fixed", ring_entries(case)
-    other = steps.once(
+    other = steps.kept("ring compliances", known) or steps.keep(
         "ring compliances",
         known,
-        lambda: with_ring(
+        with_ring(
             static.bodies,
             static.sectors,
             depth=case.static.depth,
@@ -349,10 +349,10 @@ def _ring_of_case(case: Case, static: StaticResult, steps: Steps, reach: float) 
     """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz]."""
     gears, sector, side = static.planetary_set, static.sectors.ring, 1.0 if static.sun_torque >= 0 else -1.0
     known = {**ring_entries(case), "reach": reach, "side": side}
-    return steps.once(
+    return steps.kept("ring model", known) or steps.keep(
         "ring model",
         known,
-        lambda: ring_model(
+        ring_model(
             gears,
             sector.grid,
             sector.stiffness,

@@ -73,8 +73,8 @@ def solve_static(
     """
     gears, deviations = planetary_set(case), set_deviations(case)
     steps, known = steps or Steps(), compliance_entries(case)
-    sectors, bodies = steps.once(
-        "flank compliances", known, lambda: flank_compliances(case, gears, cache=cache)
+    sectors, bodies = steps.kept("flank compliances", known) or steps.keep(
+        "flank compliances", known, flank_compliances(case, gears, cache=cache)
     )
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
