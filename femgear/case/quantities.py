@@ -25,6 +25,29 @@ _FACTOR = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)[ ]?-?\d{1,2}|[²³])?"
 _UNIT = re.compile(rf"(?:1[ ]?/[ ]?)?{_FACTOR}(?:(?:[ ]?[*/·⋅.][ ]?|[ ]){_FACTOR}){{0,7}}")
 
 
+# The definitions of pint for what most cases are written in: reading all of pint's takes longer than a case.
+_COMMON = """
+pi = 3.1415926535897932384626433832795028841971693993751
+nano- = 1e-9 = n-
+micro- = 1e-6 = µ- = μ- = u- = mu- = mc-
+milli- = 1e-3 = m-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+giga- = 1e9 = G-
+meter = [length] = m = metre
+second = [time] = s = sec
+gram = [mass] = g
+radian = [] = rad
+degree = pi / 180 * radian = deg
+turn = 2 * pi * radian = _ = revolution
+minute = 60 * second = min
+hertz = 1 / second = Hz
+newton = kilogram * meter / second ** 2 = N
+pascal = newton / meter ** 2 = Pa
+revolutions_per_minute = revolution / minute = rpm
+"""
+
+
 @dataclass(frozen=True)
 class Dimension:
     """A physical dimension as the case file knows it.
@@ -178,7 +201,9 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
             limit="unit names with * / ^ or blanks, without brackets",
             remedy=example,
         )
-    found, expected = _root(unit), _root(dimension.si)
+    found, expected = (_root(one, "common") for one in (unit, dimension.si))
+    if found is None:
+        found, expected = (_root(one, "all") for one in (unit, dimension.si))
     if found is None or expected is None:
         raise CaseError(f"unknown unit {unit!a}", code="E-UNIT", value=text, remedy=example)
     if found[1] != expected[1]:
@@ -193,11 +218,11 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
 
 
 @functools.lru_cache(maxsize=256)
-def _root(unit: str) -> tuple[float, dict[str, float]] | None:
-    """Factor to and exponents of the registry's root units (radian among them); None if unknown."""
+def _root(unit: str, units: str) -> tuple[float, dict[str, float]] | None:
+    """Factor to and exponents of root units (radian among them) in a registry; None if unknown there."""
     import pint
 
-    registry = _registry()
+    registry = _registry(units)
     try:
         quantity = registry.Quantity(1.0, registry.parse_units(unit)).to_root_units()
     except (pint.errors.PintError, ValueError):
@@ -207,11 +232,11 @@ def _root(unit: str) -> tuple[float, dict[str, float]] | None:
 
 
 @functools.cache
-def _registry():
-    """Pint's units, loaded when the first quantity is read."""
+def _registry(units: str):
+    """Common units or all of pint's, loaded when the first quantity needs them."""
     import pint
 
-    return pint.UnitRegistry()
+    return pint.UnitRegistry(_COMMON.strip().splitlines()) if units == "common" else pint.UnitRegistry()
 
 
 class Section(BaseModel):

@@ -1,0 +1,22 @@
+"""Units of case files."""
+
+from femgear.case import quantities
+
+
+def test_common_units_are_those_of_pint():
+    """Every name with every prefix: none of them is another unit in all of pint's definitions."""
+    lines = [[part.strip() for part in line.split("=")] for line in quantities._COMMON.strip().splitlines()]
+    named = [[line[0], *line[2:]] for line in lines if line[0] != "pi"]
+    prefixes = [name.rstrip("-") for names in named if names[0].endswith("-") for name in names]
+    units = [name for names in named if not names[0].endswith("-") for name in names if name != "_"]
+    assert {"m", "mm", "kN", "GPa", "rpm", "um"} < {p + u for p in ["", *prefixes] for u in units}
+    for unit in (p + u for p in ["", *prefixes] for u in units):
+        common = quantities._root(unit, "common")
+        assert common is not None and common == quantities._root(unit, "all"), unit
+    for unit in ("N m/rad", "kg mm^2", "kN/um", "rad/s", "kg m^2"):
+        assert quantities._root(unit, "common") == quantities._root(unit, "all")
+
+
+def test_other_units_than_common_ones_are_known():
+    assert quantities.to_si("2 inch", quantities.LENGTH) == 2 * 0.0254
+    assert quantities._root("inch", "common") is None
