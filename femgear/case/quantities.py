@@ -236,7 +236,11 @@ def _registry(units: str):
     """Common units or all of pint's, loaded when the first quantity needs them."""
     import pint
 
-    return pint.UnitRegistry(_COMMON.strip().splitlines()) if units == "common" else pint.UnitRegistry()
+    if units == "all":
+        return pint.UnitRegistry()
+    registry: Any = pint.UnitRegistry(None)  # type: ignore[arg-type]
+    registry.load_definitions(_COMMON.strip().splitlines())
+    return registry
 
 
 class Section(BaseModel):
