@@ -136,7 +136,8 @@ def _too_deep(name: str) -> CaseError:
 def _syntax_error(text: str, message: str, name: str) -> CaseError:
     """Refusal of a text that is no TOML: of a key given twice with both lines."""
     position = re.search(r"\(at line (\d+), column \d+\)", message)
-    line = int(position[1]) if position else text.count("\n") + 1
+    lines_of_text = text.split("\n")
+    line = int(position[1]) if position else len(lines_of_text)
     if "Cannot overwrite a value" in message or "Cannot declare" in message:
         key, lines = _duplicate(text, line)
         if len(lines) > 1:
@@ -149,10 +150,11 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
                 remedy="keep one of them",
             )
     remedy = None
-    if "octal" in message or re.search(
-        r"=\s*0\d", (text.splitlines() or [""])[min(line, text.count("\n") + 1) - 1]
-    ):
+    if "octal" in message or re.search(r"=\s*0\d", lines_of_text[min(line, len(lines_of_text)) - 1]):
         remedy = "a number has no leading zeros"
+    elif "end of document" in message:
+        started = max((number for _, number in _entries(text)), default=1)
+        remedy = f"close the brackets and quotation marks of the entry in line {started}, or complete it"
     return CaseError(f"not TOML: {message}", code="E-TOML", file=name, remedy=remedy)
 
 

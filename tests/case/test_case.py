@@ -305,6 +305,22 @@ def test_syntax_error_with_line_and_column(tmp_path):
     assert error.code == "E-TOML" and "line 2, column 5" in str(error)
 
 
+@pytest.mark.parametrize(("text", "line"), [("x = [\n", 1), ('a = 1\nx = """\nb\n', 2), ("[set]\nx =", 2)])
+def test_what_is_open_at_the_end_of_the_file(tmp_path, text, line):
+    error = refused(text, tmp_path)
+    assert error.code == "E-TOML" and f"entry in line {line}," in error.remedy
+
+
+def test_a_case_cut_off_anywhere_is_read_or_refused():
+    refusals = 0
+    for end in range(0, len(TEXT), 5):
+        try:
+            case_text.parse(TEXT[:end], "cut.toml")
+        except CaseError as error:
+            refusals += error.code == "E-TOML"
+    assert refusals > len(TEXT) / 50
+
+
 def test_leading_zero(tmp_path):  # bad input 8
     error = refused(replaced("teeth = 27", "teeth = 027"), tmp_path)
     assert error.code == "E-TOML" and "leading zeros" in error.remedy
