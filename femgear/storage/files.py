@@ -152,10 +152,16 @@ def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Ite
     """Write a table as CSV, units in the header, numbers with nine digits; the file is whole."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
+    writer.writerow(map(csv_cell, header))
     for row in rows:
-        writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
+        writer.writerow(f"{value:.9g}" if isinstance(value, float) else csv_cell(value) for value in row)
     write_text(stream.getvalue(), path)
+
+
+def csv_cell(value: object) -> object:
+    """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
+    formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{value}" if formula else value
 
 
 def checksum(path: str | os.PathLike) -> str:

@@ -28,6 +28,7 @@ from femgear.errors import StorageError
 from femgear.storage.files import (
     checked_name,
     checksum,
+    csv_cell,
     exclusive_lock,
     is_safe_path,
     read_dataset,
@@ -110,7 +111,7 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
     flat, tables = data.reset_coords(), {}
     single = [
         *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
-        *((str(name), str(value), "") for name, value in data.attrs.items()),
+        *((str(name), value if np.isscalar(value) else str(value), "") for name, value in data.attrs.items()),
     ]
     if single:
         tables[()] = pd.DataFrame(single, columns=["name", "value", "unit"])
@@ -121,6 +122,8 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
     names = []
     for dims, frame in tables.items():
         names.append("_".join((stage, *dims)) + ".csv")
+        text = frame.select_dtypes(["object", "str"]).map(csv_cell)
+        frame[text.columns] = text
         write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])
     return names
 

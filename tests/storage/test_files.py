@@ -14,7 +14,7 @@ import xarray as xr
 
 from femgear.errors import StorageError
 from femgear.storage import files
-from femgear.storage.files import checksum, read_dataset, write_dataset, write_text
+from femgear.storage.files import checksum, read_dataset, write_csv, write_dataset, write_text
 from femgear.storage.results import (
     MANIFEST,
     finish,
@@ -23,6 +23,7 @@ from femgear.storage.results import (
     read_manifest,
     record,
     run_folder,
+    write_csv_tables,
 )
 from femgear.trains.reading import open_results
 
@@ -472,3 +473,13 @@ def test_results_and_cases_show_themselves_in_a_line(tmp_path):
     case = results.case
     assert repr(case) == f"<Case {case.title!r} of {folder / 'case.toml'}>"
     assert case.title in case._repr_html_() and "centre_distance" in case._repr_html_()
+
+
+def test_text_of_a_table_is_no_formula(tmp_path):
+    write_csv(tmp_path / "a.csv", ["=cmd", "level [dB]"], [["@sum", -1.5], ["-3 N m", "+x"], ["fine", 2]])
+    written = (tmp_path / "a.csv").read_text()
+    assert written == "'=cmd,level [dB]\n'@sum,-1.5\n'-3 N m,'+x\nfine,2\n"
+    data = xr.Dataset({"name": ("m", ["=1", "b"]), "x": ("m", [-1.0, 2.0])}, attrs={"title": "-a", "n": -3})
+    names = write_csv_tables(data, tmp_path, "s")
+    written = "".join((tmp_path / name).read_text() for name in names)
+    assert "title,'-a," in written and "n,-3," in written and "0,'=1,-1.0" in written
