@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write docs/errors.md: every error code, what it means, and the refusals of the package that carry it.
+"""Write docs/errors.md: every error code, what it means, the refusals that carry it, and all warnings.
 
 Meanings are those of `femgear.errors.CODES`; messages, limits and remedies are read from the source::
 
@@ -23,9 +23,17 @@ Its code is stable: scripts may test the `code` of a `femgear.errors.FemgearErro
 line are 2 for input that cannot be used, 3 for computations without trustworthy result, 4 for results that
 cannot be written or read.
 
-Below are all codes with the messages that carry them; `…` stands for numbers and names. This page is written
-by `python tests/tools/error_page.py -o docs/errors.md`.
+Below are all codes with the messages that carry them; `…` stands for numbers and names. Warnings, which end
+nothing, follow [at the end](#warnings). This page is written by
+`python tests/tools/error_page.py -o docs/errors.md`.
 """
+WARNINGS = """## Warnings
+
+What a result deserves to be doubted for. They stand in the terminal and in the report; `femgear check` tells
+those that the case alone decides. A run that warns ends with exit code 0.
+
+| code | entry | message | remedy |
+|---|---|---|---|"""
 
 
 def refusals(folder: Path = ROOT / "femgear") -> dict[str, list[tuple[str, str, str]]]:
@@ -42,6 +50,33 @@ def refusals(folder: Path = ROOT / "femgear") -> dict[str, list[tuple[str, str, 
                     if entry not in found[code]:
                         found[code].append(entry)
     return dict(found)
+
+
+def warnings(folder: Path = ROOT / "femgear") -> list[tuple[str, str, str, str]]:
+    """Codes, entries of the case, messages and remedies of all warnings, by code."""
+    found = set()
+    for path in folder.rglob("*.py"):
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.FunctionDef):
+                calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
+                for call in calls:
+                    if ast.unparse(call.func) == "Finding" and _text(call.args[0]).startswith("W-"):
+                        remedy = next((word.value for word in call.keywords if word.arg == "remedy"), None)
+                        cells = [*call.args[:3], call.args[3] if len(call.args) > 3 else remedy]
+                        found.add(tuple(_text(_assigned(cell, call, function)) for cell in cells))
+    return sorted(found)
+
+
+def _assigned(node: ast.expr | None, use: ast.Call, function: ast.FunctionDef) -> ast.expr | None:
+    """Value that a name has had in a function before its use."""
+    if not isinstance(node, ast.Name):
+        return node
+    values = [
+        one
+        for one in ast.walk(function)
+        if isinstance(one, ast.Assign) and ast.unparse(one.targets[0]) == node.id and one.lineno < use.lineno
+    ]
+    return max(values, key=lambda one: one.lineno).value if values else node
 
 
 def named_codes(folder: Path = ROOT / "femgear") -> set[str]:
@@ -86,7 +121,8 @@ def page(meanings: dict[str, str]) -> str:
             cells = (" | ".join(_cell(text) for text in row) for row in rows)
             table = "\n".join(f"| {row} |" for row in cells)
             parts.append(f"| message | allowed | remedy |\n|---|---|---|\n{table}\n")
-    return "\n".join(parts)
+    rows = "\n".join(f"| {' | '.join(map(_cell, row))} |" for row in warnings())
+    return "\n".join([*parts, f"{WARNINGS}\n{rows}\n"])
 
 
 def _cell(text: str) -> str:

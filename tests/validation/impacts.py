@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from small_trains import example_pair, level_crossings, lightly_loaded_pair
@@ -13,6 +14,7 @@ from femgear.solvers.stability.lyapunov import lyapunov_exponents
 from femgear.solvers.time.stroboscopic import sweep_response
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
+from femgear.system.system import HarmonicForce, NonlinearSystem
 from femgear.trains.gear_pair.model import (
     BACK,
     DRIVE,
@@ -151,6 +153,14 @@ def damping_and_impacts() -> tuple[Row, ...]:
     return tuple(rows)
 
 
+def over_two_periods(problem: NonlinearSystem) -> NonlinearSystem:
+    """The same problem with half its base frequency."""
+    (mesh,) = problem.elements
+    mesh = replace(mesh, stiffness=FourierSeries(mesh.stiffness.amplitudes, (2,)))
+    forces = tuple(HarmonicForce(one.force, (2 * one.orders[0],)) for one in problem.forces)
+    return replace(problem, elements=(mesh,), forces=forces)
+
+
 def period_two() -> tuple[Row, ...]:
     """Two-sided impacts of the motion of two tooth periods that coexists with that of one, zeta 0.09."""
     from scipy.optimize import brentq
@@ -161,9 +171,8 @@ def period_two() -> tuple[Row, ...]:
     phase, start = 4.0 * np.pi * np.arange(2048) / 2048, run.lines[-1]
 
     def lowest(ratio):
-        found = solve_harmonic_balance(
-            pair.problem(ratio, divided=2), 0.5, harmonics=32, samples=2048, start=start, stability=False
-        )
+        problem = over_two_periods(pair.problem(ratio))
+        found = solve_harmonic_balance(problem, 0.5, harmonics=32, samples=2048, start=start, stability=False)
         return float(found.at(phase).min())
 
     ours = brentq(lambda ratio: lowest(ratio) - BACK, 1.63, 1.66, xtol=1e-6)
