@@ -45,6 +45,9 @@ hertz = 1 / second = Hz
 newton = kilogram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
 revolutions_per_minute = revolution / minute = rpm
+joule = newton * meter = J
+gray = joule / kilogram = Gy
+rads = 0.01 * gray
 """
 
 

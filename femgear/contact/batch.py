@@ -295,7 +295,8 @@ class _ActiveSets:
         self.gaps[todo] = np.where(candidate, gaps, 0.0)
         self.iterations[todo] += 1
         rounding = ROUNDING * (self.clearance + 10 * turned[:, None] + np.abs(closed))
-        spring_flips = np.where(springs, closed < -rounding, closed > rounding)
+        # a closed spring without force would hold a planet that nothing presses at the end of its clearance
+        spring_flips = np.where(springs, carried <= _FAINT * largest[..., 0], closed > rounding)
         return flips & ~blocked[0] | forced[0], spring_flips & ~blocked[1] | forced[1]
 
     def _settled(self, todo, separation, motions, null):

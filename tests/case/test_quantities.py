@@ -1,10 +1,13 @@
 """Units of case files."""
 
+import pytest
+
 from femgear.case import quantities
+from femgear.errors import CaseError
 
 
 def test_common_units_are_those_of_pint():
-    """Every name with every prefix: none of them is another unit in all of pint's definitions."""
+    """Every name with every prefix, one or several: none is another unit in all of pint's definitions."""
     lines = [[part.strip() for part in line.split("=")] for line in quantities._COMMON.strip().splitlines()]
     named = [[line[0], *line[2:]] for line in lines if line[0] != "pi"]
     prefixes = [name.rstrip("-") for names in named if names[0].endswith("-") for name in names]
@@ -13,8 +16,15 @@ def test_common_units_are_those_of_pint():
     for unit in (p + u for p in ["", *prefixes] for u in units):
         common = quantities._root(unit, "common")
         assert common is not None and common == quantities._root(unit, "all"), unit
+        several = quantities._root(f"{unit}s", "common")
+        assert several is None or several == quantities._root(f"{unit}s", "all"), unit
     for unit in ("N m/rad", "kg mm^2", "kN/um", "rad/s", "kg m^2"):
         assert quantities._root(unit, "common") == quantities._root(unit, "all")
+
+
+def test_absorbed_doses_are_no_angles():
+    with pytest.raises(CaseError, match="'rads' is not a unit of angle"):
+        quantities.to_si("0.3 rads", quantities.ANGLE)
 
 
 def test_other_units_than_common_ones_are_known():
