@@ -235,7 +235,7 @@ def test_the_optimum_of_the_page_is_one():
     page = (CASE.parents[1] / "docs" / "optimise.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     values = dict(re.findall(r'^(\S+) = "(.*)"$', block, flags=re.MULTILINE))
-    assert len(values) == 6
+    assert len(values) == 8
     case, _ = tip_reliefs(read_case(CASE))
     case = with_values(case, {"static.positions": 40, "static.stresses": False})
     steps, cache = Steps(), grid_cache()

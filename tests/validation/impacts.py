@@ -108,6 +108,7 @@ def one_term_balance() -> tuple[Row, ...]:
 def damping_and_impacts() -> tuple[Row, ...]:
     """Folds and borders of impact for two damping ratios, harmonic balance against integration."""
     rows, peaks, branches = [], {}, {}
+    half = "half of the range of the deflection"
     for zeta, folds in ((0.15, 0), (0.09, 2)):
         pair = example_pair(zeta)
         branch = parameter_curve(pair.problem, (3.5, 0.1), 1.0, harmonics=12, samples=1024, radius=False)
@@ -117,7 +118,7 @@ def damping_and_impacts() -> tuple[Row, ...]:
         source = "jumps of the sweeps below" if folds else "one answer at every ratio"
         rows += [
             counted("impacts", source, f"zeta {zeta}: limit points", folds, len(branch.folds)),
-            information("impacts", "", f"zeta {zeta}: largest amplitude [half backlash]", None, peaks[zeta]),
+            information("impacts", half, f"zeta {zeta}: largest amplitude [half backlash]", None, peaks[zeta]),
         ]
     name, share = "amplitude of zeta 0.15 over that of 0.09", peaks[0.15] / peaks[0.09]
     rows.append(at_most("impacts", "less damping, more motion", name, 0.9, share))
