@@ -118,7 +118,9 @@ def damping_and_impacts() -> tuple[Row, ...]:
         source = "jumps of the sweeps below" if folds else "one answer at every ratio"
         rows += [
             counted("impacts", source, f"zeta {zeta}: limit points", folds, len(branch.folds)),
-            information("impacts", half, f"zeta {zeta}: largest amplitude [half backlash]", None, peaks[zeta]),
+            information(
+                "impacts", half, f"zeta {zeta}: largest amplitude [half backlash]", None, peaks[zeta]
+            ),
         ]
     name, share = "amplitude of zeta 0.15 over that of 0.09", peaks[0.15] / peaks[0.09]
     rows.append(at_most("impacts", "less damping, more motion", name, 0.9, share))
