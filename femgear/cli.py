@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import sys
+import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 _INTERRUPTED = 130
 
@@ -337,7 +340,7 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _termination_interrupts():
             warnings.showwarning = _show_warning
             result = program_app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         return result if isinstance(result, int) else 0
@@ -350,8 +353,29 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
         return _INTERRUPTED
     except BrokenPipeError:
         return 0
+    except MemoryError as error:
+        return _fail(
+            FemgearError(
+                f"the memory of this machine does not suffice: {error}".removesuffix(": "),
+                code="E-MEMORY",
+                remedy="ask for fewer speeds, positions, harmonics or elements",
+            )
+        )
     except OSError as error:
         return _fail(storage_error(error, error.filename))
+
+
+@contextlib.contextmanager
+def _termination_interrupts() -> Iterator[None]:
+    """End the block by SIGTERM as by Ctrl-C, so that files stay whole and locks are released."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 if __name__ == "__main__":

@@ -57,6 +57,7 @@ CODES = {
     "E-LOCKED": "Another run is writing into the folder.",
     "E-MASS": "A mass matrix is not positive definite.",
     "E-MECHANISM": "Something moves freely that must be held, or is held that must move.",
+    "E-MEMORY": "The computation needs more memory than there is.",
     "E-MODEL": "There is no such model, or the model of the case has not what is asked for.",
     "E-MODES": "The modes that are asked for do not exist.",
     "E-MODIFICATION": "A modification or an error of the flanks that they cannot have.",

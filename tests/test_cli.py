@@ -4,12 +4,15 @@ import errno
 import importlib.util
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from femgear import cli
@@ -403,13 +406,28 @@ def _interrupt(*_, **__):
     raise KeyboardInterrupt
 
 
+def _terminate(*_, **__):
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(10)
+
+
+def _exhaust(*_, **__):
+    np.empty(2**50)
+
+
 def _fill(*_, **__):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "static.nc")
 
 
 @pytest.mark.parametrize(
     ("function", "code", "words"),
-    [(_diverge, 3, "no solution"), (_interrupt, 130, "interrupted"), (_fill, 4, "E-DISK-FULL")],
+    [
+        (_diverge, 3, "no solution"),
+        (_exhaust, 3, "E-MEMORY"),
+        (_interrupt, 130, "interrupted"),
+        (_terminate, 130, "interrupted"),
+        (_fill, 4, "E-DISK-FULL"),
+    ],
 )
 def test_exit_codes(tmp_path, capsys, pipeline, function, code, words):
     pipeline(function)
