@@ -1,6 +1,7 @@
 """Makes the modules that several tests share, and those of scripts, importable by name; shared fixtures."""
 
 import contextlib
+import gc
 import importlib.util
 import io
 import os
@@ -15,6 +16,9 @@ import pytest
 # before NumPy is loaded, as the Makefile has it: threads of BLAS and workers of pytest would share the cores
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# every full collection walks all that hundreds of test modules hold
+gc.set_threshold(100_000, 20, 100)
 
 TESTS = Path(__file__).parent
 
