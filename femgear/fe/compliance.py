@@ -215,8 +215,7 @@ def condense_sector(
         A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
     cut = np.concatenate([boundary_nodes(grid, name) for name in ("cut_right", "cut_left")])
-    if np.any(loads[dof_pairs(cut)]):
-        raise GridError("a load acts on a cut of the sector", code="E-GRID")
+    _check_loads(loads, dof_pairs(cut))
     columns = csc_array(np.hstack([loads, observations]))
     f, d = np.split(np.arange(loads.shape[1] + observations.shape[1]), [loads.shape[1]])
     parts = []
@@ -226,6 +225,21 @@ def condense_sector(
         K, P, C = schur[:size, :size], schur[:size, size:], -schur[size:, size:]
         parts.append((0.5 * (K + K.T), C[np.ix_(d, f)], P[:, f], P[:, d]))
     return SectorSchur(count, *(np.stack(part) for part in zip(*parts, strict=True)))
+
+
+def _check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
+    if np.any(loads[cut]):
+        raise GridError("a load acts on a cut of the sector", code="E-GRID")
+
+
+def _check_residual(residual: float) -> None:
+    if not residual <= 1e-8:
+        raise GridError(
+            f"the sector solution has a relative residual of {residual:.1e}",
+            code="E-RESIDUAL",
+            limit="1e-8",
+            remedy="the body is not held, or its grid is distorted",
+        )
 
 
 def _half_sector_fields(grid: Grid, held: str | None) -> list[tuple[csc_array, int]]:
@@ -288,13 +302,7 @@ def _schur_complement(matrix, columns, inner: int) -> np.ndarray:
     right[last] = np.random.default_rng(0).standard_normal(size + count - inner)
     solution = factor.solve(right)
     residual = max(np.abs(whole @ solution - right).max(), np.abs(schur @ solution[last] - right[last]).max())
-    if not residual < 1e-8:
-        raise GridError(
-            f"the sector solution has a relative residual of {residual:.1e}",
-            code="E-RESIDUAL",
-            limit="1e-8",
-            remedy="the body is not held, or its grid is distorted",
-        )
+    _check_residual(residual)
     schur -= np.diag(shift[last])
     unscale = np.append(np.ones(size - inner), 1.0 / scale)
     return unscale[:, None] * schur * unscale
@@ -331,8 +339,7 @@ def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> _Interior
     """
     interior, right, left = parts
     cut = np.concatenate([right, left])
-    if np.any(loads[cut]):
-        raise GridError("a load acts on a cut of the sector", code="E-GRID")
+    _check_loads(loads, cut)
     stiffness = stiffness.tocsc()
     rows = stiffness[interior]
     K_ii, K_ib = rows[:, interior], rows[:, cut]
@@ -341,13 +348,7 @@ def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> _Interior
     factor = symmetric_factor(K_ii)
     solution = factor.solve(rhs)
     residual = np.abs(K_ii @ solution - rhs).max() / np.abs(rhs).max()
-    if not np.isfinite(residual) or residual > 1e-8:
-        raise GridError(
-            f"the sector solution has a relative residual of {residual:.1e}",
-            code="E-RESIDUAL",
-            limit="1e-8",
-            remedy="the body is not held, or its grid is distorted",
-        )
+    _check_residual(residual)
     full = np.zeros((stiffness.shape[0], nl))
     full[interior] = solution[:, :nl]
     # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
