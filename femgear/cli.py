@@ -186,7 +186,7 @@ def run(
     check_case(data, only)  # refuse before the folder is touched
     train = train_of(data)
     _warn(train.case_warnings(data))
-    with run_folder(output, force=force) as folder, Progress() as progress:
+    with run_folder(output, case=data.source, force=force) as folder, Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(output)
     _print(train.describe_results(results))

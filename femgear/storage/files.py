@@ -9,14 +9,19 @@ import contextlib
 import csv
 import errno
 import hashlib
+import importlib
 import io
+import json
 import os
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType, MethodType
+from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -35,8 +40,12 @@ _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
+_SEQUENCES = (tuple, list, set, frozenset)
+_OWN = "femgear."
 # bytes that a file may declare beyond four times its size
 _MARGIN = 1_000_000
+# bytes of a file from which its numbers are read when they are asked for
+_LARGE = 200_000_000
 
 
 def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
@@ -53,6 +62,11 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     StorageError
         ``E-FORMAT``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
     """
+    replace_file(path, lambda temporary: _to_netcdf(dataset, temporary), size=int(dataset.nbytes))
+
+
+def _to_netcdf(dataset: xr.Dataset, path: Path, **options: Any) -> None:
+    """Write a dataset as `write_dataset` does, under the name itself."""
     encoding = {}
     for name, variable in dataset.variables.items():
         kind = variable.dtype.kind
@@ -61,17 +75,43 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         if kind == "f":
             encoding[name] |= {"dtype": "float64", "_FillValue": None}
     stamped = dataset.assign_attrs(femgear_format=_FORMAT, femgear_version=__version__)
-    replace_file(
-        path,
-        lambda temporary: stamped.to_netcdf(temporary, engine="h5netcdf", encoding=encoding),
-        size=int(dataset.nbytes),
-    )
+    stamped.to_netcdf(path, engine="h5netcdf", encoding=encoding, **options)
+
+
+def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
+    """Append a dataset to a file of its kind along one dimension; the file has the texts of the latest.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As for `write_dataset`; what does not extend over the dimension is that of the first one.
+    path : path
+        From `replaced_file`; the first dataset makes the file.
+    along : str
+        Name of the dimension.
+    """
+    import h5py
+
+    if not path.exists():
+        _to_netcdf(dataset, path, unlimited_dims=[along])
+        return
+    with h5py.File(path, "r+") as file:
+        for name, variable in dataset.variables.items():
+            if along in variable.dims:
+                axis, stored = variable.dims.index(along), file[str(name)]
+                end = stored.shape[axis] + variable.shape[axis]
+                place = [slice(None)] * variable.ndim
+                place[axis] = slice(stored.shape[axis], end)
+                stored.resize(end, axis=axis)
+                stored[tuple(place)] = variable.values
+        file.attrs.update({str(name): text for name, text in dataset.attrs.items() if isinstance(text, str)})
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     """Read a dataset that `write_dataset` wrote: numbers in memory, dimensions, and units as attributes.
 
-    The file is walked first: links, data kept in other files, unusual types and declared sizes that the
+    Numbers of a large file stay there until they are asked for, and are read again whenever they are: choose
+    some by ``isel`` first. The file is walked first: links, data kept in other files, unusual types and declared sizes that the
     file cannot hold are refused before anything is read.
 
     Raises
@@ -86,8 +126,10 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
         if not os.path.isfile(path):
             raise StorageError("no such file", code="E-STORAGE", file=name)
         _refuse_hostile(path)
+    options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
     try:
-        dataset = xr.load_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False)
+        large = os.path.getsize(path) > _LARGE
+        dataset = xr.open_dataset(path, cache=False, **options) if large else xr.load_dataset(path, **options)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
         raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
     version = dataset.attrs.get("femgear_format")
@@ -102,13 +144,162 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     return dataset
 
 
-def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
-    """Write a file under a temporary name, force it to the disk, then give it its name.
+def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -> None:
+    """Write the result of a stage, so that a run that was interrupted goes on from it; see `read_result`.
 
     Parameters
     ----------
-    write : callable
-        ``(path)`` writes the file under a temporary path, in the same folder and with the same suffix.
+    result : object
+        Made of dataclasses and sections of femgear, arrays, sparse matrices, tables, sequences and numbers.
+    fingerprint : str
+        Of all that the result depends on.
+
+    Raises
+    ------
+    TypeError
+        Anything else, such as a function.
+    StorageError
+    """
+    arrays: list[np.ndarray] = []
+    tree = {"fingerprint": fingerprint, "result": _encoded(result, arrays, {})}
+    text = np.frombuffer(json.dumps(tree).encode(), np.uint8)
+    size = sum(array.nbytes for array in arrays)
+    replace_file(path, lambda new: np.savez(new, text, *arrays), size=size)  # type: ignore[arg-type]
+
+
+def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
+    """Read the result that `write_result` wrote with a fingerprint: nothing but numbers and classes of femgear.
+
+    Raises
+    ------
+    StorageError
+        ``E-FORMAT``: damaged, or written with another fingerprint.
+    """
+    try:
+        with storage_errors(path), np.load(path, allow_pickle=False) as file:
+            arrays = [file[f"arr_{i}"] for i in range(len(file.files))]
+        tree = json.loads(arrays[0].tobytes())
+        if tree["fingerprint"] == fingerprint:
+            return _decoded(tree["result"], arrays[1:], {})
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, ImportError, BadZipFile):
+        pass
+    raise StorageError("no result of this case", code="E-FORMAT", file=os.fspath(path))
+
+
+def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, Any]]) -> Any:
+    """Turn a value into JSON that numbers its arrays; what was met before is named by its number."""
+
+    def inner(value: Any) -> Any:
+        return _encoded(value, arrays, known)
+
+    def pairs(table: Mapping) -> list:
+        return [[inner(key), inner(item)] for key, item in table.items()]
+
+    kind = type(value)
+    if value is None or kind in (bool, int, float, str):
+        return value
+    if id(value) in known:
+        return {"kind": "known", "number": known[id(value)][0]}
+    number = len(known)
+    # the value itself is kept, so that no other one gets its id
+    known[id(value)] = number, value
+    found: dict[str, Any] = {"number": number, "kind": kind.__name__}
+    if kind is np.ndarray and value.dtype != object:
+        arrays.append(value)
+        return found | {"array": len(arrays) - 1, "fixed": not value.flags.writeable}
+    if isinstance(value, np.generic | complex):
+        arrays.append(np.asarray(value))
+        return found | {"kind": "complex" if kind is complex else "generic", "array": len(arrays) - 1}
+    if kind in _SEQUENCES:
+        return found | {"items": [inner(item) for item in value]}
+    if kind in (dict, MappingProxyType):
+        return found | {"items": pairs(value)}
+    if kind is slice:
+        return found | {"items": [inner(item) for item in (value.start, value.stop, value.step)]}
+    if kind is MethodType:
+        return found | {"name": value.__name__, "of": inner(value.__self__)}
+    if kind.__module__.startswith("scipy.sparse") and value.format in ("csc", "csr"):
+        parts = value.data, value.indices, value.indptr, value.shape
+        return found | {"items": [inner(item) for item in parts]}
+    if not kind.__module__.startswith(_OWN):
+        raise TypeError(f"a {kind.__qualname__} cannot be written")
+    state = value.__getstate__()
+    if is_dataclass(value):
+        state = {one.name: getattr(value, one.name) for one in fields(value)}
+    return found | {"kind": "own", "class": [kind.__module__, kind.__qualname__], "items": pairs(state)}
+
+
+def _decoded(node: Any, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
+    """Turn JSON of `_encoded` into the value again."""
+    if not isinstance(node, dict):
+        return node
+    if node["kind"] == "known":
+        return known[node["number"]]
+    value = known[node["number"]] = _made(node, arrays, known)
+    return value
+
+
+def _made(node: dict, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
+    """Make the value of a node that was not met before."""
+    from scipy import sparse
+
+    def items() -> list:
+        return [_decoded(item, arrays, known) for item in node["items"]]
+
+    def table() -> dict:
+        return {_decoded(key, arrays, known): _decoded(item, arrays, known) for key, item in node["items"]}
+
+    match node["kind"]:
+        case "ndarray":
+            array = arrays[node["array"]]
+            array.setflags(write=not node["fixed"])
+            return array
+        case "generic" | "complex" as kind:
+            number = arrays[node["array"]][()]
+            return number if kind == "generic" else complex(number)
+        case "dict":
+            return table()
+        case "mappingproxy":
+            return MappingProxyType(table())
+        case "slice":
+            return slice(*items())
+        case "method":
+            return getattr(_decoded(node["of"], arrays, known), node["name"])
+        case "csc_array" | "csr_array" | "csc_matrix" | "csr_matrix" as kind:
+            *parts, shape = items()
+            return getattr(sparse, kind)(tuple(parts), shape=shape)
+        case "own":
+            return _own_object(*node["class"], table())
+        case kind:
+            sequence = next(one for one in _SEQUENCES if one.__name__ == kind)
+            return sequence(items())
+
+
+def _own_object(module: str, name: str, state: dict) -> Any:
+    """Make an object of one of femgear's classes as it was; its checks have been passed before."""
+    found = getattr(importlib.import_module(module), name) if module.startswith(_OWN) else None
+    if not isinstance(found, type):
+        raise TypeError(f"{module} has no class {name}")
+    made = object.__new__(found)
+    if is_dataclass(found):
+        vars(made).update(state)
+    else:
+        made.__setstate__(state)  # type: ignore[attr-defined]
+    return made
+
+
+def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
+    """Write a file by ``write(path)`` under a temporary path; see `replaced_file`."""
+    with replaced_file(path, size=size) as temporary:
+        write(temporary)
+
+
+@contextlib.contextmanager
+def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Path]:
+    """Have a file written under a temporary path in the block, force it to the disk, then give it its name.
+
+    Parameters
+    ----------
     size : int
         What the disk must have room for [bytes].
 
@@ -120,23 +311,29 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
     with storage_errors(path):
-        free = shutil.disk_usage(path.parent).free
-        if free < size + _RESERVE:
-            raise StorageError(
-                f"{size / 1e6:.1f} MB to write, {free / 1e6:.1f} MB left on the disk, of which "
-                f"{_RESERVE / 1e6:.0f} MB are kept in reserve",
-                code="E-DISK-FULL",
-                file=str(path),
-                limit=f"{(size + _RESERVE) / 1e6:.1f} MB free",
-                remedy="free some space or name another folder",
-            )
+        check_room(path, size)
         try:
-            write(temporary)
+            yield temporary
             with open(temporary, "rb+") as stream:
                 os.fsync(stream.fileno())
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
+
+
+def check_room(path: str | os.PathLike, size: float) -> None:
+    """Refuse (E-DISK-FULL) a file that the disk has no room for; its size in bytes."""
+    with storage_errors(path):
+        free = shutil.disk_usage(Path(path).parent).free
+    if free < size + _RESERVE:
+        raise StorageError(
+            f"{size / 1e6:.1f} MB to write, {free / 1e6:.1f} MB left on the disk, of which "
+            f"{_RESERVE / 1e6:.0f} MB are kept in reserve",
+            code="E-DISK-FULL",
+            file=str(path),
+            limit=f"{(size + _RESERVE) / 1e6:.1f} MB free",
+            remedy="free some space or name another folder",
+        )
 
 
 def write_bytes(data: bytes, path: str | os.PathLike) -> None:

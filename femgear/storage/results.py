@@ -5,6 +5,7 @@ The manifest holds the checksum of every file and whether the run came to its en
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
@@ -295,7 +296,7 @@ def results_of(
 
 
 @contextmanager
-def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Path]:
+def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: bool = False) -> Iterator[Path]:
     """Lock a folder for a run to write into; old results stay until the new ones are complete.
 
     A run that replaces results is given a folder inside, whose files take their place at the end; should it
@@ -305,8 +306,10 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
     ----------
     folder : path-like
         Created where it does not exist (its last name must be safe, see `checked_name`).
+    case : str, optional
+        Text of the case, as for `prepare_output`.
     force : bool
-        Replace the results of a complete earlier run.
+        Replace the results of an earlier run.
 
     Yields
     ------
@@ -323,21 +326,27 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
     with folder_lock(folder):
         if (folder / _FINISHED).is_dir():
             _publish(folder)  # what a run could not bring to its end because it was killed
-        _remove_tree(folder / _RUNNING)
+        running = folder / _RUNNING
         if not (force and (folder / MANIFEST).is_file() and read_manifest(folder).complete):
-            yield prepare_output(folder)
+            _remove_tree(running)
+            yield prepare_output(folder, case=case, force=force)
             return
         _refuse_changed(folder, read_manifest(folder))
         try:
+            if case is None or not (running / MANIFEST).is_file():
+                _remove_tree(running)
             with storage_errors(folder):
-                (folder / _RUNNING).mkdir()
-            yield prepare_output(folder / _RUNNING)
-            if read_manifest(folder / _RUNNING).complete:
+                running.mkdir(exist_ok=True)
+            yield prepare_output(running, case=case, force=True)
+            if read_manifest(running).complete:
                 with storage_errors(folder):
-                    os.replace(folder / _RUNNING, folder / _FINISHED)
+                    os.replace(running, folder / _FINISHED)
                 _publish(folder)
-        finally:
-            _remove_tree(folder / _RUNNING)
+        except BaseException as error:
+            # what a user interrupts goes on with the next run
+            if case is None or isinstance(error, Exception):
+                _remove_tree(running)
+            raise
 
 
 def folder_lock(folder: str | os.PathLike):
@@ -349,8 +358,16 @@ def folder_lock(folder: str | os.PathLike):
     return exclusive_lock(Path(folder) / _LOCK)
 
 
-def prepare_output(folder: str | os.PathLike) -> Path:
+def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force: bool = False) -> Path:
     """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
+
+    Parameters
+    ----------
+    folder : path-like
+    case : str, optional
+        Text of the case to run: what an interrupted run of it left stays, for this one to go on from.
+    force : bool
+        Replace what an interrupted run of another case left.
 
     Returns
     -------
@@ -360,8 +377,8 @@ def prepare_output(folder: str | os.PathLike) -> Path:
     Raises
     ------
     StorageError
-        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, or files of an
-        interrupted run that were changed.
+        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, files of an
+        interrupted run of another case, or files of one that were changed.
     """
     folder = Path(folder)
     _make(folder)
@@ -375,10 +392,28 @@ def prepare_output(folder: str | os.PathLike) -> Path:
                 remedy="name a new folder, or replace them with --force",
             )
         _refuse_changed(folder, manifest)
-        with storage_errors(folder):
-            _remove_unchanged(folder, manifest.files)
+        own = case is not None and manifest.files.get(_CASE) == hashlib.sha256(case.encode()).hexdigest()
+        if own:
+            return folder
+        if case is not None and _CASE in manifest.files and not force:
+            raise StorageError(
+                "the folder holds an interrupted run of another case",
+                code="E-OUTPUT",
+                file=str(folder),
+                remedy="name a new folder, or replace it with --force",
+            )
+        discard(folder, manifest.files)
     _write_manifest(folder, Manifest(complete=False))
     return folder
+
+
+def discard(folder: Path, files: Mapping[str, str]) -> None:
+    """Remove files of a run that are unchanged, names with checksums, and folders that are empty then."""
+    with storage_errors(folder):
+        _remove_unchanged(folder, files)
+        for parent in {(folder / name).parent for name in files} - {folder}:
+            if parent.is_dir() and not any(parent.iterdir()):
+                parent.rmdir()
 
 
 def record(
@@ -387,6 +422,7 @@ def record(
     *,
     timings: Mapping[str, float],
     convergence: Mapping[str, object],
+    known: Mapping[str, str] = MappingProxyType({}),
     complete: bool = False,
 ) -> Manifest:
     """Write the manifest of what a run has written so far.
@@ -395,6 +431,8 @@ def record(
     ----------
     names : list of str
         Files that the run wrote, as paths inside the folder.
+    known : mapping of str to str
+        Checksums of those that are as they were, which saves reading them.
     timings : mapping of str to float
         Seconds a stage.
     convergence : mapping
@@ -402,16 +440,20 @@ def record(
     complete : bool
         Whether the run came to its end.
     """
-    files = {name: checksum(Path(folder) / name) for name in names}
-    versions = {"femgear": __version__, "python": platform.python_version()}
-    versions |= {name: version(name) for name in _LIBRARIES}
-    manifest = Manifest(complete, files, timings, convergence, versions)
+    files = {name: known.get(name) or checksum(Path(folder) / name) for name in names}
+    manifest = Manifest(complete, files, timings, convergence, versions())
     _write_manifest(folder, manifest)
     return manifest
 
 
 finish = partial(record, complete=True)
 """`record` of a run that came to its end."""
+
+
+def versions() -> dict[str, str]:
+    """List the versions of femgear and of the libraries that compute."""
+    found = {"femgear": __version__, "python": platform.python_version()}
+    return found | {name: version(name) for name in _LIBRARIES}
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:

@@ -170,6 +170,8 @@ class Response:
         Spectral radius of the fixed-point operator; the iteration contracts below one.
     tail : (n_speeds,) array
         Share of the amplitude in the upper half of the harmonics, a measure of truncation.
+    lowest_force : (n_speeds,) array
+        Lowest force of all meshes within the period [N]; teeth cannot pull.
     method : tuple of str
         ``"fixed point"`` or ``"direct"``, one a speed.
     message : str
@@ -187,6 +189,7 @@ class Response:
     iterations: np.ndarray
     spectral_radius: np.ndarray
     tail: np.ndarray
+    lowest_force: np.ndarray
     method: tuple[str, ...]
     message: str
     periods: int = 1

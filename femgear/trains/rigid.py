@@ -181,6 +181,12 @@ def member_speeds(case: Case, gears: PlanetarySet, speed: float = 1.0) -> Speeds
     return speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
 
 
+def at_speeds(case: Case, speeds: Sequence[float]) -> Case:
+    """Make the case that has these speeds of the input member [rad/s] and no others."""
+    operation = case.operation.model_copy(update={"speeds": tuple(map(float, speeds))})
+    return case.model_copy(update={"operation": operation})
+
+
 def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:
     """Tell the sense of the sun against the carrier: 1 counter-clockwise, -1 clockwise."""
     found = member_speeds(case, gears)

@@ -30,6 +30,7 @@ from femgear.case.dependencies import (
     static_entries,
 )
 from femgear.case.gear_set import material_of, planetary_set, set_deviations
+from femgear.case.quantities import RPM
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, active_flank_load, with_ring
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
@@ -48,7 +49,7 @@ from femgear.housing.sensor import (
 from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
-from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
 from femgear.system.system import MeshExcitation, Response
@@ -63,6 +64,7 @@ from femgear.trains.elastic.checks import (
     dynamics_warnings,
     fastest_mesh_frequency,
     max_nodal_diameter,
+    missing_level,
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
@@ -93,7 +95,7 @@ from femgear.trains.protocol import (
     response_verdict,
     silent,
 )
-from femgear.trains.rigid import member_speeds
+from femgear.trains.rigid import at_speeds, member_speeds
 from femgear.trains.static.description import describe_set
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS, case_supports, mesh_backlash, ring_foundation
@@ -108,7 +110,9 @@ HARMONICS = 512
 """The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide. Slower
 speeds are excited less far, and `_level_share` tells what they lose."""
 MEMORY = 1.5e9
-"""Largest size of the lines and signals of a run [bytes]."""
+"""Size of the lines and signals of a run beyond which its slowest speeds are excited less far [bytes]."""
+_PART = 100e6
+"""Size of those that are in memory at a time [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -119,13 +123,28 @@ class _FrequencyLimit:
     response: np.ndarray
     frequency: np.ndarray
 
-    def options(self, case: Case) -> dict[str, Any]:
-        """What `solve_spectral` takes beside modes, excitation and frequencies."""
+    def options(self, case: Case, some: Any = slice(None)) -> dict[str, Any]:
+        """What `solve_spectral` takes at some of the speeds beside modes, excitation and frequencies."""
         return {
-            "excitation_harmonics": self.excitation,
-            "response_harmonics": self.response,
+            "excitation_harmonics": self.excitation[some],
+            "response_harmonics": self.response[some],
+            "lines": int(self.response.max()),
             "tolerance": case.dynamics.tolerance,
         }
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """How far the excitation reaches at all speeds, and what the level of the housing says of it.
+
+    Change of the level (n_speeds,) [dB] with excitation up to another frequency [Hz], nan at speeds that were
+    not looked at; the response where it was solved at all speeds on the way.
+    """
+
+    limit: _FrequencyLimit
+    level_change: np.ndarray
+    compared_to: float
+    response: Response | None
 
 
 def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
@@ -159,9 +178,7 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     """
     frequency = np.asarray(mesh_frequency, float)
     if given is None:
-        # lines of the sensor with their signal, modes, ring field and meshes, a harmonic of all speeds
-        size = len(frequency) * (144 * case.ring.teeth + 8000 + 96 * planetary_set(case).n_planets)
-        most = min(HARMONICS, max(int(MEMORY / size), 18))
+        most = min(HARMONICS, max(int(MEMORY / (len(frequency) * _harmonic_size(case))), 18))
         excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, most).astype(int)
     else:
         excitation = np.full(len(frequency), given)
@@ -171,25 +188,54 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     return _FrequencyLimit(excitation, response, excitation * frequency)
 
 
+def _harmonic_size(case: Case) -> int:
+    """Size of a mesh harmonic of one speed: sensor with its signal, modes, ring field and meshes [bytes]."""
+    return 144 * case.ring.teeth + 8000 + 96 * planetary_set(case).n_planets
+
+
+def _excitation_reach(case: Case, modes: ModesResult, all_speeds: tuple[Speeds, ...]) -> _Reach:
+    """Choose how far the excitation reaches, by what the level at some speeds loses beyond it."""
+    frequency = np.array([s.mesh_frequency for s in all_speeds])
+    carrier, some = np.array([s.carrier for s in all_speeds]), checked_speeds(len(frequency))
+    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
+    limit = limited(case, frequency, up_to, given=given)
+
+    def solved(limit: _FrequencyLimit) -> Response:
+        options = limit.options(case, some)
+        return solve_spectral(modes.modes, modes.excitation, frequency[some], **options)
+
+    response = solved(limit)
+    beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
+    change, largest = _level_change(case, modes, carrier[some], response, beyond)
+    if given is None and case.dynamics.up_to is None and largest >= NOTICEABLE:
+        limit = limited(case, frequency, beyond)
+        response = solved(limit)
+        beyond *= 2.0
+        change, _ = _level_change(case, modes, carrier[some], response, beyond)
+    level_change = np.full(len(frequency), np.nan)
+    level_change[some] = change
+    slow = frequency * HARMONICS < beyond - frequency
+    if slow.any():
+        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
+        level_change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
+    return _Reach(limit, level_change, beyond, response if len(some) == len(frequency) else None)
+
+
 def _level_change(
-    case: Case, modes: ModesResult, all_speeds: tuple[Speeds, ...], response: Response, beyond: float
+    case: Case, modes: ModesResult, carrier: np.ndarray, response: Response, beyond: float
 ) -> tuple[np.ndarray, float]:
     """What the level of the housing changes when the excitation reaches a frequency beyond [dB].
 
-    The changes (n_speeds,) are nan at speeds that were not looked at; the largest one of those whose
-    excitation comes as far is returned too.
+    The changes (n_speeds,) at the speeds of a response and of the carrier [rad/s], and the largest of those
+    whose excitation comes as far.
     """
-    frequency, carrier = response.mesh_frequency, np.array([s.carrier for s in all_speeds])
-    some = checked_speeds(len(frequency))
-    further = limited(case, frequency[some], beyond)
-    wider = solve_spectral(modes.modes, modes.excitation, frequency[some], **further.options(case))
-    parts = {name: getattr(response, name)[some] for name in ("deflection", "force", "modal")}
-    lines = (_sensor_lines(case, modes, one, carrier[some]) for one in (replace(response, **parts), wider))
-    level, wider_level = (order_level(one) for one in lines)
-    change = np.full(len(frequency), np.nan)
-    change[some] = 20.0 * np.log10(wider_level / level)
-    reached = further.frequency > beyond - frequency[some]
-    return change, np.abs(change[some][reached]).max(initial=0.0)
+    frequency = response.mesh_frequency
+    further = limited(case, frequency, beyond)
+    wider = solve_spectral(modes.modes, modes.excitation, frequency, **further.options(case))
+    level, wider_level = (order_level(_sensor_lines(case, modes, one, carrier)) for one in (response, wider))
+    change = 20.0 * np.log10(wider_level / level)
+    reached = further.frequency > beyond - frequency
+    return change, np.abs(change[reached]).max(initial=0.0)
 
 
 def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
@@ -404,49 +450,67 @@ def solve_dynamics(
         A carrier that runs around the ring faster than its waves (E-SPEED).
     ConvergenceError
     """
+    return next(dynamics_parts(case, static, modes, progress=progress, memory=math.inf))[1]
+
+
+def dynamics_parts(
+    case: Case,
+    static: StaticResult,
+    modes: ModesResult,
+    *,
+    progress: Progress = silent,
+    memory: float = _PART,
+) -> Iterator[tuple[Case, DynamicsResult]]:
+    """Solve as `solve_dynamics` for some speeds after the others, each with the case that has them alone.
+
+    Parameters
+    ----------
+    case, static, modes, progress
+        As there.
+    memory : float
+        Size of the lines and signals of some speeds [bytes].
+    """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
-    gears, basis = static.planetary_set, modes.modes
+    gears, basis, speeds = static.planetary_set, modes.modes, np.array(case.operation.speeds)
     check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
-    all_speeds = _turning_speeds(case, modes)
-    frequency = np.array([s.mesh_frequency for s in all_speeds])
-    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
-    limit = limited(case, frequency, up_to, given=given)
-    response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case))
-    beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
-    change, largest = _level_change(case, modes, all_speeds, response, beyond)
-    if given is None and case.dynamics.up_to is None and largest >= NOTICEABLE:
-        limit = limited(case, frequency, beyond)
-        response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case))
-        beyond *= 2.0
-        change, _ = _level_change(case, modes, all_speeds, response, beyond)
-    slow = frequency * HARMONICS < beyond - frequency
-    if slow.any():
-        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(all_speeds[0].carrier))
-        change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
-    progress("dynamics", 1, 2)
-    verdict = stability(
-        basis,
-        modes.excitation,
-        response.mesh_frequency,
-        excitation_harmonics=decisive_harmonics(basis, modes.excitation, int(limit.excitation.max())),
-    )
-    progress("dynamics", 2, 2)
-    dte, field = mesh_and_ring_outputs(modes, response)
-    return DynamicsResult(
-        input_speed=np.array(case.operation.speeds),
-        speeds=all_speeds,
-        response=response,
-        stability=verdict,
-        dte=dte,
-        ring_radial=field[0],
-        ring_tangential=field[1],
-        ring_teeth=gears.ring.teeth,
-        excitation_limit=limit.frequency,
-        level_change=change,
-        compared_to=beyond,
-        entries=dynamic_entries(case),
-    )
+    turning = _turning_speeds(case, modes)
+    reach = _excitation_reach(case, modes, turning)
+    limit, told = reach.limit, list[Response]()
+    found = missing_level(speeds / RPM, reach.level_change, limit.frequency, reach.compared_to)
+    decisive = decisive_harmonics(basis, modes.excitation, int(limit.excitation.max()))
+    count = min(math.ceil(len(speeds) * _harmonic_size(case) * limit.response.max() / memory), len(speeds))
+    for some in np.array_split(np.arange(len(speeds)), max(count, 1)):
+        own = tuple(turning[i] for i in some)
+        response = reach.response if len(some) == len(speeds) else None
+        if response is None:
+            frequency = [one.mesh_frequency for one in own]
+            response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case, some))
+        verdict = stability(basis, modes.excitation, response.mesh_frequency, excitation_harmonics=decisive)
+        dte, field = mesh_and_ring_outputs(modes, response)
+        told.append(replace(response, deflection=(), force=(), modal=()))
+        if len(told) > 1:
+            response = replace(response, message=joint_message(told))
+        part = case if len(some) == len(speeds) else at_speeds(case, speeds[some])
+        yield (
+            part,
+            DynamicsResult(
+                input_speed=speeds[some],
+                speeds=own,
+                response=response,
+                stability=verdict,
+                dte=dte,
+                ring_radial=field[0],
+                ring_tangential=field[1],
+                ring_teeth=gears.ring.teeth,
+                excitation_limit=limit.frequency[some],
+                level_change=reach.level_change[some],
+                compared_to=reach.compared_to,
+                warnings=found,
+                entries=dynamic_entries(part),
+            ),
+        )
+        progress("dynamics", some[-1] + 1, len(speeds))
 
 
 @one_blas_thread()
@@ -530,6 +594,7 @@ ELASTIC = Train(
             name="dynamics",
             title="Dynamics",
             solve=solve_dynamics,
+            parts=dynamics_parts,
             takes=("static", "modes",),
             options=("progress",),
             verdict=response_verdict,

@@ -245,8 +245,8 @@ def test_arnoldi_finds_the_spectral_radius(planet_set, planet_excitation):
     excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
     modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
     problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
-    exact = spectral.spectral_radius(problem, exact_limit=np.inf)
-    np.testing.assert_allclose(spectral.spectral_radius(problem, exact_limit=0.0), exact, rtol=0.02)
+    exact = spectral.spectral_radius(problem, exact_limit=10**6)
+    np.testing.assert_allclose(spectral.spectral_radius(problem, exact_limit=0), exact, rtol=0.02)
 
 
 def test_many_speeds_equal_one_at_a_time(geared_chain, chain_excitation):
