@@ -192,9 +192,12 @@ def _compute(
     taken, options = map(results.get, stage.takes), _options(stage, progress)
     seconds, start = defaultdict(float), time.perf_counter()
     progress(stage.name, 0, 1)
-    parts = ((case, stage.solve(case, *taken, **options)) for _ in range(1))
+    if stage.parts is None:
+        parts = iter([(case, stage.solve(case, *taken, **options))])
+    else:
+        parts = stage.parts(case, *taken, **options)
     with ExitStack() as opened:
-        for part, first in parts if stage.parts is None else stage.parts(case, *taken, **options):
+        for part, first in parts:
             for one in members:
                 found = first if one is stage else one.solve(part, first, **_options(one, progress))
                 path, data = run.folder / f"{one.name}.nc", found.dataset()

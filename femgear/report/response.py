@@ -374,7 +374,7 @@ def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure
 
 
 def fluctuation_rms(dynamics: xr.Dataset) -> np.ndarray:
-    """Compute the RMS of the transmission errors less their means (speeds, meshes) [m], some speeds at a time."""
+    """Compute the RMS of the transmission errors less their means (speeds, meshes) [m]."""
     fluctuating, count = dynamics["harmonic"].values > 0, dynamics.sizes["speed"]
     parts = (dynamics.isel(speed=slice(i, i + _READ)) for i in range(0, count, _READ))
     squares = (np.abs(harmonics_of(part, "dte")[..., fluctuating]) ** 2 for part in parts)

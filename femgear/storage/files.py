@@ -111,8 +111,8 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     """Read a dataset that `write_dataset` wrote: numbers in memory, dimensions, and units as attributes.
 
     Numbers of a large file stay there until they are asked for, and are read again whenever they are: choose
-    some by ``isel`` first. The file is walked first: links, data kept in other files, unusual types and declared sizes that the
-    file cannot hold are refused before anything is read.
+    some by ``isel`` first. The file is walked before: links, data kept in other files, unusual types and
+    declared sizes that the file cannot hold are refused.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -
 
 
 def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
-    """Read the result that `write_result` wrote with a fingerprint: nothing but numbers and classes of femgear.
+    """Read the result that `write_result` wrote with a fingerprint: numbers and objects of femgear alone.
 
     Raises
     ------
@@ -241,7 +241,6 @@ def _decoded(node: Any, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
 
 def _made(node: dict, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
     """Make the value of a node that was not met before."""
-    from scipy import sparse
 
     def items() -> list:
         return [_decoded(item, arrays, known) for item in node["items"]]
@@ -267,7 +266,7 @@ def _made(node: dict, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
             return getattr(_decoded(node["of"], arrays, known), node["name"])
         case "csc_array" | "csr_array" | "csc_matrix" | "csr_matrix" as kind:
             *parts, shape = items()
-            return getattr(sparse, kind)(tuple(parts), shape=shape)
+            return getattr(importlib.import_module("scipy.sparse"), kind)(tuple(parts), shape=shape)
         case "own":
             return _own_object(*node["class"], table())
         case kind:

@@ -133,20 +133,6 @@ class _FrequencyLimit:
         }
 
 
-@dataclass(frozen=True)
-class _Reach:
-    """How far the excitation reaches at all speeds, and what the level of the housing says of it.
-
-    Change of the level (n_speeds,) [dB] with excitation up to another frequency [Hz], nan at speeds that were
-    not looked at; the response where it was solved at all speeds on the way.
-    """
-
-    limit: _FrequencyLimit
-    level_change: np.ndarray
-    compared_to: float
-    response: Response | None
-
-
 def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
     """Choose the frequency to which the excitation reaches unless the case says less [Hz].
 
@@ -193,41 +179,13 @@ def _harmonic_size(case: Case) -> int:
     return 144 * case.ring.teeth + 8000 + 96 * planetary_set(case).n_planets
 
 
-def _excitation_reach(case: Case, modes: ModesResult, all_speeds: tuple[Speeds, ...]) -> _Reach:
-    """Choose how far the excitation reaches, by what the level at some speeds loses beyond it."""
-    frequency = np.array([s.mesh_frequency for s in all_speeds])
-    carrier, some = np.array([s.carrier for s in all_speeds]), checked_speeds(len(frequency))
-    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
-    limit = limited(case, frequency, up_to, given=given)
-
-    def solved(limit: _FrequencyLimit) -> Response:
-        options = limit.options(case, some)
-        return solve_spectral(modes.modes, modes.excitation, frequency[some], **options)
-
-    response = solved(limit)
-    beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
-    change, largest = _level_change(case, modes, carrier[some], response, beyond)
-    if given is None and case.dynamics.up_to is None and largest >= NOTICEABLE:
-        limit = limited(case, frequency, beyond)
-        response = solved(limit)
-        beyond *= 2.0
-        change, _ = _level_change(case, modes, carrier[some], response, beyond)
-    level_change = np.full(len(frequency), np.nan)
-    level_change[some] = change
-    slow = frequency * HARMONICS < beyond - frequency
-    if slow.any():
-        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
-        level_change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
-    return _Reach(limit, level_change, beyond, response if len(some) == len(frequency) else None)
-
-
 def _level_change(
     case: Case, modes: ModesResult, carrier: np.ndarray, response: Response, beyond: float
-) -> tuple[np.ndarray, float]:
+) -> tuple[np.ndarray, bool]:
     """What the level of the housing changes when the excitation reaches a frequency beyond [dB].
 
-    The changes (n_speeds,) at the speeds of a response and of the carrier [rad/s], and the largest of those
-    whose excitation comes as far.
+    The changes (n_speeds,) at the speeds of a response and of the carrier [rad/s], and whether one of those
+    whose excitation comes as far is worth it.
     """
     frequency = response.mesh_frequency
     further = limited(case, frequency, beyond)
@@ -235,7 +193,7 @@ def _level_change(
     level, wider_level = (order_level(_sensor_lines(case, modes, one, carrier)) for one in (response, wider))
     change = 20.0 * np.log10(wider_level / level)
     reached = further.frequency > beyond - frequency
-    return change, np.abs(change[reached]).max(initial=0.0)
+    return change, bool(np.abs(change[reached]).max(initial=0.0) >= NOTICEABLE)
 
 
 def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
@@ -472,45 +430,57 @@ def dynamics_parts(
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
-    gears, basis, speeds = static.planetary_set, modes.modes, np.array(case.operation.speeds)
-    check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
-    turning = _turning_speeds(case, modes)
-    reach = _excitation_reach(case, modes, turning)
-    limit, told = reach.limit, list[Response]()
-    found = missing_level(speeds / RPM, reach.level_change, limit.frequency, reach.compared_to)
-    decisive = decisive_harmonics(basis, modes.excitation, int(limit.excitation.max()))
-    count = min(math.ceil(len(speeds) * _harmonic_size(case) * limit.response.max() / memory), len(speeds))
-    for some in np.array_split(np.arange(len(speeds)), max(count, 1)):
-        own = tuple(turning[i] for i in some)
-        response = reach.response if len(some) == len(speeds) else None
-        if response is None:
-            frequency = [one.mesh_frequency for one in own]
-            response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case, some))
-        verdict = stability(basis, modes.excitation, response.mesh_frequency, excitation_harmonics=decisive)
-        dte, field = mesh_and_ring_outputs(modes, response)
+    check_reach(case, modes.reach, fastest_mesh_frequency(case, static.planetary_set))
+    basis, excitation, turning = modes.modes, modes.excitation, _turning_speeds(case, modes)
+    speeds, carrier = np.array(case.operation.speeds), np.array([one.carrier for one in turning])
+    frequency, some = np.array([one.mesh_frequency for one in turning]), checked_speeds(len(turning))
+    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
+    limit = limited(case, frequency, up_to, given=given)
+    response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
+    beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
+    change, short = _level_change(case, modes, carrier[some], response, beyond)
+    if short and given is None and case.dynamics.up_to is None:
+        limit = limited(case, frequency, beyond)
+        response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
+        beyond *= 2.0
+        change, _ = _level_change(case, modes, carrier[some], response, beyond)
+    level_change = np.full(len(speeds), np.nan)
+    level_change[some] = change
+    slow = frequency * HARMONICS < beyond - frequency
+    if slow.any():
+        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
+        level_change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
+    found = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
+    decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
+    size = len(speeds) * _harmonic_size(case) * limit.response.max()
+    for own in np.array_split(np.arange(len(speeds)), min(max(math.ceil(size / memory), 1), len(speeds))):
+        whole = len(own) == len(speeds)
+        if not whole or len(own) > len(some):
+            response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(replace(response, deflection=(), force=(), modal=()))
-        if len(told) > 1:
+        if not whole:
             response = replace(response, message=joint_message(told))
-        part = case if len(some) == len(speeds) else at_speeds(case, speeds[some])
+        part = case if whole else at_speeds(case, speeds[own])
+        dte, field = mesh_and_ring_outputs(modes, response)
         yield (
             part,
             DynamicsResult(
-                input_speed=speeds[some],
-                speeds=own,
+                input_speed=speeds[own],
+                speeds=tuple(turning[i] for i in own),
                 response=response,
-                stability=verdict,
+                stability=stability(basis, excitation, frequency[own], excitation_harmonics=decisive),
                 dte=dte,
                 ring_radial=field[0],
                 ring_tangential=field[1],
-                ring_teeth=gears.ring.teeth,
-                excitation_limit=limit.frequency[some],
-                level_change=reach.level_change[some],
-                compared_to=reach.compared_to,
+                ring_teeth=static.planetary_set.ring.teeth,
+                excitation_limit=limit.frequency[own],
+                level_change=level_change[own],
+                compared_to=beyond,
                 warnings=found,
                 entries=dynamic_entries(part),
             ),
         )
-        progress("dynamics", some[-1] + 1, len(speeds))
+        progress("dynamics", float(own[-1] + 1), float(len(speeds)))
 
 
 @one_blas_thread()

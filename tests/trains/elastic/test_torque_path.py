@@ -74,6 +74,8 @@ def torque_path(folder: Path) -> list[str]:
     def watch(frame: FrameType, event: str, result: Any) -> None:
         if event != "return":
             return
+        # a part of the response comes with its case
+        result = result[1] if isinstance(result, tuple) and len(result) == 2 else result
         if isinstance(result, DynamicsResult):
             kept.append(result.response)
         elif isinstance(result, HousingResult):
