@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import time
+import warnings
 from collections import defaultdict
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -157,6 +158,8 @@ def run_case(
     """
     asked, stages = _asked(case, only)
     run, results = _resumed(folder, asked, stages)
+    if results:
+        warnings.warn(f"{', '.join(results)}: as the run that was interrupted left them", stacklevel=2)
     write_text(case.source, folder / "case.toml")
     run.record("case.toml")
     with storage_errors(folder):

@@ -40,7 +40,7 @@ _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
-_SEQUENCES = (tuple, list, set, frozenset)
+_SEQUENCES: dict[str, Callable] = {one.__name__: one for one in (tuple, list, set, frozenset)}
 _OWN = "femgear."
 # bytes that a file may declare beyond four times its size
 _MARGIN = 1_000_000
@@ -99,6 +99,7 @@ def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
         for name, variable in dataset.variables.items():
             if along in variable.dims:
                 axis, stored = variable.dims.index(along), file[str(name)]
+                assert isinstance(stored, h5py.Dataset)
                 end = stored.shape[axis] + variable.shape[axis]
                 place = [slice(None)] * variable.ndim
                 place[axis] = slice(stored.shape[axis], end)
@@ -210,7 +211,7 @@ def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, A
     if isinstance(value, np.generic | complex):
         arrays.append(np.asarray(value))
         return found | {"kind": "complex" if kind is complex else "generic", "array": len(arrays) - 1}
-    if kind in _SEQUENCES:
+    if kind in (tuple, list, set, frozenset):
         return found | {"items": [inner(item) for item in value]}
     if kind in (dict, MappingProxyType):
         return found | {"items": pairs(value)}
@@ -270,8 +271,7 @@ def _made(node: dict, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
         case "own":
             return _own_object(*node["class"], table())
         case kind:
-            sequence = next(one for one in _SEQUENCES if one.__name__ == kind)
-            return sequence(items())
+            return _SEQUENCES[kind](items())
 
 
 def _own_object(module: str, name: str, state: dict) -> Any:

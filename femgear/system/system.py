@@ -9,7 +9,7 @@ free motion that it drives away (`drift_note`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -196,6 +196,11 @@ class Response:
 
     def __post_init__(self):
         freeze(self)
+
+    def without_lines(self) -> Response:
+        """Give what is known of every speed, without the harmonics, which take the memory."""
+        none = np.empty((len(self.mesh_frequency), 0, 0), complex)
+        return replace(self, deflection=none, force=none, modal=none)
 
 
 def gear_meshes(

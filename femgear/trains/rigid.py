@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 Entry = TypeVar("Entry")
+AnyCase = TypeVar("AnyCase", bound=Case)
 
 
 def listed(names: list[str]) -> str:
@@ -181,7 +182,7 @@ def member_speeds(case: Case, gears: PlanetarySet, speed: float = 1.0) -> Speeds
     return speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
 
 
-def at_speeds(case: Case, speeds: Sequence[float]) -> Case:
+def at_speeds(case: AnyCase, speeds: Iterable[float]) -> AnyCase:
     """Make the case that has these speeds of the input member [rad/s] and no others."""
     operation = case.operation.model_copy(update={"speeds": tuple(map(float, speeds))})
     return case.model_copy(update={"operation": operation})

@@ -113,6 +113,8 @@ MEMORY = 1.5e9
 """Size of the lines and signals of a run beyond which its slowest speeds are excited less far [bytes]."""
 _PART = 100e6
 """Size of those that are in memory at a time [bytes]."""
+_NOTICED, _SECONDS = 1e9, 1.5e-4
+"""Size of files that is said before [bytes], and what a harmonic of one speed takes (2 GHz, one core) [s]."""
 
 
 @dataclass(frozen=True)
@@ -457,7 +459,7 @@ def dynamics_parts(
         whole = len(own) == len(speeds)
         if not whole or len(own) > len(some):
             response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
-        told.append(replace(response, deflection=(), force=(), modal=()))
+        told.append(response.without_lines())
         if not whole:
             response = replace(response, message=joint_message(told))
         part = case if whole else at_speeds(case, speeds[own])
@@ -534,6 +536,27 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )
 
 
+def _warnings(case: Case) -> Iterator[Finding]:
+    """List what deserves a look in the case, and the size of the results of many speeds."""
+    yield from case_warnings(case)
+    speeds, teeth, meshes = case.operation.speeds, case.ring.teeth, 2 * planetary_set(case).n_planets
+    first = member_speeds(case, planetary_set(case), speeds[0]).mesh_frequency
+    frequency = first * np.array(speeds) / speeds[0]
+    # whether the excitation is doubled is known with the modes
+    up_to = case.dynamics.up_to or 2.0 * highest_excitation(case, 0.0, float(frequency.max()))
+    harmonics = int(limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics).response.max())
+    lines = 3 * meshes + 4 * max_nodal_diameter(case) + 2
+    size = len(speeds) * harmonics * (120 * teeth + 16 * lines)
+    if size > _NOTICED:
+        yield Finding(
+            "W-SIZE",
+            "operation.speeds",
+            f"{len(speeds)} speeds with up to {harmonics} harmonics each fill about {size / 1e9:.2g} GB and "
+            f"take about {max(len(speeds) * harmonics * _SECONDS / 60.0, 1.0):.0f} min of one core",
+            remedy="fewer speeds, or a lower dynamics.up_to, if that is too much",
+        )
+
+
 def _notices(data: dict, case: Case) -> Iterator[Finding]:
     if "bearing_clearance" in data["planet"] and case.static.members == "fixed":
         yield remark(
@@ -582,7 +605,7 @@ ELASTIC = Train(
         ),
     ),
     describe=describe_set,
-    warnings=case_warnings,
+    warnings=_warnings,
     figures=FIGURES,
     notices=_notices,
 )  # fmt: skip
