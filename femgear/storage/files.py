@@ -269,7 +269,8 @@ def _made(node: dict, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
             *parts, shape = items()
             return getattr(importlib.import_module("scipy.sparse"), kind)(tuple(parts), shape=shape)
         case "own":
-            return _own_object(*node["class"], table())
+            module, name = node["class"]
+            return _own_object(module, name, table())
         case kind:
             return _SEQUENCES[kind](items())
 
