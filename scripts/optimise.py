@@ -20,6 +20,9 @@ ERRORS = ("ste overall", "ste sun-planet", "ste planet-ring")
 FORCES = ("mesh force", "peak mesh force", "housing")
 QUIET = {"static.stresses": False, "housing.published": None}
 COLUMNS = ("quantity", "before", "optimum", "change")
+FILES = ("optimum.toml", "optimum.csv", "tolerances.png")
+FRONT, CHECK = ("front.csv", "front.png"), ("check.csv", "optimum.png")
+JOURNALS, RUNS = ("journal.jsonl", "journal_fine.jsonl"), ("before", "after")
 
 
 @Parameter(name="*")
@@ -119,21 +122,24 @@ def main(
     _check_request(data, extent)
     data, problem = _problem(data, task, extent)
     another = None if task.second is None else named_quantity(task.second, speeds=task.speeds)
-    folder = ready_folder(output)
+    names = [*FILES, *(FRONT if another else ()), *(CHECK if extent.check else ())]
+    folder = ready_folder(output, names)
+    for run in RUNS if extent.check else ():
+        _refuse_foreign_run(folder / run)
     counts = SearchOptions(seed=extent.seed, samples=extent.samples, max_designs=extent.max_designs)
     options = {"options": counts, "cache": grid_cache()}
-    coarsely = options | {"journal": folder / "journal.jsonl"}
+    coarsely = options | {"journal": folder / JOURNALS[0]}
     with Progress() as progress:
         rough = minimise(problem, method=extent.method, sensitivity=False, progress=progress, **coarsely)
         progress("refinement", 0, 1)
         found = _refined(rough, with_values(data, QUIET), folder, options, extent.method)
         progress("refinement", 1, 1)
-    names = _write(found, data, folder, rough)
+    _write(found, data, folder, rough)
     if another is not None:
-        names += _front(problem, another, folder, coarsely | {"start": rough.x})
+        _front(problem, another, folder, coarsely | {"start": rough.x})
     if extent.check:
-        names += _check(found, data, folder, None if data.rigid else task.speeds, rough)
-    say_files(folder, names)
+        _check(found, data, folder, None if data.rigid else task.speeds, rough)
+    say_files(folder, [*names, *JOURNALS, *(RUNS if extent.check else ())])
 
 
 def _problem(data, task: Task, extent: Extent):
@@ -185,11 +191,11 @@ def _refined(rough, case, folder: Path, options, method: str):
     if any(variable.integer for variable in problem.variables):
         local = "global"
     extent = replace(options["options"], samples=0, starts=1)
-    options = options | {"options": extent, "journal": folder / "journal_fine.jsonl"}
+    options = options | {"options": extent, "journal": folder / JOURNALS[1]}
     return minimise(problem, method=local, start=rough.x, **options)
 
 
-def _write(found, data, folder: Path, rough) -> list[str]:
+def _write(found, data, folder: Path, rough) -> None:
     """Tables on the terminal, and the files of the search."""
     from femgear.report.style import save_figure
     from femgear.storage.files import write_text
@@ -215,10 +221,9 @@ def _write(found, data, folder: Path, rough) -> list[str]:
     value = found.after[name] / dimension.scale
     bars = tolerance_bars(labels, less, more, value, quantity=name, unit=dimension.shown.replace("um", "µm"))
     save_figure(bars, folder / "tolerances.png")
-    return ["optimum.toml", "optimum.csv", "tolerances.png", "journal.jsonl", "journal_fine.jsonl"]
 
 
-def _front(problem, second, folder: Path, options) -> list[str]:
+def _front(problem, second, folder: Path, options) -> None:
     from femgear.report.style import save_figure
     from femgear.study.front import pareto_front
 
@@ -239,10 +244,9 @@ def _front(problem, second, folder: Path, options) -> list[str]:
     print(f"front: {len(found.values)} designs of {found.designs}, from")
     for end in (low, found.values[found.compromise], high):
         print("  " + ", ".join(f"{q.name} {q.show(value)}" for q, value in zip(both, end)))
-    return ["front.csv", "front.png"]
 
 
-def _check(found, data, folder: Path, speeds, rough) -> list[str]:
+def _check(found, data, folder: Path, speeds, rough) -> None:
     """Case and optimum anew: a full run each on a finer grid, read back from its files."""
     from femgear.report.style import save_figure
     from femgear.trains.reading import with_values
@@ -253,7 +257,7 @@ def _check(found, data, folder: Path, speeds, rough) -> list[str]:
     only = "static" if speeds is None else "housing"
     runs = [
         _run(with_values(data, values | fine), folder / name, only)
-        for name, values in (("before", {}), ("after", found.values))
+        for name, values in zip(RUNS, ({}, found.values))
     ]
     numbers = [_numbers(results, only) for results in runs]
     rows = [(name, before, numbers[1][name][0], unit) for name, (before, unit) in numbers[0].items()]
@@ -273,7 +277,15 @@ def _check(found, data, folder: Path, speeds, rough) -> list[str]:
         before_and_after(position, errors, **dynamic, costs=_costs(rough)),
         folder / "optimum.png",
     )
-    return ["check.csv", "optimum.png", "before", "after"]
+
+
+def _refuse_foreign_run(folder: Path) -> None:
+    """Refuse a folder of a full run that holds other files, before anything is computed."""
+    from femgear.storage.results import run_folder
+
+    if folder.exists():
+        with run_folder(folder, force=True):
+            pass
 
 
 def _run(case, folder: Path, only: str):
