@@ -93,9 +93,10 @@ class Journal(dict[str, dict]):
             else:
                 bad.append(str(place))
         if bad:
-            shown = ", ".join(bad[:9]) + (f" and {len(bad) - 9} more" if len(bad) > 9 else "")
+            shown = f"line{'s' * (len(bad) > 1)} {', '.join(bad[:9])}"
+            shown += f" and {len(bad) - 9} more" if len(bad) > 9 else ""
             finding = Finding(
-                "W-JOURNAL", "", f"{path}: changed or damaged since it was written: line {shown}",
+                "W-JOURNAL", "", f"{path}: changed or damaged since it was written: {shown}",
                 remedy="what stood there is left out, and computed again where no later line holds it",
             )  # fmt: skip
             warnings.warn(str(finding), stacklevel=2)
@@ -118,7 +119,7 @@ def _open_journal(path: str | Path | None, header: dict) -> Iterator[Journal]:
     with exclusive_lock(path.with_name(f".{path.name}.lock")):
         with storage_errors(path):
             if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
-                raise _broken(path, "no regular file")
+                raise _broken(path, "it is no regular file")
             # unbuffered, so that what could not be written is not written later
             stream = open(path, "a+b", buffering=0)
         with stream:
@@ -170,13 +171,13 @@ def _check_header(path: Path, line: bytes, header: dict) -> None:
                 limit=str(expected),
                 remedy="name a new place, or move this file away",
             )
-    raise _broken(path, "its first line is none that this version of femgear writes")
+    raise _broken(path, "its first line is not what this version of femgear writes there")
 
 
 def _broken(path: Path, why: str) -> StorageError:
     """Make the refusal of a file that is no journal."""
     return StorageError(
-        f"no journal: {why}",
+        f"not usable as a journal: {why}",
         code="E-JOURNAL",
         file=str(path),
         remedy="name a new place, or move this file away; it is not changed",
@@ -196,7 +197,7 @@ def _is_entry(line: dict, count: int) -> bool:
             return bool(numbers and fits and np.isfinite(value).all() and np.isfinite(slopes).all())
         point, values = json.loads(key), record["values"].values()
         error = record.get("error", {"code": "", "key": None, "message": ""})
-        texts = (error["code"], error["key"] or "", error["message"])
+        texts = (error["code"], error["message"], "" if error["key"] is None else error["key"])
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
         return False
     return (

@@ -359,7 +359,7 @@ def test_journals_of_other_searches_are_refused(case, tmp_path):
     good = path.read_bytes()
     for notes in ("some notes\n", "some notes", "[]\nhalf a line"):
         path.write_text(notes)
-        with pytest.raises(StorageError, match="no journal"):
+        with pytest.raises(StorageError, match="not usable as a journal"):
             open_designs(case, [("carrier.mass",)], journal=path).__enter__()
         assert path.read_text() == notes
     # killed while the header was written
