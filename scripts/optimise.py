@@ -112,10 +112,9 @@ def main(
     output
         Folder of the results.
     """
-    from femgear.run import grid_cache
+    from femgear.study.designs import resumable
     from femgear.study.objectives import named_quantity
-    from femgear.study.search import SearchOptions, minimise
-    from femgear.trains.reading import read_case, with_value, with_values
+    from femgear.trains.reading import read_case, with_value
 
     data = read_case(case)
     data = data if task.torque is None else with_value(data, "operation.torque", task.torque)
@@ -126,6 +125,22 @@ def main(
     folder = ready_folder(output, names)
     for run in RUNS if extent.check else ():
         _refuse_foreign_run(folder / run)
+    with resumable(folder):
+        rough, found, options = _searched(data, problem, extent, folder)
+        _write(found, data, folder, rough)
+        if another is not None:
+            _front(problem, another, folder, options | {"start": rough.x})
+        if extent.check:
+            _check(found, data, folder, None if data.rigid else task.speeds, rough)
+    say_files(folder, [*names, *JOURNALS, *(RUNS if extent.check else ())])
+
+
+def _searched(data, problem, extent: Extent, folder: Path):
+    """The optimum of the search, that of the refinement, and the options of the search."""
+    from femgear.run import grid_cache
+    from femgear.study.search import SearchOptions, minimise
+    from femgear.trains.reading import with_values
+
     counts = SearchOptions(seed=extent.seed, samples=extent.samples, max_designs=extent.max_designs)
     options = {"options": counts, "cache": grid_cache()}
     coarsely = options | {"journal": folder / JOURNALS[0]}
@@ -134,12 +149,7 @@ def main(
         progress("refinement", 0, 1)
         found = _refined(rough, with_values(data, QUIET), folder, options, extent.method)
         progress("refinement", 1, 1)
-    _write(found, data, folder, rough)
-    if another is not None:
-        _front(problem, another, folder, coarsely | {"start": rough.x})
-    if extent.check:
-        _check(found, data, folder, None if data.rigid else task.speeds, rough)
-    say_files(folder, [*names, *JOURNALS, *(RUNS if extent.check else ())])
+    return rough, found, coarsely
 
 
 def _problem(data, task: Task, extent: Extent):

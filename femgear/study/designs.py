@@ -50,30 +50,18 @@ OUTSIDE, _REFUSED = 1e6, 1e9
 class Journal(dict[str, dict]):
     """Records by key in their order, in memory and, where `open_designs` made it, on disk."""
 
-    def __init__(self, path: Path | None = None, stream: FileIO | None = None):
+    def __init__(self, path: Path | None = None, stream: FileIO | None = None, header: dict | None = None):
         super().__init__()
         self._path, self._stream, self._number = path, stream, 0
+        self._header = _sealed(header or {})
 
     def add(self, key: str, record: Mapping[str, object]) -> None:
         """Keep a record; one of the same key is replaced."""
         self[key] = dict(record)
         self._number += 1
-        self._write(_sealed({"number": self._number, "key": key, "record": self[key]}))
-
-    def _write(self, line: bytes) -> None:
-        """Append a line and force it out; where that fails, no half of it stays."""
-        if self._path is None or self._stream is None:
-            return
-        with storage_errors(self._path):
-            size = os.fstat(self._stream.fileno()).st_size
-            try:
-                while line:
-                    line = line[self._stream.write(line) or 0 :]
-                os.fsync(self._stream.fileno())
-            except OSError:
-                with suppress(OSError):
-                    self._stream.truncate(size)
-                raise
+        if self._path is not None and self._stream is not None:
+            line = {"number": self._number, "key": key, "record": self[key]}
+            _append(self._path, self._stream, _sealed(line, self._header))
 
     def _read(self, path: Path, stream: FileIO, header: dict) -> None:
         """Take what the file holds; a line that a killed process left half written is cut off."""
@@ -83,10 +71,10 @@ class Journal(dict[str, dict]):
         whole, bad = text.rfind(b"\n") + 1, []
         lines = text[:whole].split(b"\n")[:-1]
         # a file without a whole line is either the beginning of this header or none of ours
-        if lines or not _sealed(header).startswith(text):
+        if lines or not self._header.startswith(text):
             _check_header(path, lines[0] if lines else text, header)
         for place, line in enumerate(lines[1:], 2):
-            found = _unsealed(line)
+            found = _unsealed(line, self._header)
             # numbers rise, but where lines were copied or moved
             if _is_entry(found, len(header["keys"])) and found["number"] > self._number:
                 self._number, self[found["key"]] = found["number"], found["record"]
@@ -104,7 +92,21 @@ class Journal(dict[str, dict]):
             with storage_errors(path):
                 stream.truncate(whole)
         if not lines:
-            self._write(_sealed(header))
+            _append(path, stream, self._header)
+
+
+def _append(path: Path, stream: FileIO, line: bytes) -> None:
+    """Append a line and force it out; where that fails, no half of it stays."""
+    with storage_errors(path):
+        size = os.fstat(stream.fileno()).st_size
+        try:
+            while line:
+                line = line[stream.write(line) or 0 :]
+            os.fsync(stream.fileno())
+        except OSError:
+            with suppress(OSError):
+                stream.truncate(size)
+            raise
 
 
 @contextmanager
@@ -123,26 +125,32 @@ def _open_journal(path: str | Path | None, header: dict) -> Iterator[Journal]:
             # unbuffered, so that what could not be written is not written later
             stream = open(path, "a+b", buffering=0)
         with stream:
-            journal = Journal(path, stream)
+            journal = Journal(path, stream, header)
             journal._read(path, stream, header)
-            try:
-                yield journal
-            except KeyboardInterrupt as interrupt:
-                interrupt.add_note(f"the same command goes on from {path}")
-                raise
+            yield journal
 
 
-def _sealed(line: dict) -> bytes:
-    """Write a table as a line of JSON that ends with a checksum of what stands before it."""
+@contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """Say with an interruption of the block that the same command goes on from what a folder holds."""
+    try:
+        yield
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note(f"the same command goes on from what {folder} holds")
+        raise
+
+
+def _sealed(line: dict, header: bytes = b"") -> bytes:
+    """Write a table as a line of JSON that ends with a checksum of the header and what stands before it."""
     # a number that is not finite is no JSON, and no result either
-    text = json.dumps(line, allow_nan=False)[:-1]
-    return f'{text}, "check": "{_check(text.encode())}"}}\n'.encode()
+    text = json.dumps(line, allow_nan=False)[:-1].encode()
+    return text + b', "check": "' + _check(header + text) + b'"}\n'
 
 
-def _unsealed(line: bytes) -> dict:
-    """Read a line that `_sealed` wrote; an empty table from any other."""
+def _unsealed(line: bytes, header: bytes = b"") -> dict:
+    """Read a line that `_sealed` wrote under the same header; an empty table from any other."""
     text, _, check = line.rpartition(b', "check": "')
-    if check != _check(text).encode() + b'"}':
+    if check != _check(header + text) + b'"}':
         return {}
     try:
         found = json.loads(text + b"}")
@@ -151,9 +159,9 @@ def _unsealed(line: bytes) -> dict:
     return found if isinstance(found, dict) else {}
 
 
-def _check(text: bytes) -> str:
-    """Compute the checksum of a line."""
-    return hashlib.sha256(text).hexdigest()[:16]
+def _check(text: bytes) -> bytes:
+    """Compute a checksum of sixteen digits."""
+    return hashlib.sha256(text).hexdigest()[:16].encode()
 
 
 def _check_header(path: Path, line: bytes, header: dict) -> None:
@@ -192,9 +200,8 @@ def _is_entry(line: dict, count: int) -> bool:
     try:
         if not key.startswith("["):
             value, slopes = (np.array(record[name]) for name in ("value", "slopes"))
-            numbers = value.dtype.kind == slopes.dtype.kind == "f"
             fits = value.ndim == 2 and slopes.shape == (count, *value.shape)
-            return bool(numbers and fits and np.isfinite(value).all() and np.isfinite(slopes).all())
+            return bool(fits and np.isfinite(value).all() and np.isfinite(slopes).all())
         point, values = json.loads(key), record["values"].values()
         error = record.get("error", {"code": "", "key": None, "message": ""})
         texts = (error["code"], error["message"], "" if error["key"] is None else error["key"])

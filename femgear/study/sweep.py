@@ -20,7 +20,7 @@ from femgear.case.sections import Case
 from femgear.errors import CaseError, Finding
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
 from femgear.storage.files import own_files, write_csv
-from femgear.study.designs import Failure, open_designs
+from femgear.study.designs import Failure, open_designs, resumable
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
 from femgear.trains.protocol import Progress, one_blas_thread
@@ -243,12 +243,13 @@ def sweep_into(
     _check_sweep(case, values, quantities)
     own_files(folder, (_TABLE, _FIGURE))
     options = {"journal": folder / _JOURNAL, "cache": cache, "progress": progress}
-    found = sweep(case, values, quantities, **options)
-    write_csv(folder / _TABLE, found.header, found.records())
-    names = [_TABLE, _JOURNAL]
-    if np.isfinite(found.values).any():
-        _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
-        names.append(_FIGURE)
+    with resumable(folder):
+        found = sweep(case, values, quantities, **options)
+        write_csv(folder / _TABLE, found.header, found.records())
+        names = [_TABLE, _JOURNAL]
+        if np.isfinite(found.values).any():
+            _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
+            names.append(_FIGURE)
     return found, names
 
 

@@ -1,5 +1,6 @@
 """Journals and tables of searches and sweeps: what is damaged is computed again and said, never believed."""
 
+import json
 import os
 import random
 import re
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import time
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +23,7 @@ from femgear.study.objectives import NUMBER, Quantity
 from femgear.study.problem import Problem, Variable
 from femgear.study.search import signals
 from femgear.study.sweep import sweep_into
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, to_toml, with_value, with_values
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
@@ -91,9 +93,9 @@ def edited(*edits):
     """Lines by their number, from 1, replaced by what a function makes of them."""
 
     def change(text):
-        lines = lines_of(text)
+        header, *_ = lines = lines_of(text)
         for number, edit in edits:
-            lines[number - 1] = edit(lines[number - 1])
+            lines[number - 1] = edit(lines[number - 1], header)
         return b"".join(lines)
 
     return change
@@ -107,42 +109,44 @@ def swapped(text):
 
 def sealed(place, /, **changes):
     """A line with other entries and the right checksum for them."""
-    return place, lambda line: _sealed(_unsealed(line.strip()) | changes)
+    return place, lambda line, header: _sealed(_unsealed(line.strip(), header) | changes, header)
 
 
 def forged(text):
     """A line of any text with the checksum for it."""
-    return text[:-1] + b', "check": "' + _check(text[:-1]).encode() + b'"}\n'
+    return lambda _, header: text[:-1] + b', "check": "' + _check(header + text[:-1]) + b'"}\n'
 
 
-def not_finite(line):
-    return forged(re.sub(rb"0\.014\d+", b"NaN", line[: line.rindex(b', "check"')]) + b"}")
+def not_finite(line, header):
+    text = re.sub(rb"0\.014\d+", b"NaN", line[: line.rindex(b', "check"')])
+    return forged(text + b"}")(line, header)
 
 
 ERROR = {"values": {"first": 0.9 / 7}}
+FIVE = {"code": 5, "key": None, "message": "too much"}
 SHAPE = {"value": [[2.0, 3.0], [0.2, 0.3]], "slopes": [[[0.1, 0.2, 0.3], [0.1, 0.2, 0.3]]]}
 POINT = '["0.1", "0.2"]'
 DAMAGED = {
-    "a digit": (edited((3, lambda line: line.replace(b"0.0142857", b"0.0152857"))), [3]),
-    "a digit of a key": (edited((3, lambda line: line.replace(b'"[0.1]"', b'"[0.2]"'))), [3]),
-    "a digit of a time": (edited((3, lambda line: re.sub(rb'"seconds": 0', b'"seconds": 9', line))), [3]),
-    "a digit of a number": (edited((3, lambda line: line.replace(b'"number": 2', b'"number": 9'))), [3]),
-    "a digit of a checksum": (edited((3, lambda line: line[:-4] + b'x"}\n')), [3]),
-    "not a number": (edited((3, lambda line: re.sub(rb"0\.014\d+", b"NaN", line))), [3]),
-    "a text": (edited((3, lambda line: re.sub(rb"0\.014\d+", b'"abc"', line))), [3]),
-    "no values": (edited((3, lambda line: re.sub(rb'"values": \{.*?\}', b'"values": 5', line))), [3]),
-    "no checksum": (edited((3, lambda line: re.sub(rb', "check".*', b"}", line))), [3]),
-    "cut in the middle": (edited((5, lambda line: line[:40] + b"\n")), [5]),
-    "without its end": (edited((5, lambda line: line[:-1])), [5]),
-    "copied": (edited((5, lambda line: line + line)), [6]),
+    "a digit": (edited((3, lambda line, *_: line.replace(b"0.0142857", b"0.0152857"))), [3]),
+    "a digit of a key": (edited((3, lambda line, *_: line.replace(b'"[0.1]"', b'"[0.2]"'))), [3]),
+    "a digit of a time": (edited((3, lambda line, *_: re.sub(rb'"seconds": 0', b'"seconds": 9', line))), [3]),
+    "a digit of a number": (edited((3, lambda line, *_: line.replace(b'"number": 2', b'"number": 9'))), [3]),
+    "a digit of a checksum": (edited((3, lambda line, *_: line[:-4] + b'x"}\n')), [3]),
+    "not a number": (edited((3, lambda line, *_: re.sub(rb"0\.014\d+", b"NaN", line))), [3]),
+    "a text": (edited((3, lambda line, *_: re.sub(rb"0\.014\d+", b'"abc"', line))), [3]),
+    "no values": (edited((3, lambda line, *_: re.sub(rb'"values": \{.*?\}', b'"values": 5', line))), [3]),
+    "no checksum": (edited((3, lambda line, *_: re.sub(rb', "check".*', b"}", line))), [3]),
+    "cut in the middle": (edited((5, lambda line, *_: line[:40] + b"\n")), [5]),
+    "without its end": (edited((5, lambda line, *_: line[:-1])), [5]),
+    "copied": (edited((5, lambda line, *_: line + line)), [6]),
     "swapped": (swapped, [4, 5]),
-    "an empty line": (edited((5, lambda line: line + b"\n")), [6]),
-    "binary": (edited((5, lambda line: b"\x00\xff\xfe\r\x85" * 40 + b"\n")), [5]),
-    "zeros": (edited((5, lambda line: bytes(len(line) - 1) + b"\n")), [5]),
-    "not UTF-8": (edited((5, lambda line: line.replace(b"number", b"n\xfcmber"))), [5]),
-    "two lines": (edited((3, lambda line: line[9:]), (7, lambda line: b"{}\n")), [3, 7]),
-    "the error": (edited((13, lambda line: line.replace(b"too much", b"too many"))), [13]),
-    "a slope": (edited((14, lambda line: line.replace(b"0.0333", b"0.0334"))), [14]),
+    "an empty line": (edited((5, lambda line, *_: line + b"\n")), [6]),
+    "binary": (edited((5, lambda line, *_: b"\x00\xff\xfe\r\x85" * 40 + b"\n")), [5]),
+    "zeros": (edited((5, lambda line, *_: bytes(len(line) - 1) + b"\n")), [5]),
+    "not UTF-8": (edited((5, lambda line, *_: line.replace(b"number", b"n\xfcmber"))), [5]),
+    "two lines": (edited((3, lambda line, *_: line[9:]), (7, lambda line, *_: b"{}\n")), [3, 7]),
+    "the error": (edited((13, lambda line, *_: line.replace(b"too much", b"too many"))), [13]),
+    "a slope": (edited((14, lambda line, *_: line.replace(b"0.0333", b"0.0334"))), [14]),
     "a second header": (lambda text: text + lines_of(text)[0], [16]),
     "an old line": (lambda text: text + b'{"key": "[0.1]", "record": {"values": {"first": 7.0}}}\n', [16]),
     "sealed: a text": (edited(sealed(3, record={"values": {"first": "abc"}})), [3]),
@@ -156,12 +160,13 @@ DAMAGED = {
     "sealed: a key too deep": (edited(sealed(3, key="[" * 9000)), [3]),
     "sealed: an error of text": (edited(sealed(13, record=ERROR | {"error": "E-CONTACT"})), [13]),
     "sealed: an error without words": (edited(sealed(13, record=ERROR | {"error": {"code": "E"}})), [13]),
+    "sealed: an error of a number": (edited(sealed(13, record=ERROR | {"error": FIVE})), [13]),
     "sealed: shapes": (edited(sealed(14, record=SHAPE)), [14]),
     "sealed: ragged": (edited(sealed(14, record={"value": [[1.0], [1.0, 2.0]], "slopes": [[[1.0]]]})), [14]),
     "sealed: texts": (edited(sealed(14, record={"value": [["1"]], "slopes": [[["1"]]]})), [14]),
     "sealed: no slopes": (edited(sealed(14, record={"value": [[1.0]]})), [14]),
-    "sealed: a list": (edited((3, lambda line: forged(b'["number", 2]'))), [3]),
-    "sealed: too deep": (edited((3, lambda line: forged(b'{"number":' + b"[" * 99_999 + b"}"))), [3]),
+    "sealed: a list": (edited((3, forged(b'["number", 2]'))), [3]),
+    "sealed: too deep": (edited((3, forged(b'{"number":' + b"[" * 99_999 + b"}"))), [3]),
     "sealed: not finite": (edited((3, not_finite)), [3]),
 }  # fmt: skip
 
@@ -182,6 +187,17 @@ def test_what_is_damaged_is_computed_again_and_said(problem, whole, tmp_path, na
         assert path.read_bytes().startswith(damaged)
 
 
+def test_lines_of_another_case_are_not_taken(problem, whole, tmp_path):
+    right, text = whole
+    other = replace(problem, case=with_value(problem.case, "carrier.mass", "7 kg"))
+    work(other, tmp_path / "other.jsonl")
+    theirs, ours = (lines_of(one) for one in ((tmp_path / "other.jsonl").read_bytes(), text))
+    (tmp_path / "j.jsonl").write_bytes(b"".join([*ours[:5], *theirs[5:]]))
+    found, computed, (words,) = work(problem, tmp_path / "j.jsonl")
+    assert found == right and computed == len(PLACES) - 2
+    assert f"lines {', '.join(str(n) for n in range(6, 15))} and 1 more;" in words
+
+
 def test_many_damaged_lines_are_one_warning(problem, whole, tmp_path):
     right, text = whole
     (tmp_path / "j").write_bytes(lines_of(text)[0] + b"\n" * 20)
@@ -195,11 +211,13 @@ def test_many_damaged_lines_are_one_warning(problem, whole, tmp_path):
 
 REFUSED = {
     "a digit of the case": lambda text: re.sub(rb'"case": "(.)', b'"case": "x', text, count=1),
-    "a digit of the checksum": edited((1, lambda line: line[:-4] + b'x"}\n')),
-    "another format": edited((1, lambda line: _sealed({"format": 3, "femgear": "9.9"}))),
-    "a format of text": edited((1, lambda line: line.replace(b"2", b'"2"', 1))),
-    "the first format": edited((1, lambda line: re.sub(rb', "check".*', b"}", line.replace(b"2", b"1", 1)))),
-    "more in the header": edited((1, lambda line: _sealed({"more": 1}))),
+    "a digit of the checksum": edited((1, lambda line, *_: line[:-4] + b'x"}\n')),
+    "another format": edited((1, lambda line, *_: _sealed({"format": 3, "femgear": "9.9"}))),
+    "a format of text": edited((1, lambda line, *_: line.replace(b"2", b'"2"', 1))),
+    "the first format": edited(
+        (1, lambda line, *_: re.sub(rb', "check".*', b"}", line.replace(b"2", b"1", 1)))
+    ),
+    "more in the header": edited((1, lambda line, *_: _sealed({"more": 1}))),
     "no header": lambda text: b"".join(lines_of(text)[1:]),
     "a header below": lambda text: b"".join([*lines_of(text)[1:], lines_of(text)[0]]),
     "a mark before it": lambda text: b"\xef\xbb\xbf" + text,
@@ -240,7 +258,8 @@ def test_what_a_killed_process_left_half_written_is_nothing_to_say(problem, whol
     found, _, said = work(problem, path)
     assert found == right and said == []
     assert work(problem, path) == (right, 0, [])
-    assert all(_unsealed(line) for line in path.read_bytes().splitlines())
+    header, *lines = lines_of(path.read_bytes())
+    assert header == lines_of(text)[0] and all(_unsealed(line.strip(), header) for line in lines)
 
 
 def mutant(text, random):
@@ -278,10 +297,10 @@ def mutant(text, random):
             text = b"".join([*lines[:one], *lines[one + 1 :]])
         elif kind == 9:
             text = text[:place] + text[end:]
-        elif table := _unsealed(lines[one].strip()):
+        elif table := _unsealed(lines[one].strip(), b"" if one == 0 else lines[0]):
             name = random.choice([*table])
             table[name] = other_kind(table[name], random)
-            lines[one] = _sealed(table)
+            lines[one] = _sealed(table, b"" if one == 0 else lines[0])
             text = b"".join(lines)
         if not text:
             return text
@@ -313,7 +332,7 @@ def test_no_mutant_of_a_journal_gives_a_wrong_number(problem, whole, tmp_path):
         assert found == right, (SEED, number)
         changed = [line for line in lines_of(damaged) if line.endswith(b"\n") and line not in known]
         # of lines with the right checksum some entries are never read
-        assert said or all(_unsealed(line.strip()) for line in changed), (SEED, number)
+        assert said or all(_unsealed(line.strip(), lines_of(text)[0]) for line in changed), (SEED, number)
         path.unlink()
     assert refused < 0.6 * MUTANTS
 
@@ -347,8 +366,6 @@ OF = ["tip thickness planet"]
 
 @pytest.fixture(scope="module")
 def free():
-    from femgear.trains.reading import with_values
-
     return with_values(read_case(CASE), {"sun.profile_shift": None, "ring.profile_shift": None})
 
 
@@ -442,8 +459,6 @@ def started(case, folder):
 
 def test_a_sweep_that_is_killed_goes_on_with_the_same_command(free, tmp_path):
     """By Ctrl-C, SIGTERM and kill -9 in turn, at random lines: the same table, nothing computed twice."""
-    from femgear.trains.reading import to_toml
-
     case, chance = tmp_path / "case.toml", random.Random(SEED)
     case.write_text(to_toml(free), encoding="utf-8")
     alone = started(case, tmp_path / "alone")
@@ -469,6 +484,6 @@ def test_a_sweep_that_is_killed_goes_on_with_the_same_command(free, tmp_path):
     assert last.returncode == 0 and f"{POINTS + 1 - lines} computed now" in said and "warning" not in errors
     for name in ("sweep.csv", "sweep.png"):
         assert (folder / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
-    keys = [_unsealed(line)["key"] for line in journal.read_bytes().splitlines()[1:]]
+    keys = [json.loads(line)["key"] for line in journal.read_bytes().splitlines()[1:]]
     assert len(keys) == len(set(keys)) == POINTS
     assert {path.name for path in folder.iterdir()} == {"sweep.csv", "sweep.png", "sweep.jsonl", ".written"}
