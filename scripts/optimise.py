@@ -123,8 +123,7 @@ def main(
     another = None if task.second is None else named_quantity(task.second, speeds=task.speeds)
     names = [*FILES, *(FRONT if another else ()), *(CHECK if extent.check else ())]
     folder = ready_folder(output, names)
-    for run in RUNS if extent.check else ():
-        _refuse_foreign_run(folder / run)
+    _refuse_foreign(data, problem, folder, RUNS if extent.check else ())
     with resumable(folder):
         rough, found, options = _searched(data, problem, extent, folder)
         _write(found, data, folder, rough)
@@ -289,13 +288,19 @@ def _check(found, data, folder: Path, speeds, rough) -> None:
     )
 
 
-def _refuse_foreign_run(folder: Path) -> None:
-    """Refuse a folder of a full run that holds other files, before anything is computed."""
+def _refuse_foreign(data, problem, folder: Path, runs: Sequence[str]) -> None:
+    """Refuse the journal of the refinement and folders of runs that are another's, before all computing."""
     from femgear.storage.results import run_folder
+    from femgear.study.designs import open_designs
+    from femgear.trains.reading import with_values
 
-    if folder.exists():
-        with run_folder(folder, force=True):
-            pass
+    keys = [variable.keys for variable in problem.variables]
+    with open_designs(with_values(data, QUIET), keys, journal=folder / JOURNALS[1]):
+        pass
+    for name in runs:
+        if (folder / name).exists():
+            with run_folder(folder / name, force=True):
+                pass
 
 
 def _run(case, folder: Path, only: str):

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femgear import cli
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, ConvergenceError, StorageError
 from femgear.study.designs import Designs, Failure, Journal, evaluations, open_designs
@@ -421,7 +422,7 @@ def test_refusals(case, make, code, words):
     assert code in str(refused.value) and words in str(refused.value)
 
 
-def test_thousands_of_cases_say_how_long_they_take(case, capsys):
+def test_thousands_of_cases_say_how_long_they_take(case, tmp_path, capsys):
     quick = function("x", lambda x, y: x)
     over = {"dynamics.damping_ratio": [0.01 * n for n in range(1, 9)], "carrier.mass": ["1 kg"]}
     said = pytest.warns(UserWarning, match="W-SWEEP. 5 more cases of about")
@@ -433,6 +434,18 @@ def test_thousands_of_cases_say_how_long_they_take(case, capsys):
         sweep(case, over, [quick])
     # the command line prints warnings, nothing else does
     assert capsys.readouterr().err == ""
+    arguments = [
+        "sweep",
+        str(CASE),
+        "--over",
+        "carrier.mass=1 kg..2 kg/8",
+        "--of",
+        "contact ratio sun-planet",
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys.modules["femgear.study.sweep"], "_MANY", 8)
+        assert cli.main([*arguments, "-o", str(tmp_path)]) == 0
+    assert "warning: [W-SWEEP] 5 more cases of about" in capsys.readouterr().err
 
 
 def test_whole_numbers(case):
