@@ -144,12 +144,12 @@ def _sealed(line: dict, header: bytes = b"") -> bytes:
     """Write a table as a line of JSON that ends with a checksum of the header and what stands before it."""
     # a number that is not finite is no JSON, and no result either
     text = json.dumps(line, allow_nan=False)[:-1].encode()
-    return text + b', "check": "' + _check(header + text) + b'"}\n'
+    return text + b', "checksum": "' + _check(header + text) + b'"}\n'
 
 
 def _unsealed(line: bytes, header: bytes = b"") -> dict:
     """Read a line that `_sealed` wrote under the same header; an empty table from any other."""
-    text, _, check = line.rpartition(b', "check": "')
+    text, _, check = line.rpartition(b', "checksum": "')
     if check != _check(header + text) + b'"}':
         return {}
     try:

@@ -114,11 +114,11 @@ def sealed(place, /, **changes):
 
 def forged(text):
     """A line of any text with the checksum for it."""
-    return lambda _, header: text[:-1] + b', "check": "' + _check(header + text[:-1]) + b'"}\n'
+    return lambda _, header: text[:-1] + b', "checksum": "' + _check(header + text[:-1]) + b'"}\n'
 
 
 def not_finite(line, header):
-    text = re.sub(rb"0\.014\d+", b"NaN", line[: line.rindex(b', "check"')])
+    text = re.sub(rb"0\.014\d+", b"NaN", line[: line.rindex(b', "checksum"')])
     return forged(text + b"}")(line, header)
 
 
@@ -135,7 +135,7 @@ DAMAGED = {
     "not a number": (edited((3, lambda line, *_: re.sub(rb"0\.014\d+", b"NaN", line))), [3]),
     "a text": (edited((3, lambda line, *_: re.sub(rb"0\.014\d+", b'"abc"', line))), [3]),
     "no values": (edited((3, lambda line, *_: re.sub(rb'"values": \{.*?\}', b'"values": 5', line))), [3]),
-    "no checksum": (edited((3, lambda line, *_: re.sub(rb', "check".*', b"}", line))), [3]),
+    "no checksum": (edited((3, lambda line, *_: re.sub(rb', "checksum".*', b"}", line))), [3]),
     "cut in the middle": (edited((5, lambda line, *_: line[:40] + b"\n")), [5]),
     "without its end": (edited((5, lambda line, *_: line[:-1])), [5]),
     "copied": (edited((5, lambda line, *_: line + line)), [6]),
@@ -215,7 +215,7 @@ REFUSED = {
     "another format": edited((1, lambda line, *_: _sealed({"format": 3, "femgear": "9.9"}))),
     "a format of text": edited((1, lambda line, *_: line.replace(b"2", b'"2"', 1))),
     "the first format": edited(
-        (1, lambda line, *_: re.sub(rb', "check".*', b"}", line.replace(b"2", b"1", 1)))
+        (1, lambda line, *_: re.sub(rb', "checksum".*', b"}", line.replace(b"2", b"1", 1)))
     ),
     "more in the header": edited((1, lambda line, *_: _sealed({"more": 1}))),
     "no header": lambda text: b"".join(lines_of(text)[1:]),
