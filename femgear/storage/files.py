@@ -151,14 +151,22 @@ def own_files(folder: Path, names: Iterable[str]) -> None:
     Raises
     ------
     StorageError
-        ``E-OUTPUT``: a file of such a name is not on the list, or was changed since.
+        ``E-OUTPUT``: a file of such a name is not on the list, or was changed since; results of a run.
     """
     with storage_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
+        if os.path.lexists(folder / "manifest.json"):
+            raise StorageError(
+                "the folder holds the results of a run",
+                code="E-OUTPUT",
+                file=str(folder),
+                remedy="name another folder",
+            )
         for name in names:
             for path in folder.glob(name) if "*" in name else [folder / name]:
                 _refuse_foreign(path)
         if not _is_regular(folder / _WRITTEN):
+            _refuse_foreign(folder / _WRITTEN)
             open(folder / _WRITTEN, "x").close()
 
 

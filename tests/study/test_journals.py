@@ -408,6 +408,13 @@ def test_a_sweep_replaces_its_own_table_and_figure_alone(free, tmp_path, name, m
     refused()
 
 
+def test_a_sweep_keeps_out_of_the_results_of_a_run(free, tmp_path):
+    (tmp_path / "manifest.json").write_text("{}")
+    with pytest.raises(StorageError, match=r"E-OUTPUT.*the results of a run"):
+        sweep_into(free, tmp_path, over=OVER, of=OF)
+    assert len([*tmp_path.iterdir()]) == 1
+
+
 def test_a_file_that_comes_while_a_sweep_computes_is_not_replaced(free, tmp_path):
     def progress(*_):
         (tmp_path / "sweep.csv").write_text("theirs")
@@ -438,7 +445,7 @@ def test_the_list_of_what_was_written_may_be_damaged_and_half_written(free, tmp_
     before = CASE.read_bytes()
     for name in ("sweep.csv", "sweep.png"):
         (tmp_path / name).unlink()
-    with pytest.raises(StorageError):
+    with pytest.raises(StorageError, match=r"(?s)\.written: .*move it away"):
         sweep_into(free, tmp_path, over=OVER, of=OF)
     assert CASE.read_bytes() == before
 
