@@ -165,9 +165,10 @@ def own_files(folder: Path, names: Iterable[str]) -> None:
         for name in names:
             for path in folder.glob(name) if "*" in name else [folder / name]:
                 _refuse_foreign(path)
+        with contextlib.suppress(FileExistsError):
+            open(folder / _WRITTEN, "x").close()
         if not _is_regular(folder / _WRITTEN):
             _refuse_foreign(folder / _WRITTEN)
-            open(folder / _WRITTEN, "x").close()
 
 
 def _list_own(path: Path, digest: str) -> None:
@@ -184,10 +185,12 @@ def _list_own(path: Path, digest: str) -> None:
 
 def _refuse_foreign(path: Path) -> bytes:
     """Refuse to replace what the list of the folder has not; the list otherwise."""
+    there = os.path.lexists(path)
+    found = _entry(path, checksum(path)) if _is_regular(path) else b"a link or folder"
+    # read after the file: another process that replaces it lists it first
     written = path.with_name(_WRITTEN)
     listed = written.read_bytes() if _is_regular(written) else b""
-    own = _is_regular(path) and _entry(path, checksum(path)) in listed.splitlines()
-    if os.path.lexists(path) and not own:
+    if there and found not in listed.splitlines():
         raise StorageError(
             "would be replaced, but was not written here by femgear, or was changed since",
             code="E-OUTPUT",

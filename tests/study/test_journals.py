@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import ContactError, StorageError
+from femgear.storage import files
 from femgear.study import search
 from femgear.study.designs import Failure, _check, _sealed, _unsealed, evaluations
 from femgear.study.objectives import NUMBER, Quantity
@@ -424,6 +425,21 @@ def test_a_file_that_comes_while_a_sweep_computes_is_not_replaced(free, tmp_path
     assert (tmp_path / "sweep.csv").read_text() == "theirs"
     (tmp_path / "sweep.csv").unlink()
     assert sweep_into(free, tmp_path, over=OVER, of=OF)[0].computed == 0
+
+
+def test_another_process_may_replace_its_file_meanwhile(tmp_path, monkeypatch):
+    def checksum(path, once=[]):  # noqa: B006
+        if not once:
+            once.append(path)
+            files.write_text("new", tmp_path / "sweep.csv")
+        return original(path)
+
+    files.own_files(tmp_path, ["sweep.csv"])
+    files.write_text("old", tmp_path / "sweep.csv")
+    original = files.checksum
+    monkeypatch.setattr(files, "checksum", checksum)
+    files.own_files(tmp_path, ["sweep.csv"])
+    assert (tmp_path / "sweep.csv").read_text() == "new"
 
 
 def test_the_list_of_what_was_written_may_be_damaged_and_half_written(free, tmp_path):
