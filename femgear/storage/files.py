@@ -143,6 +143,39 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
             temporary.unlink(missing_ok=True)
 
 
+def write_bytes(data: bytes, path: str | os.PathLike) -> None:
+    """Write bytes so that the file is either the old or the new one, whole."""
+    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+
+
+def write_text(text: str, path: str | os.PathLike) -> None:
+    """Write UTF-8 text so that the file is either the old or the new one, whole."""
+    write_bytes(text.encode(), path)
+
+
+def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a table as CSV, units in the header, numbers with nine digits; the file is whole."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(map(csv_cell, header))
+    for row in rows:
+        writer.writerow(f"{value:.9g}" if isinstance(value, float) else csv_cell(value) for value in row)
+    write_text(stream.getvalue(), path)
+
+
+def csv_cell(value: object) -> object:
+    """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
+    if not isinstance(value, str) or _NUMBER.fullmatch(value):
+        return value
+    return f"'{value}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+
+
+def checksum(path: str | os.PathLike) -> str:
+    """Compute the SHA-256 of a file."""
+    with storage_errors(path), open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
 def own_files(folder: Path, names: Iterable[str]) -> None:
     """Make a folder ready for files of these names or patterns, and replace none that was not written so.
 
@@ -209,39 +242,6 @@ def _entry(path: Path, digest: str) -> bytes:
 def _is_regular(path: Path) -> bool:
     """Tell whether a path is a regular file, and no link to one."""
     return path.is_file() and not path.is_symlink()
-
-
-def write_bytes(data: bytes, path: str | os.PathLike) -> None:
-    """Write bytes so that the file is either the old or the new one, whole."""
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
-
-
-def write_text(text: str, path: str | os.PathLike) -> None:
-    """Write UTF-8 text so that the file is either the old or the new one, whole."""
-    write_bytes(text.encode(), path)
-
-
-def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write a table as CSV, units in the header, numbers with nine digits; the file is whole."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(map(csv_cell, header))
-    for row in rows:
-        writer.writerow(f"{value:.9g}" if isinstance(value, float) else csv_cell(value) for value in row)
-    write_text(stream.getvalue(), path)
-
-
-def csv_cell(value: object) -> object:
-    """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
-    if not isinstance(value, str) or _NUMBER.fullmatch(value):
-        return value
-    return f"'{value}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
-
-
-def checksum(path: str | os.PathLike) -> str:
-    """Compute the SHA-256 of a file."""
-    with storage_errors(path), open(path, "rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def checked_name(name: str) -> str:
