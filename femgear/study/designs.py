@@ -307,7 +307,7 @@ class Designs:
         try:
             variant = self.variant(point)
             for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
-                found[quantity.name] = _finite(quantity, quantity.compute(variant))
+                found[quantity.name] = float(_finite(quantity, quantity.compute(variant)))
         except StorageError:
             raise
         except FemgearError as error:
@@ -327,7 +327,7 @@ def _finite(quantity: Quantity, value: float) -> float:
     """The value, refused where it is no number."""
     if not math.isfinite(value):
         raise ContactError(f"{quantity.name} is not finite", code="E-FINITE", value=value)
-    return float(value)
+    return value
 
 
 @contextmanager
