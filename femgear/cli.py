@@ -168,6 +168,7 @@ def run(
         Replace the results that the folder holds, once the new ones are complete.
     """
     from femgear.run import run_case
+    from femgear.storage.files import resumable
     from femgear.storage.results import run_folder
     from femgear.trains.reading import open_results, read_case
     from femgear.trains.registry import TRAINS, check_case, train_of
@@ -186,7 +187,8 @@ def run(
     check_case(data, only)  # refuse before the folder is touched
     train = train_of(data)
     _warn(train.case_warnings(data))
-    with run_folder(output, case=data.source, force=force) as folder, Progress() as progress:
+    place = run_folder(output, case=data.source, force=force)
+    with resumable(output), place as folder, Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(output)
     _print(train.describe_results(results))

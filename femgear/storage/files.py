@@ -504,6 +504,16 @@ def _locked(path: Path) -> int | None:
 
 
 @contextlib.contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """Say with an interruption of the block that the same command goes on from what a folder holds."""
+    try:
+        yield
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note(f"the same command goes on from what {folder} holds")
+        raise
+
+
+@contextlib.contextmanager
 def storage_errors(path: str | os.PathLike) -> Iterator[None]:
     """Turn an `OSError` of the block into a `StorageError` that names ``path``."""
     try:

@@ -130,16 +130,6 @@ def _open_journal(path: str | Path | None, header: dict) -> Iterator[Journal]:
             yield journal
 
 
-@contextmanager
-def resumable(folder: Path) -> Iterator[None]:
-    """Say with an interruption of the block that the same command goes on from what a folder holds."""
-    try:
-        yield
-    except KeyboardInterrupt as interrupt:
-        interrupt.add_note(f"the same command goes on from what {folder} holds")
-        raise
-
-
 def _sealed(line: dict, header: bytes = b"") -> bytes:
     """Write a table as a line of JSON that ends with a checksum of the header and what stands before it."""
     # a number that is not finite is no JSON, and no result either

@@ -19,8 +19,8 @@ import numpy as np
 from femgear.case.sections import Case
 from femgear.errors import CaseError, Finding
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
-from femgear.storage.files import own_files, write_csv
-from femgear.study.designs import Failure, open_designs, resumable
+from femgear.storage.files import own_files, resumable, write_csv
+from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
 from femgear.trains.protocol import Progress, one_blas_thread
