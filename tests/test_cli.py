@@ -371,9 +371,10 @@ def test_an_interrupted_run_says_how_far_it_came(tmp_path, capsys, monkeypatch):
         return SimpleNamespace(dataset=lambda: dataset)
 
     stages = tuple(
-        replace(one, solve=lambda *_, name=one.name, **__: solve(name), verdict=lambda _: {})
+        replace(one, solve=lambda *_, name=one.name, **__: solve(name), parts=None, verdict=lambda _: {})
         for one in registry.ELASTIC.stages
     )
+    monkeypatch.setattr("femgear.run.write_result", lambda result, path, **_: path.write_bytes(b""))
     monkeypatch.setattr(registry, "TRAINS", (replace(registry.ELASTIC, stages=stages),))
     out = tmp_path / "out"
     assert cli.main(["run", str(CASE), "-o", str(out)]) == 130

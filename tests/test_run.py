@@ -1,6 +1,7 @@
 """Runs that are interrupted go on from their stages; many speeds are solved and written some at a time."""
 
 import json
+import re
 from pathlib import Path
 from shutil import disk_usage
 
@@ -236,3 +237,16 @@ def test_a_large_file_is_read_where_it_is_asked_for(tmp_path, monkeypatch):
     assert not found["x"].variable._in_memory and whole["x"].variable._in_memory
     assert found["x"].isel(speed=-1).values.tolist() == [2.0] * 5
     assert not found["x"].variable._in_memory and found.equals(whole)
+
+
+def test_the_size_of_many_speeds_is_said_before(tmp_path, monkeypatch):
+    case = with_values(quick("planetary_27_40_108"), {"operation.speeds": SPEEDS})
+    assert not [one for one in elastic.ELASTIC.case_warnings(case) if one.code == "W-SIZE"]
+    monkeypatch.setattr(elastic, "_NOTICED", 0.0)
+    (found,) = (one for one in elastic.ELASTIC.case_warnings(case) if one.code == "W-SIZE")
+    said = re.search(r"14 speeds with up to (\d+) harmonics each fill about (\S+) GB", found.text)
+    run(case, tmp_path / "out")
+    size = sum((tmp_path / "out" / f"{stage}.nc").stat().st_size for stage in ("dynamics", "housing"))
+    # whether the excitation is doubled is known with the modes
+    assert 0.95 < 1e9 * float(said[2]) / size < 2.2
+    assert int(said[1]) >= read_dataset(tmp_path / "out" / "dynamics.nc").sizes["harmonic"] - 1

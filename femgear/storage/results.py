@@ -344,7 +344,7 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
                 _publish(folder)
         except BaseException as error:
             # what a user interrupts goes on with the next run
-            if case is None or isinstance(error, Exception):
+            if case is None or isinstance(error, Exception) or not read_manifest(running).files:
                 _remove_tree(running)
             raise
 

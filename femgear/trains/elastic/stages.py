@@ -113,7 +113,7 @@ MEMORY = 1.5e9
 """Size of the lines and signals of a run beyond which its slowest speeds are excited less far [bytes]."""
 _PART = 100e6
 """Size of those that are in memory at a time [bytes]."""
-_NOTICED, _SECONDS = 1e9, 1.5e-4
+_NOTICED, _SECONDS = 2e9, 1.5e-4
 """Size of files that is said before [bytes], and what a harmonic of one speed takes (2 GHz, one core) [s]."""
 
 
