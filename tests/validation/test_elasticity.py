@@ -215,11 +215,12 @@ def test_curved_bar_in_pure_bending():
     far = int(np.flatnonzero((grid.points == [2.0, 0.0]).all(axis=1))[0])
     inside = sigma[grid.triangles == corner][:, 1].mean()
     outside = sigma[grid.triangles == far][:, 1].mean()
-    assert abs(inside) == pytest.approx(7.7552436, rel=3e-3)
+    # the outside is pulled: the moment bends the bar further
+    assert inside == pytest.approx(-7.7552436, rel=3e-3)
     assert outside / inside == pytest.approx(-4.9170168 / 7.7552436, rel=3e-3)
-    radial = [abs(sigma[grid.triangles == node][:, 0].mean()) for node in bottom]
-    peak = int(np.argmax(radial))
-    assert radial[peak] == pytest.approx(1.0698572, rel=3e-3)
+    radial = [sigma[grid.triangles == node][:, 0].mean() for node in bottom]
+    peak = int(np.argmin(radial))
+    assert radial[peak] == pytest.approx(-1.0698572, rel=3e-3)
     assert grid.points[bottom[peak], 0] == pytest.approx(1.35956, abs=0.04)
 
 
