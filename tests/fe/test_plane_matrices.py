@@ -80,6 +80,21 @@ def test_uniaxial_stress_strains_by_the_textbook(plate):
         assert np.allclose(field, [pull, 0.0, 0.0], rtol=0, atol=1e-8 * pull)
 
 
+def test_stresses_of_a_pull_at_an_angle_and_of_a_shear(plate):
+    """A pull p at 30 degrees has p cos^2, p sin^2, p sin cos by Hooke, a shear mu times its angle."""
+    pull, angle = 1e8, np.deg2rad(30.0)
+    along = np.array([np.cos(angle), np.sin(angle)])
+    tensor = pull * np.outer(along, along)
+    strain = ((1 + 0.3) * tensor - 0.3 * pull * np.eye(2)) / 206e9
+    field = stress(plate, STEEL, plate.points @ strain, state="plane stress")
+    expected = pull * np.array([0.75, 0.25, np.sqrt(0.1875)])
+    np.testing.assert_allclose(field, np.broadcast_to(expected, field.shape), rtol=1e-9)
+    for motion in ([[0.0, 1e-4], [0.0, 0.0]], [[0.0, 0.0], [1e-4, 0.0]]):
+        sheared = stress(plate, STEEL, plate.points @ np.array(motion), state="plane strain")
+        exact = np.array([0.0, 0.0, 1e-4 * 206e9 / 2.6])
+        np.testing.assert_allclose(sheared, np.broadcast_to(exact, sheared.shape), rtol=1e-9, atol=1.0)
+
+
 def test_states_and_thicknesses_by_region():
     t = np.linspace(0, 1, 9)[:, None]
     corners = np.array([(0, 0), (2, 0), (2, 1), (0, 1)], dtype=float)
