@@ -30,6 +30,7 @@ if sys.platform != "win32":
     import fcntl
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
@@ -161,7 +162,7 @@ def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Ite
 def csv_cell(value: object) -> object:
     """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
     formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
-    return f"'{value}" if formula else value
+    return f"'{value}" if formula and not _NUMBER.fullmatch(value) else value
 
 
 def checksum(path: str | os.PathLike) -> str:
