@@ -18,7 +18,7 @@ from pydantic import BaseModel, ValidationError
 from femgear.case import text as case_text
 from femgear.case.quantities import ANGLE, LENGTH
 from femgear.case.sections import Case, RackSection
-from femgear.errors import CaseError, Finding, GeometryError, remark
+from femgear.errors import CaseError, Finding, GeometryError, printable, remark
 
 _DIMENSIONS = {
     "centre_distance": LENGTH,
@@ -136,7 +136,7 @@ def _dotted(location: tuple, prefix: str) -> str:
         if isinstance(part, int):
             key += f"[{part}]"
         else:
-            key += ("." if key else "") + case_text.printable(part)
+            key += ("." if key else "") + printable(part)
     return key
 
 
@@ -147,12 +147,12 @@ def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
     """
     for problem in problems:
         line = case_text.line_of(text, problem.key) if problem.key and name else None
-        problem.file = f"{name}:{line}" if line else name
+        if problem.file in (None, name):  # or that of another file
+            problem.file = f"{name}:{line}" if line else name
     if len(problems) == 1:
         combined = problems[0]
     else:
-        listed = "\n".join(str(problem) for problem in problems)
-        combined = CaseError(f"{len(problems)} problems\n{listed}", file=name)
+        combined = CaseError(f"{len(problems)} problems", file=name)
         combined.code = problems[0].code if len({p.code for p in problems}) == 1 else "E-CASE"
     combined.problems = tuple(problems)
     return combined
@@ -172,10 +172,6 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
         )
     if error.code == "E-ASSEMBLY":
         _assembly(error, case)
-    if error.code == "E-ALLOWANCE":
-        error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
-        error.limit = f"0 mm to {LENGTH.show(2.0 * case.sun.module)}: each gear takes half of it"
-        error.remedy = "reduce the backlash"
     if error.key == "rack.root_radius":
         cut = re.match(r"(\w+):|the \w+'s tip runs into the (\w+)'s root fillet", error.message)
         gear = (cut[1] or cut[2]) if cut else ""

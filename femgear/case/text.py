@@ -12,7 +12,7 @@ from html import escape
 
 from pydantic import BaseModel, PrivateAttr
 
-from femgear.errors import CaseError, Finding
+from femgear.errors import CaseError, Finding, printable
 
 _MAX_BYTES = 1_000_000
 _MAX_DEPTH = 32
@@ -36,7 +36,7 @@ def read_text(path: str | os.PathLike) -> str:
         ``E-FILE``: missing, unreadable, not a regular file, empty or over 1 MB.
         ``E-FILE-ENC``: not UTF-8, with the offset of the first wrong byte.
     """
-    name = printable(os.fsdecode(path))
+    name = os.fsdecode(path)
     try:
         # O_NONBLOCK: opening a FIFO must not wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -300,7 +300,7 @@ class ReadCase(BaseModel):
     def __repr__(self) -> str:
         """Kind, title and file: the entries are in `source`."""
         where = f" of {self._name}" if self._name else ""
-        return f"<{type(self).__name__} {getattr(self, 'title', '')!r}{where}>"
+        return printable(f"<{type(self).__name__} {getattr(self, 'title', '')!r}{where}>")
 
     def _repr_html_(self) -> str:
         """The text of the case, for notebooks."""
@@ -331,13 +331,6 @@ class ReadCase(BaseModel):
     def notices(self) -> tuple[Finding, ...]:
         """Remarks on how the file was read."""
         return self._notices
-
-
-def printable(text: str) -> str:
-    """Write every control character of ``text`` as an escape: it then fits one line of a message."""
-    return "".join(
-        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text
-    )
 
 
 def shown(number: int) -> str:

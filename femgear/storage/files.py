@@ -14,6 +14,7 @@ import os
 import re
 import shutil
 import sys
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,7 +31,8 @@ if sys.platform != "win32":
     import fcntl
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
-_RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
+_RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
+"""Names that some file system gives a meaning of its own, or takes for others."""
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
@@ -172,12 +174,15 @@ def checksum(path: str | os.PathLike) -> str:
 
 def checked_name(name: str) -> str:
     """Refuse (E-CHOICE) a name that some file system does not take as one plain file name."""
-    if not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.startswith(".") or name.endswith("."):
+    plain = name.isprintable() and unicodedata.is_normalized("NFC", name) and not _RESERVED.fullmatch(name)
+    if not plain or len(name) > 100 or len(name.encode()) > 240:
         raise StorageError(
             "not a safe file name",
             code="E-CHOICE",
             value=name,
-            limit="1 to 100 of A-Z a-z 0-9 . _ -, no dot at the ends, no reserved name",
+            limit='1 to 100 characters (240 bytes), composed (NFC), without / \\ : * ? " < > | and control '
+            "characters, no dot or blank at the ends, none that Windows reserves (con, nul, com1, ...)",
+            remedy="name another folder",
         )
     return name
 

@@ -30,6 +30,8 @@ from femgear.trains.protocol import OwnFile, Train
 
 _SET_FILE = OwnFile(embed=embed_profiles, points="measured profiles", remedy="measure at fewer points")
 """Case file of a planetary set, whatever its train."""
+_MOST_UNREAD = 20
+"""Files of a case that are refused at once."""
 
 
 def read_case(path: str | os.PathLike) -> Any:
@@ -50,7 +52,7 @@ def read_case(path: str | os.PathLike) -> Any:
     CaseError
         Everything that is wrong with the file, at once; ``problems`` holds one `CaseError` for each.
     """
-    return parse_case(case_text.read_text(path), name=case_text.printable(os.fsdecode(path)))
+    return parse_case(case_text.read_text(path), name=os.fsdecode(path))
 
 
 def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
@@ -67,14 +69,19 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     data, lines = case_text.parse(text, name), text if numbered else ""
     train = _train_of_file(data, lines, name)
     own_file = train.own_file or _SET_FILE
-    files = own_file.embed(data, name)
+    files, unread = _embedded_files(own_file, data, name)
     if files:
         text = text_with_points(data, name, points=own_file.points, remedy=own_file.remedy)
     try:
         case = train.model.model_validate(data)
     except ValidationError as error:
         keys = every_section() if own_file is _SET_FILE else train.model
-        raise combine(translate(error, keys), lines, name) from None
+        # tables whose files cannot be read have no points
+        tables = {(problem.key or "").rpartition(".")[0] for problem in unread}
+        problems = [problem for problem in translate(error, keys) if problem.key not in tables]
+        raise combine([*unread, *problems], lines, name) from None
+    if unread:
+        raise combine(unread, lines, name)
     try:
         more = train.cross_check(case)
         problems = cross_check(case, more) if own_file is _SET_FILE else list(more)
@@ -87,6 +94,19 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         said = (*notices(data), *said, *added_material(case))
     case.read_from(text, lines, name, notices=said, profile_files=files)
     return with_shafts(case) if own_file is _SET_FILE else case
+
+
+def _embedded_files(own_file: OwnFile, data: dict, name: str) -> tuple[dict[str, str], list[CaseError]]:
+    """Files whose points are put into the tables of a case, and the refusals of others."""
+    unread: dict[str | None, CaseError] = {}
+    while True:
+        try:
+            return own_file.embed(data, name), list(unread.values())
+        except CaseError as error:
+            # a refused file is not read again
+            if error.key in unread or len(unread) == _MOST_UNREAD:
+                raise
+            unread[error.key] = error
 
 
 def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:

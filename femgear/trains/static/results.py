@@ -452,7 +452,7 @@ def describe_stress(data: xr.Dataset) -> Block:
         notes.append(f"outside the range of ISO 6336: {data.attrs['iso']}")
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
-    header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [°]", "range", "cycles"
+    header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [deg]", "range", "cycles"
     return Block("Stresses", header, (*contact, *roots), tuple(notes))
 
 
