@@ -12,9 +12,10 @@ import script_tools
 
 from femgear import cli
 from femgear import run as run_module
-from femgear.errors import CaseError, Finding
+from femgear.errors import CaseError, Finding, StorageError
 from femgear.report.tables import Block
-from femgear.trains.reading import read_case
+from femgear.storage.files import checked_name
+from femgear.trains.reading import open_results, read_case
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -157,3 +158,30 @@ def test_a_case_in_a_folder_with_an_unusual_blank_finds_its_profile(tmp_path):
     measured = '\n[[sun.modifications]]\nkind = "measured profile"\nfile = "p.csv"\n'
     (folder / "case.toml").write_text(TEXT + measured, encoding="utf-8")
     assert read_case(folder / "case.toml").profile_files == {"sun.modifications[0]": "p.csv"}
+
+
+# --- names of folders ----------------------------------------------------------------------------------
+
+NAMES = ("Prüfstand 3", "歯車 1", "दाँत", "run_3-b (new)", "a.b", "ä" * 100, "condor", "com10x")
+WRONG_NAMES = (
+    "", "a\x1b", "a\nb", "a/b", "a\\b", "a:b", "a*", "a?", 'a"b', "<a", "a>", "a|b", ".a", "a.", " a", "a ",
+    "..", "con", "NUL.txt", "Com1", "lpt²", "nul .txt", "a" * 101, "歯" * 81, "u\u0308", "a\u202eb",
+    "\udcff", "a\u00a0b",
+)  # fmt: skip
+
+
+def test_folders_have_names_that_every_file_system_takes(tmp_path):
+    for name in NAMES:
+        assert checked_name(name) == name
+        (tmp_path / name).mkdir()
+    for name in WRONG_NAMES:
+        with pytest.raises(StorageError) as caught:
+            checked_name(name)
+        assert caught.value.code == "E-CHOICE" and caught.value.limit and caught.value.remedy
+
+
+def test_a_run_into_a_folder_with_umlaut_and_blank(tmp_path, capsys):
+    out = tmp_path / "Prüfstand 3"
+    case = Path(__file__).parents[1] / "cases" / "four_stage_reducer.toml"
+    assert cli.main(["run", str(case), "-o", str(out), "--only", "modes", "--no-pictures"]) == 0
+    assert f"results: {out}\n" in capsys.readouterr().out and open_results(out).stages == ("modes",)

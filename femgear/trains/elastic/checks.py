@@ -18,7 +18,8 @@ from femgear.case.quantities import RPM
 from femgear.case.sections import Case, output_member
 from femgear.errors import CaseError, Finding
 from femgear.gears.kinematics import torques
-from femgear.report.tables import response_warnings
+from femgear.report.tables import first_speeds, response_warnings
+from femgear.system.fourier import sample
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
 from femgear.trains.static.description import set_warnings
@@ -35,6 +36,8 @@ _CHECKED = 12
 """Speeds at which the level is computed again, at most."""
 NOTICEABLE = 1.0
 """Change of the level that is worth a warning [dB]."""
+_NOTHING = 1e-3
+"""Pull that is no more than the end of the harmonics, in mean mesh forces."""
 MOST_WINDING = 1.0
 """Angle between the ends of a coupling that is worth a warning [rad]."""
 
@@ -222,11 +225,39 @@ def checked_speeds(count: int, most: int = _CHECKED) -> np.ndarray:
 
 
 def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """List what the solver says against dynamics.nc: excitation that ends too early, no solution."""
+    """List what dynamics.nc says against itself: excitation that ends too early, teeth that would part."""
     if "level_change" in data:
         change, limit = data["level_change"].values, data["excitation_limit"].values
         yield from missing_level(data["speed"].values, change, limit, float(data.attrs["compared_to"]))
+    force = data["mesh_force_real"].values + 1j * data["mesh_force_imag"].values
+    yield from pulling_meshes(data["speed"].values, data["mesh"].values, force)
     yield from response_warnings(data)
+
+
+def pulling_meshes(rpm, names, force: np.ndarray) -> Iterator[Finding]:
+    """Warn where the force of a mesh, whose spring knows no contact loss, turns into a pull.
+
+    Parameters
+    ----------
+    rpm, names : (n_speeds,) and (n_meshes,) arrays
+        Speeds of the input [rpm], and names of the meshes.
+    force : (n_speeds, n_meshes, H + 1) complex array
+        Harmonics of the mesh forces [N].
+    """
+    least, share = np.zeros(force.shape[:2]), np.zeros(force.shape[:2])
+    nothing = _NOTHING * np.abs(force[..., 0]).max(initial=0.0)
+    for s, harmonics in enumerate(force):
+        record = sample(harmonics, 4 * force.shape[-1])
+        least[s], share[s] = record.min(axis=-1), (record < -nothing).mean(axis=-1)
+    pulls = share.any(axis=1)
+    if pulls.any():
+        s, mesh = np.unravel_index(least.argmin(), least.shape)
+        text = (
+            f"{names[mesh]} pulls for {share[s, mesh]:.2%} of the time at {rpm[s]:.6g} rpm, with up to "
+            f"{-1e-3 * least[s, mesh]:.4g} kN: real teeth would part; meshes pull at {pulls.sum()} of the "
+            f"{len(pulls)} speeds: {first_speeds(rpm[pulls])}"
+        )
+        yield Finding("W-PULL", "", text, remedy="in the section [planar] meshes lose contact")
 
 
 def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[Finding, ...]:

@@ -33,7 +33,7 @@ from femgear.storage.results import (
     mode_entries,
     response_entries,
 )
-from femgear.trains.elastic.checks import checked_speeds, missing_level
+from femgear.trains.elastic.checks import checked_speeds, missing_level, pulling_meshes
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 
 if TYPE_CHECKING:
@@ -148,9 +148,9 @@ class DynamicsResult:
     @property
     def warnings(self) -> tuple[Finding, ...]:
         """Findings that an engineer should not overlook in this result."""
-        return missing_level(
-            self.input_speed / RPM, self.level_change, self.excitation_limit, self.compared_to
-        )
+        rpm, names = self.input_speed / RPM, mesh_names(self.dte.shape[1] // 2)
+        missing = missing_level(rpm, self.level_change, self.excitation_limit, self.compared_to)
+        return (*missing, *pulling_meshes(rpm, names, self.response.force))
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
