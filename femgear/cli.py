@@ -93,6 +93,8 @@ def _say(text: str) -> None:
 
 
 def _fail(error: FemgearError) -> int:
+    if error.key == "only":
+        error.key = "--only"
     print(error, file=sys.stderr)
     return error.exit_code
 

@@ -204,8 +204,8 @@ def printable(text: str) -> str:
 
 
 def _one_line(value: object, limit: int = 120) -> str:
-    text = repr(value) if isinstance(value, str) else str(value)
-    text = " ".join(text.split())
+    text = repr(value) if isinstance(value, str) else " ".join(str(value).split())
+    text = text.lower() if isinstance(value, bool) else text
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 

@@ -43,6 +43,10 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
     problems = []
     details: Any = error.errors(include_url=False)
     for item in details:
+        # a list whose entries are refused has too few left
+        inside = [one["loc"][: len(item["loc"])] for one in details if len(one["loc"]) > len(item["loc"])]
+        if item["type"] == "too_short" and item["loc"] in inside:
+            continue
         key = _dotted(item["loc"], prefix)
         nested = item.get("ctx", {}).get("error")
         if isinstance(nested, ValidationError):
@@ -76,8 +80,14 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
         section = f"[[{key.partition('[')[0]}]]" if key.endswith("]") else f"[{key}]"
         return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section {section}")
     if kind in _WANTED:
-        message = f"{_WANTED[kind]} is needed, not {case_text.described(value)}"
-        return CaseError(message, code="E-TYPE", key=key, value=value)
+        words = _WANTED[kind]
+        message = f"{words} is needed, not {case_text.described(value)}"
+        remedy = (
+            "write it in quotation marks" if words == "a text" else f"write {words}, without quotation marks"
+        )
+        if words == "a list":
+            remedy = f"write [[{key}]]" if _section(model, item["loc"]) else "write it in brackets: [...]"
+        return CaseError(message, code="E-TYPE", key=key, value=value, remedy=remedy)
     if kind in ("too_long", "too_short"):
         many = kind == "too_long"
         limit = f"at most {context['max_length']}" if many else f"{context['min_length']} or more"
@@ -109,7 +119,8 @@ def _description(model: type[BaseModel], location: tuple) -> str:
     section = _section(model, location[:-1]) or model
     schema = section.model_json_schema()["properties"].get(str(location[-1]), {})
     choices = " or ".join(str(choice) for choice in schema.get("enum", ()))
-    return schema.get("description") or choices or schema.get("type", "")
+    kind = schema.get("type", "")
+    return schema.get("description") or choices or {"string": "a text", "array": "a list"}.get(kind, kind)
 
 
 def _keys(section: type[BaseModel] | None) -> list[str]:
@@ -136,7 +147,7 @@ def _dotted(location: tuple, prefix: str) -> str:
         if isinstance(part, int):
             key += f"[{part}]"
         else:
-            key += ("." if key else "") + printable(part)
+            key += ("." if key else "") + (printable(part) or '""')
     return key
 
 

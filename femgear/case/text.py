@@ -42,20 +42,28 @@ def read_text(path: str | os.PathLike) -> str:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise CaseError(f"cannot open the file: {reason}", code="E-FILE", file=name) from error
+        raise CaseError(
+            f"cannot open the file: {reason}",
+            code="E-FILE",
+            file=name,
+            remedy="check its name and permissions",
+        ) from error
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise CaseError("not a regular file", code="E-FILE", file=name, remedy="name a TOML file")
         with open(descriptor, "rb", closefd=False) as stream:
             data = stream.read(_MAX_BYTES + 1)
     except OSError as error:
-        raise CaseError(f"cannot read the file: {error.strerror}", code="E-FILE", file=name) from error
+        raise CaseError(
+            f"cannot read the file: {error.strerror}", code="E-FILE", file=name, remedy="name a TOML file"
+        ) from error
     finally:
         os.close(descriptor)
     if len(data) > _MAX_BYTES:
         raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{_MAX_BYTES} bytes")
     if not data.strip():
-        raise CaseError("the file is empty", code="E-FILE", file=name)
+        remedy = "femgear schema prints what a case file holds"
+        raise CaseError("the file is empty", code="E-FILE", file=name, remedy=remedy)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -147,9 +155,10 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
                 code="E-TOML",
                 key=key,
                 file=name,
-                remedy="keep one of them",
-            )
-    remedy = None
+                remedy="keep one of them" if "Cannot overwrite" in message
+                else f"keep one of them; tables of a list have double brackets, [[{key}]]",
+            )  # fmt: skip
+    remedy = 'lines are [section] or key = value; texts and quantities stand in quotation marks, as in "2 mm"'
     if "octal" in message or re.search(r"=\s*0\d", lines_of_text[min(line, len(lines_of_text)) - 1]):
         remedy = "a number has no leading zeros"
     elif "end of document" in message:
@@ -276,7 +285,12 @@ def _value(value: object) -> str:
         return "[" + ", ".join(_value(item) for item in value) + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
-    raise CaseError(f"no TOML form for a {type(value).__name__}", code="E-TYPE", value=value)
+    raise CaseError(
+        f"no TOML form for a {type(value).__name__}",
+        code="E-TYPE",
+        value=value,
+        limit="texts, numbers, true or false, lists and tables",
+    )
 
 
 class ReadCase(BaseModel):

@@ -259,7 +259,7 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
         error.strerror or str(error),
         code="E-DISK-FULL" if full else "E-STORAGE",
         file=None if path is None else os.fsdecode(path),
-        remedy="free some space or name another folder" if full else None,
+        remedy="free some space or name another folder" if full else "check name and permissions",
     )
 
 

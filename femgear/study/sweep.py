@@ -235,7 +235,10 @@ def sweep_into(
     """
     values = dict(parse_over(text) for text in over)
     if len(values) < len(over):
-        raise CaseError("a key is given twice", code="E-VARIABLE", key="--over", value=", ".join(over))
+        raise CaseError(
+            "a key is given twice", code="E-VARIABLE", key="--over", value=", ".join(over),
+            remedy="give all its values in one --over",
+        )  # fmt: skip
     quantities = [named_quantity(words, speeds=speeds) for words in of]
     _check_sweep(case, values, quantities)
     with storage_errors(folder):

@@ -198,7 +198,10 @@ def _change(data: dict, key: str, value: Any, name: str) -> None:
     for part, following in zip(tables, parts[1:], strict=True):
         table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
     if last.startswith("["):
-        raise CaseError("a list is changed as a whole", code="E-TYPE", key=key, file=name or None)
+        remedy = "give the whole list, or the key of an entry of one of its tables"
+        raise CaseError(
+            "a list is changed as a whole", code="E-TYPE", key=key, file=name or None, remedy=remedy
+        )
     if value is None:
         table.pop(last, None)
     else:
@@ -214,7 +217,13 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
         found = table.setdefault(part, {}) if wanted is dict else table.get(part)
     if not isinstance(found, (dict, list)) or not isinstance(found, wanted):
         kind = "table" if wanted is dict else "list"
-        raise CaseError(f"{part} is not a {kind}", code="E-TYPE", key=key, file=name or None)
+        raise CaseError(
+            f"{part} is not a {kind}",
+            code="E-TYPE",
+            key=key,
+            file=name or None,
+            limit='keys such as "operation.torque" or "sun.modifications[0].amount"',
+        )
     return found
 
 
@@ -293,9 +302,10 @@ def _own_files() -> dict[str, Train]:
 
 
 def _unknown_model(value: object) -> CaseError:
-    if not isinstance(value, str):
-        return CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", key="model", value=value)
     known = tuple(_own_files())
+    if not isinstance(value, str):
+        message, limit = f"a text is needed, not {described(value)}", ", ".join(known)
+        return CaseError(message, code="E-TYPE", key="model", value=value, limit=limit)
     near = difflib.get_close_matches(value.lower(), known, n=1, cutoff=0.6)
     return CaseError(
         "there is no such model",

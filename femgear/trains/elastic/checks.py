@@ -255,7 +255,7 @@ def pulling_meshes(rpm, names, force: np.ndarray) -> Iterator[Finding]:
         text = (
             f"{names[mesh]} pulls for {share[s, mesh]:.2%} of the time at {rpm[s]:.6g} rpm, with up to "
             f"{-1e-3 * least[s, mesh]:.4g} kN: real teeth would part; meshes pull at {pulls.sum()} of the "
-            f"{len(pulls)} speeds: {first_speeds(rpm[pulls])}"
+            f"{len(force)} speeds: {first_speeds(rpm[pulls])}"
         )
         yield Finding("W-PULL", "", text, remedy="in the section [planar] meshes lose contact")
 

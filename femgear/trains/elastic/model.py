@@ -288,8 +288,9 @@ def mesh_excitation(
     between = np.diag(remaining.min(axis=1)) + flexibility
     if remaining.min() <= 0 or np.linalg.eigvalsh(between)[0] <= 0:
         raise ContactError(
-            "the compliance of the ring model exceeds that of the loaded mesh", code="E-CONTACT-COMPLIANCE"
-        )
+            "the compliance of the ring model exceeds that of the loaded mesh", code="E-CONTACT-COMPLIANCE",
+            remedy="refine the grid: more static.flank_elements",
+        )  # fmt: skip
     spring = deflection - flexibility @ force
     spring[N:] -= ring_compliance @ force[N:]
     return MeshExcitation(

@@ -143,7 +143,8 @@ def solve_helical_dynamics(
     ConvergenceError
     """
     if modes.excitation is None:
-        raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness")
+        remedy = "leave it out: the static solution then gives a stiffness that varies"
+        raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness", remedy=remedy)
     operation, dynamics = case.operation, case.dynamics
     turning = tuple(member_speeds(case, modes.planetary_set, speed) for speed in operation.speeds)
     frequency = np.array([one.mesh_frequency for one in turning])

@@ -60,10 +60,11 @@ _REMEDIES = {
 
 
 def _member(value: object) -> str:
+    limit = 'a stage and its carrier, ring or sun, such as "stage 1 sun"'
     if not isinstance(value, str):
-        raise CaseError(f"a member of a stage is needed, not {described(value)}", code="E-TYPE", value=value)
+        message = f"a member of a stage is needed, not {described(value)}"
+        raise CaseError(message, code="E-TYPE", value=value, limit=limit)
     if not _MEMBER.fullmatch(value):
-        limit = 'a stage and its carrier, ring or sun, such as "stage 1 sun"'
         raise CaseError("not a member of a stage", code="E-CHOICE", value=value, limit=limit)
     return value
 
