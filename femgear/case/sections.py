@@ -387,7 +387,7 @@ class DynamicsSection(Section):
     up_to: Annotated[float, Quantity(FREQUENCY, 10.0, 200e3)] | None = None
     mesh_harmonics: Annotated[int, Count(1, 512)] | None = None
     response_harmonics: Annotated[int, Count(1, 1000)] | None = None
-    tolerance: Annotated[float, Number(1e-14, 1e-2)] = 1e-6
+    tolerance: Annotated[float, Number(1e-12, 1e-2)] = 1e-6
 
 
 class PublishedLines(Section):
@@ -420,7 +420,7 @@ class Case(Section, ReadCase):
     ``notices`` what was read in a way that deserves to be said.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = FORMAT
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
     title: Title
     set: SetSection
     rack: RackSection = RackSection()

@@ -8,6 +8,7 @@ import os
 import re
 import stat
 import tomllib
+from datetime import date, time
 from html import escape
 
 from pydantic import BaseModel, PrivateAttr
@@ -161,7 +162,7 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
     remedy = 'lines are [section] or key = value; texts and quantities stand in quotation marks, as in "2 mm"'
     if "octal" in message or re.search(r"=\s*0\d", lines_of_text[min(line, len(lines_of_text)) - 1]):
         remedy = "a number has no leading zeros"
-    elif "end of document" in message:
+    elif "(at end of document)" in message:
         started = max((number for _, number in _entries(text)), default=1)
         remedy = f"close the brackets and quotation marks of the entry in line {started}, or complete it"
     return CaseError(f"not TOML: {message}", code="E-TOML", file=name, remedy=remedy)
@@ -360,6 +361,8 @@ def found(number: int) -> int | str:
 
 
 def described(value: object) -> str:
-    """Tell in words what a TOML value is."""
+    """Tell in words what a TOML value, or another one in its place, is."""
     names = {bool: "true or false", int: "an integer", float: "a number", str: "a text", list: "a list"}
-    return names.get(type(value), "a table" if isinstance(value, dict) else "a date or time")
+    if isinstance(value, date | time):
+        return "a date or time"
+    return names.get(type(value)) or ("a table" if isinstance(value, dict) else f"a {type(value).__name__}")

@@ -249,8 +249,9 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
     own = _own_files()
     if model not in own:
         raise CaseError(
-            "there is no such model", code="E-MODEL", key="--model", value=model, limit=", ".join(own)
-        )
+            "there is no such model", code="E-MODEL", key="--model", value=model, limit=", ".join(own),
+            remedy="planetary sets have no model: leave it out",
+        )  # fmt: skip
     return own[model].model.model_json_schema()
 
 
@@ -269,15 +270,15 @@ def _train_of_file(data: dict, lines: str, name: str) -> Train:
     """Train that the tables of a file are of; its lines and name are for refusals."""
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
-        raise CaseError(
+        problem = CaseError(
             "the file is written for a newer femgear",
             code="E-FORMAT",
             key="format",
             value=case_text.found(version),
             limit=f"up to {FORMAT}",
             remedy="update femgear",
-            file=name,
         )
+        raise combine([problem], lines, name)
     own = _own_files()
     if "model" in data:
         model = data["model"]

@@ -125,7 +125,7 @@ class DrivetrainCase(Section, ReadCase):
     deserves to be said.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = FORMAT
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
     model: Literal["drivetrain"]
     title: Title
     body: Annotated[tuple[BodySection, ...], Field(min_length=1, max_length=_MOST_PARTS)]

@@ -172,7 +172,7 @@ class MultistageCase(Section, ReadCase):
     The fields carry the names of the case file; ``source`` is the text that gives this case.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = FORMAT
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
     model: Literal["multistage"]
     title: Title
     stage: Annotated[tuple[StageSection, ...], Field(min_length=1, max_length=20)]
