@@ -43,7 +43,7 @@ WORDS = {
         ("E-FORMAT", "format", "set.toml:8: ", "up to 1", "update femgear"),
     ),
     "a tolerance that no solution reaches": (
-        edited("damping_ratio = 0.05", "damping_ratio = 0.05\ntolerance = 1e-13"),
+        edited("tolerance = 1e-6", "tolerance = 1e-13"),
         ("E-RANGE", "dynamics.tolerance", "from 1e-12 to 0.01"),
     ),
     "an older format": (edited("format = 1", "format = 0"), ("E-RANGE", "format", "1 to 1")),
