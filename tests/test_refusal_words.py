@@ -86,6 +86,18 @@ def test_words_of_refusals(defect):
         assert part in str(error)
 
 
+def test_a_date_beside_a_series_of_a_file_is_named():
+    """The points of files are written into the text of the case once its entries are known to be right."""
+    text = (
+        (CASES / "own_chain.toml")
+        .read_text(encoding="utf-8")
+        .replace('name = "motor"', "name = 1979-05-27", 1)
+    )
+    with pytest.raises(CaseError) as caught:
+        parse_case(text, name=str(CASES / "own_chain.toml"))
+    assert ("E-TYPE", "body[0].name") in [(one.code, one.key) for one in caught.value.problems]
+
+
 def test_a_stage_is_refused_in_the_words_of_python_and_of_the_command_line(capsys, tmp_path):
     case = read_case(CASES / "planetary_27_40_108.toml")
     with pytest.raises(CaseError, match="no stage branch") as caught:
