@@ -125,6 +125,16 @@ def test_motions_that_are_too_large_name_their_entry_with_its_line(changes, key)
     assert caught.value.limit and caught.value.remedy and caught.value.file
 
 
+def test_meshes_that_never_carry_are_refused_before_the_modes():
+    """A pin circle 300 um off its centre leaves the load to one planet: no linear dynamic model."""
+    coarse = {"static.flank_elements": 4, "static.positions": 8, "static.stresses": False}
+    changes = {"carrier.errors": {"runout_amplitude": "300 um", "runout_phase": "10 deg"}}
+    case = with_values(read_case(CASES / "planetary_27_40_108.toml"), coarse | changes)
+    with pytest.raises(ContactError, match="cannot represent loss of contact") as caught:
+        femgear.solve(case, only="modes")
+    assert (caught.value.code, caught.value.key) == ("E-CONTACT-OPEN", "operation.torque")
+
+
 def test_a_branch_without_a_start_names_its_entry(monkeypatch):
     from femgear.errors import ConvergenceError
     from femgear.trains.protocol import blaming_start
