@@ -173,7 +173,7 @@ def parse_over(text: str) -> tuple[str, Sequence[object]]:
         count = int(match[3])
         if not 2 <= count <= _LARGEST:
             raise _not_over(text)
-        whole = type(low) is type(high) is int and (high - low) % (count - 1) == 0
+        whole = isinstance(low, int) and isinstance(high, int) and (high - low) % (count - 1) == 0
         variable = Variable(key, low, high, integer=whole)
         found = [variable.text(float(x)) for x in np.linspace(*variable.bounds, count)]
         return key, found

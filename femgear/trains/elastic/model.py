@@ -287,7 +287,7 @@ def mesh_excitation(
     N = len(force) // 2
     flexibility = np.zeros((2 * N, 2 * N)) if flexibility is None else flexibility
     ring_compliance = held_compliance if ring_compliance is None else ring_compliance
-    _refuse_open((stiffness <= 0).any(axis=1))
+    _refuse_open((stiffness <= 0).max(axis=1))
     own = np.zeros((2 * N, 1))
     own[N:, 0] = np.diag(held_compliance)
     remaining = 1.0 / stiffness - own
