@@ -31,6 +31,7 @@ if sys.platform != "win32":
     import fcntl
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 _RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
 """Names that some file system gives a meaning of its own, or takes for others."""
 # bytes of the disk that stay free
@@ -162,8 +163,9 @@ def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Ite
 
 def csv_cell(value: object) -> object:
     """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
-    formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
-    return f"'{value}" if formula else value
+    if not isinstance(value, str) or _NUMBER.fullmatch(value):
+        return value
+    return f"'{value}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 def checksum(path: str | os.PathLike) -> str:
