@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -157,7 +158,9 @@ def test_control_characters_are_escaped(tmp_path):
     """Of a manifest that somebody else has written, and of the text of the case."""
     case = parse_case(CASE.read_text(encoding="utf-8") + "# \u202eotfel\n")
     results = open_results(make_run(tmp_path / "out", case=case))
-    results.manifest.versions["femgear"] = "1\x1b[31m\x00\ud800"
+    results = replace(
+        results, manifest=replace(results.manifest, versions={"femgear": "1\x1b[31m\x00\ud800"})
+    )
     text = write_report(ELASTIC, results).read_text(encoding="utf-8")
     assert r"1\x1b[31m\x00\ud800" in text and r"# \u202eotfel" in text
     assert all(one.isprintable() or one in "\n\u00a0" for one in text)
