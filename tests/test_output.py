@@ -180,6 +180,14 @@ def test_folders_have_names_that_every_file_system_takes(tmp_path):
         assert caught.value.code == "E-CHOICE" and caught.value.limit and caught.value.remedy
 
 
+def test_links_that_lead_nowhere_are_no_folders(tmp_path, capsys):
+    for name, target in (("loop", "loop"), ("dangling", "absent")):
+        (tmp_path / name).symlink_to(tmp_path / target)
+        assert cli.main(["run", str(CASE), "-o", str(tmp_path / name)]) == 4
+        err = capsys.readouterr().err
+        assert "[E-STORAGE]" in err and "remedy:" in err
+
+
 def test_a_run_into_a_folder_with_umlaut_and_blank(tmp_path, capsys):
     out = tmp_path / "Prüfstand 3"
     case = Path(__file__).parents[1] / "cases" / "four_stage_reducer.toml"

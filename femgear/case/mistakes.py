@@ -119,8 +119,10 @@ def _description(model: type[BaseModel], location: tuple) -> str:
     section = _section(model, location[:-1]) or model
     schema = section.model_json_schema()["properties"].get(str(location[-1]), {})
     choices = " or ".join(str(choice) for choice in schema.get("enum", ()))
-    kind = schema.get("type", "")
-    return schema.get("description") or choices or {"string": "a text", "array": "a list"}.get(kind, kind)
+    kind = str(schema.get("type", ""))
+    return str(
+        schema.get("description") or choices or {"string": "a text", "array": "a list"}.get(kind, kind)
+    )
 
 
 def _keys(section: type[BaseModel] | None) -> list[str]:

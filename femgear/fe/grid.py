@@ -243,10 +243,7 @@ def write_grid(path: Path, grid: Grid) -> None:
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
-        raise StorageError(
-            f"cannot write the grid {path}: {error}", code="E-GRID-FILE",
-            remedy="name a folder with room and write permission in FEMGEAR_MESHES",
-        ) from error  # fmt: skip
+        raise StorageError(f"cannot write the grid {path}: {error}", code="E-GRID-FILE") from error
 
 
 def read_grid(path: Path) -> Grid:

@@ -7,7 +7,7 @@ afterwards a warning says what the housing would feel beyond the excitation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -229,25 +229,26 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if "level_change" in data:
         change, limit = data["level_change"].values, data["excitation_limit"].values
         yield from missing_level(data["speed"].values, change, limit, float(data.attrs["compared_to"]))
-    force = data["mesh_force_real"].values + 1j * data["mesh_force_imag"].values
-    yield from pulling_meshes(data["speed"].values, data["mesh"].values, force)
+    real, imag = data["mesh_force_real"], data["mesh_force_imag"]
+    # one speed after the other: those of many may fill the memory
+    forces = (real[s].values + 1j * imag[s].values for s in range(data.sizes["speed"]))
+    yield from pulling_meshes(data["speed"].values, data["mesh"].values, forces)
     yield from response_warnings(data)
 
 
-def pulling_meshes(rpm, names, force: np.ndarray) -> Iterator[Finding]:
+def pulling_meshes(rpm, names, forces: Iterable[np.ndarray]) -> Iterator[Finding]:
     """Warn where the force of a mesh, whose spring knows no contact loss, turns into a pull.
 
     Parameters
     ----------
     rpm, names : (n_speeds,) and (n_meshes,) arrays
         Speeds of the input [rpm], and names of the meshes.
-    force : (n_speeds, n_meshes, H + 1) complex array
-        Harmonics of the mesh forces [N].
+    forces : iterable of (n_meshes, H + 1) complex arrays
+        Harmonics of the mesh forces [N], of every speed.
     """
-    least, share = np.zeros(force.shape[:2]), np.zeros(force.shape[:2])
-    nothing = _NOTHING * np.abs(force[..., 0]).max(initial=0.0)
-    for s, harmonics in enumerate(force):
-        record = sample(harmonics, 4 * force.shape[-1])
+    least, share = np.zeros((2, len(rpm), len(names)))
+    for s, harmonics in enumerate(forces):
+        record, nothing = sample(harmonics, 4 * harmonics.shape[-1]), _NOTHING * np.abs(harmonics[:, 0]).max()
         least[s], share[s] = record.min(axis=-1), (record < -nothing).mean(axis=-1)
     pulls = share.any(axis=1)
     if pulls.any():
@@ -255,7 +256,7 @@ def pulling_meshes(rpm, names, force: np.ndarray) -> Iterator[Finding]:
         text = (
             f"{names[mesh]} pulls for {share[s, mesh]:.2%} of the time at {rpm[s]:.6g} rpm, with up to "
             f"{-1e-3 * least[s, mesh]:.4g} kN: real teeth would part; meshes pull at {pulls.sum()} of the "
-            f"{len(force)} speeds: {first_speeds(rpm[pulls])}"
+            f"{len(rpm)} speeds: {first_speeds(rpm[pulls])}"
         )
         yield Finding("W-PULL", "", text, remedy="in the section [planar] meshes lose contact")
 
