@@ -401,8 +401,8 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
         return _fail(_wrong_arguments(error, program))
     except FemgearError as error:
         return _fail(error)
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])]), file=sys.stderr)
         return _INTERRUPTED
     except MemoryError as error:
         return _fail(
