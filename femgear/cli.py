@@ -402,7 +402,7 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
     except FemgearError as error:
         return _fail(error)
     except KeyboardInterrupt as interrupt:
-        print("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])]), file=sys.stderr)
+        print(printable("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])])), file=sys.stderr)
         return _INTERRUPTED
     except MemoryError as error:
         return _fail(
