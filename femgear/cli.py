@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import sys
 import threading
@@ -18,7 +19,7 @@ try:
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
     from femgear import __version__
-    from femgear.errors import CaseError, FemgearError
+    from femgear.errors import CaseError, FemgearError, printable
     from femgear.storage.files import storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
@@ -74,20 +75,26 @@ def _print(blocks) -> None:
     if not console.is_terminal:
         console.width = 120
     for block in blocks:
-        console.print(f"\n{block.title}")
+        console.print(f"\n{printable(block.title)}")
         if block.rows:
             table = Table(box=box.SIMPLE_HEAD if block.header else None, show_header=bool(block.header))
             for index, name in enumerate(block.header or block.rows[0]):
                 side = "right" if index else "left"
                 table.add_column(name if block.header else "", justify=side, overflow="fold")
             for row in block.rows:
-                table.add_row(*row)
+                table.add_row(*map(printable, row))
             console.print(table)
         for note in block.notes:
-            console.print(f"  {note}")
+            console.print(f"  {printable(note)}")
+
+
+def _say(text: str) -> None:
+    print(printable(text))
 
 
 def _fail(error: FemgearError) -> int:
+    if error.key == "only":
+        error.key = "--only"
     print(error, file=sys.stderr)
     return error.exit_code
 
@@ -115,8 +122,10 @@ def _warn(findings) -> None:
 
 def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
     """Print a warning as one line on standard error; takes the place of `warnings.showwarning`."""
-    text = message if category is UserWarning else f"{message} ({category.__name__}, {filename}:{lineno})"
-    print(f"warning: {text}", file=sys.stderr)
+    text = (
+        str(message) if category is UserWarning else f"{message} ({category.__name__}, {filename}:{lineno})"
+    )
+    print(f"warning: {printable(text)}", file=sys.stderr)
 
 
 @app.command
@@ -193,9 +202,9 @@ def run(
     results = open_results(output)
     _print(train.describe_results(results))
     _warn(train.result_warnings(results))
-    print(f"results: {output}")
+    _say(f"results: {output}")
     if "report.html" in results.manifest.files:
-        print(f"report:  {output / 'report.html'}")
+        _say(f"report:  {output / 'report.html'}")
     return 0
 
 
@@ -211,7 +220,7 @@ def report(folder: Path, /) -> int:
     from femgear.run import report_again
 
     report_again(folder)
-    print(f"report:  {folder / 'report.html'}")
+    _say(f"report:  {folder / 'report.html'}")
     return 0
 
 
@@ -288,7 +297,7 @@ def sweep(
         found, names = sweep_into(data, output, over=over, of=of, **options)
     failed = sum(bool(error) for error in found.errors)
     print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")
-    print(f"files in {output}: {', '.join(names)}")
+    _say(f"files in {output}: {', '.join(names)}")
     return 0
 
 
@@ -340,7 +349,51 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
     int
         Exit code as of `main`.
     """
-    tokens = sys.argv[1:] if arguments is None else list(arguments)
+    for descriptor in range(3):  # a file that takes the number of a closed one would hold what is printed
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    output, errors = _Stream(sys.stdout), _Stream(sys.stderr)
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+        code = _called(program_app, sys.argv[1:] if arguments is None else list(arguments), program)
+        output.flush()
+        # a reader that has seen enough is no failure
+        if code == 0 and output.error and not isinstance(output.error, BrokenPipeError):
+            code = _fail(storage_error(output.error, "standard output"))
+        errors.flush()
+    return code
+
+
+class _Stream:
+    """Standard stream that escapes what its encoding lacks, and keeps the failure to write in ``error``."""
+
+    def __init__(self, stream):
+        self._stream, self.error = stream or open(os.devnull, "w", encoding="utf-8"), None
+
+    def __getattr__(self, name: str):
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        encoding = self._stream.encoding or "utf-8"
+        self._try(self._stream.write, text.encode(encoding, "backslashreplace").decode(encoding))
+        return len(text)
+
+    def flush(self) -> None:
+        self._try(self._stream.flush)
+
+    def _try(self, function, *arguments) -> None:
+        try:
+            function(*arguments)
+        except OSError as error:
+            self.error = self.error or error
+            # what the buffer holds would fail again when the interpreter ends
+            with contextlib.suppress(OSError), open(os.devnull, "wb") as nothing:
+                os.dup2(nothing.fileno(), self._stream.fileno())
+
+
+def _called(program_app: App, tokens: list[str], program: str) -> int:
+    """Exit code of a program, its errors told."""
     try:
         with warnings.catch_warnings(), _termination_interrupts():
             warnings.showwarning = _show_warning
@@ -351,10 +404,8 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
     except FemgearError as error:
         return _fail(error)
     except KeyboardInterrupt as interrupt:
-        print("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])]), file=sys.stderr)
+        print(printable("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])])), file=sys.stderr)
         return _INTERRUPTED
-    except BrokenPipeError:
-        return 0
     except MemoryError as error:
         return _fail(
             FemgearError(

@@ -424,7 +424,10 @@ def _worker_error(done):
     text = " ".join(done.stderr.split())[-400:]
     if done.returncode == 3:
         return _library_error(text)
-    return GridError(f"Gmsh failed (exit code {done.returncode}): {text}", code="E-GRID-GMSH")
+    return GridError(
+        f"Gmsh failed (exit code {done.returncode}): {text}", code="E-GRID-GMSH",
+        remedy="try another static.flank_elements; if no grid can be made, install Gmsh anew",
+    )  # fmt: skip
 
 
 def _library_error(text):
@@ -447,7 +450,8 @@ def _second_order(plan: Plan, points, corners, face) -> Grid:
     key = ends[:, 0] * n + ends[:, 1]
     at = np.minimum(np.searchsorted(edges, key), len(edges) - 1)
     if np.any(edges[at] != key):
-        raise GridError("Gmsh divided a segment of the outline", code="E-GRID-GMSH")
+        remedy = "try another static.flank_elements"
+        raise GridError("Gmsh divided a segment of the outline", code="E-GRID-GMSH", remedy=remedy)
     mids[at] = plan.mids
     triangles = np.hstack([corners, n + where.reshape(-1, 3)])
     edge_nodes = np.column_stack([plan.segments, n + at])

@@ -16,6 +16,7 @@ import os
 import re
 import shutil
 import sys
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -36,7 +37,8 @@ if sys.platform != "win32":
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
-_RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
+_RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
+"""Names that some file system gives a meaning of its own, or takes for others."""
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
@@ -437,12 +439,15 @@ def _is_regular(path: Path) -> bool:
 
 def checked_name(name: str) -> str:
     """Refuse (E-CHOICE) a name that some file system does not take as one plain file name."""
-    if not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.startswith(".") or name.endswith("."):
+    plain = name.isprintable() and unicodedata.is_normalized("NFC", name) and not _RESERVED.fullmatch(name)
+    if not plain or len(name) > 100 or len(name.encode()) > 240:
         raise StorageError(
             "not a safe file name",
             code="E-CHOICE",
             value=name,
-            limit="1 to 100 of A-Z a-z 0-9 . _ -, no dot at the ends, no reserved name",
+            limit='1 to 100 characters (240 bytes), composed (NFC), without / \\ : * ? " < > | and control '
+            "characters, no dot or blank at the ends, none that Windows reserves (con, nul, com1, ...)",
+            remedy="name another folder",
         )
     return name
 
@@ -529,7 +534,7 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
         error.strerror or str(error),
         code="E-DISK-FULL" if full else "E-STORAGE",
         file=None if path is None else os.fsdecode(path),
-        remedy="free some space or name another folder" if full else None,
+        remedy="free some space or name another folder" if full else "check name and permissions",
     )
 
 

@@ -512,7 +512,10 @@ def _plain(value: Any) -> object:
 def _refuse_missing(folder: Path) -> None:
     """Refuse a folder that is not there."""
     if not folder.is_dir():
-        raise StorageError("no such results folder", code="E-RESULTS-MISSING", file=str(folder))
+        remedy = "name a folder that femgear run wrote"
+        raise StorageError(
+            "no such results folder", code="E-RESULTS-MISSING", file=str(folder), remedy=remedy
+        )
 
 
 def _refuse_incomplete(results: Results) -> None:
@@ -551,10 +554,11 @@ def _interrupted(results: Results) -> str:
 def _make(folder: Path) -> None:
     """Create a folder, or refuse one that is not for results."""
     if not folder.exists():
-        checked_name(folder.resolve().name)
+        checked_name(os.path.basename(os.path.abspath(folder)))
     with storage_errors(folder):
         if folder.exists() and not folder.is_dir():
-            raise StorageError("exists and is not a folder", code="E-OUTPUT", file=str(folder))
+            message, remedy = "exists and is not a folder", "name another folder"
+            raise StorageError(message, code="E-OUTPUT", file=str(folder), remedy=remedy)
         folder.mkdir(parents=True, exist_ok=True)
         foreign = any(path.name != _LOCK for path in folder.iterdir())
     if foreign and not (folder / MANIFEST).is_file():

@@ -316,7 +316,8 @@ class Designs:
 def _finite(quantity: Quantity, value: float) -> float:
     """The value, refused where it is no number."""
     if not math.isfinite(value):
-        raise ContactError(f"{quantity.name} is not finite", code="E-FINITE", value=value)
+        message = f"{quantity.name} is not finite"
+        raise ContactError(message, code="E-FINITE", value=value, limit="finite numbers")
     return value
 
 

@@ -14,6 +14,7 @@ import numpy as np
 # only libraries that are loaded can be limited to one thread, and SciPy brings a BLAS of its own
 import scipy.linalg  # noqa: F401
 
+from femgear.errors import FemgearError
 from femgear.report.tables import Block
 
 if TYPE_CHECKING:
@@ -42,6 +43,17 @@ def one_blas_thread() -> Iterator[None]:
 
     with threadpool_limits(1):
         yield
+
+
+@contextmanager
+def blaming_start(case: Any, key: str) -> Iterator[None]:
+    """Let a start that cannot be used (E-START) in a block of code name an entry of the case."""
+    try:
+        yield
+    except FemgearError as error:
+        if error.code == "E-START":
+            error.key, error.file = key, case.location(key)
+        raise
 
 
 @dataclass(frozen=True)

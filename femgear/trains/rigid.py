@@ -141,7 +141,8 @@ def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
 def needed(entry: Entry | None, name: str) -> Entry:
     """Refuse the absence of an entry, or of the result of a stage, that is needed here (E-KEY-MISSING)."""
     if entry is None:
-        raise CaseError(f"{name} is needed here", code="E-KEY-MISSING", key=name)
+        remedy = "add it, or compute the stage before"
+        raise CaseError(f"{name} is needed here", code="E-KEY-MISSING", key=name, remedy=remedy)
     return entry
 
 

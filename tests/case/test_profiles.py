@@ -189,3 +189,32 @@ def test_little_of_the_flank_is_a_warning(folder):
     assert len(found) == 1 and "roll angles 34 to 60 deg" in found[0] and "sun.modifications" in found[0]
     case = read_case(folder(GOOD))
     assert not [str(one) for one in set_warnings(case) if one.code == "W-PROFILE"]
+
+
+def test_files_that_cannot_be_read_hide_no_other_mistake(folder):
+    """Nor one another; the tables that lack their points are not refused for that as well."""
+    wrong = TEXT.replace("teeth = 27", "teeth = 27.5").replace('fixed = "ring"', 'fixed = "rnig"')
+    for gear, file, more in (
+        ("sun", "one.csv", ""),
+        ("planet", "two.csv", "foo = 1"),
+        ("ring", "../x.csv", ""),
+    ):
+        wrong += f'\n[[{gear}.modifications]]\nkind = "measured profile"\nfile = "{file}"\n{more}\n'
+    path = folder("diameter [mm],deviation [um]\n40,0\n44,0\n")
+    path.write_text(wrong, encoding="utf-8")
+    with pytest.raises(CaseError) as caught:
+        read_case(path)
+    found = [(one.code, one.key) for one in caught.value.problems]
+    assert found == [
+        ("E-FILE", "sun.modifications[0].file"),
+        ("E-FILE", "planet.modifications[0].file"),
+        ("E-FILE", "ring.modifications[0].file"),
+        ("E-TYPE", "sun.teeth"),
+        ("E-KEY-UNKNOWN", "planet.modifications[0].foo"),
+        ("E-CHOICE", "operation.fixed"),
+    ]
+    text = str(caught.value)
+    assert (
+        "one.csv: sun.mod" in text
+        and f"{path}:{wrong[: wrong.index('../x.csv')].count(chr(10)) + 1}: " in text
+    )

@@ -38,7 +38,7 @@ from femgear.contact.supports import Supports
 from femgear.errors import Finding, remark
 from femgear.fe.elasticity import mass
 from femgear.gears.kinematics import Speeds
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import (
     SensorLines,
@@ -65,6 +65,8 @@ from femgear.trains.elastic.checks import (
     fastest_mesh_frequency,
     max_nodal_diameter,
     missing_level,
+    pulling_meshes,
+    pulls_of,
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
@@ -452,7 +454,8 @@ def dynamics_parts(
     if slow.any():
         share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
         level_change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
-    found = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
+    short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
+    names, pulls = mesh_names(len(basis.mesh_stiffness) // 2), list[np.ndarray]()
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     size = len(speeds) * _harmonic_size(case) * limit.response.max()
     for own in np.array_split(np.arange(len(speeds)), min(max(math.ceil(size / memory), 1), len(speeds))):
@@ -460,6 +463,7 @@ def dynamics_parts(
         if not whole or len(own) > len(some):
             response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
+        pulls.append(pulls_of(response.force))
         if not whole:
             response = replace(response, message=joint_message(told))
         part = case if whole else at_speeds(case, speeds[own])
@@ -478,7 +482,7 @@ def dynamics_parts(
                 excitation_limit=limit.frequency[own],
                 level_change=level_change[own],
                 compared_to=beyond,
-                warnings=found,
+                warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)),
                 entries=dynamic_entries(part),
             ),
         )

@@ -158,7 +158,8 @@ def helical_dynamics_parts(
 ) -> Iterator[tuple[HelicalCase, HelicalDynamicsResult]]:
     """Solve as `solve_helical_dynamics` for ``most`` speeds after the others, with the case of each."""
     if modes.excitation is None:
-        raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness")
+        remedy = "leave it out: the static solution then gives a stiffness that varies"
+        raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness", remedy=remedy)
     speeds, told = np.array(case.operation.speeds), list[Response]()
     for own in np.array_split(speeds, -(-len(speeds) // most)):
         turning = tuple(member_speeds(case, modes.planetary_set, float(speed)) for speed in own)
