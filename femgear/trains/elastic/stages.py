@@ -110,7 +110,7 @@ _STEP = 2500.0
 """In whole steps, so that variants of one set are excited alike [Hz]."""
 HARMONICS = 512
 """The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide. Slower
-speeds are excited less far, and `_level_share` tells what they lose."""
+speeds are excited less far, and `_lost_level` tells what they lose."""
 MEMORY = 1.5e9
 """Size of the lines and signals of a run beyond which its slowest speeds are excited less far [bytes]."""
 _PART = 100e6
@@ -200,8 +200,8 @@ def _level_change(
     return change, bool(np.abs(change[reached]).max(initial=0.0) >= NOTICEABLE)
 
 
-def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
-    """Level up to frequencies (n,) over that up to another one, of the slowest speed that reaches it [Hz].
+def _lost_level(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
+    """What the level loses that ends at frequencies (n,) instead of beyond, of the slowest speed [Hz] [dB].
 
     Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
     weaker and closer by the same factor: the share of the level below a frequency depends little on the
@@ -213,7 +213,7 @@ def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense
     lines = _sensor_lines(case, modes, response, sense * 2.0 * np.pi * fast / case.ring.teeth)
     power = np.cumsum(np.abs(lines.acceleration[0]) ** 2)
     place = np.searchsorted(lines.frequency[0], frequency, side="right") - 1
-    return np.sqrt(power[place] / power[-1])
+    return -20.0 * np.log10(np.maximum(np.sqrt(power[place] / power[-1]), 1e-10))
 
 
 def _sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np.ndarray) -> SensorLines:
@@ -427,8 +427,6 @@ def dynamics_parts(
 
     Parameters
     ----------
-    case, static, modes, progress
-        As there.
     memory : float
         Size of the lines and signals of some speeds [bytes].
     """
@@ -452,8 +450,7 @@ def dynamics_parts(
     level_change[some] = change
     slow = frequency * HARMONICS < beyond - frequency
     if slow.any():
-        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
-        level_change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
+        level_change[slow] = _lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
     short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
     names, pulls = mesh_names(len(basis.mesh_stiffness) // 2), list[np.ndarray]()
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
