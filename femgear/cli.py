@@ -233,19 +233,22 @@ def export(
         Folder of the files. Default: exported, inside the other.
     """
     from femgear.storage.files import storage_errors
-    from femgear.storage.results import write_csv_tables
+    from femgear.storage.results import EXPORTED, additions, folder_lock, write_csv_tables
     from femgear.trains.reading import open_results
 
     if not csv:
         raise CaseError(
             "no format is named", code="E-ARGUMENTS", limit="--csv", remedy="femgear export --help"
         )
-    results = open_results(folder)
-    target = folder / "exported" if output is None else output
-    with storage_errors(target):
-        target.mkdir(parents=True, exist_ok=True)
-    names = [name for stage in results.stages for name in write_csv_tables(results[stage], target, stage)]
-    print(f"files in {target}: {', '.join(names)}")
+    if output is not None:
+        with storage_errors(output):
+            output.mkdir(parents=True, exist_ok=True)
+    target = folder if output is None else output
+    with folder_lock(target), additions(target) as new:
+        results, below = open_results(folder), "" if output else EXPORTED
+        (new / below).mkdir(exist_ok=True)
+        names = [n for stage in results.stages for n in write_csv_tables(results[stage], new / below, stage)]
+    print(f"files in {target / below}: {', '.join(names)}")
     return 0
 
 

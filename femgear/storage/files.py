@@ -12,9 +12,11 @@ import hashlib
 import io
 import os
 import re
+import secrets
 import shutil
-import sys
+import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,11 +28,10 @@ from femgear.errors import StorageError
 if TYPE_CHECKING:
     import xarray as xr
 
-if sys.platform != "win32":
-    import fcntl
-
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
+# what `replace_file` writes under; older versions had the number of the process
+_TEMPORARY = re.compile(r"\..+\.([0-9a-f]{16}|\d{1,10})\.tmp(\..{1,8})?")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
@@ -62,9 +63,45 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     stamped = dataset.assign_attrs(femgear_format=_FORMAT, femgear_version=__version__)
     replace_file(
         path,
-        lambda temporary: stamped.to_netcdf(temporary, engine="h5netcdf", encoding=encoding),
+        lambda temporary: write_hdf5(
+            temporary, lambda stream: stamped.to_netcdf(stream, engine="h5netcdf", encoding=encoding)
+        ),
         size=int(dataset.nbytes),
     )
+
+
+def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object]) -> None:
+    """Write an HDF5 file by ``write(stream)``; raises the `OSError` of a disk that fails meanwhile."""
+    with _Disk(path, "r+b") as disk, ThreadPoolExecutor(1) as pool:
+        try:
+            # signals interrupt the main thread alone: raised within HDF5 they would be lost
+            pool.submit(write, disk).result()
+        finally:
+            if disk.failure is not None:
+                raise disk.failure
+
+
+class _Disk(io.FileIO):
+    """A file that keeps its first failure for later: HDF5 ends the process where a disk fails under it."""
+
+    failure: OSError | None = None
+
+    def write(self, data) -> int:
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        try:
+            while len(rest) and self.failure is None:
+                rest = rest[super().write(rest) :]
+        except OSError as error:
+            self.failure = error
+        return size
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size) if self.failure is None else 0
+        except OSError as error:
+            self.failure = error
+            return 0
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
@@ -102,12 +139,12 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
 
 
 def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
-    """Write a file under a temporary name, force it to the disk, then give it its name.
+    """Write a file under a temporary name, force it to the disk, then give it its name; follows no link.
 
     Parameters
     ----------
     write : callable
-        ``(path)`` writes the file under a temporary path, in the same folder and with the same suffix.
+        ``(path)`` writes into an empty file that is there, in the same folder and with the same suffix.
     size : int
         What the disk must have room for [bytes].
 
@@ -117,7 +154,7 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
         ``E-DISK-FULL``, ``E-STORAGE``; the old file is untouched and no temporary one stays behind.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.tmp{path.suffix}")
     with storage_errors(path):
         free = shutil.disk_usage(path.parent).free
         if free < size + _RESERVE:
@@ -130,12 +167,26 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
                 remedy="free some space or name another folder",
             )
         try:
+            open(temporary, "xb").close()
             write(temporary)
             with open(temporary, "rb+") as stream:
                 os.fsync(stream.fileno())
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
+
+
+def remove_temporaries(folder: str | os.PathLike) -> None:
+    """Remove what dead processes left half written in a folder; nobody else may write into it meanwhile."""
+    with storage_errors(folder):
+        for path in Path(folder).iterdir():
+            if is_temporary(path):
+                path.unlink()
+
+
+def is_temporary(path: Path) -> bool:
+    """Tell whether a regular file has a name that `replace_file` writes under."""
+    return bool(_TEMPORARY.fullmatch(path.name)) and path.is_file() and not path.is_symlink()
 
 
 def write_bytes(data: bytes, path: str | os.PathLike) -> None:
@@ -196,46 +247,37 @@ def is_safe_path(name: str) -> bool:
 def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
     """Hold a lock file for the block; the system releases it when the process ends, however it ends.
 
-    Advisory (``flock``): it keeps those out that ask for it. Where the system has no ``flock`` (Windows)
-    nothing is locked.
+    It keeps those out that ask for it, other threads of this process too; at the end the file is removed.
 
     Raises
     ------
     StorageError
         ``E-LOCKED``: another process, or another block of this one, holds it.
     """
-    if sys.platform == "win32":
-        yield
-        return
+    from filelock import FileLock, Timeout
+
     path = Path(path)
+    # not at once: whoever held it before removes the file and may be about to
+    lock = FileLock(path, timeout=0.1, poll_interval=0.02, thread_local=False, fallback_to_soft=False)
     with storage_errors(path):
-        # whoever held it before may have removed the file that was opened
-        while (descriptor := _locked(path)) is None:
-            pass
+        try:
+            lock.acquire()
+        except Timeout:
+            raise StorageError(
+                "another run is writing into this folder",
+                code="E-LOCKED",
+                file=str(path.parent),
+                remedy="wait until it has ended, or name another folder",
+            ) from None
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)
-        os.close(descriptor)
-
-
-def _locked(path: Path) -> int | None:
-    """Open and lock a file; nothing where the path names another file by now."""
-    descriptor, held = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644), False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        held = path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor))
-    except BlockingIOError:
-        raise StorageError(
-            "another run is writing into this folder",
-            code="E-LOCKED",
-            file=str(path.parent),
-            remedy="wait until it has ended, or name another folder",
-        ) from None
-    finally:
-        if not held:
-            os.close(descriptor)
-    return descriptor if held else None
+        # on Windows the library removes it, after the release
+        with contextlib.suppress(OSError):
+            found = path.lstat()
+            if stat.S_ISREG(found.st_mode) and not found.st_size:
+                path.unlink()
+        lock.release()
 
 
 @contextlib.contextmanager
@@ -250,11 +292,14 @@ def storage_errors(path: str | os.PathLike) -> Iterator[None]:
 def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
     """Say what an `OSError` says in a `StorageError`, ``E-DISK-FULL`` or ``E-STORAGE``."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    remedy = "free some space or name another folder" if full else None
+    if error.errno == errno.EFBIG:
+        remedy = "raise the limit of the size of files (ulimit -f), or name another folder"
     return StorageError(
         error.strerror or str(error),
         code="E-DISK-FULL" if full else "E-STORAGE",
         file=None if path is None else os.fsdecode(path),
-        remedy="free some space or name another folder" if full else None,
+        remedy=remedy,
     )
 
 
