@@ -244,7 +244,7 @@ def export(
         with storage_errors(output):
             output.mkdir(parents=True, exist_ok=True)
     target = folder if output is None else output
-    with folder_lock(target), additions(target) as new:
+    with folder_lock(target), additions(target, listed=output is None) as new:
         results, below = open_results(folder), "" if output else EXPORTED
         (new / below).mkdir(exist_ok=True)
         names = [n for stage in results.stages for n in write_csv_tables(results[stage], new / below, stage)]

@@ -157,11 +157,11 @@ def test_a_changed_or_foreign_table_is_not_replaced(out, refused):
 def test_tables_in_another_folder_replace_nothing(out, tmp_path, refused):
     other = tmp_path / "tables"
     other.mkdir()
-    (other / "notes.txt").write_text("mine")
+    (other / "manifest.json").write_text("mine")
     before = contents(out)
     assert cli.main(["export", str(out), "--csv", "-o", str(other)]) == 0
     there = contents(other)
-    assert contents(out) == before and "modes_mode.csv" in there and there["notes.txt"] == b"mine"
+    assert contents(out) == before and "modes_mode.csv" in there and there["manifest.json"] == b"mine"
     # the same tables again
     assert cli.main(["export", str(out), "--csv", "-o", str(other)]) == 0
     assert contents(other) == there

@@ -217,6 +217,9 @@ def csv_cell(value: object) -> object:
 
 def checksum(path: str | os.PathLike) -> str:
     """Compute the SHA-256 of a file."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        # a pipe would wait, a device never end
+        raise StorageError("not a regular file", file=os.fspath(path), remedy="move it away")
     with storage_errors(path), open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
@@ -292,14 +295,17 @@ def storage_errors(path: str | os.PathLike) -> Iterator[None]:
 def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
     """Say what an `OSError` says in a `StorageError`, ``E-DISK-FULL`` or ``E-STORAGE``."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    remedy = "free some space or name another folder" if full else None
-    if error.errno == errno.EFBIG:
-        remedy = "raise the limit of the size of files (ulimit -f), or name another folder"
+    remedies = {
+        errno.ENOSPC: "free some space or name another folder",
+        errno.EDQUOT: "free some space or name another folder",
+        errno.EFBIG: "raise the limit of the size of files (ulimit -f), or name another folder",
+        errno.ELOOP: "move the link away",
+    }
     return StorageError(
         error.strerror or str(error),
         code="E-DISK-FULL" if full else "E-STORAGE",
         file=None if path is None else os.fsdecode(path),
-        remedy=remedy,
+        remedy=remedies.get(error.errno or 0),
     )
 
 

@@ -47,7 +47,7 @@ _FORMAT = 1
 MANIFEST = "manifest.json"
 _CASE, _LOCK = "case.toml", ".lock"
 _RUNNING, _FINISHED, EXPORTED = ".running", ".finished", "exported"
-_WRITTEN = re.compile(r"manifest\.json|case\.toml|[\w.-]+\.(nc|png|gif|vtu|html|csv)|exported")
+_WRITTEN = re.compile(r"manifest\.json|case\.toml|[\w.-]+\.(nc|png|gif|vtu|html|csv)")
 """Names of what femgear writes into folders of its own; only such a folder is ever removed."""
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
@@ -385,8 +385,13 @@ def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
 
 
 @contextmanager
-def additions(folder: Path) -> Iterator[Path]:
-    """Add files to a folder that is locked; those of results are listed in the manifest.
+def additions(folder: Path, *, listed: bool = True) -> Iterator[Path]:
+    """Add files to a folder that is locked.
+
+    Parameters
+    ----------
+    listed : bool
+        The folder holds results: its manifest lists the files, and those that it listed before are replaced.
 
     Yields
     ------
@@ -396,17 +401,16 @@ def additions(folder: Path) -> Iterator[Path]:
     Raises
     ------
     StorageError
-        ``E-OUTPUT``: a file of the manifest was changed, or a file that it does not list is in the way.
+        ``E-OUTPUT``: a file of the manifest was changed, or one that it does not list is in the way.
     """
-    known = os.path.lexists(folder / MANIFEST)
-    manifest = read_manifest(folder) if known else Manifest(complete=False)
+    manifest = read_manifest(folder) if listed else Manifest(complete=False)
     _refuse_changed(folder, manifest)
     with _working(folder) as working:
         yield working
         paths = sorted(path for path in working.rglob("*") if path.is_file())
         files = {path.relative_to(working).as_posix(): checksum(path) for path in paths}
         _place(working, folder, files, manifest.files)
-        if known:
+        if listed:
             _write_manifest(folder, replace(manifest, files={**manifest.files, **files}))
 
 
@@ -621,8 +625,9 @@ def _place(source: Path, folder: Path, files: Mapping[str, str], owned: Mapping[
             raise _foreign(source / name)
         place, parent = folder / name, Path(name).parent
         led_away = place.parent.resolve() != folder.resolve() / parent
-        unknown = not any(_is_unchanged(folder, name, one) for one in (digest, owned.get(name)))
-        if led_away or (os.path.lexists(place) and unknown):
+        if led_away or (
+            os.path.lexists(place) and _digest(folder, name) not in {digest, owned.get(name, digest)}
+        ):
             raise _foreign(place)
     with storage_errors(folder):
         for name in moved:
@@ -638,8 +643,8 @@ def _clear(path: Path) -> None:
         if path.is_symlink() or not path.is_dir():
             raise _foreign(path)
         for one in path.rglob("*"):
-            named = _WRITTEN.fullmatch(one.name) or is_temporary(one)
-            if one.is_symlink() or not named or one.is_dir() != (one == path / EXPORTED):
+            own = one.is_dir() if one == path / EXPORTED else one.is_file() and _WRITTEN.fullmatch(one.name)
+            if one.is_symlink() or not (own or is_temporary(one)):
                 raise _foreign(one)
         shutil.rmtree(path)
 
@@ -664,7 +669,12 @@ def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
                     (folder / name).parent.rmdir()
 
 
-def _is_unchanged(folder: Path, name: str, digest: str | None) -> bool:
-    """Tell whether a file is there, no link on the way from the folder, and has its checksum."""
+def _is_unchanged(folder: Path, name: str, digest: str) -> bool:
+    """Tell whether a file is there and has the checksum of the manifest."""
+    return _digest(folder, name) == digest
+
+
+def _digest(folder: Path, name: str) -> str | None:
+    """Compute the checksum of a file to which no link leads below the folder; none where there is no such."""
     path = folder / name
-    return path.resolve() == folder.resolve() / name and path.is_file() and checksum(path) == digest
+    return checksum(path) if path.resolve() == folder.resolve() / name and path.is_file() else None

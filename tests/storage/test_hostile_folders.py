@@ -20,6 +20,7 @@ from femgear.storage.results import (
     record,
     run_folder,
 )
+from femgear.trains.reading import open_results
 
 PRECIOUS = "years of work"
 
@@ -325,6 +326,18 @@ def test_an_addition_to_changed_results_is_refused(results):
     before = contents(results)
     assert "static.nc changed" in refused(lambda: add(results, report="one")).message
     assert contents(results) == before
+
+
+@pytest.mark.parametrize("what", ["pipe", "device"])
+def test_a_pipe_or_device_in_place_of_a_result_is_not_waited_for(results, what):
+    (results / "static.nc").unlink()
+    if what == "pipe":
+        os.mkfifo(results / "static.nc")
+    else:
+        (results / "static.nc").symlink_to("/dev/zero")
+    with pytest.raises(StorageError, match="not a regular file"):
+        _ = open_results(results).static
+    assert "static.nc changed" in refused(lambda: replaced(results)).message
 
 
 # --- the lock --------------------------------------------------------------------------------------
