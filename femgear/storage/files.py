@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
 # what `replace_file` writes under; older versions had the number of the process
 _TEMPORARY = re.compile(r"\..+\.([0-9a-f]{16}|\d{1,10})\.tmp(\..{1,8})?")
@@ -212,7 +213,7 @@ def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Ite
 def csv_cell(value: object) -> object:
     """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
     formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
-    return f"'{value}" if formula else value
+    return f"'{value}" if formula and not _NUMBER.fullmatch(value) else value
 
 
 def checksum(path: str | os.PathLike) -> str:
