@@ -363,9 +363,7 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
         with _working(folder) as working:
             yield prepare_output(working)
             if read_manifest(working).complete:
-                with storage_errors(folder):
-                    os.replace(working, folder / _FINISHED)
-                _publish(folder)
+                _finish(folder)
 
 
 @contextmanager
@@ -409,9 +407,12 @@ def additions(folder: Path, *, listed: bool = True) -> Iterator[Path]:
         yield working
         paths = sorted(path for path in working.rglob("*") if path.is_file())
         files = {path.relative_to(working).as_posix(): checksum(path) for path in paths}
-        _place(working, folder, files, manifest.files)
+        moved = _movable(working, folder, files, manifest.files)
         if listed:
-            _write_manifest(folder, replace(manifest, files={**manifest.files, **files}))
+            _write_manifest(working, replace(manifest, files={**manifest.files, **files}))
+            _finish(folder)
+        else:
+            _move(working, folder, moved)
 
 
 def prepare_output(folder: str | os.PathLike) -> Path:
@@ -603,34 +604,44 @@ def _working(folder: Path) -> Iterator[Path]:
             _clear(working)
 
 
+def _finish(folder: Path) -> None:
+    """Give what is complete its places; the next that locks the folder goes on if this process is killed."""
+    with storage_errors(folder):
+        os.replace(folder / _RUNNING, folder / _FINISHED)
+    _publish(folder)
+
+
 def _publish(folder: Path) -> None:
     """Give the files of a finished run their places, the manifest last; repeated after an interruption."""
     source = folder / _FINISHED
     if not source.is_symlink() and (source / MANIFEST).is_file():
         new, old = read_manifest(source), read_manifest(folder)
-        if not new.complete:
+        if old.complete and not new.complete:
             raise _foreign(source)
-        _place(source, folder, new.files, old.files)
+        _move(source, folder, _movable(source, folder, new.files, old.files))
         with storage_errors(folder):
             _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
             os.replace(source / MANIFEST, folder / MANIFEST)
     _clear(source)
 
 
-def _place(source: Path, folder: Path, files: Mapping[str, str], owned: Mapping[str, str]) -> None:
-    """Move files with their checksums to their places; replaces nothing but what is owned and unchanged."""
-    moved = {name: digest for name, digest in files.items() if os.path.lexists(source / name)}
-    for name, digest in moved.items():
-        if not _is_unchanged(source, name, digest):
+def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mapping[str, str]) -> list[str]:
+    """List which of some files are there; refuses to replace what is not owned, or was changed."""
+    moved = [name for name in files if os.path.lexists(source / name)]
+    for name in moved:
+        if not _is_unchanged(source, name, files[name]):
             raise _foreign(source / name)
-        place, parent = folder / name, Path(name).parent
-        led_away = place.parent.resolve() != folder.resolve() / parent
-        if led_away or (
-            os.path.lexists(place) and _digest(folder, name) not in {digest, owned.get(name, digest)}
-        ):
+        place, known = folder / name, owned.get(name, files[name])
+        led_away = place.parent.resolve() != folder.resolve() / Path(name).parent
+        if led_away or (os.path.lexists(place) and not _is_unchanged(folder, name, known)):
             raise _foreign(place)
+    return moved
+
+
+def _move(source: Path, folder: Path, names: list[str]) -> None:
+    """Move files to the same places in another folder."""
     with storage_errors(folder):
-        for name in moved:
+        for name in names:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(source / name, folder / name)
 
@@ -670,11 +681,6 @@ def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
 
 
 def _is_unchanged(folder: Path, name: str, digest: str) -> bool:
-    """Tell whether a file is there and has the checksum of the manifest."""
-    return _digest(folder, name) == digest
-
-
-def _digest(folder: Path, name: str) -> str | None:
-    """Compute the checksum of a file to which no link leads below the folder; none where there is no such."""
+    """Tell whether a file is there, no link on the way from the folder, and has its checksum."""
     path = folder / name
-    return checksum(path) if path.resolve() == folder.resolve() / name and path.is_file() else None
+    return path.resolve() == folder.resolve() / name and path.is_file() and checksum(path) == digest

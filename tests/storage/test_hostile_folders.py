@@ -188,6 +188,13 @@ def test_what_somebody_puts_into_the_folder_of_a_running_run_is_kept(results):
     assert (results / ".finished" / "notes.txt").read_text() == "mine"
 
 
+def test_a_run_that_fails_says_why_whatever_somebody_put_into_its_folder(results):
+    with pytest.raises(KeyboardInterrupt), run_folder(results, force=True) as working:
+        (working / "notes.txt").write_text("mine")
+        raise KeyboardInterrupt
+    assert (results / ".running" / "notes.txt").read_text() == "mine"
+
+
 # --- planted .finished -----------------------------------------------------------------------------
 
 
@@ -259,12 +266,13 @@ def test_a_run_that_is_not_complete_is_not_published(results):
 def test_a_manifest_with_folders_leads_nowhere_through_a_link(results, elsewhere):
     source = finished(results)
     (source / "sub").mkdir()
-    (source / "sub" / "thesis.txt").write_text("new")
-    data = json.loads((source / MANIFEST).read_text())
-    data["files"]["sub/thesis.txt"] = checksum(source / "sub" / "thesis.txt")
-    (source / MANIFEST).write_text(json.dumps(data))
     (results / "sub").symlink_to(elsewhere, target_is_directory=True)
-    refused(lambda: replaced(results))
+    data = json.loads((source / MANIFEST).read_text())
+    for name in ("thesis.txt", "new.txt"):
+        (source / "sub" / name).write_text("new")
+        data["files"] = {f"sub/{name}": checksum(source / "sub" / name)}
+        (source / MANIFEST).write_text(json.dumps(data))
+        refused(lambda: replaced(results))
 
 
 def test_nothing_is_removed_through_a_link(results, elsewhere):
@@ -319,6 +327,35 @@ def test_an_addition_replaces_nothing_foreign(results, elsewhere):
     (results / "report.html").write_text("one")
     add(results, report="one")
     assert "report.html" in read_manifest(results).files
+
+
+@pytest.mark.parametrize("last", ["report.html", MANIFEST, ".finished"])
+def test_an_addition_that_is_killed_goes_on_with_the_next(results, monkeypatch, last):
+    add(results, report="one")
+    replace = os.replace
+
+    def killed(source, target):
+        if os.path.dirname(target) == str(results) and os.path.basename(target) == last:
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        add(results, report="two")
+    monkeypatch.undo()
+    with folder_lock(results):
+        pass
+    there = contents(results)
+    assert there["report.html"] == ("one" if last == ".finished" else "two")
+    assert read_manifest(results).files["report.html"] == checksum(results / "report.html")
+    assert not any(name.startswith(".") for name in there)
+
+
+def test_an_addition_to_results_that_are_not_complete(results):
+    data = json.loads((results / MANIFEST).read_text()) | {"complete": False}
+    (results / MANIFEST).write_text(json.dumps(data))
+    add(results, report="one")
+    assert "report.html" in read_manifest(results).files and not read_manifest(results).complete
 
 
 def test_an_addition_to_changed_results_is_refused(results):
