@@ -346,7 +346,8 @@ def _mesh_cached(plan: Plan, folder: Path) -> Grid:
         write_grid(path, grid)
     except (OSError, StorageError) as error:
         cause = error if isinstance(error, OSError) else error.__cause__
-        reason = "no folder" if folder.exists() and not folder.is_dir() else getattr(cause, "strerror", error)
+        reason = getattr(cause, "strerror", None) or cause or error
+        reason = "no folder" if folder.exists() and not folder.is_dir() else reason
         warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
     return grid
 
