@@ -212,8 +212,9 @@ def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Ite
 
 def csv_cell(value: object) -> object:
     """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
-    formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
-    return f"'{value}" if formula and not _NUMBER.fullmatch(value) else value
+    if not isinstance(value, str) or _NUMBER.fullmatch(value):
+        return value
+    return f"'{value}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 def checksum(path: str | os.PathLike) -> str:
