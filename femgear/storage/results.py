@@ -46,9 +46,9 @@ FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
 _FORMAT = 1
 MANIFEST = "manifest.json"
 _CASE, _LOCK = "case.toml", ".lock"
-_RUNNING, _FINISHED, EXPORTED = ".running", ".finished", "exported"
-_WRITTEN = re.compile(r"manifest\.json|case\.toml|[\w.-]+\.(nc|png|gif|vtu|html|csv)")
-"""Names of what femgear writes into folders of its own; only such a folder is ever removed."""
+_RUNNING, _FINISHED, _ADDED, EXPORTED = ".running", ".finished", ".added", "exported"
+_WRITTEN = re.compile(r"manifest\.json|case\.toml|[\w.-]+\.(nc|npz|png|gif|vtu|html|csv)")
+"""Names of the files that femgear writes; a folder of its own that holds others is not removed."""
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
     "axis": ("1", "axis of the frame of the carrier"),
@@ -65,24 +65,18 @@ _COORDINATES = {
 }
 """Unit and description of what the variables of planetary sets stand over."""
 _ATTRIBUTES = {
-    "bandwidth": "Hz",
-    "base_helix_angle": "rad",
-    "centre_distance": "m",
-    "compared_to": "Hz",
-    "excitation_reach": "Hz",
-    "face_width": "m",
-    "half_backlash": "m",
-    "natural_frequency": "Hz",
-    "planet_angles": "rad",
-    "resolution": "Hz",
-    "sensor_angle": "rad",
-    "settle": "s",
-    "speed": "rad/s",
-    "step": "s",
-    "sun_torque": "N m",
-    "unit_force": "N",
-    "working_pressure_angle_planet_ring": "rad",
-    "working_pressure_angle_sun_planet": "rad",
+    name: unit
+    for unit, names in (
+        ("Hz", "bandwidth compared_to excitation_reach natural_frequency resolution"),
+        ("m", "centre_distance face_width half_backlash"),
+        ("N", "unit_force"),
+        ("N m", "sun_torque"),
+        ("rad", "base_helix_angle planet_angles sensor_angle"),
+        ("rad", "working_pressure_angle_planet_ring working_pressure_angle_sun_planet"),
+        ("rad/s", "speed"),
+        ("s", "settle step"),
+    )
+    for name in names.split()
 }
 """Units of the attributes of the files; the others are pure numbers or words."""
 
@@ -356,14 +350,21 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
     folder = Path(folder)
     _make(folder)
     with folder_lock(folder):
+        _remove_tree(folder / _RUNNING)
         if not (force and (folder / MANIFEST).is_file() and read_manifest(folder).complete):
             yield prepare_output(folder)
             return
         _refuse_changed(folder, read_manifest(folder))
-        with _working(folder) as working:
-            yield prepare_output(working)
-            if read_manifest(working).complete:
-                _finish(folder)
+        try:
+            with storage_errors(folder):
+                (folder / _RUNNING).mkdir()
+            yield prepare_output(folder / _RUNNING)
+            if read_manifest(folder / _RUNNING).complete:
+                with storage_errors(folder):
+                    os.replace(folder / _RUNNING, folder / _FINISHED)
+                _publish(folder)
+        finally:
+            _remove_tree(folder / _RUNNING)
 
 
 @contextmanager
@@ -378,7 +379,7 @@ def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
     with exclusive_lock(folder / _LOCK):
         remove_temporaries(folder)
         _publish(folder)
-        _clear(folder / _RUNNING)
+        _remove_tree(folder / _ADDED)
         yield
 
 
@@ -403,16 +404,23 @@ def additions(folder: Path, *, listed: bool = True) -> Iterator[Path]:
     """
     manifest = read_manifest(folder) if listed else Manifest(complete=False)
     _refuse_changed(folder, manifest)
-    with _working(folder) as working:
-        yield working
-        paths = sorted(path for path in working.rglob("*") if path.is_file())
-        files = {path.relative_to(working).as_posix(): checksum(path) for path in paths}
-        moved = _movable(working, folder, files, manifest.files)
-        if listed:
-            _write_manifest(working, replace(manifest, files={**manifest.files, **files}))
-            _finish(folder)
-        else:
-            _move(working, folder, moved)
+    added = folder / _ADDED
+    try:
+        with storage_errors(added):
+            added.mkdir()
+        yield added
+        paths = sorted(path for path in added.rglob("*") if path.is_file())
+        files = {path.relative_to(added).as_posix(): checksum(path) for path in paths}
+        moved = _movable(added, folder, files, manifest.files)
+        if not listed:
+            _move(added, folder, moved)
+            return
+        _write_manifest(added, replace(manifest, files={**manifest.files, **files}))
+        with storage_errors(folder):
+            os.replace(added, folder / _FINISHED)
+        _publish(folder)
+    finally:
+        _remove_tree(added)
 
 
 def prepare_output(folder: str | os.PathLike) -> Path:
@@ -590,27 +598,6 @@ def _make(folder: Path) -> None:
         )
 
 
-@contextmanager
-def _working(folder: Path) -> Iterator[Path]:
-    """Make a folder inside for what is not complete; it does not outlive the block."""
-    working = folder / _RUNNING
-    with storage_errors(working):
-        working.mkdir()
-    try:
-        yield working
-    finally:
-        # what somebody put into it is said by the next run
-        with suppress(StorageError):
-            _clear(working)
-
-
-def _finish(folder: Path) -> None:
-    """Give what is complete its places; the next that locks the folder goes on if this process is killed."""
-    with storage_errors(folder):
-        os.replace(folder / _RUNNING, folder / _FINISHED)
-    _publish(folder)
-
-
 def _publish(folder: Path) -> None:
     """Give the files of a finished run their places, the manifest last; repeated after an interruption."""
     source = folder / _FINISHED
@@ -622,7 +609,7 @@ def _publish(folder: Path) -> None:
         with storage_errors(folder):
             _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
             os.replace(source / MANIFEST, folder / MANIFEST)
-    _clear(source)
+    _remove_tree(source)
 
 
 def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mapping[str, str]) -> list[str]:
@@ -646,15 +633,13 @@ def _move(source: Path, folder: Path, names: list[str]) -> None:
             os.replace(source / name, folder / name)
 
 
-def _clear(path: Path) -> None:
-    """Remove a folder that a dead run left; nothing is removed if anybody has put something into it."""
+def _remove_tree(path: Path) -> None:
+    """Remove a folder that a run left, where there is one; refuses one that holds what no run has written."""
     with storage_errors(path):
         if not os.path.lexists(path):
             return
-        if path.is_symlink() or not path.is_dir():
-            raise _foreign(path)
-        for one in path.rglob("*"):
-            own = one.is_dir() if one == path / EXPORTED else one.is_file() and _WRITTEN.fullmatch(one.name)
+        for one in (path, *path.rglob("*")):
+            own = one.is_dir() or (one != path and one.is_file() and _WRITTEN.fullmatch(one.name))
             if one.is_symlink() or not (own or is_temporary(one)):
                 raise _foreign(one)
         shutil.rmtree(path)

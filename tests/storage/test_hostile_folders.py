@@ -149,8 +149,9 @@ def _notes(path, elsewhere):
     (path / "notes.txt").write_text("mine")
 
 
-def _folder_below(path, elsewhere):
+def _notes_below(path, elsewhere):
     (path / "thesis").mkdir(parents=True)
+    (path / "thesis" / "chapter.tex").write_text("mine")
 
 
 def _link_below(path, elsewhere):
@@ -163,15 +164,16 @@ def _link_to_exported(path, elsewhere):
     (path / "exported").symlink_to(elsewhere, target_is_directory=True)
 
 
-PLANTED = [_link, _file, _pipe, _notes, _folder_below, _link_below, _link_to_exported]
+PLANTED = [_link, _file, _pipe, _notes, _notes_below, _link_below, _link_to_exported]
 
 
-@pytest.mark.parametrize("name", [".running", ".finished"])
+@pytest.mark.parametrize("name", [".running", ".finished", ".added"])
 @pytest.mark.parametrize("plant", PLANTED)
 def test_what_no_run_left_is_refused_and_kept(results, elsewhere, name, plant):
     plant(results / name, elsewhere)
     before = contents(results)
-    for act in (lambda: replaced(results), lambda: folder_lock(results).__enter__()):
+    acts = [lambda: replaced(results), lambda: add(results, report="one")]
+    for act in acts[: 1 if name == ".running" else 2]:
         error = refused(act)
         assert name in error.file and "move" in error.remedy
         assert contents(results) == before
@@ -186,13 +188,6 @@ def test_what_somebody_puts_into_the_folder_of_a_running_run_is_kept(results):
     assert refused(run).file == str(results / ".finished" / "notes.txt")
     assert (results / "case.toml").read_text() == "new case.toml"
     assert (results / ".finished" / "notes.txt").read_text() == "mine"
-
-
-def test_a_run_that_fails_says_why_whatever_somebody_put_into_its_folder(results):
-    with pytest.raises(KeyboardInterrupt), run_folder(results, force=True) as working:
-        (working / "notes.txt").write_text("mine")
-        raise KeyboardInterrupt
-    assert (results / ".running" / "notes.txt").read_text() == "mine"
 
 
 # --- planted .finished -----------------------------------------------------------------------------
