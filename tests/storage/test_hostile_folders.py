@@ -159,12 +159,17 @@ def _link_below(path, elsewhere):
     (path / "static.nc").symlink_to(elsewhere / "thesis.txt")
 
 
+def _pipe_below(path, elsewhere):
+    path.mkdir()
+    os.mkfifo(path / "static.nc")
+
+
 def _link_to_exported(path, elsewhere):
     path.mkdir()
     (path / "exported").symlink_to(elsewhere, target_is_directory=True)
 
 
-PLANTED = [_link, _file, _pipe, _notes, _notes_below, _link_below, _link_to_exported]
+PLANTED = [_link, _file, _pipe, _notes, _notes_below, _link_below, _pipe_below, _link_to_exported]
 
 
 @pytest.mark.parametrize("name", [".running", ".finished", ".added"])
@@ -219,6 +224,16 @@ def test_a_file_of_the_user_is_not_overwritten_by_a_finished_run(results, name):
     with folder_lock(results):
         assert (results / name).read_text() == f"new {name}"
     assert (results.parent / "moved").read_text() == "mine"
+
+
+def test_results_elsewhere_are_not_taken_through_a_link(results, tmp_path):
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    complete(theirs, "theirs")
+    (results / ".finished").symlink_to(theirs, target_is_directory=True)
+    before = contents(tmp_path)
+    refused(lambda: replaced(results))
+    assert contents(tmp_path) == before
 
 
 def test_a_publication_that_was_interrupted_goes_on(results):
