@@ -232,7 +232,7 @@ def export(
     output
         Folder of the files. Default: exported, inside the other.
     """
-    from femgear.storage.files import storage_errors
+    from femgear.storage.files import own_files
     from femgear.storage.results import EXPORTED, additions, folder_lock, write_csv_tables
     from femgear.trains.reading import open_results
 
@@ -240,15 +240,19 @@ def export(
         raise CaseError(
             "no format is named", code="E-ARGUMENTS", limit="--csv", remedy="femgear export --help"
         )
-    if output is not None:
-        with storage_errors(output):
-            output.mkdir(parents=True, exist_ok=True)
-    target = folder if output is None else output
-    with folder_lock(target), additions(target, listed=output is None) as new:
-        results, below = open_results(folder), "" if output else EXPORTED
-        (new / below).mkdir(exist_ok=True)
-        names = [n for stage in results.stages for n in write_csv_tables(results[stage], new / below, stage)]
-    print(f"files in {target / below}: {', '.join(names)}")
+
+    def write(place: Path) -> list[str]:
+        results = open_results(folder)
+        return [name for stage in results.stages for name in write_csv_tables(results[stage], place, stage)]
+
+    if output is None:
+        with folder_lock(folder), additions(folder) as new:
+            (new / EXPORTED).mkdir()
+            names = write(new / EXPORTED)
+    else:
+        own_files(output, ())
+        names = write(output)
+    print(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
     return 0
 
 

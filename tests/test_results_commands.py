@@ -154,19 +154,25 @@ def test_a_changed_or_foreign_table_is_not_replaced(out, refused):
     assert "modes_mode.csv" in refused(out, "export", out, "--csv")
 
 
-def test_tables_in_another_folder_replace_nothing(out, tmp_path, refused):
+def test_tables_in_another_folder_replace_their_own_alone(out, tmp_path, refused):
     other = tmp_path / "tables"
     other.mkdir()
-    (other / "manifest.json").write_text("mine")
+    (other / "notes.txt").write_text("mine")
     before = contents(out)
     assert cli.main(["export", str(out), "--csv", "-o", str(other)]) == 0
     there = contents(other)
-    assert contents(out) == before and "modes_mode.csv" in there and there["manifest.json"] == b"mine"
-    # the same tables again
+    assert contents(out) == before and "modes_mode.csv" in there and there["notes.txt"] == b"mine"
+    with run_folder(out, force=True) as new:
+        write_run(new, stages=("static",))
+        data = synthetic_results.static()
+        write_dataset(data.assign(ste=2 * data.ste), new / "static.nc")
+        finish(new, ["case.toml", "static.nc"], timings={}, convergence={})
     assert cli.main(["export", str(out), "--csv", "-o", str(other)]) == 0
-    assert contents(other) == there
-    (other / "modes_mode.csv").write_text("mine")
-    assert "modes_mode.csv" in refused(other, "export", out, "--csv", "-o", other)
+    assert contents(other)["static_mesh_position.csv"] != there["static_mesh_position.csv"]
+    (other / "static_mesh_position.csv").write_text("mine")
+    assert "static_mesh_position.csv" in refused(other, "export", out, "--csv", "-o", other)
+    results = out / "manifest.json"
+    assert "results of a run" in refused(out, "export", out, "--csv", "-o", results.parent)
 
 
 def test_tables_are_written_through_no_link(out, tmp_path, refused):

@@ -191,7 +191,7 @@ def remove_temporaries(folder: str | os.PathLike) -> None:
 
 def is_temporary(path: Path) -> bool:
     """Tell whether a regular file has a name that `replace_file` writes under."""
-    return bool(_TEMPORARY.fullmatch(path.name)) and path.is_file() and not path.is_symlink()
+    return bool(_TEMPORARY.fullmatch(path.name)) and _is_regular(path)
 
 
 def write_bytes(data: bytes, path: str | os.PathLike) -> None:
@@ -379,7 +379,7 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
         error.strerror or str(error),
         code="E-DISK-FULL" if full else "E-STORAGE",
         file=None if path is None else os.fsdecode(path),
-        remedy=remedies.get(error.errno or 0),
+        remedy=remedies.get(error.errno or 0, "check name and permissions"),
     )
 
 

@@ -384,13 +384,8 @@ def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
 
 
 @contextmanager
-def additions(folder: Path, *, listed: bool = True) -> Iterator[Path]:
-    """Add files to a folder that is locked.
-
-    Parameters
-    ----------
-    listed : bool
-        The folder holds results: its manifest lists the files, and those that it listed before are replaced.
+def additions(folder: Path) -> Iterator[Path]:
+    """Add files to results, whose folder is locked; the manifest lists them.
 
     Yields
     ------
@@ -402,7 +397,7 @@ def additions(folder: Path, *, listed: bool = True) -> Iterator[Path]:
     StorageError
         ``E-OUTPUT``: a file of the manifest was changed, or one that it does not list is in the way.
     """
-    manifest = read_manifest(folder) if listed else Manifest(complete=False)
+    manifest = read_manifest(folder)
     _refuse_changed(folder, manifest)
     added = folder / _ADDED
     try:
@@ -411,10 +406,7 @@ def additions(folder: Path, *, listed: bool = True) -> Iterator[Path]:
         yield added
         paths = sorted(path for path in added.rglob("*") if path.is_file())
         files = {path.relative_to(added).as_posix(): checksum(path) for path in paths}
-        moved = _movable(added, folder, files, manifest.files)
-        if not listed:
-            _move(added, folder, moved)
-            return
+        _movable(added, folder, files, manifest.files)  # refused before it counts as finished
         _write_manifest(added, replace(manifest, files={**manifest.files, **files}))
         with storage_errors(folder):
             os.replace(added, folder / _FINISHED)
@@ -605,8 +597,11 @@ def _publish(folder: Path) -> None:
         new, old = read_manifest(source), read_manifest(folder)
         if old.complete and not new.complete:
             raise _foreign(source)
-        _move(source, folder, _movable(source, folder, new.files, old.files))
+        moved = _movable(source, folder, new.files, old.files)
         with storage_errors(folder):
+            for name in moved:
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                os.replace(source / name, folder / name)
             _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
             os.replace(source / MANIFEST, folder / MANIFEST)
     _remove_tree(source)
@@ -623,14 +618,6 @@ def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mappin
         if led_away or (os.path.lexists(place) and not _is_unchanged(folder, name, known)):
             raise _foreign(place)
     return moved
-
-
-def _move(source: Path, folder: Path, names: list[str]) -> None:
-    """Move files to the same places in another folder."""
-    with storage_errors(folder):
-        for name in names:
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            os.replace(source / name, folder / name)
 
 
 def _remove_tree(path: Path) -> None:
