@@ -243,20 +243,27 @@ def export(
     output
         Folder of the files. Default: exported, inside the other.
     """
-    from femgear.storage.files import storage_errors
-    from femgear.storage.results import write_csv_tables
+    from femgear.storage.files import own_files
+    from femgear.storage.results import EXPORTED, additions, folder_lock, write_csv_tables
     from femgear.trains.reading import open_results
 
     if not csv:
         raise CaseError(
             "no format is named", code="E-ARGUMENTS", limit="--csv", remedy="femgear export --help"
         )
-    results = open_results(folder)
-    target = folder / "exported" if output is None else output
-    with storage_errors(target):
-        target.mkdir(parents=True, exist_ok=True)
-    names = [name for stage in results.stages for name in write_csv_tables(results[stage], target, stage)]
-    print(f"files in {target}: {', '.join(names)}")
+
+    def write(place: Path) -> list[str]:
+        results = open_results(folder)
+        return [name for stage in results.stages for name in write_csv_tables(results[stage], place, stage)]
+
+    if output is None:
+        with folder_lock(folder), additions(folder) as new:
+            (new / EXPORTED).mkdir()
+            names = write(new / EXPORTED)
+    else:
+        own_files(output, ())
+        names = write(output)
+    print(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
     return 0
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from femgear.case.dependencies import fingerprint
 from femgear.errors import StorageError
-from femgear.report.page import write_pictures, write_report
+from femgear.report.page import page, write_pictures, write_report
 from femgear.storage.files import (
     append_dataset,
     checksum,
@@ -31,8 +31,8 @@ from femgear.storage.files import (
 from femgear.storage.results import (
     MANIFEST,
     Manifest,
+    additions,
     discard,
-    finish,
     folder_lock,
     read_manifest,
     record,
@@ -273,11 +273,11 @@ def report_again(folder: Path) -> None:
     """Write report.html of a complete run anew, with figures where it drew none; update the manifest."""
     with folder_lock(folder):
         results = open_results(folder, partial=False)
-        manifest, train = results.manifest, train_of(results.case)
-        names = [name for name in manifest.files if name != "report.html"]
-        if not any(name.endswith(".png") for name in names):
+        train = train_of(results.case)
+        if not any(name.endswith(".png") for name in results.manifest.files):
             data = {stage: results[stage] for stage in results.stages}
-            names += write_pictures(results.folder, train, Drawn(results.case, data), progress=silent)
-            finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
-        write_report(train, open_results(folder))
-        finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)
+            with additions(results.folder) as new:
+                write_pictures(new, train, Drawn(results.case, data), progress=silent)
+            results = open_results(folder)
+        with additions(results.folder) as new:
+            write_text(page(train, results), new / "report.html")

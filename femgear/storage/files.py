@@ -14,10 +14,12 @@ import io
 import json
 import os
 import re
+import secrets
 import shutil
-import sys
+import stat
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import MappingProxyType, MethodType
@@ -32,13 +34,12 @@ from femgear.errors import StorageError
 if TYPE_CHECKING:
     import xarray as xr
 
-if sys.platform != "win32":
-    import fcntl
-
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 _RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
 """Names that some file system gives a meaning of its own, or takes for others."""
+# what `replace_file` writes under; older versions had the number of the process
+_TEMPORARY = re.compile(r"\..+\.([0-9a-f]{16}|\d{1,10})\.tmp(\..{1,8})?")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
@@ -79,7 +80,8 @@ def _to_netcdf(dataset: xr.Dataset, path: Path, **options: Any) -> None:
         if kind == "f":
             encoding[name] |= {"dtype": "float64", "_FillValue": None}
     stamped = dataset.assign_attrs(femgear_format=_FORMAT, femgear_version=__version__)
-    stamped.to_netcdf(path, engine="h5netcdf", encoding=encoding, **options)
+    options |= {"engine": "h5netcdf", "encoding": encoding}
+    write_hdf5(path, lambda stream: stamped.to_netcdf(stream, **options))
 
 
 def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
@@ -90,16 +92,21 @@ def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
     dataset : xarray.Dataset
         As for `write_dataset`; what does not extend over the dimension is that of the first one.
     path : path
-        From `replaced_file`; the first dataset makes the file.
+        From `replaced_file`: the first dataset is written into an empty file.
     along : str
         Name of the dimension.
     """
+    if path.stat().st_size:
+        write_hdf5(path, lambda stream: _append(dataset, stream, along))
+    else:
+        _to_netcdf(dataset, path, unlimited_dims=[along])
+
+
+def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
+    """Append as `append_dataset` to an open file."""
     import h5py
 
-    if not path.exists():
-        _to_netcdf(dataset, path, unlimited_dims=[along])
-        return
-    with h5py.File(path, "r+") as file:
+    with h5py.File(stream, "r+") as file:
         for name, variable in dataset.variables.items():
             if along in variable.dims:
                 axis, stored = variable.dims.index(along), file[str(name)]
@@ -110,6 +117,40 @@ def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
                 stored.resize(end, axis=axis)
                 stored[tuple(place)] = variable.values
         file.attrs.update({str(name): text for name, text in dataset.attrs.items() if isinstance(text, str)})
+
+
+def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object]) -> None:
+    """Write an HDF5 file by ``write(stream)``; raises the `OSError` of a disk that fails meanwhile."""
+    with _Disk(path, "r+b") as disk, ThreadPoolExecutor(1) as pool:
+        try:
+            # signals interrupt the main thread alone: raised within HDF5 they would be lost
+            pool.submit(write, disk).result()
+        finally:
+            if disk.failure is not None:
+                raise disk.failure
+
+
+class _Disk(io.FileIO):
+    """A file that keeps its first failure for later: HDF5 ends the process where a disk fails under it."""
+
+    failure: OSError | None = None
+
+    def write(self, data) -> int:
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        try:
+            while len(rest) and self.failure is None:
+                rest = rest[super().write(rest) :]
+        except OSError as error:
+            self.failure = error
+        return size
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size) if self.failure is None else 0
+        except OSError as error:
+            self.failure = error
+            return 0
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
@@ -293,14 +334,16 @@ def _own_object(module: str, name: str, state: dict) -> Any:
 
 
 def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
-    """Write a file by ``write(path)`` under a temporary path; see `replaced_file`."""
+    """Write a file by ``write(path)`` into an empty one of another name; see `replaced_file`."""
     with replaced_file(path, size=size) as temporary:
         write(temporary)
 
 
 @contextlib.contextmanager
 def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Path]:
-    """Have a file written under a temporary path in the block, force it to the disk, then give it its name.
+    """Have an empty file of another name filled in the block, force it to the disk, then give it its name.
+
+    It is in the same folder and has the same suffix; no link is followed.
 
     Parameters
     ----------
@@ -313,7 +356,7 @@ def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Pat
         ``E-DISK-FULL``, ``E-STORAGE``; the old file is untouched and no temporary one stays behind.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.tmp{path.suffix}")
     with storage_errors(path):
         free = shutil.disk_usage(path.parent).free
         if free < size + _RESERVE:
@@ -326,6 +369,7 @@ def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Pat
                 remedy="free some space or name another folder",
             )
         try:
+            open(temporary, "xb").close()
             yield temporary
             with open(temporary, "rb+") as stream:
                 os.fsync(stream.fileno())
@@ -334,6 +378,19 @@ def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Pat
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
+
+
+def remove_temporaries(folder: str | os.PathLike) -> None:
+    """Remove what dead processes left half written in a folder; nobody else may write into it meanwhile."""
+    with storage_errors(folder):
+        for path in Path(folder).iterdir():
+            if is_temporary(path):
+                path.unlink()
+
+
+def is_temporary(path: Path) -> bool:
+    """Tell whether a regular file has a name that `replace_file` writes under."""
+    return bool(_TEMPORARY.fullmatch(path.name)) and _is_regular(path)
 
 
 def write_bytes(data: bytes, path: str | os.PathLike) -> None:
@@ -365,6 +422,9 @@ def csv_cell(value: object) -> object:
 
 def checksum(path: str | os.PathLike) -> str:
     """Compute the SHA-256 of a file."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        # a pipe would wait, a device never end
+        raise StorageError("not a regular file", file=os.fspath(path), remedy="move it away")
     with storage_errors(path), open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
@@ -466,46 +526,37 @@ def is_safe_path(name: str) -> bool:
 def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
     """Hold a lock file for the block; the system releases it when the process ends, however it ends.
 
-    Advisory (``flock``): it keeps those out that ask for it. Where the system has no ``flock`` (Windows)
-    nothing is locked.
+    It keeps those out that ask for it, other threads of this process too; at the end the file is removed.
 
     Raises
     ------
     StorageError
         ``E-LOCKED``: another process, or another block of this one, holds it.
     """
-    if sys.platform == "win32":
-        yield
-        return
+    from filelock import FileLock, Timeout
+
     path = Path(path)
+    # not at once: whoever held it before removes the file and may be about to
+    lock = FileLock(path, timeout=0.1, poll_interval=0.02, thread_local=False, fallback_to_soft=False)
     with storage_errors(path):
-        # whoever held it before may have removed the file that was opened
-        while (descriptor := _locked(path)) is None:
-            pass
+        try:
+            lock.acquire()
+        except Timeout:
+            raise StorageError(
+                "another run is writing into this folder",
+                code="E-LOCKED",
+                file=str(path.parent),
+                remedy="wait until it has ended, or name another folder",
+            ) from None
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)
-        os.close(descriptor)
-
-
-def _locked(path: Path) -> int | None:
-    """Open and lock a file; nothing where the path names another file by now."""
-    descriptor, held = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644), False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        held = path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor))
-    except BlockingIOError:
-        raise StorageError(
-            "another run is writing into this folder",
-            code="E-LOCKED",
-            file=str(path.parent),
-            remedy="wait until it has ended, or name another folder",
-        ) from None
-    finally:
-        if not held:
-            os.close(descriptor)
-    return descriptor if held else None
+        # on Windows the library removes it, after the release
+        with contextlib.suppress(OSError):
+            found = path.lstat()
+            if stat.S_ISREG(found.st_mode) and not found.st_size:
+                path.unlink()
+        lock.release()
 
 
 @contextlib.contextmanager
@@ -530,11 +581,17 @@ def storage_errors(path: str | os.PathLike) -> Iterator[None]:
 def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
     """Say what an `OSError` says in a `StorageError`, ``E-DISK-FULL`` or ``E-STORAGE``."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    remedies = {
+        errno.ENOSPC: "free some space or name another folder",
+        errno.EDQUOT: "free some space or name another folder",
+        errno.EFBIG: "raise the limit of the size of files (ulimit -f), or name another folder",
+        errno.ELOOP: "move the link away",
+    }
     return StorageError(
         error.strerror or str(error),
         code="E-DISK-FULL" if full else "E-STORAGE",
         file=None if path is None else os.fsdecode(path),
-        remedy="free some space or name another folder" if full else "check name and permissions",
+        remedy=remedies.get(error.errno or 0, "check name and permissions"),
     )
 
 

@@ -1,6 +1,7 @@
 """Measured profiles of a case: spellings of the CSV files, and every refusal with its file and line."""
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,44 @@ def test_bad_profile_paths(folder, name):
     with pytest.raises(CaseError) as info:
         read_case(path)
     assert info.value.code == "E-FILE" and info.value.key == "sun.modifications[0].file"
+
+
+def test_a_link_or_pipe_in_place_of_a_profile(folder, tmp_path):
+    path = folder(GOOD)
+    (tmp_path / "outside").mkdir()
+    home = tmp_path / "home"
+    home.mkdir()
+    path.rename(home / "case.toml")
+    (tmp_path / "data").rename(home / "data")
+    left, outside = home / "data" / "left.csv", tmp_path / "outside" / "left.csv"
+    left.rename(home / "measured.csv")
+    left.symlink_to("../measured.csv")
+    assert measured(home / "case.toml")
+    (home / "measured.csv").rename(outside)
+
+    def refused(text):
+        with pytest.raises(CaseError, match=text) as info:
+            read_case(home / "case.toml")
+        assert info.value.code == "E-FILE" and info.value.key == "sun.modifications[0].file"
+        assert info.value.remedy
+
+    left.unlink()
+    left.symlink_to(outside)
+    refused("must lie in the folder of the case")
+    left.unlink()
+    (home / "data").rmdir()
+    (home / "data").symlink_to(outside.parent, target_is_directory=True)
+    refused("must lie in the folder of the case")
+    (home / "data").unlink()
+    (home / "data").mkdir()
+    left.symlink_to("/dev/zero")
+    refused("must lie in the folder of the case")
+    left.unlink()
+    os.mkfifo(left)
+    refused("not a regular file")
+    left.unlink()
+    left.symlink_to(left)
+    refused("cannot open")
 
 
 def test_a_table_is_read_without_a_case(tmp_path):
