@@ -107,17 +107,19 @@ def replacements(node: Any, place: str = "") -> Iterator[tuple[str, ast.AST]]:
 
 
 def _calls(node: ast.Call) -> Iterator[tuple[str, ast.AST]]:
-    name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+    func, args = node.func, node.args
+    name = getattr(func, "attr", getattr(func, "id", ""))
     if name in EXTREME:
-        if isinstance(node.func, ast.Name):
-            func = ast.Name(EXTREME[name], ast.Load())
-        else:
-            func = ast.Attribute(node.func.value, EXTREME[name], ast.Load())
-        yield "extreme", ast.Call(func, node.args, node.keywords)
-    elif name in DROPPED and (node.args or isinstance(node.func, ast.Attribute)):
-        yield "dropped", node.args[0] if node.args else node.func.value
-    elif name == "where" and len(node.args) == 3:
-        yield "branch", ast.Call(node.func, [node.args[0], node.args[2], node.args[1]], node.keywords)
+        other = ast.Name(EXTREME[name], ast.Load())
+        if isinstance(func, ast.Attribute):
+            other = ast.Attribute(func.value, EXTREME[name], ast.Load())
+        yield "extreme", ast.Call(other, args, node.keywords)
+    elif name in DROPPED and args:
+        yield "dropped", args[0]
+    elif name in DROPPED and isinstance(func, ast.Attribute):
+        yield "dropped", func.value
+    elif name == "where" and len(args) == 3:
+        yield "branch", ast.Call(func, [args[0], args[2], args[1]], node.keywords)
 
 
 def _is_text(node: ast.AST) -> bool:
