@@ -190,9 +190,12 @@ def _settle(folder: Path) -> None:
     tempfile.tempdir = None
     os.environ |= {"FEMGEAR_MESHES": str(folder / "meshes"), "PYTHONDONTWRITEBYTECODE": "1"}
     os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(folder / "hypothesis")
-    shutil.copytree(ROOT / "meshes", folder / "meshes") if (ROOT / "meshes").exists() else None
     (folder / "cwd").mkdir()
     os.chdir(folder / "cwd")
+    # grids of the repository, and cases that tests name relative to it
+    for source, copy in ((ROOT / "meshes", folder / "meshes"), (ROOT / "cases", Path("cases"))):
+        if source.exists():
+            shutil.copytree(source, copy)
     output = os.open(folder / "output.txt", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     os.dup2(output, 1)
     os.dup2(output, 2)
