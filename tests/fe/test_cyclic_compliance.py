@@ -7,6 +7,7 @@ from femgear.contact.bodies import flank_load_columns, flank_stations
 from femgear.errors import GridError
 from femgear.fe.compliance import (
     condense_sector,
+    cyclic_harmonics,
     dof_pairs,
     interpolation,
     mirror_nodes,
@@ -117,6 +118,9 @@ def test_free_body_is_refused(gear, sector):
     free = condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads)
     with pytest.raises(GridError, match="nothing holds it"):
         tooth_compliance(free)
+    # translation is the last harmonic as well as the first
+    with pytest.raises(GridError, match="nothing holds it"):
+        cyclic_harmonics(free, [gear.teeth - 1])
 
 
 def test_load_on_a_cut_is_refused(gear, sector):
