@@ -182,6 +182,7 @@ def forked(work, folder: Path) -> int:
 def _settle(folder: Path) -> None:
     """Give a forked process its own folders, limits and output."""
     sys.dont_write_bytecode = True
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     for name, below in (("TMPDIR", "tmp"), ("HOME", "home"), ("XDG_CACHE_HOME", "cache")):
@@ -499,7 +500,7 @@ def report(results: dict[Mutant, dict], reasons: dict, seed: int) -> tuple[str, 
     left = [one for one in results if results[one]["outcome"] == "survived" and not reason(one)]
     for one in sorted(left, key=lambda one: (one.kind != "sign", one.module, one.line)):
         entry = results[one]
-        ran = f"{entry['ran']} of {entry['covering']} tests that run the line pass, {entry['seconds']:.0f} s"
+        ran = f"{entry['ran']} tests pass, {entry['covering']} run the line, {entry['seconds']:.0f} s"
         why = ran if entry["covering"] else "no test runs the line"
         page.append(f"* {one.place} {one.kind} in `{one.function}`: `{one.before}` -> `{one.after}`: {why}")
     page += ["" if left else "None.", "## Equivalent", ""]
@@ -530,6 +531,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         found = [one for one in mutants(module, source) if not given.kinds or one.kind in given.kinds]
         chosen += drawn(found, given.count, given.seed)
     sys.path.insert(0, str(ROOT))
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # and end the processes started here
     preload()
     lines = LineMap(given.work / "lines", given.tests)
     with tempfile.TemporaryDirectory(prefix="femgear-mutants-") as folder:
