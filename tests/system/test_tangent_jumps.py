@@ -29,6 +29,8 @@ def staircase(steps, wave=0.0):
         {0.123: 0.5, 0.7: -0.3},
         # up, down and up again in neighbouring intervals
         {0.3: 0.5, 0.3 + WIDTH: -0.5, 0.3 + 2 * WIDTH: 0.5, 0.3 + 3 * WIDTH: -0.5},
+        {0.3: 0.5, 0.3 + WIDTH: 0.5},
+        {0.3: 0.5, 0.3 + WIDTH: 0.5, 0.3 + 2 * WIDTH: -0.5},
         # several in one interval, in either order of their heights
         {0.6001: 0.4, 0.6003: 0.2, 0.6005: 0.3},
         {0.6001: 0.2, 0.6005: 0.4},
