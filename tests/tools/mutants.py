@@ -61,6 +61,11 @@ class Mutant:
         return f"{self.module}:{self.line}"
 
     @property
+    def name(self) -> tuple[str, str, str, str]:
+        """What it is called wherever its line may go."""
+        return self.module, self.function, self.before, self.after
+
+    @property
     def change(self) -> str:
         return f"{self.before}  ->  {self.after}"
 

@@ -388,8 +388,8 @@ def meet(mutant: Mutant, lines: LineMap, covering: Sequence[str], budget: float,
 class Campaign:
     """Results of mutants by the digest of their file, one line of JSON each: the last one counts."""
 
-    def __init__(self, path: Path, lines: LineMap):
-        self.path, self.lines, self.known = path, lines, {}
+    def __init__(self, path: Path, lines: LineMap, reasons: dict):
+        self.path, self.lines, self.known, self.reasons = path, lines, {}, reasons
         if path.exists():
             for line in path.read_text(encoding="utf-8").splitlines():
                 # a campaign that was stopped may have left half a line
@@ -405,7 +405,7 @@ class Campaign:
         return hashlib.sha256(f"{text} {len(covering)}".encode()).hexdigest()[:16]
 
     def run(self, chosen: Sequence[Mutant], jobs: int, budget: float, folder: Path) -> dict[Mutant, dict]:
-        """Meet the chosen mutants that have no result yet, or survived older tests."""
+        """Meet the chosen mutants without a result, and those that survived older tests for no known reason."""
         files = {one.module: _digest(ROOT / "femgear" / one.module) for one in chosen}
         results, work = {}, []
         for one in chosen:
@@ -413,7 +413,8 @@ class Campaign:
             key = {"file": files[one.module], "number": one.number, "tests": self.state(one, covering)}
             key["covering"] = len(covering)
             known = self.known.get((key["file"], key["number"]))
-            if known and (known["outcome"] != "survived" or known["tests"] == key["tests"]):
+            settled = known and (known["outcome"] != "survived" or known["tests"] == key["tests"])
+            if settled or (known and one.name in self.reasons):
                 results[one] = known
             elif not covering:
                 results[one] = key | {"outcome": "survived", "ran": 0, "seconds": 0.0}
@@ -469,7 +470,7 @@ def report(results: dict[Mutant, dict], reasons: dict, seed: int) -> tuple[str, 
     """A page of scores by module, survivors and equivalents; and whether the aims are met."""
 
     def reason(one: Mutant) -> str:
-        return reasons.get((one.module, one.function, one.before, one.after), "")
+        return reasons.get(one.name, "")
 
     def row(name: str, ones: Sequence[Mutant]) -> str:
         same = [one for one in ones if results[one]["outcome"] == "survived" and reason(one)]
@@ -537,9 +538,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory(prefix="femgear-mutants-") as folder:
         lines.make(given.jobs, Path(folder) / "map")
         lines.load()
-        campaign = Campaign(given.work / "results.jsonl", lines)
+        reasons = equivalents()
+        campaign = Campaign(given.work / "results.jsonl", lines, reasons)
         results = campaign.run(chosen, given.jobs, given.budget, Path(folder) / "mutants")
-    page, good = report(results, equivalents(), given.seed)
+    page, good = report(results, reasons, given.seed)
     path = given.report or given.work / "report.md"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(page, encoding="utf-8")
