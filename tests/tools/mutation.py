@@ -297,22 +297,32 @@ class LineMap:
     def planned(self, module: str, covering: Sequence[str], budget: float) -> Iterator[list[str]]:
         """Tests in the order in which a mutant meets them, a file at a time: its fixtures are made once.
 
-        Those that run the line, of the module's own folder; then elsewhere, quick ones first, as far as the
-        budget goes; then the others of the same files, which may share a result that was computed once.
+        Those that run the line, of the module's own folder and then elsewhere, as far as half of the budget
+        and the whole of it go; then the others of the same files, which may share what was computed once.
         """
-        mirror = "tests/" + str(Path(module).parent) + "/"
+        mirror, stem = "tests/" + str(Path(module).parent) + "/", Path(module).stem
         near = [test for test in covering if test.startswith(mirror)]
-        yield self._ordered(near, Path(module).stem)
-        far, left = [], budget
-        for test in sorted(set(covering) - set(near), key=lambda test: (self.seconds[test], test)):
-            left -= self.seconds[test]
-            if left < 0:
-                break
-            far.append(test)
-        yield self._ordered(far, Path(module).stem)
+        first = self._within(near, 0.5 * budget)
+        yield self._ordered(first, stem)
+        yield self._ordered(self._within(set(covering) - set(near), budget), stem)
         files = {test.split("::")[0] for test in near}
         others = [test for test in self.seconds if test.split("::")[0] in files]
-        yield self._ordered(sorted(set(others) - set(near)), Path(module).stem)
+        yield self._ordered(sorted(set(others) - set(first)), stem)
+
+    def _within(self, tests, budget: float) -> list[str]:
+        """Tests of the fewest seconds, one of each function before the others with other parameters."""
+        seen, ranked = set(), []
+        for test in sorted(tests, key=lambda test: (self.seconds[test], test)):
+            name = test.split("[")[0]
+            ranked.append((name in seen, self.seconds[test], test))
+            seen.add(name)
+        found = []
+        for _, seconds, test in sorted(ranked):
+            budget -= seconds
+            if budget < 0 and found:
+                break
+            found.append(test)
+        return found
 
     def _ordered(self, tests: Sequence[str], stem: str) -> list[str]:
         files = defaultdict(list)
@@ -346,7 +356,7 @@ def run_all(work, jobs: int, folder: Path) -> Iterator[tuple[Any, dict, float]]:
                         _, status, usage = os.wait4(child, 0)
                     yield what, _outcome(place, status, late), usage.ru_utime + usage.ru_stime
                     shutil.rmtree(place, ignore_errors=True)
-            time.sleep(0.01)
+            time.sleep(0.02)
     finally:
         for child in running:
             _end_group(child)
@@ -405,7 +415,7 @@ class Campaign:
         return hashlib.sha256(f"{text} {len(covering)}".encode()).hexdigest()[:16]
 
     def run(self, chosen: Sequence[Mutant], jobs: int, budget: float, folder: Path) -> dict[Mutant, dict]:
-        """Meet the chosen mutants without a result, and those that survived older tests for no known reason."""
+        """Meet the mutants without a result, and those that survived older tests for no known reason."""
         files = {one.module: _digest(ROOT / "femgear" / one.module) for one in chosen}
         results, work = {}, []
         for one in chosen:
