@@ -415,15 +415,16 @@ class Campaign:
         return hashlib.sha256(f"{text} {len(covering)}".encode()).hexdigest()[:16]
 
     def run(self, chosen: Sequence[Mutant], jobs: int, budget: float, folder: Path) -> dict[Mutant, dict]:
-        """Meet the mutants without a result, and those that survived older tests for no known reason."""
+        """Meet mutants without a result, and those that survived fewer or older tests for no known reason."""
         files = {one.module: _digest(ROOT / "femgear" / one.module) for one in chosen}
         results, work = {}, []
         for one in chosen:
             covering = self.lines.covering(one.module, one.lines)
             key = {"file": files[one.module], "number": one.number, "tests": self.state(one, covering)}
-            key["covering"] = len(covering)
+            key |= {"covering": len(covering), "budget": budget}
             known = self.known.get((key["file"], key["number"]))
-            settled = known and (known["outcome"] != "survived" or known["tests"] == key["tests"])
+            same = known and known["tests"] == key["tests"] and known.get("budget", 0.0) >= budget
+            settled = known and (known["outcome"] != "survived" or same)
             if settled or (known and one.name in self.reasons):
                 results[one] = known
             elif not covering:

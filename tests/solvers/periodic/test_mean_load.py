@@ -133,13 +133,25 @@ def test_of_two_contacts_the_one_that_is_pulled_is_named():
     assert "column 2 (mesh 2): it needs -0.1 N, the elements there give no less than 0 N" in found.message
 
 
-def test_a_spring_in_tension_is_not_blamed():
-    """-5 N on a hardening spring that pulls: a tolerance below rounding is another reason not to converge."""
-    problem = replace(
+def pulled_spring(force):
+    return replace(
         one_mass(-5.0),
         elements=(PolynomialSprings([0], [[1.0, 0.0, 4.0]]),),
-        forces=(HarmonicForce(np.array([30.0]), (1,)),),
+        forces=(HarmonicForce(np.array([force]), (1,)),),
     )
-    found = solve_harmonic_balance(problem, 1.3, harmonics=4, tolerance=1e-17)
+
+
+def test_a_spring_in_tension_is_not_blamed():
+    """-5 N on a hardening spring that pulls: a tolerance below rounding is another reason not to converge."""
+    found = solve_harmonic_balance(pulled_spring(30.0), 1.3, harmonics=4, tolerance=1e-17)
     assert not found.converged and "Not converged" in found.message
     assert "nothing carries" not in found.message
+
+
+def test_every_iteration_after_an_embedding_costs_a_factorisation():
+    loose, tight = (
+        solve_harmonic_balance(pulled_spring(3.0), 1.3, harmonics=4, tolerance=one) for one in (1e-12, 1e-17)
+    )
+    assert "Converged in 0 steps" in loose.message and not tight.converged
+    assert "embedding" in loose.message and "embedding" in tight.message
+    assert tight.factorisations - loose.factorisations == tight.iterations - loose.iterations > 0
