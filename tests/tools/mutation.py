@@ -87,7 +87,7 @@ class Watch:
         self.order = None if wanted is None else {name: i for i, name in enumerate(wanted)}
         self.limits, self.budget, self.context = limits, budget, context
         self.killer, self.failed, self.ran, self.seconds = "", [], 0, defaultdict(float)
-        self.start = _cpu()
+        self.start, self.running = _cpu(), Path("running").absolute()
 
     def pytest_configure(self):
         import hypothesis
@@ -109,6 +109,7 @@ class Watch:
 
     def pytest_runtest_protocol(self, item):
         if self.order is not None:
+            self.running.write_text(item.nodeid)
             # ended by the system, even within compiled code
             signal.setitimer(signal.ITIMER_PROF, PATIENCE + 5.0 * self.limits.get(item.nodeid, self.budget))
 
@@ -371,7 +372,8 @@ def _end_group(child: int) -> None:
 
 def _outcome(place: Path, status: int, late: bool) -> dict:
     if late or (os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGPROF):
-        return {"timeout": True}
+        running = place / "cwd" / "running"
+        return {"timeout": running.read_text() if running.exists() else ""}
     if (place / "result.json").exists():
         return {"result": json.loads((place / "result.json").read_text())}
     error = place / "error.txt"
@@ -453,7 +455,7 @@ class Campaign:
 
 def _verdict(result: dict) -> dict:
     if "timeout" in result:
-        return {"outcome": "timeout", "ran": 0, "killer": "time limit"}
+        return {"outcome": "timeout", "ran": 0, "killer": f"time limit: {result['timeout']}"}
     if "crash" in result:
         return {"outcome": "killed", "ran": 0, "killer": f"crash: {result['crash']}"}
     found = result["result"]
