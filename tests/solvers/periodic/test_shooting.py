@@ -11,6 +11,7 @@ from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping
+from femgear.solvers.periodic import shooting
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import monodromy
@@ -200,3 +201,18 @@ def test_no_start_returns_at_an_undamped_resonance():
     assert not found.converged and found.stable is None
     assert "no start returns" in found.message
     assert found.iterations == 0 and found.factorisations == 1
+
+
+def test_a_step_that_never_helps_is_taken_whole(duffing, monkeypatch):
+    """After eight halvings: the way out may lead over a larger defect."""
+    tried = []
+
+    def shoot(moving, y, period, options):
+        tried.append(float(y[0]))
+        return y + 1.0, None
+
+    monkeypatch.setattr(shooting, "shoot", shoot)
+    moving = shooting.flow(duffing, np.array([1.2]), variational=True)
+    found = shooting._improved(moving, np.zeros(2), np.array([0.5, 0.25]), 0.9, 5.0, {})
+    assert found.tolist() == [0.5, 0.25]
+    assert tried == [0.5**k for k in range(1, 9)]

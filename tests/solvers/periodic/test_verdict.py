@@ -18,6 +18,7 @@ def judged(*multipliers, error=1e-9, tolerance=1e-6, **free):
         ((1.1 + 0.4j, 1.1 - 0.4j, 0.1), "Neimark-Sacker", 2),
         ((-1.1 + 0.4j, -1.1 - 0.4j, 1.05), "Neimark-Sacker", 3),
         ((1.01, -1.3), "flip", 2),
+        ((1.5, 1.0 - 0.5 * CIRCLE), "fold", 1),
     ],
 )
 def test_the_largest_tells_how_stability_was_lost(multipliers, loss, outside):
@@ -56,6 +57,8 @@ def test_free_positions_are_left_out_and_slow_velocities_no_border():
     slow = 1.0 - 0.5 * CIRCLE
     assert judged(slow, 0.5, velocities=1).stable is True
     assert judged(slow, slow, 0.5, velocities=1).stable is None
+    # nor does one that does not decay at all
+    assert judged(1.0, 0.5, velocities=1).stable is None
     # the velocity of a free motion does not alternate
     assert judged(-slow, 0.5, velocities=1).stable is None
 
