@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from femgear.solvers.time.adaptive import flow, motion_scale, sampled
+from femgear.errors import ConvergenceError
+from femgear.solvers.time.adaptive import flow, motion_scale, sampled, trajectory
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import constant
@@ -51,3 +52,13 @@ def test_a_contact_just_before_the_end_is_taken(beyond):
     )
     assert found.displacement[:, 0] == pytest.approx([-1.0, -0.5, 0.5 * np.sin(2.0 * beyond)], abs=1e-12)
     assert found.velocity[:, 0] == pytest.approx([1.0, 1.0, np.cos(2.0 * beyond)], abs=1e-10)
+
+
+def test_too_many_steps_are_refused():
+    moving = flow(one_mass(force=1.0), np.array([1.0]))
+    start = moving.state([0.0], [0.0])
+    taken = len(list(trajectory(moving, start, 0.0, 20.0)))
+    assert taken > 4
+    assert len(list(trajectory(moving, start, 0.0, 20.0, max_steps=taken))) == taken
+    with pytest.raises(ConvergenceError, match=f"more than {taken - 1} steps"):
+        list(trajectory(moving, start, 0.0, 20.0, max_steps=taken - 1))
