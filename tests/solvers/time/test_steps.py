@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femgear.solvers.time import steps
+from femgear.solvers.time import steps, transient
 from femgear.solvers.time.steps import generalised_alpha, stability_limit
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.4, 0.8, 1.0])
@@ -28,3 +30,27 @@ def test_newton_steps_are_halved_until_the_columns_fit_better():
 
     x, g, slope = steps._shortened(law, 0, np.eye(1), aim, np.ones(1), nothing, 0.1**2)
     assert (x.tolist(), g.tolist(), slope.tolist()) == ([1.0 / 512.0], [100.0 / 512.0], [100.0])
+
+
+@pytest.mark.parametrize("accelerations", [True, False])
+def test_motion_between_steps_is_a_cubic(accelerations):
+    """Exact for q = t^3 - 2 t; without accelerations the velocity runs straight from step to step."""
+    step, t = 0.5, 0.5 * np.arange(5.0)[:, None]
+    q, v, a = t**3 - 2.0 * t, 3.0 * t**2 - 2.0, 6.0 * t
+    at = np.array([0.0, 0.3, 1.0, 2.7, 3.999, 4.0])
+    found, rate = transient._between(at, (q, v, a if accelerations else None), step)
+    assert found[:, 0] == pytest.approx((at * step) ** 3 - 2.0 * at * step, abs=1e-13)
+    wanted = 3.0 * (at * step) ** 2 - 2.0 if accelerations else np.interp(at * step, t[:, 0], v[:, 0])
+    assert rate[:, 0] == pytest.approx(wanted, abs=1e-13)
+
+
+def test_instants_count_from_the_first_one():
+    """Of x'' + x = cos 0.7 t, at rest at t = 2 and not at zero."""
+    one = np.eye(1)
+    system = MechanicalSystem(one, 0.0 * one, one, one, np.zeros(1), ("x",))
+    problem = NonlinearSystem(system, (), (HarmonicForce([1.0]),))
+    times = np.array([2.0, 2.5, 3.75, 6.0])
+    found = solve_transient(problem, 0.7, times, start=([0.0], [0.0]), step=0.005)
+    a, b = np.cos(1.4), -0.7 * np.sin(1.4)
+    exact = (np.cos(0.7 * times) - a * np.cos(times - 2.0) - b * np.sin(times - 2.0)) / 0.51
+    assert found.displacement[:, 0] == pytest.approx(exact, abs=3e-5)
