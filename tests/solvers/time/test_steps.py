@@ -54,3 +54,12 @@ def test_instants_count_from_the_first_one():
     a, b = np.cos(1.4), -0.7 * np.sin(1.4)
     exact = (np.cos(0.7 * times) - a * np.cos(times - 2.0) - b * np.sin(times - 2.0)) / 0.51
     assert found.displacement[:, 0] == pytest.approx(exact, abs=3e-5)
+    assert found.steps == 800
+
+
+def test_size_of_a_marched_motion_is_its_distance_from_the_mean():
+    """About 4 and -1, with masses 4 and 9; what is not finite does not count."""
+    system = MechanicalSystem(np.diag([4.0, 9.0]), np.eye(2), np.eye(2), np.eye(2), np.zeros(2), ("x", "y"))
+    q = np.array([[3.0, -1.0], [5.0, -1.0], [4.0, -2.0], [4.0, 0.0], [np.nan, 7.0]])
+    assert transient._amplitude(NonlinearSystem(system, ()), q) == pytest.approx(3.0)
+    assert transient._amplitude(NonlinearSystem(system, ()), q[4:]) == 0.0
