@@ -27,3 +27,12 @@ def test_planets_stand_as_far_apart_as_the_smaller_centre_distance_has_them():
     room = phasing._room(teeth, total[:, None] * np.arange(3) // 3, total)
     gap = np.array([34, 32]) * 2 * np.pi / total
     assert room == pytest.approx(2 * np.array([25, 24]) * np.sin(gap / 2) - 22)
+
+
+def test_neighbouring_teeth_come_nearest_ratio_first_then_fewest_changes():
+    wanted = (30, 20, 70)
+    found = phasing.neighbouring_teeth(*wanted, 4, distance=3, ratio_tolerance=0.2, fitting=False)
+    change = np.round(np.abs((1 + found.teeth[:, 2] / found.teeth[:, 0]) / (1 + 70 / 30) - 1), 12)
+    keys = [*zip(change, np.abs(found.teeth - wanted).sum(axis=1).tolist())]
+    assert keys == sorted(keys) and found.teeth[0].tolist() == list(wanted)
+    assert len({key[0] for key in keys}) < len(keys)
