@@ -292,3 +292,16 @@ def test_a_jump_of_the_shapes_stays_unresolved():
     ((start, end),) = tracked.unresolved
     assert start < 1.37 <= end and end - start == pytest.approx(2.0**-14)
     assert tracked.agreement.min() == pytest.approx(0.5)
+
+
+def test_of_modes_of_one_shape_each_goes_on_at_its_own_rate():
+    """They cross between two values: the nearer eigenvalue is that of the other one."""
+
+    def family(p):
+        value, shape = 1j * np.array([1.0 + p, 2.0 - p]), np.array([[1.0, 1.0], [1e-4, -1e-4]])
+        order = np.argsort(value.imag)
+        return value[order], shape
+
+    tracked = track_modes(family, np.linspace(0.0, 0.9, 8), np.eye(2))
+    assert tracked.eigenvalue[:, 0] == pytest.approx(1j * (1.0 + tracked.value))
+    assert tracked.eigenvalue[:, 1] == pytest.approx(1j * (2.0 - tracked.value))
