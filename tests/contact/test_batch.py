@@ -163,4 +163,6 @@ def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
     )
     compare(both_ways(gears, bodies, torque, supports=SPRUNG, pins=0.3))
     steps = states[0].iterations
-    assert len(counted) > 0 and steps[steps > 2].tolist() == [2 + count for count in counted]
+    # the others: two steps and one that takes out the rounding
+    rest = [3] * (len(steps) - len(counted))
+    assert len(counted) > 0 and sorted(steps.tolist()) == sorted([2 + count for count in counted] + rest)
