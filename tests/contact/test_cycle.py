@@ -232,5 +232,6 @@ def test_face_width_scales_out(gears, bodies):
 def test_progress_tells_the_positions_done(gears, bodies, monkeypatch):
     told = []
     monkeypatch.setattr("femgear.contact.cycle._TOGETHER", 3)
-    walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, progress=lambda *done: told.append(done))
+    options = CycleOptions(progress=lambda *done: told.append(done))
+    walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, options=options)
     assert told[-3:] == [(3, 8), (6, 8), (8, 8)]
