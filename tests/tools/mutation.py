@@ -32,7 +32,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,8 @@ LIBRARIES = (
     "imageio pyvista pytest _pytest.assertion.rewrite coverage"
 ).split()
 MEMORY = 8 << 30
+# tests that killed most mutants of a module come first, so many of them
+PROVEN = 6
 # seconds that any test may take, beside five times what it took; of a mutant by the clock on the wall
 PATIENCE, WALL_LIMIT = 10.0, 900.0
 
@@ -295,14 +297,19 @@ class LineMap:
                 table[line] += contexts
         return table
 
-    def planned(self, module: str, covering: Sequence[str], budget: float) -> Iterator[list[str]]:
+    def planned(
+        self, module: str, covering: Sequence[str], budget: float, killers: Counter[str]
+    ) -> Iterator[list[str]]:
         """Tests in the order in which a mutant meets them, a file at a time: its fixtures are made once.
 
-        Those that run the line, of the module's own folder and then elsewhere, as far as half of the budget
-        and the whole of it go; then the others of the same files, which may share what was computed once.
+        Of those that run the line first the ones that killed most in this module; then those of its folder
+        and those elsewhere, as far as half of the budget and the whole of it go; then the others of the same
+        files, which may share what was computed once.
         """
         mirror, stem = "tests/" + str(Path(module).parent) + "/", Path(module).stem
         near = [test for test in covering if test.startswith(mirror)]
+        known = [test for test, _ in killers.most_common() if test in covering][:PROVEN]
+        yield self._ordered(self._within(known, 0.3 * budget), stem)
         first = self._within(near, 0.5 * budget)
         yield self._ordered(first, stem)
         yield self._ordered(self._within(set(covering) - set(near), budget), stem)
@@ -380,12 +387,19 @@ def _outcome(place: Path, status: int, late: bool) -> dict:
     return {"crash": error.read_text() if error.exists() else f"status {status}"}
 
 
-def meet(mutant: Mutant, lines: LineMap, covering: Sequence[str], budget: float, folder: Path) -> dict:
+def meet(
+    mutant: Mutant,
+    lines: LineMap,
+    covering: Sequence[str],
+    budget: float,
+    killers: Counter[str],
+    folder: Path,
+) -> dict:
     """Run one mutant in this process against its tests."""
     path = ROOT / "femgear" / mutant.module
     sys.meta_path.insert(0, Altered(path, mutated(path.read_text(encoding="utf-8"), mutant.number)))
     start, ran = _cpu(), 0
-    for tests in lines.planned(mutant.module, covering, budget):
+    for tests in lines.planned(mutant.module, covering, budget, killers):
         left = budget - (_cpu() - start)
         if tests and left > 0:
             watch = Watch(tests, lines.seconds, left)
@@ -402,12 +416,14 @@ class Campaign:
 
     def __init__(self, path: Path, lines: LineMap, reasons: dict):
         self.path, self.lines, self.known, self.reasons = path, lines, {}, reasons
+        self.killers: dict[str, Counter[str]] = defaultdict(Counter)
         if path.exists():
             for line in path.read_text(encoding="utf-8").splitlines():
                 # a campaign that was stopped may have left half a line
                 with contextlib.suppress(ValueError, KeyError):
                     entry = json.loads(line)
                     self.known[entry["file"], entry["number"]] = entry
+                    self.killers[entry["place"].split(":")[0]].update([entry.get("killer", "")])
 
     def state(self, mutant: Mutant, covering: Sequence[str]) -> str:
         """Digest of the tests in the mutant's folder that run its line: new ones try a survivor again."""
@@ -434,7 +450,7 @@ class Campaign:
             else:
 
                 def task(place, one=one, covering=covering):
-                    return meet(one, self.lines, covering, budget, place)
+                    return meet(one, self.lines, covering, budget, self.killers[one.module], place)
 
                 work.append(((one, key), task))
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -443,6 +459,7 @@ class Campaign:
                 entry = key | _verdict(result) | {"seconds": round(seconds, 2)}
                 entry |= {"place": one.place, "kind": one.kind, "change": one.change}
                 results[one] = entry
+                self.killers[one.module].update([entry.get("killer", "")])
                 stream.write(json.dumps(entry) + "\n")
                 stream.flush()
                 by = entry.get("killer", f"{entry['ran']} of {entry['covering']} tests")
