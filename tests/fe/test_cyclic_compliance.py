@@ -168,8 +168,9 @@ def test_cyclic_modes_are_those_of_the_whole_body(gear, sector, whole):
         max_frequency=6e4,
         static_correction=False,
     )
-    # no static shapes above
-    assert modes.frequency.max() < 6e4
+    # above the limit only where a diameter has no other mode: no static shapes
+    above = modes.nodal_diameter[modes.frequency > 6e4]
+    assert np.all(np.bincount(modes.nodal_diameter)[above] == 1)
     sector_frequencies = np.sort(np.repeat(modes.frequency, np.where(modes.paired, 2, 1)))
     K_whole, M_whole = matrices(whole)
     factor = symmetric_factor(K_whole)
