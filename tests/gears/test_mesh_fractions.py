@@ -1,10 +1,13 @@
 """Fractions of a mesh period, assembly positions and the room between planets, by hand."""
 
+import math
+
 import numpy as np
 import pytest
 
+from femgear.errors import GeometryError
 from femgear.gears import phasing
-from femgear.gears.planetary import _fraction, assembly_positions, feasible_angles
+from femgear.gears.planetary import _fraction, assembly_positions, check_angles, feasible_angles
 
 
 def test_rounding_makes_no_phase():
@@ -36,3 +39,19 @@ def test_neighbouring_teeth_come_nearest_ratio_first_then_fewest_changes():
     keys = [*zip(change, np.abs(found.teeth - wanted).sum(axis=1).tolist())]
     assert keys == sorted(keys) and found.teeth[0].tolist() == list(wanted)
     assert len({key[0] for key in keys}) < len(keys)
+
+
+@pytest.mark.parametrize(
+    ("angles", "problem"),
+    [
+        ((0.0, 2.0, math.nan), "not finite"),
+        ((0.0, 2.0, 1.0), "ascending"),
+        ((0.0, 2.0, 2.0), "equal"),
+        ((0.0, 2.0, 2.0 * math.pi), "more than one turn"),
+        ((0.0, 120.0, 240.0), "degrees taken for radians"),
+    ],
+)
+def test_planet_angles_that_no_set_has_are_refused(angles, problem):
+    with pytest.raises(GeometryError, match=problem):
+        check_angles(angles)
+    check_angles((-1.0, 2.0, 5.2))
