@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from femgear.housing.orders import count_lobes
 from femgear.housing.sensor import fixed_sensor_lines, hanning_model
 
 
@@ -22,3 +23,12 @@ def test_windows_of_several_speeds_are_those_of_each():
     assert field.shape == (2, 5, 4, 13)
     for k in np.ndindex(2, 5):
         assert np.array_equal(field[k], hanning_model(harmonics[k], angles, n_max=6))
+
+
+@pytest.mark.parametrize(("height", "count"), [(0.12, 2), (0.08, 1)])
+def test_a_lobe_stands_out_by_a_tenth_of_the_largest(height, count):
+    """Two bumps over a floor of 0.2, the smaller one as high above it as told."""
+    turn = 2 * np.pi * np.arange(720) / 720
+    bumps = (np.maximum(np.cos(turn - place), 0.0) ** 8 for place in (1.0, 4.0))
+    envelope = 0.2 + 0.8 * next(bumps) + height * next(bumps)
+    assert len(count_lobes(envelope).position) == count
