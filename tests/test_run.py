@@ -220,6 +220,7 @@ def test_a_full_disk_is_met_after_the_first_part(tmp_path, monkeypatch):
 def test_a_large_file_is_read_where_it_is_asked_for(tmp_path, monkeypatch):
     attrs = {"units": "m", "long_name": "x"}
     path = tmp_path / "a.nc"
+    path.touch()
     for i in range(3):
         speed = ("speed", [10.0 * i, 10.0 * i + 1], {"units": "rpm", "long_name": "speed"})
         variables = {
