@@ -24,7 +24,14 @@ import numpy as np
 import xarray as xr
 from femgear.errors import StorageError
 from femgear.report.scene import _write_gif, write_vtu
-from femgear.storage.files import write_bytes, write_dataset
+from femgear.storage.files import append_dataset, replaced_file, write_bytes, write_dataset
+
+
+def parts(path):
+    with replaced_file(path) as new:
+        for _ in range(3):
+            append_dataset(data.isel(x=slice(40)), new, "x")
+
 
 folder = Path(sys.argv[1])
 random = np.random.default_rng(1)
@@ -39,6 +46,7 @@ writers = {
     "static.nc": lambda path: write_dataset(data, path),
     "set.vtu": lambda path: write_vtu(grid, path),
     "turn.gif": lambda path: _write_gif(path, images),
+    "parts.nc": parts,
     "a.png": lambda path: write_bytes(bytes(200_000), path),
 }
 for limit in map(int, sys.argv[2:]):
@@ -56,13 +64,13 @@ print("came to its end")
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of the size of files")
 def test_a_limit_of_the_size_of_files_is_said_and_does_not_end_the_process(tmp_path):
-    limits = [0, 100, 1_000, 7_000, 20_000, 40_000]
+    limits = [0, 100, 1_000, 7_000, 20_000, 40_000, 48_000]
     command = [sys.executable, "-c", LIMITED, str(tmp_path), *map(str, limits)]
     run = subprocess.run(command, capture_output=True, text=True, timeout=120)
     *lines, last = run.stdout.splitlines()
     assert run.returncode == 0 and last == "came to its end", run.stderr
     assert "Traceback" not in run.stderr and "Exception ignored" not in run.stderr
-    assert len(lines) == 4 * len(limits) and all(line.endswith("E-STORAGE 4 True") for line in lines), lines
+    assert len(lines) == 5 * len(limits) and all(line.endswith("E-STORAGE 4 True") for line in lines), lines
     assert list(tmp_path.iterdir()) == []
 
 
