@@ -1,6 +1,6 @@
 # Everything a user or a maintainer does, by name. Needs git, python3 (3.11 or newer) and make.
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test lint validate bench clean
+.PHONY: help environment demo test lint validate bench mutants clean
 
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -12,7 +12,7 @@ PY := .venv/bin/python
 FEMGEAR := .venv/bin/femgear
 CASE := cases/planetary_27_40_108.toml
 OUT := out/demo
-# Further arguments for pytest: make test ARGS="tests/gears -k fillet"
+# Further arguments, most for pytest: make test ARGS="tests/gears -k fillet"
 ARGS :=
 
 help:
@@ -21,6 +21,7 @@ help:
 	@echo "make lint      check style and formatting (ruff) and types (basedpyright)"
 	@echo "make validate  recompute docs/validation.md and run the slow verification tests"
 	@echo "make bench     measure time and memory of every stage"
+	@echo "make mutants   change single expressions of the core and see whether a test notices"
 	@echo "make clean     delete results, caches and generated grids (.venv stays)"
 
 # Checks the system libraries, then makes .venv and installs femgear once.
@@ -45,6 +46,9 @@ validate: environment
 
 bench: environment
 	$(PY) -m pytest benchmarks -o python_files="test_*.py bench_*.py" $(ARGS)
+
+mutants: environment
+	$(PY) tests/tools/mutation.py $(ARGS)
 
 clean:
 	rm -rf out dist .pytest_cache .ruff_cache .hypothesis .benchmarks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import sys
 import threading
@@ -18,7 +19,7 @@ try:
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
     from femgear import __version__
-    from femgear.errors import CaseError, FemgearError
+    from femgear.errors import CaseError, FemgearError, printable
     from femgear.storage.files import storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
@@ -74,20 +75,26 @@ def _print(blocks) -> None:
     if not console.is_terminal:
         console.width = 120
     for block in blocks:
-        console.print(f"\n{block.title}")
+        console.print(f"\n{printable(block.title)}")
         if block.rows:
             table = Table(box=box.SIMPLE_HEAD if block.header else None, show_header=bool(block.header))
             for index, name in enumerate(block.header or block.rows[0]):
                 side = "right" if index else "left"
                 table.add_column(name if block.header else "", justify=side, overflow="fold")
             for row in block.rows:
-                table.add_row(*row)
+                table.add_row(*map(printable, row))
             console.print(table)
         for note in block.notes:
-            console.print(f"  {note}")
+            console.print(f"  {printable(note)}")
+
+
+def _say(text: str) -> None:
+    print(printable(text))
 
 
 def _fail(error: FemgearError) -> int:
+    if error.key == "only":
+        error.key = "--only"
     print(error, file=sys.stderr)
     return error.exit_code
 
@@ -115,8 +122,10 @@ def _warn(findings) -> None:
 
 def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
     """Print a warning as one line on standard error; takes the place of `warnings.showwarning`."""
-    text = message if category is UserWarning else f"{message} ({category.__name__}, {filename}:{lineno})"
-    print(f"warning: {text}", file=sys.stderr)
+    text = (
+        str(message) if category is UserWarning else f"{message} ({category.__name__}, {filename}:{lineno})"
+    )
+    print(f"warning: {printable(text)}", file=sys.stderr)
 
 
 @app.command
@@ -168,6 +177,7 @@ def run(
         Replace the results that the folder holds, once the new ones are complete.
     """
     from femgear.run import run_case
+    from femgear.storage.files import resumable
     from femgear.storage.results import run_folder
     from femgear.trains.reading import open_results, read_case
     from femgear.trains.registry import TRAINS, check_case, train_of
@@ -186,14 +196,15 @@ def run(
     check_case(data, only)  # refuse before the folder is touched
     train = train_of(data)
     _warn(train.case_warnings(data))
-    with run_folder(output, force=force) as folder, Progress() as progress:
+    place = run_folder(output, case=data.source, force=force)
+    with resumable(output), place as folder, Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(output)
     _print(train.describe_results(results))
     _warn(train.result_warnings(results))
-    print(f"results: {output}")
+    _say(f"results: {output}")
     if "report.html" in results.manifest.files:
-        print(f"report:  {output / 'report.html'}")
+        _say(f"report:  {output / 'report.html'}")
     return 0
 
 
@@ -209,7 +220,7 @@ def report(folder: Path, /) -> int:
     from femgear.run import report_again
 
     report_again(folder)
-    print(f"report:  {folder / 'report.html'}")
+    _say(f"report:  {folder / 'report.html'}")
     return 0
 
 
@@ -232,20 +243,27 @@ def export(
     output
         Folder of the files. Default: exported, inside the other.
     """
-    from femgear.storage.files import storage_errors
-    from femgear.storage.results import write_csv_tables
+    from femgear.storage.files import own_files
+    from femgear.storage.results import EXPORTED, additions, folder_lock, write_csv_tables
     from femgear.trains.reading import open_results
 
     if not csv:
         raise CaseError(
             "no format is named", code="E-ARGUMENTS", limit="--csv", remedy="femgear export --help"
         )
-    results = open_results(folder)
-    target = folder / "exported" if output is None else output
-    with storage_errors(target):
-        target.mkdir(parents=True, exist_ok=True)
-    names = [name for stage in results.stages for name in write_csv_tables(results[stage], target, stage)]
-    print(f"files in {target}: {', '.join(names)}")
+
+    def write(place: Path) -> list[str]:
+        results = open_results(folder)
+        return [name for stage in results.stages for name in write_csv_tables(results[stage], place, stage)]
+
+    if output is None:
+        with folder_lock(folder), additions(folder) as new:
+            (new / EXPORTED).mkdir()
+            names = write(new / EXPORTED)
+    else:
+        own_files(output, ())
+        names = write(output)
+    print(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
     return 0
 
 
@@ -286,7 +304,7 @@ def sweep(
         found, names = sweep_into(data, output, over=over, of=of, **options)
     failed = sum(bool(error) for error in found.errors)
     print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")
-    print(f"files in {output}: {', '.join(names)}")
+    _say(f"files in {output}: {', '.join(names)}")
     return 0
 
 
@@ -338,7 +356,51 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
     int
         Exit code as of `main`.
     """
-    tokens = sys.argv[1:] if arguments is None else list(arguments)
+    for descriptor in range(3):  # a file that takes the number of a closed one would hold what is printed
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    output, errors = _Stream(sys.stdout), _Stream(sys.stderr)
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+        code = _called(program_app, sys.argv[1:] if arguments is None else list(arguments), program)
+        output.flush()
+        # a reader that has seen enough is no failure
+        if code == 0 and output.error and not isinstance(output.error, BrokenPipeError):
+            code = _fail(storage_error(output.error, "standard output"))
+        errors.flush()
+    return code
+
+
+class _Stream:
+    """Standard stream that escapes what its encoding lacks, and keeps the failure to write in ``error``."""
+
+    def __init__(self, stream):
+        self._stream, self.error = stream or open(os.devnull, "w", encoding="utf-8"), None
+
+    def __getattr__(self, name: str):
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        encoding = self._stream.encoding or "utf-8"
+        self._try(self._stream.write, text.encode(encoding, "backslashreplace").decode(encoding))
+        return len(text)
+
+    def flush(self) -> None:
+        self._try(self._stream.flush)
+
+    def _try(self, function, *arguments) -> None:
+        try:
+            function(*arguments)
+        except OSError as error:
+            self.error = self.error or error
+            # what the buffer holds would fail again when the interpreter ends
+            with contextlib.suppress(OSError), open(os.devnull, "wb") as nothing:
+                os.dup2(nothing.fileno(), self._stream.fileno())
+
+
+def _called(program_app: App, tokens: list[str], program: str) -> int:
+    """Exit code of a program, its errors told."""
     try:
         with warnings.catch_warnings(), _termination_interrupts():
             warnings.showwarning = _show_warning
@@ -349,10 +411,8 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
     except FemgearError as error:
         return _fail(error)
     except KeyboardInterrupt as interrupt:
-        print("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])]), file=sys.stderr)
+        print(printable("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])])), file=sys.stderr)
         return _INTERRUPTED
-    except BrokenPipeError:
-        return 0
     except MemoryError as error:
         return _fail(
             FemgearError(

@@ -130,7 +130,7 @@ class Finding:
     def __str__(self) -> str:
         head = f"[{self.code}] " if self.code else ""
         where = f"{self.key}: " if self.key else ""
-        return f"{head}{where}{self.text}{'; ' if self.remedy else ''}{self.remedy}"
+        return printable(f"{head}{where}{self.text}{'; ' if self.remedy else ''}{self.remedy}")
 
 
 def remark(text: str) -> Finding:
@@ -185,20 +185,27 @@ class FemgearError(Exception):
         self.problems: tuple[FemgearError, ...] = (self,)
 
     def __str__(self) -> str:
-        where = ": ".join(part for part in (self.file, self.key) if part)
-        lines = [f"[{self.code}] {where + ': ' if where else ''}{self.message}"]
+        lines = [f"[{self.code}] {': '.join(part for part in (self.file, self.key, self.message) if part)}"]
         if self.value is not None:
             lines.append(f"  found:   {_one_line(self.value)}")
         if self.limit:
             lines.append(f"  allowed: {self.limit}")
         if self.remedy:
             lines.append(f"  remedy:  {self.remedy}")
-        return "\n".join(lines)
+        several = self.problems if len(self.problems) > 1 else ()
+        return "\n".join([*map(printable, lines), *map(str, several)])
+
+
+def printable(text: str) -> str:
+    """Write every control character of ``text`` as an escape: it then fits one line of a message."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text
+    )
 
 
 def _one_line(value: object, limit: int = 120) -> str:
-    text = ascii(value) if isinstance(value, str) else str(value)
-    text = " ".join(text.split())
+    text = repr(value) if isinstance(value, str) else " ".join(str(value).split())
+    text = text.lower() if isinstance(value, bool) else text
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 

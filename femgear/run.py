@@ -2,21 +2,52 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import time
-from collections.abc import Callable
+import warnings
+from collections import defaultdict
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from femgear.report.page import write_pictures, write_report
-from femgear.storage.files import write_dataset, write_text
-from femgear.storage.results import finish, folder_lock, record
-from femgear.trains.protocol import Drawn, Progress, Stage, one_blas_thread, silent
+from femgear.case.dependencies import fingerprint
+from femgear.errors import StorageError
+from femgear.report.page import page, write_pictures, write_report
+from femgear.storage.files import (
+    append_dataset,
+    checksum,
+    read_dataset,
+    read_result,
+    replaced_file,
+    storage_errors,
+    write_dataset,
+    write_result,
+    write_text,
+)
+from femgear.storage.results import (
+    MANIFEST,
+    Manifest,
+    additions,
+    discard,
+    folder_lock,
+    read_manifest,
+    record,
+    versions,
+)
+from femgear.trains.protocol import Drawn, Progress, Stage, joint_verdict, one_blas_thread, silent
 from femgear.trains.reading import open_results
 from femgear.trains.registry import check_case, stages_of, train_of
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
+
+
+_KEPT = ".stages"
+"""Folder of results that a run goes on from when it was interrupted."""
 
 
 def grid_cache() -> Path:
@@ -39,13 +70,7 @@ class Solution(dict[str, Any]):
         raise KeyError(f"{name!r} was not computed: there are {', '.join(self) or 'no stages'}")
 
 
-def solve(
-    case: Any,
-    only: str | None = None,
-    *,
-    progress: Progress = silent,
-    done: Callable[[Stage, Any, float], None] | None = None,
-) -> Solution:
+def solve(case: Any, only: str | None = None, *, progress: Progress = silent) -> Solution:
     """Compute the stages of a case in memory: transmission error, modes, vibration, whatever its train has.
 
     Parameters
@@ -56,8 +81,6 @@ def solve(
         Last stage to compute; it is computed with what it needs.
     progress : callable, optional
         Called with (stage, done, total).
-    done : callable, optional
-        Called with every stage, its result and its seconds as soon as it is computed.
 
     Returns
     -------
@@ -69,21 +92,47 @@ def solve(
     CaseError, GeometryError
         Before anything is computed: what the stages cannot represent; E-STAGE: no such stage.
     """
-    check_case(case, only)
-    stages = stages_of(case, only)
-    if only is not None:
-        case = stages[-1].asked(case)
-    results, options = Solution(), {"cache": grid_cache(), "progress": progress}
+    case, stages = _asked(case, only)
+    results = Solution()
     with one_blas_thread():
         for stage in stages:
             progress(stage.name, 0, 1)
-            start = time.perf_counter()
-            given = {name: options[name] for name in stage.options}
-            results[stage.name] = stage.solve(case, *map(results.get, stage.takes), **given)
-            if done is not None:
-                done(stage, results[stage.name], time.perf_counter() - start)
+            taken = map(results.get, stage.takes)
+            results[stage.name] = stage.solve(case, *taken, **_options(stage, progress))
             progress(stage.name, 1, 1)
     return results
+
+
+def _asked(case: Any, only: str | None) -> tuple[Any, tuple[Stage, ...]]:
+    """The case as it is computed up to its last stage, and the stages; refuses what they cannot represent."""
+    check_case(case, only)
+    stages = stages_of(case, only)
+    return (case if only is None else stages[-1].asked(case)), tuple(stages)
+
+
+def _options(stage: Stage, progress: Progress) -> dict[str, Any]:
+    """Options of a stage: folder of grids, and whom to tell how far it has come."""
+    known = {"cache": grid_cache(), "progress": progress}
+    return {name: known[name] for name in stage.options}
+
+
+@dataclass
+class _Run:
+    """What a run has written into its folder: files with checksums, seconds and verdicts of the stages."""
+
+    folder: Path
+    files: dict[str, str] = field(default_factory=dict)
+    timings: dict[str, float] = field(default_factory=dict)
+    convergence: dict[str, Any] = field(default_factory=dict)
+
+    def record(self, *names: str, complete: bool = False) -> None:
+        """Write the manifest with some more files."""
+        known = {name: digest for name, digest in self.files.items() if name not in names}
+        told = {"timings": self.timings, "convergence": self.convergence, "known": known}
+        manifest = record(
+            self.folder, list({**self.files, **dict.fromkeys(names)}), **told, complete=complete
+        )
+        self.files = dict(manifest.files)
 
 
 def run_case(
@@ -94,7 +143,7 @@ def run_case(
     pictures: bool = True,
     progress: Progress = silent,
 ) -> None:
-    """Compute a case and write its results.
+    """Compute a case and write its results; goes on from the stages of an interrupted run of the same case.
 
     Parameters
     ----------
@@ -107,39 +156,128 @@ def run_case(
     progress : callable, optional
         Called with (stage, done, total).
     """
-    check_case(case, only)
+    asked, stages = _asked(case, only)
+    run, results = _resumed(folder, asked, stages)
+    if results:
+        warnings.warn(f"{', '.join(results)}: as the run that was interrupted left them", stacklevel=2)
     write_text(case.source, folder / "case.toml")
-    names, timings, convergence, data = ["case.toml"], {}, {}, {}
-    record(folder, names, timings=timings, convergence=convergence)
-
-    def write(stage: Stage, result: Any, seconds: float) -> None:
-        data[stage.name] = result.dataset()
-        write_dataset(data[stage.name], folder / f"{stage.name}.nc")
-        names.append(f"{stage.name}.nc")
-        timings[stage.name], convergence[stage.name] = seconds, stage.verdict(result)
-        record(folder, names, timings=timings, convergence=convergence)
-
-    results = solve(case, only, progress=progress, done=write)
+    run.record("case.toml")
+    with storage_errors(folder):
+        (folder / _KEPT).mkdir(exist_ok=True)
+    with one_blas_thread():
+        for stage in stages:
+            if stage.name not in run.timings:
+                _compute(run, asked, stage, stages, results, progress)
     if pictures:
         start = time.perf_counter()
-        drawn = Drawn(case, data, results, grid_cache())
-        names += write_pictures(folder, train_of(case), drawn, progress=progress)
-        timings["pictures"] = time.perf_counter() - start
-    finish(folder, names, timings=timings, convergence=convergence)
+        data = {stage.name: read_dataset(folder / f"{stage.name}.nc") for stage in stages}
+        drawn = Drawn(
+            case, data, {name: one for name, one in results.items() if one is not None}, grid_cache()
+        )
+        names = write_pictures(folder, train_of(case), drawn, progress=progress)
+        run.timings["pictures"] = time.perf_counter() - start
+        run.record(*names)
+    kept = {name: digest for name, digest in run.files.items() if name.startswith(_KEPT)}
+    run.files = {name: digest for name, digest in run.files.items() if name not in kept}
+    run.record(complete=True)
     if pictures:
         write_report(train_of(case), open_results(folder))
-        finish(folder, [*names, "report.html"], timings=timings, convergence=convergence)
+        run.record("report.html", complete=True)
+    discard(folder, kept)
+
+
+def _compute(
+    run: _Run, case: Any, stage: Stage, stages: Sequence[Stage], results: dict[str, Any], progress: Progress
+) -> None:
+    """Solve a stage and write its file, part after part with those stages that take its result alone."""
+    following = () if stage.parts is None else (one for one in stages if one.takes == (stage.name,))
+    members, verdicts, files = [stage, *following], defaultdict(list), dict[str, Path]()
+    taken, options = map(results.get, stage.takes), _options(stage, progress)
+    seconds, start = defaultdict(float), time.perf_counter()
+    progress(stage.name, 0, 1)
+    if stage.parts is None:
+        parts = iter([(case, stage.solve(case, *taken, **options))])
+    else:
+        parts = stage.parts(case, *taken, **options)
+    with ExitStack() as opened:
+        for part, first in parts:
+            for one in members:
+                found = first if one is stage else one.solve(part, first, **_options(one, progress))
+                path, data = run.folder / f"{one.name}.nc", found.dataset()
+                if part is case:
+                    write_dataset(data, path)
+                else:
+                    if one.name not in files:
+                        share = len(part.operation.speeds) / len(case.operation.speeds)
+                        files[one.name] = opened.enter_context(replaced_file(path, size=data.nbytes / share))
+                    append_dataset(data, files[one.name], "speed")
+                results[one.name] = found if part is case else None
+                verdicts[one.name].append(one.verdict(found))
+                seconds[one.name] += time.perf_counter() - start
+                start = time.perf_counter()
+    names = []
+    for one in members:
+        run.timings[one.name], run.convergence[one.name] = (
+            seconds[one.name],
+            joint_verdict(verdicts[one.name]),
+        )
+        names += _file_names(one)
+        write_result(results[one.name], run.folder / names[-1], fingerprint=_fingerprint(case))
+        progress(one.name, 1, 1)
+    run.record(*names)
+
+
+def _file_names(stage: Stage) -> tuple[str, str]:
+    """Files of a stage: its results, and what a run goes on from when it was interrupted."""
+    return f"{stage.name}.nc", f"{_KEPT}/{stage.name}.npz"
+
+
+def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, dict[str, Any]]:
+    """What an interrupted run of the same case left: its record, and the results of its first stages."""
+    results = dict[str, Any]()
+    manifest = read_manifest(folder) if (folder / MANIFEST).is_file() else Manifest(complete=False)
+    files = {name: digest for name, digest in manifest.files.items() if name == "case.toml"}
+    for stage in stages:
+        names = _file_names(stage)
+        if not {*names} <= manifest.files.keys() or stage.name not in manifest.timings:
+            break
+        try:
+            if any(checksum(folder / name) != manifest.files[name] for name in names):
+                break
+            results[stage.name] = read_result(folder / names[1], fingerprint=_fingerprint(case))
+        except StorageError:
+            break
+        files |= {name: manifest.files[name] for name in names}
+    discard(folder, {name: digest for name, digest in manifest.files.items() if name not in files})
+    run = _Run(folder, files)
+    for name in results:
+        run.timings[name], run.convergence[name] = manifest.timings[name], manifest.convergence.get(name)
+    return run, results
+
+
+def _fingerprint(case: Any) -> str:
+    """SHA-256 of all that the results depend on: the case, femgear as it stands here, the libraries."""
+    return fingerprint({"case": case.model_dump(), "source": _source_checksum(), **versions()})
+
+
+@cache
+def _source_checksum() -> str:
+    """SHA-256 of femgear's own files."""
+    found = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        found.update(path.read_bytes())
+    return found.hexdigest()
 
 
 def report_again(folder: Path) -> None:
     """Write report.html of a complete run anew, with figures where it drew none; update the manifest."""
     with folder_lock(folder):
         results = open_results(folder, partial=False)
-        manifest, train = results.manifest, train_of(results.case)
-        names = [name for name in manifest.files if name != "report.html"]
-        if not any(name.endswith(".png") for name in names):
+        train = train_of(results.case)
+        if not any(name.endswith(".png") for name in results.manifest.files):
             data = {stage: results[stage] for stage in results.stages}
-            names += write_pictures(results.folder, train, Drawn(results.case, data), progress=silent)
-            finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
-        write_report(train, open_results(folder))
-        finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)
+            with additions(results.folder) as new:
+                write_pictures(new, train, Drawn(results.case, data), progress=silent)
+            results = open_results(folder)
+        with additions(results.folder) as new:
+            write_text(page(train, results), new / "report.html")

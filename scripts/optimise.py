@@ -112,7 +112,7 @@ def main(
     output
         Folder of the results.
     """
-    from femgear.study.designs import resumable
+    from femgear.storage.files import resumable
     from femgear.study.objectives import named_quantity
     from femgear.trains.reading import read_case, with_value
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from femgear.cli import Progress as Progress
 from femgear.cli import call
+from femgear.errors import printable
 from femgear.storage.files import own_files
 from femgear.storage.files import write_csv as write_csv
 
@@ -71,4 +72,4 @@ def print_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]
 
 def say_files(folder: Path, names: Sequence[str]) -> None:
     """Print where the files are."""
-    print(f"files in {folder}: {', '.join(names)}")
+    print(printable(f"files in {folder}: {', '.join(names)}"))

@@ -49,16 +49,16 @@ def gmsh_is_loaded_once():
     one_at_a_time = threading.Lock()
 
     class Within:
-        TimeoutExpired, DEVNULL = subprocess.TimeoutExpired, subprocess.DEVNULL
+        TimeoutExpired = subprocess.TimeoutExpired
 
         @staticmethod
-        def run(command, **_):
-            said = io.StringIO()
+        def run(command, *, input, **_):
+            said, output = io.StringIO(), io.BytesIO()
             with one_at_a_time, contextlib.redirect_stderr(said):
-                code = worker.main(*command[-2:])
+                code = worker.main(io.BytesIO(input), output)
                 if hasattr(signal, "alarm"):
                     signal.alarm(0)
-            return subprocess.CompletedProcess(command, code, "", said.getvalue())
+            return subprocess.CompletedProcess(command, code, output.getvalue(), said.getvalue().encode())
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(meshing, "subprocess", Within)

@@ -20,7 +20,8 @@ from femgear.fe.meshing import mesh_outline
 from femgear.gears.checks import check_set
 from femgear.gears.deviations import check_deviations
 from femgear.gears.tooth import half_sector
-from femgear.trains.reading import read_case, with_value
+from femgear.trains.reading import read_case, with_value, with_values
+from femgear.trains.static.results import describe_static
 from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
@@ -66,6 +67,14 @@ REFUSED = {
     "negative backlash": (
         [('# backlash = "0.1 mm"', 'backlash = "-0.1 mm"')],
         ("E-RANGE", "set.backlash", "-0.1 mm", "0 mm to 10 mm"),
+    ),
+    "backlash that leaves the sun no tip": (
+        [('# backlash = "0.1 mm"', 'backlash = "3 mm"')],
+        ("E-POINTED", "set.backlash", "found:   '3 mm'", "up to 1.463 mm for these gears", "reduce the back"),
+    ),
+    "backlash beyond the module, beside planets that overlap": (
+        [('# backlash = "0.1 mm"', 'backlash = "5 mm"'), ("planets = 3", "planets = 5")],
+        ("E-ALLOWANCE", "set.backlash", "found:   '5 mm'", "up to 1.463 mm", "check its unit"),
     ),
     "profile shift whose flanks overlap": (
         [("profile_shift = 0.52681", "profile_shift = 0.6")],
@@ -193,6 +202,22 @@ def test_a_pitch_error_that_separates_a_planet_is_computed_and_said():
     assert cycle.open_planets[1].any() and not cycle.open_planets[[0, 2]].any()
     assert np.isfinite(cycle.stiffness).all() and not cycle.force[1][cycle.open_planets[1]].any()
     assert any("[W-OPEN] planet 2" in str(warning) for warning in static.warnings)
+    # the table marks it where it carries at others
+    data = static.dataset()
+    data["mesh_force"].loc[{"mesh": "sun-planet 2", "position": data.position[0]}] = 1.0
+    for row in describe_static(data, 1.5e-3).rows:
+        assert [cell.endswith("*") for cell in row[1:3]] == [row[0] == "sun-planet 2"] * 2
+
+
+def test_a_planet_that_never_carries_shows_no_transmission_error():
+    """A pin 50 um behind leaves the load to the two other planets; without torque all is zero and shown."""
+    settings = {"static.flank_elements": 8, "static.positions": 16}
+    case = with_values(read_case(CASE), settings)
+    behind = with_value(case, "set.pin_errors", [{"planet": 1, "tangential": "50 um"}])
+    for one, shown in ((behind, "-"), (with_value(case, "operation.torque", "0 N m"), "0.0000")):
+        block = describe_static(solve_static(one).dataset(), 1.5e-3)
+        assert {row[1:3] for row in block.rows if "planet 1" in row[0]} == {(shown, shown)}
+        assert any("a dash where it never carries" in note for note in block.notes) == (shown == "-")
 
 
 # --- loads and linear algebra -------------------------------------------------------------------------

@@ -89,6 +89,7 @@ def test_this_system_has_what_is_needed():
         ("lint", "-m ruff check"),
         ("validate", "python tests/validation -o docs/validation.md"),
         ("bench", "-m pytest benchmarks"),
+        ("mutants", "python tests/tools/mutation.py"),
         ("clean", "rm -rf out"),
     ],
 )

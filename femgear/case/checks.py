@@ -48,7 +48,9 @@ def _check_operation(case: Case):
             remedy="drive the sun and hold the ring, or name two other members",
         )
     if len(set(operation.speeds)) < len(operation.speeds):
-        yield CaseError("a speed is given twice", code="E-DUPLICATE", key="operation.speeds")
+        yield CaseError(
+            "a speed is given twice", code="E-DUPLICATE", key="operation.speeds", remedy="keep one of them"
+        )
     if 0.0 < abs(operation.torque) < LEAST_TORQUE:
         yield CaseError(
             "the torque is too small to be told from none",
@@ -199,7 +201,10 @@ def _check_planets(case: Case):
                 )
             if table.planet in seen:
                 yield CaseError(
-                    f"planet {table.planet} is given twice", code="E-DUPLICATE", key=f"{key}[{i}].planet"
+                    f"planet {table.planet} is given twice",
+                    code="E-DUPLICATE",
+                    key=f"{key}[{i}].planet",
+                    remedy="keep one of the tables",
                 )
             seen.add(table.planet)
 

@@ -227,14 +227,19 @@ def embed_points(
 
 
 def _embedded(file: str, name: str, key: str, read: Callable[[str], Mapping[str, list[float]]]):
-    """What `read` finds in a file beside the case file or below."""
-    path = PurePath(file)
-    if path.is_absolute() or ".." in path.parts or not path.parts:
+    """What `read` finds in a file beside the case file or below, no link leading out of there."""
+    folder, path = os.path.dirname(name), PurePath(file)
+    try:
+        home = os.path.realpath(folder)
+        inside = os.path.commonpath([home, os.path.realpath(os.path.join(folder, file))]) == home
+    except ValueError:  # another drive; a character that no name has
+        inside = False
+    if path.anchor or ".." in path.parts or not path.parts or not inside:
         message = "the file must lie in the folder of the case or below"
         shown, remedy = text.printable(file), "copy it there and name it relative to the case file"
         raise CaseError(message, code="E-FILE", key=key, value=shown, file=name or None, remedy=remedy)
     try:
-        return read(os.path.join(os.path.dirname(name), file))
+        return read(os.path.join(folder, file))
     except CaseError as error:
         error.key = key
         raise

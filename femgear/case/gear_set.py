@@ -17,6 +17,7 @@ import numpy as np
 
 from femgear.case.checks import check_floating
 from femgear.case.mistakes import in_terms_of_the_case, rack_at
+from femgear.case.quantities import LENGTH
 from femgear.case.sections import (
     CarrierErrors,
     Case,
@@ -87,14 +88,21 @@ def planetary_set(case: Case) -> PlanetarySet:
     """
     need_set(case)
     try:
-        closed = _closed_set(case)
-        check_set(closed)
-        check_floating(case, closed)
+        return _checked_set(case)
     except GeometryError as error:
         in_terms_of_the_case(error, case)
         if (error.key or "").endswith("rack.root_radius"):
             _name_root_radius(error, case)
+        if case.set.backlash:
+            _name_backlash(error, case)
         raise
+
+
+def _checked_set(case: Case) -> PlanetarySet:
+    """Gears of a case, closed on their centre distance and checked as a set."""
+    closed = _closed_set(case)
+    check_set(closed)
+    check_floating(case, closed)
     return closed
 
 
@@ -150,6 +158,28 @@ def _normal_modules(case: Case) -> float:
     return 1.0 if case.helix_angle is None else math.cos(case.helix_angle)
 
 
+def _name_backlash(error: GeometryError, case: Case) -> None:
+    """Let a refusal of teeth that the backlash thins too far name it, and its largest value in whole um."""
+
+    def code(steps: int) -> str:
+        less = case.set.model_copy(update={"backlash": 1e-6 * steps})
+        try:
+            _checked_set(case.model_copy(update={"set": less}))
+        except GeometryError as other:
+            return other.code
+        return ""
+
+    without = code(0)
+    if error.code != without:
+        steps = range(math.ceil(1e6 * case.set.backlash))
+        first = bisect_left(steps, True, key=lambda one: code(one) != without)
+        error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
+        error.limit = (
+            f"up to {LENGTH.show(1e-6 * (first - 1))} for these gears, each of which takes half of it"
+        )
+        error.remedy, error.file = "reduce the backlash, or check its unit", case.location("set.backlash")
+
+
 def _name_root_radius(error: GeometryError, case: Case) -> None:
     """Let a refusal of the tool's rounding name the largest root radius that can be typed in its place.
 
@@ -179,7 +209,7 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
         gear = key.partition(".")[0]
         owner = {} if gear == "rack" else {gear: getattr(case, gear).model_copy(update={"rack": rack})}
         try:
-            check_set(_closed_set(case.model_copy(update=owner or {"rack": rack})))
+            _checked_set(case.model_copy(update=owner or {"rack": rack}))
         except GeometryError as other:
             return other.code in codes
         return False

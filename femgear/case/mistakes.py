@@ -18,7 +18,7 @@ from pydantic import BaseModel, ValidationError
 from femgear.case import text as case_text
 from femgear.case.quantities import ANGLE, LENGTH
 from femgear.case.sections import Case, RackSection
-from femgear.errors import CaseError, Finding, GeometryError, remark
+from femgear.errors import CaseError, Finding, GeometryError, printable, remark
 
 _DIMENSIONS = {
     "centre_distance": LENGTH,
@@ -43,6 +43,10 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
     problems = []
     details: Any = error.errors(include_url=False)
     for item in details:
+        # a list whose entries are refused has too few left
+        inside = [one["loc"][: len(item["loc"])] for one in details if len(one["loc"]) > len(item["loc"])]
+        if item["type"] == "too_short" and item["loc"] in inside:
+            continue
         key = _dotted(item["loc"], prefix)
         nested = item.get("ctx", {}).get("error")
         if isinstance(nested, ValidationError):
@@ -76,8 +80,14 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
         section = f"[[{key.partition('[')[0]}]]" if key.endswith("]") else f"[{key}]"
         return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section {section}")
     if kind in _WANTED:
-        message = f"{_WANTED[kind]} is needed, not {case_text.described(value)}"
-        return CaseError(message, code="E-TYPE", key=key, value=value)
+        words = _WANTED[kind]
+        message = f"{words} is needed, not {case_text.described(value)}"
+        remedy = (
+            "write it in quotation marks" if words == "a text" else f"write {words}, without quotation marks"
+        )
+        if words == "a list":
+            remedy = f"write [[{key}]]" if _section(model, item["loc"]) else "write it in brackets: [...]"
+        return CaseError(message, code="E-TYPE", key=key, value=value, remedy=remedy)
     if kind in ("too_long", "too_short"):
         many = kind == "too_long"
         limit = f"at most {context['max_length']}" if many else f"{context['min_length']} or more"
@@ -109,7 +119,10 @@ def _description(model: type[BaseModel], location: tuple) -> str:
     section = _section(model, location[:-1]) or model
     schema = section.model_json_schema()["properties"].get(str(location[-1]), {})
     choices = " or ".join(str(choice) for choice in schema.get("enum", ()))
-    return schema.get("description") or choices or schema.get("type", "")
+    kind = str(schema.get("type", ""))
+    return str(
+        schema.get("description") or choices or {"string": "a text", "array": "a list"}.get(kind, kind)
+    )
 
 
 def _keys(section: type[BaseModel] | None) -> list[str]:
@@ -136,7 +149,7 @@ def _dotted(location: tuple, prefix: str) -> str:
         if isinstance(part, int):
             key += f"[{part}]"
         else:
-            key += ("." if key else "") + case_text.printable(part)
+            key += ("." if key else "") + (printable(part) or '""')
     return key
 
 
@@ -147,12 +160,12 @@ def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
     """
     for problem in problems:
         line = case_text.line_of(text, problem.key) if problem.key and name else None
-        problem.file = f"{name}:{line}" if line else name
+        if problem.file in (None, name):  # or that of another file
+            problem.file = f"{name}:{line}" if line else name
     if len(problems) == 1:
         combined = problems[0]
     else:
-        listed = "\n".join(str(problem) for problem in problems)
-        combined = CaseError(f"{len(problems)} problems\n{listed}", file=name)
+        combined = CaseError(f"{len(problems)} problems", file=name)
         combined.code = problems[0].code if len({p.code for p in problems}) == 1 else "E-CASE"
     combined.problems = tuple(problems)
     return combined
@@ -172,10 +185,6 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
         )
     if error.code == "E-ASSEMBLY":
         _assembly(error, case)
-    if error.code == "E-ALLOWANCE":
-        error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
-        error.limit = f"0 mm to {LENGTH.show(2.0 * case.sun.module)}: each gear takes half of it"
-        error.remedy = "reduce the backlash"
     if error.key == "rack.root_radius":
         cut = re.match(r"(\w+):|the \w+'s tip runs into the (\w+)'s root fillet", error.message)
         gear = (cut[1] or cut[2]) if cut else ""

@@ -162,7 +162,9 @@ def _no_text(value: object, dimension: Dimension, low: float, high: float) -> Ca
     if isinstance(value, int | float) and not isinstance(value, bool):
         remedy = _as_text(value, low, high, dimension)
         return CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=value, remedy=remedy)
-    return CaseError(f"{dimension.name} is needed, not {described(value)}", code="E-TYPE", value=value)
+    remedy = f'write it as in "{dimension.show(dimension.scale)}"'
+    message = f"{dimension.name} is needed, not {described(value)}"
+    return CaseError(message, code="E-TYPE", value=value, remedy=remedy)
 
 
 def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
@@ -296,9 +298,8 @@ def Number(
     def convert(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             remedy = "write it without quotes" if isinstance(value, str) else None
-            raise CaseError(
-                f"a number is needed, not {described(value)}", code="E-TYPE", value=value, remedy=remedy
-            )
+            message = f"a number is needed, not {described(value)}"
+            raise CaseError(message, code="E-TYPE", value=value, limit=limit, remedy=remedy)
         above = low < value if open_low else low <= value
         below = value < high if open_high else value <= high
         if not (above and below):
@@ -343,9 +344,8 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
     def convert(value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
             remedy = "write it without quotes" if isinstance(value, str) else None
-            raise CaseError(
-                f"a whole number is needed, not {described(value)}", code="E-TYPE", value=value, remedy=remedy
-            )
+            message = f"a whole number is needed, not {described(value)}"
+            raise CaseError(message, code="E-TYPE", value=value, limit=f"{low} to {high}", remedy=remedy)
         number = abs(value) if signed else value
         if not low <= number <= high:
             why = note if number > high else ""
@@ -364,7 +364,8 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
 def printable_line(value: object, *, name: str = "title", most: int = 200) -> str:
     """Check that a text is printable and has at most so many characters."""
     if not isinstance(value, str):
-        raise CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
+        message = f"a text is needed, not {described(value)}"
+        raise CaseError(message, code="E-TYPE", value=value, remedy="write it in quotation marks")
     if len(value) > most or not value.isprintable():
         limit = f"{most} printable characters"
         raise CaseError(f"the {name} must be one printable line", code="E-RANGE", value=value, limit=limit)

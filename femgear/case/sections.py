@@ -102,7 +102,8 @@ class ModificationSection(Section):
         unused += [name for name in laws if measured and getattr(self, name) is not None]
         unused += [name for name in ("shape", "power") if not relief and getattr(self, name) is not None]
         if unused:
-            raise CaseError(f"a {self.kind} has no {' and no '.join(unused)}", code="E-MODIFICATION")
+            message = f"a {self.kind} has no {' and no '.join(unused)}"
+            raise CaseError(message, code="E-MODIFICATION", remedy=f"leave out {', '.join(unused)}")
         if measured:
             _check_points(self)
         elif self.amount is None:
@@ -147,7 +148,8 @@ def _check_points(section: ModificationSection) -> None:
         raise CaseError(message, code="E-COUNT", limit="two or more, and as many of both")
     rising = {b > a for a, b in pairwise(places) if a != b}
     if len(rising) > 1 or len(set(places)) < count:
-        raise CaseError(f"{columns[0]} are neither ascending nor descending", code="E-RANGE")
+        message = f"{columns[0]} are neither ascending nor descending"
+        raise CaseError(message, code="E-RANGE", remedy="sort the points, and keep one of every place")
 
 
 class CarrierErrors(Section):
@@ -334,6 +336,11 @@ def _speed_range(value: object) -> object:
             message = f"a list of speeds is needed, not {'an empty one' if value == [] else described(value)}"
             raise CaseError(message, code="E-TYPE", value=value, remedy='write ["250 rpm", "3100 rpm"]')
         return value
+    if value.keys() != {"from", "to", "count"}:
+        raise CaseError(
+            f"a range of speeds with {', '.join(map(repr, value)) or 'nothing'}", code="E-KEY-MISSING",
+            limit="from, to and count", remedy='write {from = "250 rpm", to = "3100 rpm", count = 12}',
+        )  # fmt: skip
     ends = _SpeedRange.model_validate(value)
     step = (ends.to - ends.start) / (ends.count - 1)
     return [f"{ends.start + i * step!r} rad/s" for i in range(ends.count)]
@@ -380,7 +387,7 @@ class DynamicsSection(Section):
     up_to: Annotated[float, Quantity(FREQUENCY, 10.0, 200e3)] | None = None
     mesh_harmonics: Annotated[int, Count(1, 512)] | None = None
     response_harmonics: Annotated[int, Count(1, 1000)] | None = None
-    tolerance: Annotated[float, Number(1e-14, 1e-2)] = 1e-6
+    tolerance: Annotated[float, Number(1e-12, 1e-2)] = 1e-6
 
 
 class PublishedLines(Section):
@@ -413,7 +420,7 @@ class Case(Section, ReadCase):
     ``notices`` what was read in a way that deserves to be said.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = FORMAT
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
     title: Title
     set: SetSection
     rack: RackSection = RackSection()

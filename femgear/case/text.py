@@ -8,11 +8,12 @@ import os
 import re
 import stat
 import tomllib
+from datetime import date, time
 from html import escape
 
 from pydantic import BaseModel, PrivateAttr
 
-from femgear.errors import CaseError, Finding
+from femgear.errors import CaseError, Finding, printable
 
 _MAX_BYTES = 1_000_000
 _MAX_DEPTH = 32
@@ -36,26 +37,34 @@ def read_text(path: str | os.PathLike) -> str:
         ``E-FILE``: missing, unreadable, not a regular file, empty or over 1 MB.
         ``E-FILE-ENC``: not UTF-8, with the offset of the first wrong byte.
     """
-    name = printable(os.fsdecode(path))
+    name = os.fsdecode(path)
     try:
         # O_NONBLOCK: opening a FIFO must not wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise CaseError(f"cannot open the file: {reason}", code="E-FILE", file=name) from error
+        raise CaseError(
+            f"cannot open the file: {reason}",
+            code="E-FILE",
+            file=name,
+            remedy="check its name and permissions",
+        ) from error
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise CaseError("not a regular file", code="E-FILE", file=name, remedy="name a TOML file")
         with open(descriptor, "rb", closefd=False) as stream:
             data = stream.read(_MAX_BYTES + 1)
     except OSError as error:
-        raise CaseError(f"cannot read the file: {error.strerror}", code="E-FILE", file=name) from error
+        raise CaseError(
+            f"cannot read the file: {error.strerror}", code="E-FILE", file=name, remedy="name a TOML file"
+        ) from error
     finally:
         os.close(descriptor)
     if len(data) > _MAX_BYTES:
         raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{_MAX_BYTES} bytes")
     if not data.strip():
-        raise CaseError("the file is empty", code="E-FILE", file=name)
+        remedy = "femgear schema prints what a case file holds"
+        raise CaseError("the file is empty", code="E-FILE", file=name, remedy=remedy)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -147,12 +156,13 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
                 code="E-TOML",
                 key=key,
                 file=name,
-                remedy="keep one of them",
-            )
-    remedy = None
+                remedy="keep one of them" if "Cannot overwrite" in message
+                else f"keep one of them; tables of a list have double brackets, [[{key}]]",
+            )  # fmt: skip
+    remedy = 'lines are [section] or key = value; texts and quantities stand in quotation marks, as in "2 mm"'
     if "octal" in message or re.search(r"=\s*0\d", lines_of_text[min(line, len(lines_of_text)) - 1]):
         remedy = "a number has no leading zeros"
-    elif "end of document" in message:
+    elif "(at end of document)" in message:
         started = max((number for _, number in _entries(text)), default=1)
         remedy = f"close the brackets and quotation marks of the entry in line {started}, or complete it"
     return CaseError(f"not TOML: {message}", code="E-TOML", file=name, remedy=remedy)
@@ -276,7 +286,12 @@ def _value(value: object) -> str:
         return "[" + ", ".join(_value(item) for item in value) + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
-    raise CaseError(f"no TOML form for a {type(value).__name__}", code="E-TYPE", value=value)
+    raise CaseError(
+        f"no TOML form for a {type(value).__name__}",
+        code="E-TYPE",
+        value=value,
+        limit="texts, numbers, true or false, lists and tables",
+    )
 
 
 class ReadCase(BaseModel):
@@ -300,7 +315,7 @@ class ReadCase(BaseModel):
     def __repr__(self) -> str:
         """Kind, title and file: the entries are in `source`."""
         where = f" of {self._name}" if self._name else ""
-        return f"<{type(self).__name__} {getattr(self, 'title', '')!r}{where}>"
+        return printable(f"<{type(self).__name__} {getattr(self, 'title', '')!r}{where}>")
 
     def _repr_html_(self) -> str:
         """The text of the case, for notebooks."""
@@ -333,13 +348,6 @@ class ReadCase(BaseModel):
         return self._notices
 
 
-def printable(text: str) -> str:
-    """Write every control character of ``text`` as an escape: it then fits one line of a message."""
-    return "".join(
-        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text
-    )
-
-
 def shown(number: int) -> str:
     """Write an integer of any size (``str`` refuses those of thousands of digits)."""
     if abs(number) < 10**15:
@@ -353,6 +361,8 @@ def found(number: int) -> int | str:
 
 
 def described(value: object) -> str:
-    """Tell in words what a TOML value is."""
+    """Tell in words what a TOML value, or another one in its place, is."""
     names = {bool: "true or false", int: "an integer", float: "a number", str: "a text", list: "a list"}
-    return names.get(type(value), "a table" if isinstance(value, dict) else "a date or time")
+    if isinstance(value, date | time):
+        return "a date or time"
+    return names.get(type(value)) or ("a table" if isinstance(value, dict) else f"a {type(value).__name__}")

@@ -1,10 +1,12 @@
-"""Runs Gmsh on one prepared outline, in a process of its own: ``python _gmsh_worker.py IN.npz OUT.npz``.
+"""Runs Gmsh on one prepared outline, in a process of its own: ``python _gmsh_worker.py < IN.npz > OUT.npz``.
 
 Gmsh has one global model, does not return on some outlines and installs signal handlers; in a process
 that can be killed none of this matters. Only gmsh and numpy are imported, never femgear.
 Exit codes: 0 done; 3 gmsh cannot be imported; 4 gmsh refused the outline.
 """
 
+import io
+import os
 import signal
 import sys
 
@@ -60,8 +62,8 @@ def _collect(gmsh, n_outline, n_faces):
 
 
 def main(source, target):
-    """Triangulate the job in one ``.npz`` file into another; returns 0, 3 without Gmsh, 4 where it fails."""
-    with np.load(source) as file:
+    """Triangulate the job of one ``.npz`` stream into another; returns 0, 3 without Gmsh, 4 if it fails."""
+    with np.load(io.BytesIO(source.read())) as file:
         job = dict(file)
     if hasattr(signal, "alarm"):  # ends the process even when the one that started it is gone
         signal.alarm(int(job["time_limit"]) + 5)
@@ -78,9 +80,14 @@ def main(source, target):
         return 4
     finally:
         gmsh.finalize()
-    np.savez(target, **result)
+    data = io.BytesIO()
+    np.savez(data, **result)
+    target.write(data.getvalue())
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    # whatever Gmsh prints goes to standard error: standard output holds the grid
+    with open(os.dup(1), "wb") as output:
+        os.dup2(2, 1)
+        sys.exit(main(sys.stdin.buffer, output))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import threading
+import secrets
+import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from femgear.errors import GridError, StorageError
 
 # boundaries of a half sector that `mirror` also gives as one
 JOINED = ("tip", "rim", "root")
+_LARGEST_FILE = 200_000_000
+"""Bytes of a grid."""
 
 
 @dataclass(frozen=True)
@@ -214,6 +217,8 @@ def check_grid(grid: Grid) -> None:
 def write_grid(path: Path, grid: Grid) -> None:
     """Write a grid [m] as Gmsh 2.2 binary with a checksum, boundaries and regions as named physical groups.
 
+    What dead processes left half written under this name is removed.
+
     Raises
     ------
     StorageError
@@ -234,15 +239,22 @@ def write_grid(path: Path, grid: Grid) -> None:
         cells.append(("line3", edges))
         tags.append(np.full(len(edges), number, dtype=np.int32))
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}-{threading.get_ident()}{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.tmp{path.suffix}")
     try:
+        open(temporary, "xb").close()
         meshio.Mesh(points, cells, {}, data, groups).write(temporary, file_format="gmsh22")
         written = temporary.read_bytes()
         temporary.write_bytes(written + _seal_of(written))
         os.replace(temporary, path)
+        # that of a living process is the same grid, which stands there now
+        for other in path.parent.glob(f".{path.stem}.*{path.suffix}"):
+            with contextlib.suppress(OSError):
+                other.unlink()
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+        if isinstance(error, FileNotFoundError) and path.is_file():
+            return
         raise StorageError(f"cannot write the grid {path}: {error}", code="E-GRID-FILE") from error
 
 
@@ -252,12 +264,19 @@ def read_grid(path: Path) -> Grid:
     Raises
     ------
     StorageError
-        The file is missing, truncated, no such grid, or was changed since it was written (E-GRID-FILE).
+        The file is missing, a link or no regular one, truncated, no such grid, or was changed since it was
+        written (E-GRID-FILE).
     """
     import meshio
 
     try:
-        data = path.read_bytes()
+        # O_NONBLOCK: opening a FIFO must not wait for a writer
+        flags = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+        with open(os.open(path, flags), "rb") as stream:
+            found = os.fstat(stream.fileno())
+            if not stat.S_ISREG(found.st_mode) or found.st_size > _LARGEST_FILE:
+                raise ValueError("no regular file of reasonable size")
+            data = stream.read()
         start = data.rfind(b"$Comments\n")
         if start < 0 or data[start:] != _seal_of(data[:start]):
             raise ValueError("its checksum is missing or is not that of its contents")

@@ -6,11 +6,11 @@ Gmsh runs in a process that can be killed; results are cached by content.
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import re
 import subprocess
 import sys
-import tempfile
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -306,7 +306,8 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
         Or any object with the same fields [m].
     cache : path, optional
         Folder in which grids are kept under the hash of their content; None to keep nothing. Where it cannot
-        be written there is a warning.
+        be written there is a warning; so for a file that is damaged or no grid of the outline, which is then
+        made again.
 
     Returns
     -------
@@ -334,20 +335,43 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
 def _mesh_cached(plan: Plan, folder: Path) -> Grid:
     """The grid of a plan from the folder, or made and kept there."""
     path = folder / f"{_content_hash(plan)}.msh"
-    if os.path.exists(path):
+    if os.path.lexists(path):
         try:
-            return read_grid(path)
-        except StorageError:
-            pass  # a damaged file in the cache is made again and replaced
+            return _grid_of_plan(plan, read_grid(path), path)
+        except StorageError as error:
+            warnings.warn(f"the grid is made again: {error.message}", stacklevel=2)
     grid = _mesh_plan(plan)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_grid(path, grid)
     except (OSError, StorageError) as error:
         cause = error if isinstance(error, OSError) else error.__cause__
-        reason = "no folder" if folder.exists() and not folder.is_dir() else getattr(cause, "strerror", error)
+        reason = getattr(cause, "strerror", None) or cause or error
+        reason = "no folder" if folder.exists() and not folder.is_dir() else reason
         warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
     return grid
+
+
+def _grid_of_plan(plan: Plan, found: Grid, path: Path) -> Grid:
+    """The grid of a plan from what a file holds, refused (E-GRID-FILE) where it is none of this plan."""
+    try:
+        corners, n = found.triangles[:, :3], len(plan.points)
+        used, face = np.unique(corners), np.full(len(corners), -1)
+        for k, name in enumerate(plan.faces):
+            face[found.regions[name]] = k
+        points = np.vstack([plan.points, found.points[n : len(used)]])
+        if used[0] != 0 or used[-1] != len(used) - 1 or len(used) < n or not np.isfinite(points).all():
+            raise GridError("it has other nodes", code="E-GRID")
+        grid = _second_order(plan, points, corners, face)
+        check_grid(grid)
+        same = [np.array_equal(grid.points, found.points), np.array_equal(grid.triangles, found.triangles)]
+        for mine, other in ((grid.boundaries, found.boundaries), (grid.regions, found.regions)):
+            same += [mine.keys() == other.keys(), *(np.array_equal(mine[key], other[key]) for key in mine)]
+        if not all(same):
+            raise GridError("it has other points or boundaries", code="E-GRID")
+        return grid
+    except (GridError, KeyError, IndexError, ValueError) as error:
+        raise StorageError(f"{path} is not a grid of this outline: {error!r}", code="E-GRID-FILE") from error
 
 
 def mesh_outlines(outlines, *, cache: Path | None = None) -> tuple[Grid, ...]:
@@ -397,34 +421,35 @@ def _run_gmsh(plan: Plan) -> dict[str, np.ndarray]:
         "loop_ends": np.cumsum([len(loop) for loop in plan.loops]),
         "time_limit": TIME_LIMIT,
     }
-    with tempfile.TemporaryDirectory(prefix="femgear-") as folder:
-        source, target = Path(folder) / "outline.npz", Path(folder) / "grid.npz"
-        np.savez(source, **job)
-        command = [sys.executable, "-P", str(WORKER), str(source), str(target)]
-        try:
-            done = subprocess.run(
-                command, timeout=TIME_LIMIT, capture_output=True, text=True, stdin=subprocess.DEVNULL
-            )
-        except subprocess.TimeoutExpired as error:
-            raise GridError(
-                f"Gmsh was stopped: no grid after {TIME_LIMIT:g} s",
-                code="E-GRID-GMSH",
-                remedy="use fewer points along the outline or a longer time limit",
-            ) from error
-        if done.returncode != 0 or not target.exists():
-            raise _worker_error(done)
-        with np.load(target) as file:
-            result = dict(file)
+    # through pipes: no file is left behind, however this process ends
+    source = io.BytesIO()
+    np.savez(source, **job)
+    command = [sys.executable, "-P", str(WORKER)]
+    try:
+        done = subprocess.run(command, input=source.getvalue(), timeout=TIME_LIMIT, capture_output=True)
+    except subprocess.TimeoutExpired as error:
+        raise GridError(
+            f"Gmsh was stopped: no grid after {TIME_LIMIT:g} s",
+            code="E-GRID-GMSH",
+            remedy="use fewer points along the outline or a longer time limit",
+        ) from error
+    if done.returncode != 0 or not done.stdout:
+        raise _worker_error(done)
+    with np.load(io.BytesIO(done.stdout)) as file:
+        result = dict(file)
     result["points"] = result["points"] * size + centre
     return result
 
 
 def _worker_error(done):
     """Refusal with the last words of the process of Gmsh."""
-    text = " ".join(done.stderr.split())[-400:]
+    text = " ".join(done.stderr.decode(errors="replace").split())[-400:]
     if done.returncode == 3:
         return _library_error(text)
-    return GridError(f"Gmsh failed (exit code {done.returncode}): {text}", code="E-GRID-GMSH")
+    return GridError(
+        f"Gmsh failed (exit code {done.returncode}): {text}", code="E-GRID-GMSH",
+        remedy="try another static.flank_elements; if no grid can be made, install Gmsh anew",
+    )  # fmt: skip
 
 
 def _library_error(text):
@@ -447,7 +472,8 @@ def _second_order(plan: Plan, points, corners, face) -> Grid:
     key = ends[:, 0] * n + ends[:, 1]
     at = np.minimum(np.searchsorted(edges, key), len(edges) - 1)
     if np.any(edges[at] != key):
-        raise GridError("Gmsh divided a segment of the outline", code="E-GRID-GMSH")
+        remedy = "try another static.flank_elements"
+        raise GridError("Gmsh divided a segment of the outline", code="E-GRID-GMSH", remedy=remedy)
     mids[at] = plan.mids
     triangles = np.hstack([corners, n + where.reshape(-1, 3)])
     edge_nodes = np.column_stack([plan.segments, n + at])

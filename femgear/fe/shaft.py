@@ -290,7 +290,10 @@ def _half_section(steps, refine):
         raise GeometryError("a shaft without parts", code="E-SHAFT", limit="one part or more")
     for one, other in pairwise(steps):
         if not max(one.inner_diameter, other.inner_diameter) < min(one.outer_diameter, other.outer_diameter):
-            raise GeometryError("two neighbouring parts of a shaft do not touch", code="E-SHAFT")
+            raise GeometryError(
+                "two neighbouring parts of a shaft do not touch", code="E-SHAFT",
+                limit="the bore of each below the outer diameter of the other",
+            )  # fmt: skip
     wall = min(0.5 * (step.outer_diameter - step.inner_diameter) for step in steps)
     size = wall / (ACROSS * refine)
     z = np.concatenate([[0.0], np.cumsum([step.length for step in steps])])

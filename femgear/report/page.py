@@ -12,6 +12,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from femgear.errors import printable
 from femgear.report.style import save_figure
 from femgear.report.tables import Block
 from femgear.storage.files import checksum, storage_errors, write_text
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 _LARGEST_PICTURE = 8_000_000
 """Bytes of a picture on the page."""
 _OTHER = "Other pictures"
+# what HTML and UTF-8 do not hold, and what reverses the order of the text around it
+_CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """Section of those that no stage describes."""
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
 _STYLE = """
@@ -119,7 +122,7 @@ def write_report(train: Train, results: Results) -> Path:
         When files were changed since the run, or the page cannot be written.
     """
     path = results.folder / "report.html"
-    write_text(page(train, results), path)
+    write_text(_CONTROLS.sub(lambda found: printable(found[0]), page(train, results)), path)
     return path
 
 

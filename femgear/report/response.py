@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
     from femgear.gears.planetary import PlanetarySet
 
+_READ = 500
+"""Speeds that are read at once where all are looked at."""
 _MANY_SPEEDS = 3
 """More speeds are drawn over the speed, too."""
 _DECADES, _MOST_BARS = 1e-5, 60
@@ -230,7 +232,7 @@ def transmission_error_period(
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
     position = np.linspace(0.0, 1.0, max(256, 16 * int(h.max())) + 1)
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
-    errors = 1e6 * np.real(harmonics_of(dynamics, "dte")[speeds][..., h > 0] @ wave)
+    errors = 1e6 * np.real(harmonics_of(dynamics.isel(speed=speeds), "dte")[..., h > 0] @ wave)
     curves = [*errors] if static is None else [*errors, 1e6 * static["ste"].values]
     # what is one line at one speed need not be one at another: the lines are those of all speeds
     lines = distinct_lines(dynamics["mesh"].values, np.hstack(curves), partly=together)
@@ -267,14 +269,14 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     """
     from matplotlib.ticker import MaxNLocator
 
-    speeds = _some_speeds(dynamics.sizes["speed"])
-    figure, axes = _panels(len(speeds))
+    dynamics = dynamics.isel(speed=_some_speeds(dynamics.sizes["speed"]))
+    figure, axes = _panels(dynamics.sizes["speed"])
     h = dynamics["harmonic"].values
     amplitude, h = np.abs(harmonics_of(dynamics, "dte"))[:, :, h > 0] * 1e6, h[h > 0]
-    names, largest = dynamics["mesh"].values, amplitude[speeds].max(initial=0.0)
+    names, largest = dynamics["mesh"].values, amplitude.max(initial=0.0)
     # below are rounding and what the iteration leaves: no line is drawn there
     floor = _DECADES * largest
-    for ax, s in zip(axes, speeds):
+    for s, ax in enumerate(axes):
         lines = distinct_lines(names, amplitude[s])
         few = len(lines) * len(h) <= _MOST_BARS
         for i, (text, row) in enumerate(lines):
@@ -332,8 +334,7 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     figure, (top, bottom) = new_figure(rows=2, height=7.0, sharex=True)
     order = np.argsort(dynamics["speed"].values)
     speed = dynamics["speed"].values[order]
-    h = dynamics["harmonic"].values
-    rms = np.sqrt(0.5 * (np.abs(harmonics_of(dynamics, "dte")[order][:, :, h > 0]) ** 2).sum(axis=2)) * 1e6
+    rms = fluctuation_rms(dynamics)[order] * 1e6
     marker = {"marker": "o", "markersize": 4} if len(speed) < 40 else {}
     lines = distinct_lines(dynamics["mesh"].values, rms.T)
     for i, (text, row) in enumerate(lines):
@@ -370,6 +371,14 @@ def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure
     if dynamics.sizes["speed"] > _MANY_SPEEDS:
         figures["speed_sweep"] = speed_sweep(dynamics)
     return figures
+
+
+def fluctuation_rms(dynamics: xr.Dataset) -> np.ndarray:
+    """Compute the RMS of the transmission errors less their means (speeds, meshes) [m]."""
+    fluctuating, count = dynamics["harmonic"].values > 0, dynamics.sizes["speed"]
+    parts = (dynamics.isel(speed=slice(i, i + _READ)) for i in range(0, count, _READ))
+    squares = (np.abs(harmonics_of(part, "dte")[..., fluctuating]) ** 2 for part in parts)
+    return np.sqrt(0.5 * np.concatenate([one.sum(axis=2) for one in squares]))
 
 
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:

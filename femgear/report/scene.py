@@ -24,7 +24,7 @@ from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
-from femgear.storage.files import replace_file, write_bytes
+from femgear.storage.files import write_bytes, write_text
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -208,9 +208,15 @@ def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
     """Write a grid as compressed VTU; the file is either the old or the new one, whole."""
     if Path(path).suffix != ".vtu":
         raise CaseError("fields are written as VTU", code="E-CHOICE", value=str(path), limit=".vtu")
-    replace_file(
-        path, lambda temporary: grid.save(temporary, binary=True), size=grid.actual_memory_size * 1024
-    )
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    # in memory, and then to the file: VTK ends the process where a disk fails under it
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    write_text(writer.GetOutputString(), path)
 
 
 def deformed_picture(
@@ -598,5 +604,6 @@ def _write_gif(path, images) -> None:
     """Write the frames, whole or not at all."""
     import imageio.v3 as iio
 
-    duration, size = 1000.0 * _SECONDS / len(images), sum(image.nbytes for image in images) // 20
-    replace_file(path, lambda new: iio.imwrite(new, images, duration=duration, loop=0), size=size)
+    stream = io.BytesIO()
+    iio.imwrite(stream, images, extension=".gif", duration=1000.0 * _SECONDS / len(images), loop=0)
+    write_bytes(stream.getvalue(), path)

@@ -9,14 +9,22 @@ import contextlib
 import csv
 import errno
 import hashlib
+import importlib
 import io
+import json
 import os
 import re
+import secrets
 import shutil
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import stat
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType, MethodType
+from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -26,19 +34,23 @@ from femgear.errors import StorageError
 if TYPE_CHECKING:
     import xarray as xr
 
-if sys.platform != "win32":
-    import fcntl
-
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
-_RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
+_RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
+"""Names that some file system gives a meaning of its own, or takes for others."""
+# what `replace_file` writes under; older versions had the number of the process
+_TEMPORARY = re.compile(r"\..+\.([0-9a-f]{16}|\d{1,10})\.tmp(\..{1,8})?")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
+_SEQUENCES: dict[str, Callable] = {one.__name__: one for one in (tuple, list, set, frozenset)}
+_OWN = "femgear."
 # what was written into a folder, as sha256sum lists it
 _WRITTEN = ".written"
 # bytes that a file may declare beyond four times its size
 _MARGIN = 1_000_000
+# bytes of a file from which its numbers are read when they are asked for
+_LARGE = 200_000_000
 
 
 def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
@@ -55,6 +67,11 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     StorageError
         ``E-FORMAT``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
     """
+    replace_file(path, lambda temporary: _to_netcdf(dataset, temporary), size=int(dataset.nbytes))
+
+
+def _to_netcdf(dataset: xr.Dataset, path: Path, **options: Any) -> None:
+    """Write a dataset as `write_dataset` does, under the name itself."""
     encoding = {}
     for name, variable in dataset.variables.items():
         kind = variable.dtype.kind
@@ -63,18 +80,85 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         if kind == "f":
             encoding[name] |= {"dtype": "float64", "_FillValue": None}
     stamped = dataset.assign_attrs(femgear_format=_FORMAT, femgear_version=__version__)
-    replace_file(
-        path,
-        lambda temporary: stamped.to_netcdf(temporary, engine="h5netcdf", encoding=encoding),
-        size=int(dataset.nbytes),
-    )
+    options |= {"engine": "h5netcdf", "encoding": encoding}
+    write_hdf5(path, lambda stream: stamped.to_netcdf(stream, **options))
+
+
+def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
+    """Append a dataset to a file of its kind along one dimension; the file has the texts of the latest.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As for `write_dataset`; what does not extend over the dimension is that of the first one.
+    path : path
+        From `replaced_file`: the first dataset is written into an empty file.
+    along : str
+        Name of the dimension.
+    """
+    if path.stat().st_size:
+        write_hdf5(path, lambda stream: _append(dataset, stream, along))
+    else:
+        _to_netcdf(dataset, path, unlimited_dims=[along])
+
+
+def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
+    """Append as `append_dataset` to an open file."""
+    import h5py
+
+    with h5py.File(stream, "r+") as file:
+        for name, variable in dataset.variables.items():
+            if along in variable.dims:
+                axis, stored = variable.dims.index(along), file[str(name)]
+                assert isinstance(stored, h5py.Dataset)
+                end = stored.shape[axis] + variable.shape[axis]
+                place = [slice(None)] * variable.ndim
+                place[axis] = slice(stored.shape[axis], end)
+                stored.resize(end, axis=axis)
+                stored[tuple(place)] = variable.values
+        file.attrs.update({str(name): text for name, text in dataset.attrs.items() if isinstance(text, str)})
+
+
+def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object]) -> None:
+    """Write an HDF5 file by ``write(stream)``; raises the `OSError` of a disk that fails meanwhile."""
+    with _Disk(path, "r+b") as disk, ThreadPoolExecutor(1) as pool:
+        try:
+            # signals interrupt the main thread alone: raised within HDF5 they would be lost
+            pool.submit(write, disk).result()
+        finally:
+            if disk.failure is not None:
+                raise disk.failure
+
+
+class _Disk(io.FileIO):
+    """A file that keeps its first failure for later: HDF5 ends the process where a disk fails under it."""
+
+    failure: OSError | None = None
+
+    def write(self, data) -> int:
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        try:
+            while len(rest) and self.failure is None:
+                rest = rest[super().write(rest) :]
+        except OSError as error:
+            self.failure = error
+        return size
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size) if self.failure is None else 0
+        except OSError as error:
+            self.failure = error
+            return 0
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     """Read a dataset that `write_dataset` wrote: numbers in memory, dimensions, and units as attributes.
 
-    The file is walked first: links, data kept in other files, unusual types and declared sizes that the
-    file cannot hold are refused before anything is read.
+    Numbers of a large file stay there until they are asked for, and are read again whenever they are: choose
+    some by ``isel`` first. The file is walked before: links, data kept in other files, unusual types and
+    declared sizes that the file cannot hold are refused.
 
     Raises
     ------
@@ -88,8 +172,10 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
         if not os.path.isfile(path):
             raise StorageError("no such file", code="E-STORAGE", file=name)
         _refuse_hostile(path)
+    options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
     try:
-        dataset = xr.load_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False)
+        large = os.path.getsize(path) > _LARGE
+        dataset = xr.open_dataset(path, cache=False, **options) if large else xr.load_dataset(path, **options)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
         raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
     version = dataset.attrs.get("femgear_format")
@@ -104,13 +190,163 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     return dataset
 
 
-def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
-    """Write a file under a temporary name, force it to the disk, then give it its name.
+def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -> None:
+    """Write the result of a stage, so that a run that was interrupted goes on from it; see `read_result`.
 
     Parameters
     ----------
-    write : callable
-        ``(path)`` writes the file under a temporary path, in the same folder and with the same suffix.
+    result : object
+        Made of dataclasses and sections of femgear, arrays, sparse matrices, tables, sequences and numbers.
+    fingerprint : str
+        Of all that the result depends on.
+
+    Raises
+    ------
+    TypeError
+        Anything else, such as a function.
+    StorageError
+    """
+    arrays: list[np.ndarray] = []
+    tree = {"fingerprint": fingerprint, "result": _encoded(result, arrays, {})}
+    text = np.frombuffer(json.dumps(tree).encode(), np.uint8)
+    size = sum(array.nbytes for array in arrays)
+    replace_file(path, lambda new: np.savez(new, text, *arrays), size=size)  # type: ignore[arg-type]
+
+
+def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
+    """Read the result that `write_result` wrote with a fingerprint: numbers and objects of femgear alone.
+
+    Raises
+    ------
+    StorageError
+        ``E-FORMAT``: damaged, or written with another fingerprint.
+    """
+    try:
+        with storage_errors(path), np.load(path, allow_pickle=False) as file:
+            arrays = [file[f"arr_{i}"] for i in range(len(file.files))]
+        tree = json.loads(arrays[0].tobytes())
+        if tree["fingerprint"] == fingerprint:
+            return _decoded(tree["result"], arrays[1:], {})
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, ImportError, BadZipFile):
+        pass
+    raise StorageError("no result of this case", code="E-FORMAT", file=os.fspath(path))
+
+
+def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, Any]]) -> Any:
+    """Turn a value into JSON that numbers its arrays; what was met before is named by its number."""
+
+    def inner(value: Any) -> Any:
+        return _encoded(value, arrays, known)
+
+    def pairs(table: Mapping) -> list:
+        return [[inner(key), inner(item)] for key, item in table.items()]
+
+    kind = type(value)
+    if value is None or kind in (bool, int, float, str):
+        return value
+    if id(value) in known:
+        return {"kind": "known", "number": known[id(value)][0]}
+    number = len(known)
+    # the value itself is kept, so that no other one gets its id
+    known[id(value)] = number, value
+    found: dict[str, Any] = {"number": number, "kind": kind.__name__}
+    if kind is np.ndarray and value.dtype != object:
+        arrays.append(value)
+        return found | {"array": len(arrays) - 1, "fixed": not value.flags.writeable}
+    if isinstance(value, np.generic | complex):
+        arrays.append(np.asarray(value))
+        return found | {"kind": "complex" if kind is complex else "generic", "array": len(arrays) - 1}
+    if kind in (tuple, list, set, frozenset):
+        return found | {"items": [inner(item) for item in value]}
+    if kind in (dict, MappingProxyType):
+        return found | {"items": pairs(value)}
+    if kind is slice:
+        return found | {"items": [inner(item) for item in (value.start, value.stop, value.step)]}
+    if kind is MethodType:
+        return found | {"name": value.__name__, "of": inner(value.__self__)}
+    if kind.__module__.startswith("scipy.sparse") and value.format in ("csc", "csr"):
+        parts = value.data, value.indices, value.indptr, value.shape
+        return found | {"items": [inner(item) for item in parts]}
+    if not kind.__module__.startswith(_OWN):
+        raise TypeError(f"a {kind.__qualname__} cannot be written")
+    state = value.__getstate__()
+    if is_dataclass(value):
+        state = {one.name: getattr(value, one.name) for one in fields(value)}
+    return found | {"kind": "own", "class": [kind.__module__, kind.__qualname__], "items": pairs(state)}
+
+
+def _decoded(node: Any, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
+    """Turn JSON of `_encoded` into the value again."""
+    if not isinstance(node, dict):
+        return node
+    if node["kind"] == "known":
+        return known[node["number"]]
+    value = known[node["number"]] = _made(node, arrays, known)
+    return value
+
+
+def _made(node: dict, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
+    """Make the value of a node that was not met before."""
+
+    def items() -> list:
+        return [_decoded(item, arrays, known) for item in node["items"]]
+
+    def table() -> dict:
+        return {_decoded(key, arrays, known): _decoded(item, arrays, known) for key, item in node["items"]}
+
+    match node["kind"]:
+        case "ndarray":
+            array = arrays[node["array"]]
+            array.setflags(write=not node["fixed"])
+            return array
+        case "generic" | "complex" as kind:
+            number = arrays[node["array"]][()]
+            return number if kind == "generic" else complex(number)
+        case "dict":
+            return table()
+        case "mappingproxy":
+            return MappingProxyType(table())
+        case "slice":
+            return slice(*items())
+        case "method":
+            return getattr(_decoded(node["of"], arrays, known), node["name"])
+        case "csc_array" | "csr_array" | "csc_matrix" | "csr_matrix" as kind:
+            *parts, shape = items()
+            return getattr(importlib.import_module("scipy.sparse"), kind)(tuple(parts), shape=shape)
+        case "own":
+            module, name = node["class"]
+            return _own_object(module, name, table())
+        case kind:
+            return _SEQUENCES[kind](items())
+
+
+def _own_object(module: str, name: str, state: dict) -> Any:
+    """Make an object of one of femgear's classes as it was; its checks have been passed before."""
+    found = getattr(importlib.import_module(module), name) if module.startswith(_OWN) else None
+    if not isinstance(found, type):
+        raise TypeError(f"{module} has no class {name}")
+    made = object.__new__(found)
+    if is_dataclass(found):
+        vars(made).update(state)
+    else:
+        made.__setstate__(state)  # type: ignore[attr-defined]
+    return made
+
+
+def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
+    """Write a file by ``write(path)`` into an empty one of another name; see `replaced_file`."""
+    with replaced_file(path, size=size) as temporary:
+        write(temporary)
+
+
+@contextlib.contextmanager
+def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Path]:
+    """Have an empty file of another name filled in the block, force it to the disk, then give it its name.
+
+    It is in the same folder and has the same suffix; no link is followed.
+
+    Parameters
+    ----------
     size : int
         What the disk must have room for [bytes].
 
@@ -120,7 +356,7 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
         ``E-DISK-FULL``, ``E-STORAGE``; the old file is untouched and no temporary one stays behind.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.tmp{path.suffix}")
     with storage_errors(path):
         free = shutil.disk_usage(path.parent).free
         if free < size + _RESERVE:
@@ -133,7 +369,8 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
                 remedy="free some space or name another folder",
             )
         try:
-            write(temporary)
+            open(temporary, "xb").close()
+            yield temporary
             with open(temporary, "rb+") as stream:
                 os.fsync(stream.fileno())
             if _is_regular(path.with_name(_WRITTEN)):
@@ -141,6 +378,19 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
+
+
+def remove_temporaries(folder: str | os.PathLike) -> None:
+    """Remove what dead processes left half written in a folder; nobody else may write into it meanwhile."""
+    with storage_errors(folder):
+        for path in Path(folder).iterdir():
+            if is_temporary(path):
+                path.unlink()
+
+
+def is_temporary(path: Path) -> bool:
+    """Tell whether a regular file has a name that `replace_file` writes under."""
+    return bool(_TEMPORARY.fullmatch(path.name)) and _is_regular(path)
 
 
 def write_bytes(data: bytes, path: str | os.PathLike) -> None:
@@ -172,6 +422,9 @@ def csv_cell(value: object) -> object:
 
 def checksum(path: str | os.PathLike) -> str:
     """Compute the SHA-256 of a file."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        # a pipe would wait, a device never end
+        raise StorageError("not a regular file", file=os.fspath(path), remedy="move it away")
     with storage_errors(path), open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
@@ -246,12 +499,15 @@ def _is_regular(path: Path) -> bool:
 
 def checked_name(name: str) -> str:
     """Refuse (E-CHOICE) a name that some file system does not take as one plain file name."""
-    if not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.startswith(".") or name.endswith("."):
+    plain = name.isprintable() and unicodedata.is_normalized("NFC", name) and not _RESERVED.fullmatch(name)
+    if not plain or len(name) > 100 or len(name.encode()) > 240:
         raise StorageError(
             "not a safe file name",
             code="E-CHOICE",
             value=name,
-            limit="1 to 100 of A-Z a-z 0-9 . _ -, no dot at the ends, no reserved name",
+            limit='1 to 100 characters (240 bytes), composed (NFC), without / \\ : * ? " < > | and control '
+            "characters, no dot or blank at the ends, none that Windows reserves (con, nul, com1, ...)",
+            remedy="name another folder",
         )
     return name
 
@@ -270,46 +526,47 @@ def is_safe_path(name: str) -> bool:
 def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
     """Hold a lock file for the block; the system releases it when the process ends, however it ends.
 
-    Advisory (``flock``): it keeps those out that ask for it. Where the system has no ``flock`` (Windows)
-    nothing is locked.
+    It keeps those out that ask for it, other threads of this process too; at the end the file is removed.
 
     Raises
     ------
     StorageError
         ``E-LOCKED``: another process, or another block of this one, holds it.
     """
-    if sys.platform == "win32":
-        yield
-        return
+    from filelock import FileLock, Timeout
+
     path = Path(path)
+    # not at once: whoever held it before removes the file and may be about to
+    lock = FileLock(path, timeout=0.1, poll_interval=0.02, thread_local=False, fallback_to_soft=False)
     with storage_errors(path):
-        # whoever held it before may have removed the file that was opened
-        while (descriptor := _locked(path)) is None:
-            pass
+        try:
+            lock.acquire()
+        except Timeout:
+            raise StorageError(
+                "another run is writing into this folder",
+                code="E-LOCKED",
+                file=str(path.parent),
+                remedy="wait until it has ended, or name another folder",
+            ) from None
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)
-        os.close(descriptor)
+        # on Windows the library removes it, after the release
+        with contextlib.suppress(OSError):
+            found = path.lstat()
+            if stat.S_ISREG(found.st_mode) and not found.st_size:
+                path.unlink()
+        lock.release()
 
 
-def _locked(path: Path) -> int | None:
-    """Open and lock a file; nothing where the path names another file by now."""
-    descriptor, held = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644), False
+@contextlib.contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """Say with an interruption of the block that the same command goes on from what a folder holds."""
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        held = path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor))
-    except BlockingIOError:
-        raise StorageError(
-            "another run is writing into this folder",
-            code="E-LOCKED",
-            file=str(path.parent),
-            remedy="wait until it has ended, or name another folder",
-        ) from None
-    finally:
-        if not held:
-            os.close(descriptor)
-    return descriptor if held else None
+        yield
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note(f"the same command goes on from what {folder} holds")
+        raise
 
 
 @contextlib.contextmanager
@@ -324,11 +581,17 @@ def storage_errors(path: str | os.PathLike) -> Iterator[None]:
 def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
     """Say what an `OSError` says in a `StorageError`, ``E-DISK-FULL`` or ``E-STORAGE``."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    remedies = {
+        errno.ENOSPC: "free some space or name another folder",
+        errno.EDQUOT: "free some space or name another folder",
+        errno.EFBIG: "raise the limit of the size of files (ulimit -f), or name another folder",
+        errno.ELOOP: "move the link away",
+    }
     return StorageError(
         error.strerror or str(error),
         code="E-DISK-FULL" if full else "E-STORAGE",
         file=None if path is None else os.fsdecode(path),
-        remedy="free some space or name another folder" if full else None,
+        remedy=remedies.get(error.errno or 0, "check name and permissions"),
     )
 
 

@@ -5,15 +5,17 @@ The manifest holds the checksum of every file and whether the run came to its en
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
 import platform
+import re
 import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from html import escape
 from importlib.metadata import version
@@ -31,7 +33,9 @@ from femgear.storage.files import (
     csv_cell,
     exclusive_lock,
     is_safe_path,
+    is_temporary,
     read_dataset,
+    remove_temporaries,
     storage_errors,
     write_text,
 )
@@ -43,7 +47,9 @@ FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
 _FORMAT = 1
 MANIFEST = "manifest.json"
 _CASE, _LOCK = "case.toml", ".lock"
-_RUNNING, _FINISHED = ".running", ".finished"
+_RUNNING, _FINISHED, _ADDED, EXPORTED = ".running", ".finished", ".added", "exported"
+_WRITTEN = re.compile(r"manifest\.json|case\.toml|[\w.-]+\.(nc|npz|png|gif|vtu|html|csv)")
+"""Names of the files that femgear writes; a folder of its own that holds others is not removed."""
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
     "axis": ("1", "axis of the frame of the carrier"),
@@ -59,6 +65,21 @@ _COORDINATES = {
     "speed": ("rpm", "speed of the input"),
 }
 """Unit and description of what the variables of planetary sets stand over."""
+_ATTRIBUTES = {
+    name: unit
+    for unit, names in (
+        ("Hz", "bandwidth compared_to excitation_reach natural_frequency resolution"),
+        ("m", "centre_distance face_width half_backlash"),
+        ("N", "unit_force"),
+        ("N m", "sun_torque"),
+        ("rad", "base_helix_angle planet_angles sensor_angle"),
+        ("rad", "working_pressure_angle_planet_ring working_pressure_angle_sun_planet"),
+        ("rad/s", "speed"),
+        ("s", "settle step"),
+    )
+    for name in names.split()
+}
+"""Units of the attributes of the files; the others are pure numbers or words."""
 
 
 def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
@@ -99,7 +120,8 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
     """Write the variables of a stage as CSV files, one for each set of dimensions; headers carry the units.
 
     ``modes_dof_mode.csv`` holds the variables over degrees of freedom and modes, a line for each pair;
-    ``modes.csv`` holds single numbers and the attributes of the file, a line for each.
+    ``modes.csv`` holds single numbers and the attributes of the file, a line for each. Tables without a line
+    are left out.
 
     Returns
     -------
@@ -111,7 +133,7 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
     flat, tables = data.reset_coords(), {}
     single = [
         *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
-        *((str(name), value if np.isscalar(value) else str(value), "") for name, value in data.attrs.items()),
+        *(_attribute(str(name), value) for name, value in data.attrs.items()),
     ]
     if single:
         tables[()] = pd.DataFrame(single, columns=["name", "value", "unit"])
@@ -121,11 +143,19 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
         tables[dims] = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
     names = []
     for dims, frame in tables.items():
-        names.append("_".join((stage, *dims)) + ".csv")
+        if frame.empty:
+            continue
+        names.append(checked_name("_".join((stage, *dims)) + ".csv"))
         text = frame.select_dtypes(["object", "str"]).map(csv_cell)
         frame[text.columns] = text
         write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])
     return names
+
+
+def _attribute(name: str, value: Any) -> tuple[str, Any, str]:
+    """Name, value and unit of an attribute of a file."""
+    number = np.asarray(value).dtype.kind in "iuf"
+    return name, value if np.isscalar(value) else str(value), _ATTRIBUTES.get(name, "1") if number else ""
 
 
 def _unit(one: xr.DataArray) -> str:
@@ -295,7 +325,7 @@ def results_of(
 
 
 @contextmanager
-def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Path]:
+def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: bool = False) -> Iterator[Path]:
     """Lock a folder for a run to write into; old results stay until the new ones are complete.
 
     A run that replaces results is given a folder inside, whose files take their place at the end; should it
@@ -305,8 +335,10 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
     ----------
     folder : path-like
         Created where it does not exist (its last name must be safe, see `checked_name`).
+    case : str, optional
+        Text of the case, as for `prepare_output`.
     force : bool
-        Replace the results of a complete earlier run.
+        Replace the results of an earlier run.
 
     Yields
     ------
@@ -321,36 +353,87 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
     folder = Path(folder)
     _make(folder)
     with folder_lock(folder):
-        if (folder / _FINISHED).is_dir():
-            _publish(folder)  # what a run could not bring to its end because it was killed
-        _remove_tree(folder / _RUNNING)
+        running = folder / _RUNNING
         if not (force and (folder / MANIFEST).is_file() and read_manifest(folder).complete):
-            yield prepare_output(folder)
+            _remove_tree(running)
+            yield prepare_output(folder, case=case, force=force)
             return
         _refuse_changed(folder, read_manifest(folder))
         try:
+            if case is None or not (running / MANIFEST).is_file():
+                _remove_tree(running)
             with storage_errors(folder):
-                (folder / _RUNNING).mkdir()
-            yield prepare_output(folder / _RUNNING)
-            if read_manifest(folder / _RUNNING).complete:
+                running.mkdir(exist_ok=True)
+            yield prepare_output(running, case=case, force=True)
+            if read_manifest(running).complete:
                 with storage_errors(folder):
-                    os.replace(folder / _RUNNING, folder / _FINISHED)
+                    os.replace(running, folder / _FINISHED)
                 _publish(folder)
-        finally:
-            _remove_tree(folder / _RUNNING)
+        except BaseException as error:
+            # what a user interrupts goes on with the next run
+            if case is None or isinstance(error, Exception) or not read_manifest(running).files:
+                _remove_tree(running)
+            raise
 
 
-def folder_lock(folder: str | os.PathLike):
+@contextmanager
+def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
     """Lock a results folder: in this context no other process writes into it (readers need no lock).
 
-    Refuses a folder that another run holds (E-LOCKED), or that is not there (E-RESULTS-MISSING).
+    What a killed run left in it is brought to its end or removed. Refuses a folder that another run holds
+    (E-LOCKED), or that is not there (E-RESULTS-MISSING).
     """
-    _refuse_missing(Path(folder))
-    return exclusive_lock(Path(folder) / _LOCK)
+    folder = Path(folder)
+    _refuse_missing(folder)
+    with exclusive_lock(folder / _LOCK):
+        remove_temporaries(folder)
+        _publish(folder)
+        _remove_tree(folder / _ADDED)
+        yield
 
 
-def prepare_output(folder: str | os.PathLike) -> Path:
+@contextmanager
+def additions(folder: Path) -> Iterator[Path]:
+    """Add files to results, whose folder is locked; the manifest lists them.
+
+    Yields
+    ------
+    Path
+        Folder inside. At the end its files take the places that they have in it.
+
+    Raises
+    ------
+    StorageError
+        ``E-OUTPUT``: a file of the manifest was changed, or one that it does not list is in the way.
+    """
+    manifest = read_manifest(folder)
+    _refuse_changed(folder, manifest)
+    added = folder / _ADDED
+    try:
+        with storage_errors(added):
+            added.mkdir()
+        yield added
+        paths = sorted(path for path in added.rglob("*") if path.is_file())
+        files = {path.relative_to(added).as_posix(): checksum(path) for path in paths}
+        _movable(added, folder, files, manifest.files)  # refused before it counts as finished
+        _write_manifest(added, replace(manifest, files={**manifest.files, **files}))
+        with storage_errors(folder):
+            os.replace(added, folder / _FINISHED)
+        _publish(folder)
+    finally:
+        _remove_tree(added)
+
+
+def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force: bool = False) -> Path:
     """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
+
+    Parameters
+    ----------
+    folder : path-like
+    case : str, optional
+        Text of the case to run: what an interrupted run of it left stays, for this one to go on from.
+    force : bool
+        Replace what an interrupted run of another case left.
 
     Returns
     -------
@@ -360,8 +443,8 @@ def prepare_output(folder: str | os.PathLike) -> Path:
     Raises
     ------
     StorageError
-        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, or files of an
-        interrupted run that were changed.
+        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, files of an
+        interrupted run of another case, or files of one that were changed.
     """
     folder = Path(folder)
     _make(folder)
@@ -375,10 +458,25 @@ def prepare_output(folder: str | os.PathLike) -> Path:
                 remedy="name a new folder, or replace them with --force",
             )
         _refuse_changed(folder, manifest)
-        with storage_errors(folder):
-            _remove_unchanged(folder, manifest.files)
+        own = case is not None and manifest.files.get(_CASE) == hashlib.sha256(case.encode()).hexdigest()
+        if own:
+            return folder
+        if case is not None and _CASE in manifest.files and not force:
+            raise StorageError(
+                "the folder holds an interrupted run of another case",
+                code="E-OUTPUT",
+                file=str(folder),
+                remedy="name a new folder, or replace it with --force",
+            )
+        discard(folder, manifest.files)
     _write_manifest(folder, Manifest(complete=False))
     return folder
+
+
+def discard(folder: Path, files: Mapping[str, str]) -> None:
+    """Remove files of a run that are unchanged, names with checksums, and folders that are empty then."""
+    with storage_errors(folder):
+        _remove_unchanged(folder, files)
 
 
 def record(
@@ -387,6 +485,7 @@ def record(
     *,
     timings: Mapping[str, float],
     convergence: Mapping[str, object],
+    known: Mapping[str, str] = MappingProxyType({}),
     complete: bool = False,
 ) -> Manifest:
     """Write the manifest of what a run has written so far.
@@ -395,6 +494,8 @@ def record(
     ----------
     names : list of str
         Files that the run wrote, as paths inside the folder.
+    known : mapping of str to str
+        Checksums of those that are as they were, which saves reading them.
     timings : mapping of str to float
         Seconds a stage.
     convergence : mapping
@@ -402,16 +503,20 @@ def record(
     complete : bool
         Whether the run came to its end.
     """
-    files = {name: checksum(Path(folder) / name) for name in names}
-    versions = {"femgear": __version__, "python": platform.python_version()}
-    versions |= {name: version(name) for name in _LIBRARIES}
-    manifest = Manifest(complete, files, timings, convergence, versions)
+    files = {name: known.get(name) or checksum(Path(folder) / name) for name in names}
+    manifest = Manifest(complete, files, timings, convergence, versions())
     _write_manifest(folder, manifest)
     return manifest
 
 
 finish = partial(record, complete=True)
 """`record` of a run that came to its end."""
+
+
+def versions() -> dict[str, str]:
+    """List the versions of femgear and of the libraries that compute."""
+    found = {"femgear": __version__, "python": platform.python_version()}
+    return found | {name: version(name) for name in _LIBRARIES}
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:
@@ -470,7 +575,10 @@ def _plain(value: Any) -> object:
 def _refuse_missing(folder: Path) -> None:
     """Refuse a folder that is not there."""
     if not folder.is_dir():
-        raise StorageError("no such results folder", code="E-RESULTS-MISSING", file=str(folder))
+        remedy = "name a folder that femgear run wrote"
+        raise StorageError(
+            "no such results folder", code="E-RESULTS-MISSING", file=str(folder), remedy=remedy
+        )
 
 
 def _refuse_incomplete(results: Results) -> None:
@@ -489,14 +597,14 @@ def _refuse_incomplete(results: Results) -> None:
 
 def _refuse_changed(folder: Path, manifest: Manifest) -> None:
     """Refuse to replace results in which somebody has changed a file."""
-    found = [name for name in manifest.files if (folder / name).exists()]
-    changed = [name for name in found if not _is_unchanged(folder / name, manifest.files[name])]
+    found = [name for name in manifest.files if os.path.lexists(folder / name)]
+    changed = [name for name in found if not _is_unchanged(folder, name, manifest.files[name])]
     if changed:
         raise StorageError(
             f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
             code="E-OUTPUT",
             file=str(folder),
-            remedy="name a new folder, or move the changed files away",
+            remedy="move the changed files away, or name a new folder",
         )
 
 
@@ -509,12 +617,13 @@ def _interrupted(results: Results) -> str:
 def _make(folder: Path) -> None:
     """Create a folder, or refuse one that is not for results."""
     if not folder.exists():
-        checked_name(folder.resolve().name)
+        checked_name(os.path.basename(os.path.abspath(folder)))
     with storage_errors(folder):
         if folder.exists() and not folder.is_dir():
-            raise StorageError("exists and is not a folder", code="E-OUTPUT", file=str(folder))
+            message, remedy = "exists and is not a folder", "name another folder"
+            raise StorageError(message, code="E-OUTPUT", file=str(folder), remedy=remedy)
         folder.mkdir(parents=True, exist_ok=True)
-        foreign = any(path.name != _LOCK for path in folder.iterdir())
+        foreign = any(path.name != _LOCK and not is_temporary(path) for path in folder.iterdir())
     if foreign and not (folder / MANIFEST).is_file():
         raise StorageError(
             "the folder holds files but no femgear results",
@@ -525,37 +634,68 @@ def _make(folder: Path) -> None:
 
 
 def _publish(folder: Path) -> None:
-    """Give the new files their places, the manifest last; may be repeated after an interruption."""
+    """Give the files of a finished run their places, the manifest last; repeated after an interruption."""
     source = folder / _FINISHED
-    if (source / MANIFEST).is_file():
+    if not source.is_symlink() and (source / MANIFEST).is_file():
         new, old = read_manifest(source), read_manifest(folder)
+        if old.complete and not new.complete:
+            raise _foreign(source)
+        moved = _movable(source, folder, new.files, old.files)
         with storage_errors(folder):
-            for name in new.files:
-                if (source / name).is_file():
-                    (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                    os.replace(source / name, folder / name)
+            for name in moved:
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                os.replace(source / name, folder / name)
             _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
             os.replace(source / MANIFEST, folder / MANIFEST)
     _remove_tree(source)
 
 
+def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mapping[str, str]) -> list[str]:
+    """List which of some files are there; refuses to replace what is not owned, or was changed."""
+    moved = [name for name in files if os.path.lexists(source / name)]
+    for name in moved:
+        if not _is_unchanged(source, name, files[name]):
+            raise _foreign(source / name)
+        place, known = folder / name, owned.get(name, files[name])
+        led_away = place.parent.resolve() != folder.resolve() / Path(name).parent
+        if led_away or (os.path.lexists(place) and not _is_unchanged(folder, name, known)):
+            raise _foreign(place)
+    return moved
+
+
 def _remove_tree(path: Path) -> None:
-    """Remove a folder with all that it holds, where there is one."""
+    """Remove a folder that a run left, where there is one; refuses one that holds what no run has written."""
     with storage_errors(path):
-        if path.is_dir():
-            shutil.rmtree(path)
+        if not os.path.lexists(path):
+            return
+        for one in (path, *path.rglob("*")):
+            own = one.is_dir() or (one != path and one.is_file() and _WRITTEN.fullmatch(one.name))
+            if one.is_symlink() or not (own or is_temporary(one)):
+                raise _foreign(one)
+        shutil.rmtree(path)
+
+
+def _foreign(path: Path) -> StorageError:
+    """Make the refusal to replace or remove what no run has written, or somebody has changed."""
+    return StorageError(
+        "no run has written this, or it was changed since",
+        code="E-OUTPUT",
+        file=str(path),
+        remedy="move it away and repeat the command",
+    )
 
 
 def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
-    """Remove those of some files that are as the run wrote them."""
+    """Remove those of some files that are as the run wrote them, and folders that are empty then."""
     for name, digest in files.items():
-        path = folder / name
-        # a link inside the folder must not lead the removal out of it
-        inside = path.resolve() == folder.resolve() / name
-        if inside and _is_unchanged(path, digest):
-            path.unlink()
+        if _is_unchanged(folder, name, digest):
+            (folder / name).unlink()
+            if (folder / name).parent != folder:
+                with suppress(OSError):
+                    (folder / name).parent.rmdir()
 
 
-def _is_unchanged(path: Path, digest: str) -> bool:
-    """Tell whether a file is there and has the checksum of the manifest."""
-    return path.is_file() and checksum(path) == digest
+def _is_unchanged(folder: Path, name: str, digest: str) -> bool:
+    """Tell whether a file is there, no link on the way from the folder, and has its checksum."""
+    path = folder / name
+    return path.resolve() == folder.resolve() / name and path.is_file() and checksum(path) == digest

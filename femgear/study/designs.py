@@ -130,16 +130,6 @@ def _open_journal(path: str | Path | None, header: dict) -> Iterator[Journal]:
             yield journal
 
 
-@contextmanager
-def resumable(folder: Path) -> Iterator[None]:
-    """Say with an interruption of the block that the same command goes on from what a folder holds."""
-    try:
-        yield
-    except KeyboardInterrupt as interrupt:
-        interrupt.add_note(f"the same command goes on from what {folder} holds")
-        raise
-
-
 def _sealed(line: dict, header: bytes = b"") -> bytes:
     """Write a table as a line of JSON that ends with a checksum of the header and what stands before it."""
     # a number that is not finite is no JSON, and no result either
@@ -326,7 +316,8 @@ class Designs:
 def _finite(quantity: Quantity, value: float) -> float:
     """The value, refused where it is no number."""
     if not math.isfinite(value):
-        raise ContactError(f"{quantity.name} is not finite", code="E-FINITE", value=value)
+        message = f"{quantity.name} is not finite"
+        raise ContactError(message, code="E-FINITE", value=value, limit="finite numbers")
     return value
 
 

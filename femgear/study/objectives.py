@@ -204,7 +204,10 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
     signal = _chosen(mesh, signals, "mesh")
     value = None if torque is None else to_si(torque, TORQUE, low=-LARGEST_TORQUE, high=LARGEST_TORQUE)
     if value is not None and abs(value) < LEAST_TORQUE:
-        raise CaseError("without torque no tooth bends", code="E-TORQUE", key="torque", value=torque)
+        raise CaseError(
+            "without torque no tooth bends", code="E-TORQUE", key="torque", value=torque,
+            limit=f"{LEAST_TORQUE:g} N m or more of either sign",
+        )  # fmt: skip
 
     def compute(variant: Variant) -> float:
         cycle = variant.static(value).cycle

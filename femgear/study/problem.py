@@ -85,9 +85,12 @@ class Variable:
                 code="E-VARIABLE",
                 key=self.name,
                 value=f"{self.low} to {self.high}",
+                limit="two whole numbers without unit",
             )
         if not self.tolerance_at(high) > 0:
-            raise CaseError("a tolerance is over 0", code="E-VARIABLE", key=self.name, value=self.tolerance)
+            raise CaseError(
+                "a tolerance is over 0", code="E-VARIABLE", key=self.name, value=self.tolerance, limit="> 0"
+            )
 
     def _check_units(self) -> None:
         """Refuse bounds of which one has a unit."""
@@ -325,7 +328,8 @@ def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
     if quantity.dimension is NUMBER:
         bound = _number(match[3])
         if not isinstance(bound, float):
-            raise CaseError("not a number", code="E-OBJECTIVE", key="--limit", value=text)
+            remedy = f"write a plain number behind {match[2]}: {quantity.name} has no unit"
+            raise CaseError("not a number", code="E-OBJECTIVE", key="--limit", value=text, remedy=remedy)
     else:
         bound = to_si(match[3], quantity.dimension)
     return Limit(quantity, low=bound) if match[2] == ">=" else Limit(quantity, high=bound)

@@ -83,7 +83,9 @@ class DesignBasis:
         Refuses no torque (E-TORQUE) and bearings with clearance (E-SUPPORT).
         """
         if not (np.isfinite(sun_torque) and sun_torque):
-            raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
+            raise CaseError(
+                "without torque nothing touches", code="E-TORQUE", value=sun_torque, limit="not zero"
+            )
         if clearance := self.supports.planet_clearance:
             raise CaseError(
                 "derivatives and the load sharing of samples know no clearance of the planet bearings",
@@ -113,7 +115,8 @@ def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> 
     """Find the torque on the sun under one on the input [N m], by default the case's; E-TORQUE for none."""
     value = case.operation.torque if torque is None else torque
     if value == 0:
-        raise CaseError("without torque no tooth bends", code="E-TORQUE", key="operation.torque")
+        message = "without torque no tooth bends"
+        raise CaseError(message, code="E-TORQUE", key="operation.torque", remedy="give a torque")
     return torques(gears, member=case.operation.input, torque=value).sun
 
 
@@ -230,7 +233,8 @@ def harris_map(
     """
     torques = np.array(torques, float)
     if not len(torques) or not (np.isfinite(torques).all() and torques.all()):
-        raise CaseError("every torque of the map must differ from zero", code="E-TORQUE", value=torques)
+        message = "every torque of the map must differ from zero"
+        raise CaseError(message, code="E-TORQUE", value=torques, remedy="leave zero out")
     N = basis.gears.n_planets
     peaks = np.zeros((len(deviations), 2, len(torques)))
     overall, residual = np.zeros((len(deviations), len(torques))), 0.0
@@ -314,7 +318,10 @@ def relief_grid(
 def loads_back(torques: np.ndarray) -> bool:
     """Tell whether torques (T,) are negative; E-TORQUE (CaseError) where their signs differ."""
     if (torques > 0).any() and (torques < 0).any():
-        raise CaseError("torques of both signs load different flanks", code="E-TORQUE", value=torques)
+        message = "torques of both signs load different flanks"
+        raise CaseError(
+            message, code="E-TORQUE", value=torques, remedy="take those of each sign by themselves"
+        )
     return bool((torques < 0).any())
 
 

@@ -541,7 +541,8 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
         found = sensitivity(linear, _deviations(case, variable), inside, step=step)
         slopes.append(signal(found.sun_arc, found.deflection, n))
     if not np.isfinite(slopes).all():
-        raise ContactError("a planet that carries nothing has no derivative", code="E-NO-LOAD")
+        remedy = "raise operation.torque, or narrow the bounds of the variables"
+        raise ContactError("a planet that carries nothing has no derivative", code="E-NO-LOAD", remedy=remedy)
     return value, np.array(slopes)
 
 

@@ -282,7 +282,10 @@ def _monotone_curves(model: SharingModel) -> Callable[[np.ndarray], tuple[np.nda
     from scipy.interpolate import PchipInterpolator
 
     if not np.all(np.diff(model.deflection, axis=1) > 0):
-        raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
+        raise ContactError(
+            "the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE",
+            remedy="refine the grid: more static.flank_elements",
+        )  # fmt: skip
     values = [PchipInterpolator(model.force, row) for row in model.deflection]
     slopes = [one.derivative() for one in values]
 
@@ -337,7 +340,8 @@ def _one(model, curves, separation):
         forces = forces + (state.loads - forces) * (1.0 if step < 30 else 0.5)
         if change < 1e-10 * model.load:
             return state.loads, state.motions
-    raise ContactError("the load sharing of a sample does not settle", code="E-CONTACT")
+    remedy = "raise operation.torque, or reduce the errors"
+    raise ContactError("the load sharing of a sample does not settle", code="E-CONTACT", remedy=remedy)
 
 
 def _residual(model, curves, separation, forces, motions) -> float:

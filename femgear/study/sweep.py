@@ -19,8 +19,8 @@ import numpy as np
 from femgear.case.sections import Case
 from femgear.errors import CaseError, Finding
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
-from femgear.storage.files import own_files, write_csv
-from femgear.study.designs import Failure, open_designs, resumable
+from femgear.storage.files import own_files, resumable, write_csv
+from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
 from femgear.trains.protocol import Progress, one_blas_thread
@@ -35,7 +35,7 @@ _JOURNAL, _TABLE, _FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 _TIMED = 3
 """Cases that the estimate is made from."""
 _WITHOUT_EFFECT = {"title", "format"}
-_RANGE = re.compile(r"(.+?)\.\.(.+?)/\s*(\d{1,6})\s*", re.DOTALL)
+_RANGE = re.compile(r"(.+?)\.\.(.+?)/\s*(\d{1,18})\s*", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -171,10 +171,12 @@ def parse_over(text: str) -> tuple[str, Sequence[object]]:
         raise _not_over(text)
     if match := _RANGE.fullmatch(values):
         low, high = (_value(part) for part in match.groups()[:2])
-        if int(match[3]) < 2:
+        count = int(match[3])
+        if not 2 <= count <= _LARGEST:
             raise _not_over(text)
-        variable = Variable(key, low, high)
-        found = [variable.text(float(x)) for x in np.linspace(*variable.bounds, int(match[3]))]
+        whole = isinstance(low, int) and isinstance(high, int) and (high - low) % (count - 1) == 0
+        variable = Variable(key, low, high, integer=whole)
+        found = [variable.text(float(x)) for x in np.linspace(*variable.bounds, count)]
         return key, found
     found = [_value(part) for part in values.split(",")]
     if any(value == "" for value in found):
@@ -201,7 +203,7 @@ def _not_over(text: str) -> CaseError:
         code="E-VARIABLE",
         key="--over",
         value=text,
-        limit="KEY=V1,V2,V3 or KEY=LOW..HIGH/COUNT with a count of 2 or more",
+        limit=f"KEY=V1,V2,V3 or KEY=LOW..HIGH/COUNT with a count of 2 to {_LARGEST}",
         remedy='--over "operation.torque=50 N m, 100 N m" --over "sun.modifications[0].amount=0 um..12 um/7"',
     )
 
@@ -238,7 +240,10 @@ def sweep_into(
     """
     values = dict(parse_over(text) for text in over)
     if len(values) < len(over):
-        raise CaseError("a key is given twice", code="E-VARIABLE", key="--over", value=", ".join(over))
+        raise CaseError(
+            "a key is given twice", code="E-VARIABLE", key="--over", value=", ".join(over),
+            remedy="give all its values in one --over",
+        )  # fmt: skip
     quantities = [named_quantity(words, speeds=speeds) for words in of]
     _check_sweep(case, values, quantities)
     own_files(folder, (_TABLE, _FIGURE))

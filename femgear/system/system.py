@@ -9,7 +9,7 @@ free motion that it drives away (`drift_note`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -170,6 +170,8 @@ class Response:
         Spectral radius of the fixed-point operator; the iteration contracts below one.
     tail : (n_speeds,) array
         Share of the amplitude in the upper half of the harmonics, a measure of truncation.
+    lowest_force : (n_speeds,) array
+        Lowest force of all meshes within the period [N]; teeth cannot pull.
     method : tuple of str
         ``"fixed point"`` or ``"direct"``, one a speed.
     message : str
@@ -187,12 +189,18 @@ class Response:
     iterations: np.ndarray
     spectral_radius: np.ndarray
     tail: np.ndarray
+    lowest_force: np.ndarray
     method: tuple[str, ...]
     message: str
     periods: int = 1
 
     def __post_init__(self):
         freeze(self)
+
+    def without_lines(self) -> Response:
+        """Give what is known of every speed, without the harmonics, which take the memory."""
+        none = np.empty((len(self.mesh_frequency), 0, 0), complex)
+        return replace(self, deflection=none, force=none, modal=none)
 
 
 def gear_meshes(

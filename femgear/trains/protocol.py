@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import chain
@@ -14,6 +14,7 @@ import numpy as np
 # only libraries that are loaded can be limited to one thread, and SciPy brings a BLAS of its own
 import scipy.linalg  # noqa: F401
 
+from femgear.errors import FemgearError
 from femgear.report.tables import Block
 
 if TYPE_CHECKING:
@@ -42,6 +43,17 @@ def one_blas_thread() -> Iterator[None]:
 
     with threadpool_limits(1):
         yield
+
+
+@contextmanager
+def blaming_start(case: Any, key: str) -> Iterator[None]:
+    """Let a start that cannot be used (E-START) in a block of code name an entry of the case."""
+    try:
+        yield
+    except FemgearError as error:
+        if error.code == "E-START":
+            error.key, error.file = key, case.location(key)
+        raise
 
 
 @dataclass(frozen=True)
@@ -99,6 +111,10 @@ class Stage:
         ``(result) -> dict`` for the manifest.
     describe : callable
         ``(Results) -> Block``: the numbers of the stage, read from its folder.
+    parts : callable, optional
+        Called as `solve`, gives pairs of a case with some of the speeds alone and its result, one after the
+        other, so that any number of speeds needs little memory. Stages after it that take its result alone
+        are solved for every part.
     takes : tuple of str
         Stages whose results it goes on from.
     options : tuple of str
@@ -124,6 +140,7 @@ class Stage:
     solve: Callable[..., Any]
     verdict: Callable[[Any], dict]
     describe: Callable[[Results], Block]
+    parts: Callable[..., Iterator[tuple[Any, Any]]] | None = None
     takes: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
     wanted: Callable[[Any], bool] = lambda case: True
@@ -240,6 +257,16 @@ class Train:
 def modes_verdict(result: Any) -> dict:
     """Count the modes and coordinates of any result with modes, for the manifest."""
     return {"modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape)}
+
+
+def joint_verdict(verdicts: Sequence[dict]) -> dict:
+    """Join the verdicts of the parts of a stage: all of them, the largest number, the latest text."""
+    joins = {bool: all, float: max, int: max}
+    found = {}
+    for name, latest in verdicts[-1].items():
+        values = [one[name] for one in verdicts]
+        found[name] = joins.get(type(latest), lambda values: values[-1])(values)
+    return found
 
 
 def response_verdict(result: Any) -> dict:

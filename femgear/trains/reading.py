@@ -30,6 +30,8 @@ from femgear.trains.protocol import OwnFile, Train
 
 _SET_FILE = OwnFile(embed=embed_profiles, points="measured profiles", remedy="measure at fewer points")
 """Case file of a planetary set, whatever its train."""
+_MOST_UNREAD = 20
+"""Files of a case that are refused at once."""
 
 
 def read_case(path: str | os.PathLike) -> Any:
@@ -50,7 +52,7 @@ def read_case(path: str | os.PathLike) -> Any:
     CaseError
         Everything that is wrong with the file, at once; ``problems`` holds one `CaseError` for each.
     """
-    return parse_case(case_text.read_text(path), name=case_text.printable(os.fsdecode(path)))
+    return parse_case(case_text.read_text(path), name=os.fsdecode(path))
 
 
 def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
@@ -67,14 +69,19 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     data, lines = case_text.parse(text, name), text if numbered else ""
     train = _train_of_file(data, lines, name)
     own_file = train.own_file or _SET_FILE
-    files = own_file.embed(data, name)
-    if files:
-        text = text_with_points(data, name, points=own_file.points, remedy=own_file.remedy)
+    files, unread = _embedded_files(own_file, data, name)
     try:
         case = train.model.model_validate(data)
     except ValidationError as error:
         keys = every_section() if own_file is _SET_FILE else train.model
-        raise combine(translate(error, keys), lines, name) from None
+        # tables whose files cannot be read have no points
+        tables = {(problem.key or "").rpartition(".")[0] for problem in unread}
+        problems = [problem for problem in translate(error, keys) if problem.key not in tables]
+        raise combine([*unread, *problems], lines, name) from None
+    if unread:
+        raise combine(unread, lines, name)
+    if files:
+        text = text_with_points(data, name, points=own_file.points, remedy=own_file.remedy)
     try:
         more = train.cross_check(case)
         problems = cross_check(case, more) if own_file is _SET_FILE else list(more)
@@ -87,6 +94,19 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         said = (*notices(data), *said, *added_material(case))
     case.read_from(text, lines, name, notices=said, profile_files=files)
     return with_shafts(case) if own_file is _SET_FILE else case
+
+
+def _embedded_files(own_file: OwnFile, data: dict, name: str) -> tuple[dict[str, str], list[CaseError]]:
+    """Files whose points are put into the tables of a case, and the refusals of others."""
+    unread: dict[str | None, CaseError] = {}
+    while True:
+        try:
+            return own_file.embed(data, name), list(unread.values())
+        except CaseError as error:
+            # a refused file is not read again
+            if error.key in unread or len(unread) == _MOST_UNREAD:
+                raise
+            unread[error.key] = error
 
 
 def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
@@ -178,7 +198,10 @@ def _change(data: dict, key: str, value: Any, name: str) -> None:
     for part, following in zip(tables, parts[1:], strict=True):
         table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
     if last.startswith("["):
-        raise CaseError("a list is changed as a whole", code="E-TYPE", key=key, file=name or None)
+        remedy = "give the whole list, or the key of an entry of one of its tables"
+        raise CaseError(
+            "a list is changed as a whole", code="E-TYPE", key=key, file=name or None, remedy=remedy
+        )
     if value is None:
         table.pop(last, None)
     else:
@@ -194,7 +217,13 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
         found = table.setdefault(part, {}) if wanted is dict else table.get(part)
     if not isinstance(found, (dict, list)) or not isinstance(found, wanted):
         kind = "table" if wanted is dict else "list"
-        raise CaseError(f"{part} is not a {kind}", code="E-TYPE", key=key, file=name or None)
+        raise CaseError(
+            f"{part} is not a {kind}",
+            code="E-TYPE",
+            key=key,
+            file=name or None,
+            limit='keys such as "operation.torque" or "sun.modifications[0].amount"',
+        )
     return found
 
 
@@ -220,8 +249,9 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
     own = _own_files()
     if model not in own:
         raise CaseError(
-            "there is no such model", code="E-MODEL", key="--model", value=model, limit=", ".join(own)
-        )
+            "there is no such model", code="E-MODEL", key="--model", value=model, limit=", ".join(own),
+            remedy="planetary sets have no model: leave it out",
+        )  # fmt: skip
     return own[model].model.model_json_schema()
 
 
@@ -240,15 +270,15 @@ def _train_of_file(data: dict, lines: str, name: str) -> Train:
     """Train that the tables of a file are of; its lines and name are for refusals."""
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
-        raise CaseError(
+        problem = CaseError(
             "the file is written for a newer femgear",
             code="E-FORMAT",
             key="format",
             value=case_text.found(version),
             limit=f"up to {FORMAT}",
             remedy="update femgear",
-            file=name,
         )
+        raise combine([problem], lines, name)
     own = _own_files()
     if "model" in data:
         model = data["model"]
@@ -273,9 +303,10 @@ def _own_files() -> dict[str, Train]:
 
 
 def _unknown_model(value: object) -> CaseError:
-    if not isinstance(value, str):
-        return CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", key="model", value=value)
     known = tuple(_own_files())
+    if not isinstance(value, str):
+        message, limit = f"a text is needed, not {described(value)}", ", ".join(known)
+        return CaseError(message, code="E-TYPE", key="model", value=value, limit=limit)
     near = difflib.get_close_matches(value.lower(), known, n=1, cutoff=0.6)
     return CaseError(
         "there is no such model",

@@ -48,7 +48,7 @@ def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:
     if why:
         allowed = [stage.name for stage in train.stages if not stage.unavailable(case)]
         raise CaseError(
-            f"no stage {only}: {why}", code="E-STAGE", key="--only", value=only, limit=", ".join(allowed)
+            f"no stage {only}: {why}", code="E-STAGE", key="only", value=only, limit=", ".join(allowed)
         )
     needs, needed = {stage.name: stage.before(case) for stage in train.stages}, {only}
     while more := {one for name in needed for one in needs[name]} - needed:

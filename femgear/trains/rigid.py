@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 Entry = TypeVar("Entry")
+AnyCase = TypeVar("AnyCase", bound=Case)
 
 
 def listed(names: list[str]) -> str:
@@ -140,7 +141,8 @@ def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
 def needed(entry: Entry | None, name: str) -> Entry:
     """Refuse the absence of an entry, or of the result of a stage, that is needed here (E-KEY-MISSING)."""
     if entry is None:
-        raise CaseError(f"{name} is needed here", code="E-KEY-MISSING", key=name)
+        remedy = "add it, or compute the stage before"
+        raise CaseError(f"{name} is needed here", code="E-KEY-MISSING", key=name, remedy=remedy)
     return entry
 
 
@@ -179,6 +181,12 @@ def driving_torque(case: RigidCase, *, reacts: bool = True) -> PlanarTorque:
 def member_speeds(case: Case, gears: PlanetarySet, speed: float = 1.0) -> Speeds:
     """Compute the speeds of all members [rad/s] at a speed of the input [rad/s]."""
     return speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
+
+
+def at_speeds(case: AnyCase, speeds: Iterable[float]) -> AnyCase:
+    """Make the case that has these speeds of the input member [rad/s] and no others."""
+    operation = case.operation.model_copy(update={"speeds": tuple(map(float, speeds))})
+    return case.model_copy(update={"operation": operation})
 
 
 def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:

@@ -1,6 +1,7 @@
 """Measured profiles of a case: spellings of the CSV files, and every refusal with its file and line."""
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,44 @@ def test_bad_profile_paths(folder, name):
     assert info.value.code == "E-FILE" and info.value.key == "sun.modifications[0].file"
 
 
+def test_a_link_or_pipe_in_place_of_a_profile(folder, tmp_path):
+    path = folder(GOOD)
+    (tmp_path / "outside").mkdir()
+    home = tmp_path / "home"
+    home.mkdir()
+    path.rename(home / "case.toml")
+    (tmp_path / "data").rename(home / "data")
+    left, outside = home / "data" / "left.csv", tmp_path / "outside" / "left.csv"
+    left.rename(home / "measured.csv")
+    left.symlink_to("../measured.csv")
+    assert measured(home / "case.toml")
+    (home / "measured.csv").rename(outside)
+
+    def refused(text):
+        with pytest.raises(CaseError, match=text) as info:
+            read_case(home / "case.toml")
+        assert info.value.code == "E-FILE" and info.value.key == "sun.modifications[0].file"
+        assert info.value.remedy
+
+    left.unlink()
+    left.symlink_to(outside)
+    refused("must lie in the folder of the case")
+    left.unlink()
+    (home / "data").rmdir()
+    (home / "data").symlink_to(outside.parent, target_is_directory=True)
+    refused("must lie in the folder of the case")
+    (home / "data").unlink()
+    (home / "data").mkdir()
+    left.symlink_to("/dev/zero")
+    refused("must lie in the folder of the case")
+    left.unlink()
+    os.mkfifo(left)
+    refused("not a regular file")
+    left.unlink()
+    left.symlink_to(left)
+    refused("cannot open")
+
+
 def test_a_table_is_read_without_a_case(tmp_path):
     path = tmp_path / "p.csv"
     path.write_text("diameter [mm], deviation [um]\n40, 1\n44, 2\n")
@@ -189,3 +228,32 @@ def test_little_of_the_flank_is_a_warning(folder):
     assert len(found) == 1 and "roll angles 34 to 60 deg" in found[0] and "sun.modifications" in found[0]
     case = read_case(folder(GOOD))
     assert not [str(one) for one in set_warnings(case) if one.code == "W-PROFILE"]
+
+
+def test_files_that_cannot_be_read_hide_no_other_mistake(folder):
+    """Nor one another; the tables that lack their points are not refused for that as well."""
+    wrong = TEXT.replace("teeth = 27", "teeth = 27.5").replace('fixed = "ring"', 'fixed = "rnig"')
+    for gear, file, more in (
+        ("sun", "one.csv", ""),
+        ("planet", "two.csv", "foo = 1"),
+        ("ring", "../x.csv", ""),
+    ):
+        wrong += f'\n[[{gear}.modifications]]\nkind = "measured profile"\nfile = "{file}"\n{more}\n'
+    path = folder("diameter [mm],deviation [um]\n40,0\n44,0\n")
+    path.write_text(wrong, encoding="utf-8")
+    with pytest.raises(CaseError) as caught:
+        read_case(path)
+    found = [(one.code, one.key) for one in caught.value.problems]
+    assert found == [
+        ("E-FILE", "sun.modifications[0].file"),
+        ("E-FILE", "planet.modifications[0].file"),
+        ("E-FILE", "ring.modifications[0].file"),
+        ("E-TYPE", "sun.teeth"),
+        ("E-KEY-UNKNOWN", "planet.modifications[0].foo"),
+        ("E-CHOICE", "operation.fixed"),
+    ]
+    text = str(caught.value)
+    assert (
+        "one.csv: sun.mod" in text
+        and f"{path}:{wrong[: wrong.index('../x.csv')].count(chr(10)) + 1}: " in text
+    )

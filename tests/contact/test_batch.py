@@ -144,3 +144,25 @@ def test_teeth_wedged_between_both_flanks():
     results = list(both_ways(gears, bodies, 5.0, supports=Supports(), both_flanks=True, gap=-400.0))
     assert (np.array(results[2][1])[:, 6:] > 0).any()
     compare(results)
+
+
+def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
+    gears, bodies, torque = random_bodies(SEEDS[0])
+    together, alone, states = batch.solve_batch, batch.solve_contact, []
+    counted = []
+
+    def counting(*arrays, **options):
+        state = alone(*arrays, **options)
+        counted.append(state.iterations)
+        return state
+
+    monkeypatch.setattr(batch, "_MOST_STEPS", 2)
+    monkeypatch.setattr(batch, "solve_contact", counting)
+    monkeypatch.setitem(
+        globals(), "solve_batch", lambda *given: states.append(together(*given)) or states[-1]
+    )
+    compare(both_ways(gears, bodies, torque, supports=SPRUNG, pins=0.3))
+    steps = states[0].iterations
+    # the others: two steps and one that takes out the rounding
+    rest = [3] * (len(steps) - len(counted))
+    assert len(counted) > 0 and sorted(steps.tolist()) == sorted([2 + count for count in counted] + rest)

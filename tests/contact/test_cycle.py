@@ -231,3 +231,11 @@ def test_face_width_scales_out(gears, bodies):
     two = walk_mesh_cycle(wide_gears, wide, sun_torque=2 * TORQUE, positions=8)
     assert two.deflection == pytest.approx(one.deflection, rel=1e-9)
     assert two.stiffness == pytest.approx(2 * one.stiffness, rel=1e-9)
+
+
+def test_progress_tells_the_positions_done(gears, bodies, monkeypatch):
+    told = []
+    monkeypatch.setattr("femgear.contact.cycle._TOGETHER", 3)
+    options = CycleOptions(progress=lambda *done: told.append(done))
+    walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, options=options)
+    assert told[-3:] == [(3, 8), (6, 8), (8, 8)]

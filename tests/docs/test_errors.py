@@ -1,5 +1,6 @@
 """Every error code of the package has a meaning, and docs/errors.md is what is written from the source."""
 
+import ast
 import importlib.util
 from pathlib import Path
 
@@ -35,3 +36,16 @@ def test_codes_on_the_other_pages_exist():
         found = {word.strip("`[]().,:;") for word in path.read_text(encoding="utf-8").split()}
         codes = {word for word in found if word.startswith("E-") and word[2:].replace("-", "").isupper()}
         assert codes <= set(errors.CODES), path.name
+
+
+@pytest.mark.parametrize("folder", ["case", "gears", "trains", "study"])
+def test_what_a_user_meets_says_what_is_allowed_or_what_to_do(error_page, folder):
+    """Refusals of cases, trains and studies; what `checked_numbers` and the like refuse has both."""
+    bare = []
+    for path in (PATH.parents[2] / "femgear" / folder).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("Error"):
+                words = {word.arg: word.value for word in node.keywords}
+                if error_page._codes(words.get("code")) and not words.keys() & {"limit", "remedy"}:
+                    bare.append(f"{path.name}:{node.lineno}: {error_page._text(node.args[0])}")
+    assert bare == []

@@ -121,6 +121,9 @@ def test_free_body_is_refused(gear, sector):
     free = condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads)
     with pytest.raises(GridError, match="nothing holds it"):
         tooth_compliance(free)
+    # translation is the last harmonic as well as the first
+    with pytest.raises(GridError, match="nothing holds it"):
+        cyclic_harmonics(free, [gear.teeth - 1])
 
 
 @pytest.mark.parametrize(("axis", "free"), [(1, (1, 17)), (0, (0,))], ids=["translation", "rotation"])
@@ -211,6 +214,9 @@ def test_cyclic_modes_are_those_of_the_whole_body(gear, sector, whole):
         max_frequency=6e4,
         static_correction=False,
     )
+    # above the limit only where a diameter has no other mode: no static shapes
+    above = modes.nodal_diameter[modes.frequency > 6e4]
+    assert np.all(np.bincount(modes.nodal_diameter)[above] == 1)
     sector_frequencies = np.sort(np.repeat(modes.frequency, np.where(modes.paired, 2, 1)))
     K_whole, M_whole = matrices(whole)
     factor = symmetric_factor(K_whole)

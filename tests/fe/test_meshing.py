@@ -4,7 +4,9 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
 import threading
+import warnings
 
 import numpy as np
 import pytest
@@ -78,7 +80,8 @@ def test_cache_is_used_and_damaged_files_are_made_again(tmp_path, monkeypatch):
     (file,) = (tmp_path / "meshes").iterdir()
     whole = file.read_bytes()
     file.write_bytes(whole[: len(whole) // 2])
-    second = mesh_outline(outline, cache=tmp_path / "meshes")
+    with pytest.warns(UserWarning, match=f"the grid is made again: {file} is not a readable grid"):
+        second = mesh_outline(outline, cache=tmp_path / "meshes")
     assert np.array_equal(first.points, second.points) and file.read_bytes() == whole
     # a coordinate of the boundary that was changed in the file
     place = whole.index(np.float64(0.25).tobytes())
@@ -99,6 +102,142 @@ def test_cache_is_used_and_damaged_files_are_made_again(tmp_path, monkeypatch):
     assert np.array_equal(first.points, third.points) and np.array_equal(first.triangles, third.triangles)
 
 
+def sealed(path, grid):
+    """A file that read_grid accepts."""
+    path.unlink()
+    fe_grid.write_grid(path, grid)
+
+
+def _truncated(path, grid, elsewhere):
+    path.write_bytes(path.read_bytes()[:1000])
+
+
+def _empty(path, grid, elsewhere):
+    path.write_bytes(b"")
+
+
+def _link(path, grid, elsewhere):
+    path.rename(elsewhere)
+    path.symlink_to(elsewhere)
+
+
+def _pipe(path, grid, elsewhere):
+    path.unlink()
+    os.mkfifo(path)
+
+
+def _sparse(path, grid, elsewhere):
+    with open(path, "r+b") as stream:
+        stream.truncate(10**12)
+
+
+def _of_another_outline(path, grid, elsewhere):
+    sealed(path, mesh_outline(polygon(2.0 * np.array(SQUARE), divide=4)))
+
+
+def _moved_corner(path, grid, elsewhere):
+    points = grid.points.copy()
+    points[0] += 1e-9
+    sealed(path, fe_grid.Grid(points, grid.triangles, grid.boundaries, grid.regions))
+
+
+def _moved_middle(path, grid, elsewhere):
+    points = grid.points.copy()
+    points[-1] += 1e-9
+    sealed(path, fe_grid.Grid(points, grid.triangles, grid.boundaries, grid.regions))
+
+
+def _not_a_number(path, grid, elsewhere):
+    points = grid.points.copy()
+    points[16] = np.nan
+    sealed(path, fe_grid.Grid(points, grid.triangles, grid.boundaries, grid.regions))
+
+
+def _wrong_node(path, grid, elsewhere):
+    triangles = grid.triangles.copy()
+    triangles[0, 0] = 10**6
+    sealed(path, fe_grid.Grid(grid.points, triangles, grid.boundaries, grid.regions))
+
+
+def _inverted(path, grid, elsewhere):
+    triangles = grid.triangles.copy()
+    triangles[0] = triangles[0][[0, 2, 1, 5, 4, 3]]
+    sealed(path, fe_grid.Grid(grid.points, triangles, grid.boundaries, grid.regions))
+
+
+def _exchanged_boundaries(path, grid, elsewhere):
+    names = list(grid.boundaries)
+    boundaries = dict(zip(names, [grid.boundaries[name] for name in names[::-1]], strict=True))
+    sealed(path, fe_grid.Grid(grid.points, grid.triangles, boundaries, grid.regions))
+
+
+def _no_region(path, grid, elsewhere):
+    sealed(path, fe_grid.Grid(grid.points, grid.triangles, grid.boundaries, {}))
+
+
+def _no_triangle(path, grid, elsewhere):
+    sealed(
+        path, fe_grid.Grid(grid.points, np.zeros((0, 6), int), grid.boundaries, {"body": np.zeros(0, int)})
+    )
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        _truncated, _empty, _link, _pipe, _sparse, _of_another_outline, _moved_corner, _moved_middle,
+        _not_a_number, _wrong_node, _inverted, _exchanged_boundaries, _no_region, _no_triangle,
+    ],
+)  # fmt: skip
+def test_a_grid_in_the_cache_that_is_not_that_of_the_outline_is_said_and_made_again(tmp_path, damage):
+    outline, cache = polygon(SQUARE, divide=4), tmp_path / "meshes"
+    first = mesh_outline(outline, cache=cache)
+    (file,) = cache.iterdir()
+    whole = file.read_bytes()
+    damage(file, first, tmp_path / "elsewhere")
+    with pytest.warns(UserWarning, match="the grid is made again: ") as said:
+        again = mesh_outline(outline, cache=cache)
+    assert len(said) == 1 and str(file) in str(said[0].message)
+    assert np.array_equal(first.points, again.points) and np.array_equal(first.triangles, again.triangles)
+    assert not file.is_symlink() and file.read_bytes() == whole and list(cache.iterdir()) == [file]
+    assert not (tmp_path / "elsewhere").exists() or (tmp_path / "elsewhere").read_bytes() == whole
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.array_equal(mesh_outline(outline, cache=cache).points, first.points)
+
+
+def test_a_grid_is_written_through_no_link_and_what_dead_processes_left_is_removed(tmp_path, monkeypatch):
+    outline, elsewhere = polygon(SQUARE, divide=2), tmp_path / "elsewhere"
+    elsewhere.write_text("mine")
+    mesh_outline(outline, cache=tmp_path / "meshes")
+    (file,) = (tmp_path / "meshes").iterdir()
+    file.unlink()
+    left = [f".{file.stem}.4711-140737.msh", f".{file.stem}.0123456789abcdef.tmp.msh"]
+    for name in [*left, "notes.txt", ".other.msh"]:
+        (tmp_path / "meshes" / name).write_text("half")
+    mesh_outline(outline, cache=tmp_path / "meshes")
+    assert {path.name for path in (tmp_path / "meshes").iterdir()} == {file.name, "notes.txt", ".other.msh"}
+    file.unlink()
+    monkeypatch.setattr(fe_grid.secrets, "token_hex", lambda n: "0" * 2 * n)
+    (tmp_path / "meshes" / f".{file.stem}.{'0' * 16}.tmp.msh").symlink_to(elsewhere)
+    with pytest.warns(UserWarning, match="File exists"):
+        mesh_outline(outline, cache=tmp_path / "meshes")
+    assert elsewhere.read_text() == "mine"
+
+
+def test_threads_that_make_the_same_grid_all_have_it(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        grids = mesh_outlines([polygon(SQUARE, divide=3)] * 6, cache=tmp_path)
+    assert len({grid.points.tobytes() for grid in grids}) == 1 and len(list(tmp_path.iterdir())) == 1
+
+
+def test_gmsh_leaves_nothing_in_the_folder_of_temporary_files(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "absent"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "absent"))
+    assert mesh_outline(polygon(SQUARE)).n_nodes > 8
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     outline = polygon(SQUARE, divide=4)
     (tmp_path / "file").write_text("")
@@ -107,13 +246,16 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
             assert mesh_outline(outline, cache=cache).n_nodes > 8
         assert str(cache) in str(warned[0].message)
 
-    def full(*_):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    # as of the system, and as of NumPy
+    for error in (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), OSError("9 requested and 3 written")):
 
-    monkeypatch.setattr(fe_grid.os, "replace", full)
-    with pytest.warns(UserWarning, match="No space left"):
-        mesh_outline(outline, cache=tmp_path / "meshes")
-    assert list((tmp_path / "meshes").iterdir()) == []
+        def full(*_, error=error):
+            raise error
+
+        monkeypatch.setattr(fe_grid.os, "replace", full)
+        with pytest.warns(UserWarning, match="No space left|9 requested"):
+            mesh_outline(outline, cache=tmp_path / "meshes")
+        assert list((tmp_path / "meshes").iterdir()) == []
 
 
 def test_the_sealed_file_is_read_by_others(tmp_path):

@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from femgear.report.page import write_report
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, prepare_output
 from femgear.trains.elastic.stages import ELASTIC
-from femgear.trains.reading import open_results, read_case, with_value
+from femgear.trains.reading import open_results, parse_case, read_case, with_value
 from femgear.trains.static import figures as static_figures
 
 _HERE = Path(__file__).parents[1]
@@ -144,13 +145,25 @@ def test_bands_of_an_amplitude_modulated_signal(tmp_path):
 
 
 def test_hostile_title_is_text(tmp_path):
-    title = "<script>alert('x')</script> & \"quotes\""
+    title = "<script>alert('x')</script> & \"quotes\" $\\frac{x_$"
     case = with_value(read_case(CASE), "title", title)
     page = Page(
         write_report(ELASTIC, open_results(make_run(tmp_path / "out", case=case))).read_text(encoding="utf-8")
     )
     assert "script" not in page.tags
     assert title in "".join(page.text)
+
+
+def test_control_characters_are_escaped(tmp_path):
+    """Of a manifest that somebody else has written, and of the text of the case."""
+    case = parse_case(CASE.read_text(encoding="utf-8") + "# \u202eotfel\n")
+    results = open_results(make_run(tmp_path / "out", case=case))
+    results = replace(
+        results, manifest=replace(results.manifest, versions={"femgear": "1\x1b[31m\x00\ud800"})
+    )
+    text = write_report(ELASTIC, results).read_text(encoding="utf-8")
+    assert r"1\x1b[31m\x00\ud800" in text and r"# \u202eotfel" in text
+    assert all(one.isprintable() or one in "\n\u00a0" for one in text)
 
 
 def test_verdicts_are_warnings(tmp_path):

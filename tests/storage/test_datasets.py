@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from page_examples import check_documented
 
+from femgear.storage.results import _attribute
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.stages import solve_static
@@ -98,6 +99,14 @@ def test_results_page_names_every_variable_and_attribute(datasets, stage):
     if stage not in ("modes", "dynamics"):
         for attribute in set(datasets[stage].attrs) - {"title", "fourier_convention"}:
             assert f"`{attribute}`" in page, attribute
+
+
+@pytest.mark.parametrize("stage", PLACES)
+def test_exported_attributes_have_units(datasets, stage):
+    pure = {"contact_ratio_sun_planet", "contact_ratio_planet_ring", "mesh_phases"}
+    for name, value in datasets[stage].attrs.items():
+        if np.asarray(value).dtype.kind == "f" and name not in pure:
+            assert _attribute(name, value)[2] not in ("", "1"), name
 
 
 def test_static_attributes_and_labels(datasets):

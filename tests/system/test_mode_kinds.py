@@ -1,5 +1,7 @@
 """Kinds of modes against the theorems of Lin and Parker (J. Vib. Acoust. 121, 1999) for a rigid ring."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
@@ -7,6 +9,7 @@ from validation.reference.mode_energy import motion_planes, signed_phase_shares
 
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.mode_kinds import (
+    SetMotions,
     class_energies,
     class_shares,
     mode_kinds,
@@ -262,3 +265,39 @@ def test_energies_of_whirling_motions_are_those_of_both_parts():
 def test_planes_of_motion():
     dofs = ("sun: x", "sun: u", "sun: y", "ring: x", "planet 1: radial", "planet 1: tangential")
     assert motion_planes(dofs).tolist() == [[0, 2], [4, 5]]
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3])
+def test_planets_that_move_by_rounding_alone_rest(size):
+    """A mode of the sun: what is left of the planets is 1e-9 of it, without a phasing."""
+    N = 3
+    motions = SetMotions(
+        central=size * np.array([[[1.0], [0.0], [0.0]]]),
+        central_mass=np.ones((1, 3)),
+        planets=1e-9 * size * np.array([[1.0], [0.3], [-0.2]])[None] * np.ones((N, 1, 1)),
+        planet_mass=np.ones((N, 3)),
+        planet_angles=2 * np.pi * np.arange(N) / N,
+    )
+    assert np.all(np.isnan(phase_shares(motions)))
+    assert phasing(motions) == ("at rest",)
+
+
+def test_a_motion_that_two_harmonics_explain_is_mixed():
+    """At unequal spacing three planets all alike are a combination of 1, cos psi and sin psi in many ways."""
+    psi = np.array([0.0, 1.5, 4.0])
+    wave = np.cos(psi) + 0.4
+    motions = SetMotions(
+        central=np.zeros((1, 3, 1)),
+        central_mass=np.ones((1, 3)),
+        planets=np.array([wave, 0.0 * wave, 0.0 * wave]).T[:, :, None],
+        planet_mass=np.ones((3, 3)),
+        planet_angles=psi,
+    )
+    one, cosine = np.ones(3) / np.sqrt(3.0), np.column_stack([np.cos(psi), np.sin(psi)])
+    alike = (one @ wave) ** 2 / (wave @ wave)
+    turning = wave @ cosine @ np.linalg.solve(cosine.T @ cosine, cosine.T @ wave) / (wave @ wave)
+    assert phase_shares(motions)[:, 0] == pytest.approx([alike, turning], rel=1e-12)
+    assert alike + turning > 1.01
+    pure = replace(motions, planets=(motions.planets - 0.4 * (motions.planets != 0.0)))
+    assert phase_shares(pure)[1, 0] == pytest.approx(1.0, rel=1e-12) and phase_shares(pure)[0, 0] > 0.01
+    assert phasing(pure) == ("mixed",)

@@ -514,7 +514,8 @@ def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
             f"the constant load does work on a rigid-body motion (largest at {name}): "
             f"{work[mode]:.3e} of {size:.3e}",
             code="E-LOAD-BALANCE", limit="a load in equilibrium with itself",
-            remedy="add the reaction torque of the output, or hold that motion by a support",
+            remedy="add the reaction torque of the output, hold that motion by a support, or check the unit "
+            "of the spring that holds it: one far softer than the others counts as none",
         )  # fmt: skip
 
 

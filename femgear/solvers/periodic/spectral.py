@@ -6,6 +6,7 @@ fixed point or directly; meshes that repeat others later in time are solved once
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,7 @@ def solve_spectral(
     *,
     excitation_harmonics: int | np.ndarray = 6,
     response_harmonics: int | np.ndarray = 12,
+    lines: int = 0,
     tolerance: float = 1e-6,
     method: str = "auto",
     max_iterations: int = 100,
@@ -61,6 +63,8 @@ def solve_spectral(
     excitation_harmonics, response_harmonics : int or (n_speeds,) int array
         Mesh harmonics kept in the data and in the response, of all speeds or one a speed; products are formed
         without aliasing. The result has as many harmonics as the speed with the most, zeros beyond its own.
+    lines : int
+        Harmonics that the result has at least.
     tolerance : float
         Relative change at which the fixed point stops; the full equations of a converged solution then hold
         to ten times that.
@@ -86,11 +90,11 @@ def solve_spectral(
     kept = np.stack(np.broadcast_arrays(frequency, excitation_harmonics, response_harmonics)[1:]).astype(int)
     _check_harmonics(*kept)
     options = (method, tolerance, max_iterations)
-    top = int(kept[1].max()) * excitation.periods
+    top = max(int(kept[1].max()), lines) * excitation.periods
     found: list = [None] * len(frequency)
-    for harmonics, lines in np.unique(kept, axis=1).T:
-        data = _Data.build(modes, excitation, int(harmonics), int(lines) * excitation.periods)
-        chosen = np.flatnonzero((kept.T == (harmonics, lines)).all(axis=1))
+    for harmonics, own in np.unique(kept, axis=1).T:
+        data = _Data.build(modes, excitation, int(harmonics), int(own) * excitation.periods)
+        chosen = np.flatnonzero((kept.T == (harmonics, own)).all(axis=1))
         for part in np.array_split(chosen, -(-len(chosen) // _BATCH)):
             solved = _solve_batch(modes, data, frequency[part] / excitation.periods, options, top)
             for i, *values in zip(part, *solved, strict=True):
@@ -306,19 +310,20 @@ def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
     return deflection[twins.group] * twins.shift[:, None, :]
 
 
-def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np.ndarray:
+def spectral_radius(problem: HarmonicProblem, *, exact_limit: int = 80) -> np.ndarray:
     """Compute the spectral radius (n_speeds,) of the fixed point, that of ``T G``, without unit.
 
-    Eigenvalues of the full matrices while their number of rows cubed, times the speeds, stays below
-    `exact_limit`; otherwise the largest Ritz value of 20 Arnoldi steps from one random vector (Saad,
-    Numerical Methods for Large Eigenvalue Problems, algorithm 6.1), all speeds together.
+    Eigenvalues of the full matrices of at most `exact_limit` rows; otherwise the largest Ritz value of 20
+    Arnoldi steps from one random vector (Saad, Numerical Methods for Large Eigenvalue Problems, algorithm
+    6.1), all speeds together but none dependent on the others.
     """
     n, speeds, size = problem.source.shape
-    if speeds * (2 * n * size) ** 3 <= exact_limit:
+    if 2 * n * size <= exact_limit:
         return np.abs(np.linalg.eigvals(matrices(problem))).max(axis=-1)
     steps = min(20, n * (2 * size - 1))
-    start = np.random.default_rng(0).standard_normal((n, speeds, size, 2)).view(np.complex128)[..., 0]
+    start = np.random.default_rng(0).standard_normal((n, 1, size, 2)).view(np.complex128)[..., 0]
     start.imag[..., 0] = 0.0
+    start = np.repeat(start, speeds, axis=1)
     basis = np.empty((speeds, steps + 1, 2 * n * size))
     hessenberg = np.zeros((speeds, steps + 1, steps))
     basis[:, 0] = _rows(start / _norm(start)[None, :, None])
@@ -350,11 +355,13 @@ def _response(frequency, found, method: str, tolerance: float, periods: int) -> 
     for array in (deflection, force, modal):
         array[~converged] = np.nan
     tail = np.where(converged, tail, np.nan)
+    lowest = sample(force, 4 * force.shape[-1]).min(axis=(1, 2))
     return Response(
         mesh_frequency=frequency, deflection=deflection, force=force, modal=modal, converged=converged,
         residual=residual, iterations=iterations, spectral_radius=radius, tail=tail,
         method=tuple("direct" if flag else "fixed point" for flag in direct),
-        message=_message(frequency, converged, direct, radius, tail, force), periods=periods,
+        lowest_force=lowest, message=_message(frequency, converged, direct, radius, tail, lowest),
+        periods=periods,
     )  # fmt: skip
 
 
@@ -503,7 +510,17 @@ def _tail(deflection: np.ndarray) -> np.ndarray:
     return np.where(still, 0.0, np.sqrt(upper / np.where(still, 1.0, total)))
 
 
-def _message(frequency, converged, direct, radius, tail, force) -> str:
+def joint_message(responses: Sequence[Response]) -> str:
+    """Write the message of the responses at some speeds each as if all had been solved together."""
+    names = ("mesh_frequency", "converged", "spectral_radius", "tail", "lowest_force")
+    frequency, converged, radius, tail, lowest = (
+        np.concatenate([getattr(one, name) for one in responses]) for name in names
+    )
+    direct = np.concatenate([np.array(one.method) == "direct" for one in responses])
+    return _message(frequency, converged, direct, radius, tail, lowest)
+
+
+def _message(frequency, converged, direct, radius, tail, lowest) -> str:
     """One sentence on the method, and one for everything that deserves doubt."""
     parts = [
         f"{len(frequency)} speeds: fixed point at {int(np.sum(~direct & converged))}, direct solution at "
@@ -526,12 +543,11 @@ def _message(frequency, converged, direct, radius, tail, force) -> str:
             f"{tail[worst] ** 2:.2g} of the energy at {frequency[worst]:.6g} Hz (wanted: below "
             f"{_TAIL_ENERGY:g})."
         )
-    lowest = sample(force[converged], 4 * force.shape[-1]).min(axis=(1, 2))
     if np.any(lowest < 0.0):
-        where = frequency[converged]
+        worst = int(np.nanargmin(lowest))
         parts.append(
             f"A mesh force becomes negative at {int(np.sum(lowest < 0.0))} speeds, worst at "
-            f"{where[int(np.argmin(lowest))]:.6g} Hz ({np.min(lowest):.4g} N): teeth would separate there, "
+            f"{frequency[worst]:.6g} Hz ({lowest[worst]:.4g} N): teeth would separate there, "
             "which this linear solution cannot follow."
         )
     return " ".join(parts)

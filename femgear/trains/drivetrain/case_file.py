@@ -125,7 +125,7 @@ class DrivetrainCase(Section, ReadCase):
     deserves to be said.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = FORMAT
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
     model: Literal["drivetrain"]
     title: Title
     body: Annotated[tuple[BodySection, ...], Field(min_length=1, max_length=_MOST_PARTS)]
@@ -192,7 +192,10 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
     names = [body.name for body in case.body]
     for i, name in enumerate(names):
         if name in names[:i]:
-            yield CaseError("two bodies have one name", code="E-DUPLICATE", key=f"body[{i}].name", value=name)
+            yield CaseError(
+                "two bodies have one name", code="E-DUPLICATE", key=f"body[{i}].name", value=name,
+                remedy="give every body a name of its own",
+            )  # fmt: skip
     used = [(key, name) for key, *ends in _joints(case) if ".between" in key for name in ends]
     for i, stage in enumerate(case.planetary):
         used += [(f"planetary[{i}].carrier", stage.carrier), (f"planetary[{i}].sun", stage.sun)]
@@ -211,7 +214,9 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
             )
     for key, first, second in _joints(case):
         if first == second:
-            yield CaseError("a body is joined to itself", code="E-CHOICE", key=key, value=first)
+            yield CaseError(
+                "a body is joined to itself", code="E-CHOICE", key=key, value=first, limit="two bodies"
+            )
 
 
 def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -349,9 +354,13 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
                     code="E-TORQUE",
                     key=f"{key}.times",
                     value=f"{len(one.times)} times, {len(one.torques)} torques",
+                    remedy="sort the points by time, and keep one of every instant",
                 )
         if one.body in bodies:
-            yield CaseError("a second torque on one body", code="E-DUPLICATE", key=f"{key}.body")
+            yield CaseError(
+                "a second torque on one body", code="E-DUPLICATE", key=f"{key}.body", value=one.body,
+                remedy="add the torques up in one table",
+            )  # fmt: skip
         bodies.append(one.body)
         shares += [key] if one.share is not None else []
     if len(shares) > 1 or (shares and len(bodies) == 1):
@@ -490,7 +499,10 @@ def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
     both, angles, equal = stage.ring_teeth + stage.sun_teeth, stage.angles, stage.planet_angles is None
     key = f"{key}.{'planets' if equal else 'planet_angles'}"
     if any(b <= a for a, b in pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi - 1e-9:
-        yield CaseError("the planet angles do not ascend within one turn", code="E-RANGE", key=key)
+        yield CaseError(
+            "the planet angles do not ascend within one turn", code="E-RANGE", key=key,
+            limit="ascending angles, the last less than 360 deg after the first",
+        )  # fmt: skip
     # sizes by the teeth
     share = (stage.ring_teeth - stage.sun_teeth) / both
     apart = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))

@@ -44,7 +44,8 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
 
 def _name(value: object) -> str:
     if not isinstance(value, str):
-        raise CaseError(f"a name is needed, not {described(value)}", code="E-TYPE", value=value)
+        message = f"a name is needed, not {described(value)}"
+        raise CaseError(message, code="E-TYPE", value=value, remedy="write it in quotation marks")
     if not _NAME.fullmatch(value) or value != value.strip() or re.match(r"(planet|shaft)\b", value):
         raise CaseError(
             "not a name for a body",

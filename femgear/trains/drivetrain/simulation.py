@@ -278,7 +278,8 @@ def _static_deviations(model: DrivetrainModel, W, k, load, contacts: FlankContac
     if loose.max() > _CARRIED * scale:
         raise CaseError(
             f"the first loads part the flanks of {model.meshes[int(np.argmax(loose))]}, and nothing else"
-            " holds the gears", code="E-START", limit="loads that close the drive flanks, or a backlash",
+            " holds the gears", code="E-START", key="operation.torque",
+            limit="loads that close the drive flanks, or a backlash",
             remedy="name the driver of the stage that these loads press, give the mesh a backlash, or"
             " start = \"zero\"",
         )  # fmt: skip

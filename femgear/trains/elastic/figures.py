@@ -109,7 +109,7 @@ def ring_mean_deflection(dynamics: xr.Dataset, planetary_set: PlanetarySet) -> F
     figure, (ax,) = new_figure(width=6.4, height=6.6, polar=True)
     angle = np.linspace(0.0, 2 * np.pi, 721)
     zero = int(np.flatnonzero(dynamics["harmonic"].values == 0)[0])
-    component = harmonics_of(dynamics, "ring")[0, zero]
+    component = harmonics_of(dynamics.isel(speed=0), "ring")[zero]
     radial = (np.exp(1j * np.outer(angle, dynamics["circumferential"].values)) @ component).real * 1e6
     size = np.abs(radial).max(initial=0.0) or 1.0
     ax.plot(angle, np.zeros_like(angle), color="0.45", linewidth=1.2, label="undeformed")
@@ -420,16 +420,14 @@ def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Data
 
 def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
     """The ring's operating deflection while the carrier turns, at the last speed."""
-    case, dynamics = drawn.case, drawn.results.get("dynamics")
-    if dynamics is None:
-        return []
+    case, last = drawn.case, drawn.data["dynamics"].isel(speed=-1)
     animate_operating_deflection(
         folder / "operating_deflection.gif",
-        drawn.results["static"].planetary_set,
-        radial=dynamics.ring_radial[-1],
-        tangential=dynamics.ring_tangential[-1],
+        planetary_set(case),
+        radial=harmonics_of(last, "ring"),
+        tangential=harmonics_of(last, "ring_tangential"),
         sensor_angle=case.housing.sensor_angle,
-        clockwise=dynamics.speeds[-1].carrier < 0,
+        clockwise=float(last["carrier_speed"]) < 0,
         title=f"{case.operation.input} at {case.operation.speeds[-1] / RPM:.0f} rpm",
     )
     return ["operating_deflection.gif"]

@@ -194,6 +194,7 @@ def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun
     stiffness : (2N,) array
         Mean mesh stiffness [N/m].
     """
+    _refuse_open(stiffness <= 0)
     names = _rigid_dofs(planetary_set.n_planets)
     place = {name: i for i, name in enumerate(names)}
     M, K, W = np.zeros(len(names)), np.zeros((len(names),) * 2), np.zeros((len(names), len(stiffness)))
@@ -203,6 +204,19 @@ def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun
     values, shapes = np.linalg.eigh(K / np.sqrt(np.outer(M, M)))
     strain = stiffness @ (W.T @ (shapes / np.sqrt(M)[:, None])) ** 2
     return float(np.sqrt(values[strain > 0.1 * np.abs(values)].max()) / (2 * np.pi))
+
+
+def _refuse_open(opened: np.ndarray) -> None:
+    """Refuse meshes (2N,) that carry nothing at some positions (E-CONTACT-OPEN)."""
+    if opened.any():
+        planets = sorted(set(np.flatnonzero(opened) % (len(opened) // 2) + 1))
+        raise ContactError(
+            f"planet {', '.join(map(str, planets))} carries nothing at some positions: the linear dynamic "
+            "model cannot represent loss of contact",
+            code="E-CONTACT-OPEN",
+            key="operation.torque",
+            remedy="raise operation.torque or reduce the errors",
+        )
 
 
 def ring_mesh_compliance(harmonic_compliance, count: int, angles) -> np.ndarray:
@@ -273,23 +287,16 @@ def mesh_excitation(
     N = len(force) // 2
     flexibility = np.zeros((2 * N, 2 * N)) if flexibility is None else flexibility
     ring_compliance = held_compliance if ring_compliance is None else ring_compliance
-    opened = np.flatnonzero((stiffness <= 0).any(axis=1))
-    if len(opened):
-        planets = sorted(set(opened % N + 1))
-        raise ContactError(
-            f"planet {', '.join(map(str, planets))} carries nothing at some positions: the linear dynamic "
-            "model cannot represent loss of contact",
-            code="E-CONTACT-OPEN",
-            remedy="raise operation.torque or reduce the errors",
-        )
+    _refuse_open((stiffness <= 0).max(axis=1))
     own = np.zeros((2 * N, 1))
     own[N:, 0] = np.diag(held_compliance)
     remaining = 1.0 / stiffness - own
     between = np.diag(remaining.min(axis=1)) + flexibility
     if remaining.min() <= 0 or np.linalg.eigvalsh(between)[0] <= 0:
         raise ContactError(
-            "the compliance of the ring model exceeds that of the loaded mesh", code="E-CONTACT-COMPLIANCE"
-        )
+            "the compliance of the ring model exceeds that of the loaded mesh", code="E-CONTACT-COMPLIANCE",
+            remedy="refine the grid: more static.flank_elements",
+        )  # fmt: skip
     spring = deflection - flexibility @ force
     spring[N:] -= ring_compliance @ force[N:]
     return MeshExcitation(

@@ -24,6 +24,7 @@ from femgear.housing.sensor import (
     fixed_sensor_signal,
     hanning_model,
 )
+from femgear.report.response import harmonics_of
 from femgear.report.tables import Block, chosen, tabulate
 from femgear.storage.results import (
     FOURIER,
@@ -33,7 +34,7 @@ from femgear.storage.results import (
     mode_entries,
     response_entries,
 )
-from femgear.trains.elastic.checks import checked_speeds, missing_level
+from femgear.trains.elastic.checks import checked_speeds
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 
 if TYPE_CHECKING:
@@ -129,7 +130,7 @@ class DynamicsResult:
     ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its
     outer surface. The excitation ends at ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB]
     is what the level of the housing changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that
-    were not looked at.
+    were not looked at. ``warnings`` are of all speeds of the case, should these be some of them.
     """
 
     input_speed: np.ndarray
@@ -143,14 +144,8 @@ class DynamicsResult:
     excitation_limit: np.ndarray
     level_change: np.ndarray
     compared_to: float
+    warnings: tuple[Finding, ...]
     entries: Entries
-
-    @property
-    def warnings(self) -> tuple[Finding, ...]:
-        """Findings that an engineer should not overlook in this result."""
-        return missing_level(
-            self.input_speed / RPM, self.level_change, self.excitation_limit, self.compared_to
-        )
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
@@ -263,7 +258,7 @@ def mesh_bands(results: Results) -> Block:
     teeth = int(housing.attrs["ring_teeth"])
     rows, threshold = [], 0.0
     for s in checked_speeds(housing.sizes["speed"], _FEW):
-        spectrum = order_spectrum(housing["acceleration"].values[s])
+        spectrum = order_spectrum(housing["acceleration"].isel(speed=s).values)
         windowed = _hanning_spectrum(results, s)
         rpm = float(housing["speed"][s])
         for h in _shown_harmonics(spectrum, teeth, case.dynamics.mesh_harmonics):
@@ -313,7 +308,7 @@ def _hanning_spectrum(results: Results, speed: int):
         return None
     data = results.dynamics
     ring = [str(name).endswith("ring") for name in data["mesh"].values]
-    force = (data["mesh_force_real"] + 1j * data["mesh_force_imag"]).values[speed][ring]
+    force = harmonics_of(data.isel(speed=speed), "mesh_force")[ring]
     teeth = int(results.housing.attrs["ring_teeth"])
     field = hanning_model(force, planetary_set(results.case).planet_angles)
     lines = fixed_sensor_lines(

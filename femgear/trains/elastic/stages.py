@@ -30,6 +30,7 @@ from femgear.case.dependencies import (
     static_entries,
 )
 from femgear.case.gear_set import material_of, planetary_set, set_deviations
+from femgear.case.quantities import RPM
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, active_flank_load, with_ring
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
@@ -37,7 +38,7 @@ from femgear.contact.supports import Supports
 from femgear.errors import Finding, remark
 from femgear.fe.elasticity import mass
 from femgear.gears.kinematics import Speeds
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import (
     SensorLines,
@@ -48,7 +49,7 @@ from femgear.housing.sensor import (
 from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
-from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
 from femgear.system.system import MeshExcitation, Response
@@ -63,6 +64,9 @@ from femgear.trains.elastic.checks import (
     dynamics_warnings,
     fastest_mesh_frequency,
     max_nodal_diameter,
+    missing_level,
+    pulling_meshes,
+    pulls_of,
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
@@ -93,7 +97,7 @@ from femgear.trains.protocol import (
     response_verdict,
     silent,
 )
-from femgear.trains.rigid import member_speeds
+from femgear.trains.rigid import at_speeds, member_speeds
 from femgear.trains.static.description import describe_set
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS, case_supports, mesh_backlash, ring_foundation
@@ -106,9 +110,13 @@ _STEP = 2500.0
 """In whole steps, so that variants of one set are excited alike [Hz]."""
 HARMONICS = 512
 """The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide. Slower
-speeds are excited less far, and `_level_share` tells what they lose."""
+speeds are excited less far, and `_lost_level` tells what they lose."""
 MEMORY = 1.5e9
-"""Largest size of the lines and signals of a run [bytes]."""
+"""Size of the lines and signals of a run beyond which its slowest speeds are excited less far [bytes]."""
+_PART = 100e6
+"""Size of those that are in memory at a time [bytes]."""
+_NOTICED, _SECONDS = 2e9, 1.5e-4
+"""Size of files that is said before [bytes], and what a harmonic of one speed takes (2 GHz, one core) [s]."""
 
 
 @dataclass(frozen=True)
@@ -119,11 +127,12 @@ class _FrequencyLimit:
     response: np.ndarray
     frequency: np.ndarray
 
-    def options(self, case: Case) -> dict[str, Any]:
-        """What `solve_spectral` takes beside modes, excitation and frequencies."""
+    def options(self, case: Case, some: Any = slice(None)) -> dict[str, Any]:
+        """What `solve_spectral` takes at some of the speeds beside modes, excitation and frequencies."""
         return {
-            "excitation_harmonics": self.excitation,
-            "response_harmonics": self.response,
+            "excitation_harmonics": self.excitation[some],
+            "response_harmonics": self.response[some],
+            "lines": int(self.response.max()),
             "tolerance": case.dynamics.tolerance,
         }
 
@@ -159,9 +168,7 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     """
     frequency = np.asarray(mesh_frequency, float)
     if given is None:
-        # lines of the sensor with their signal, modes, ring field and meshes, a harmonic of all speeds
-        size = len(frequency) * (144 * case.ring.teeth + 8000 + 96 * planetary_set(case).n_planets)
-        most = min(HARMONICS, max(int(MEMORY / size), 18))
+        most = min(HARMONICS, max(int(MEMORY / (len(frequency) * _harmonic_size(case))), 18))
         excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, most).astype(int)
     else:
         excitation = np.full(len(frequency), given)
@@ -171,29 +178,30 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     return _FrequencyLimit(excitation, response, excitation * frequency)
 
 
+def _harmonic_size(case: Case) -> int:
+    """Size of a mesh harmonic of one speed: sensor with its signal, modes, ring field and meshes [bytes]."""
+    return 144 * case.ring.teeth + 8000 + 96 * planetary_set(case).n_planets
+
+
 def _level_change(
-    case: Case, modes: ModesResult, all_speeds: tuple[Speeds, ...], response: Response, beyond: float
-) -> tuple[np.ndarray, float]:
+    case: Case, modes: ModesResult, carrier: np.ndarray, response: Response, beyond: float
+) -> tuple[np.ndarray, bool]:
     """What the level of the housing changes when the excitation reaches a frequency beyond [dB].
 
-    The changes (n_speeds,) are nan at speeds that were not looked at; the largest one of those whose
-    excitation comes as far is returned too.
+    The changes (n_speeds,) at the speeds of a response and of the carrier [rad/s], and whether one of those
+    whose excitation comes as far is worth it.
     """
-    frequency, carrier = response.mesh_frequency, np.array([s.carrier for s in all_speeds])
-    some = checked_speeds(len(frequency))
-    further = limited(case, frequency[some], beyond)
-    wider = solve_spectral(modes.modes, modes.excitation, frequency[some], **further.options(case))
-    parts = {name: getattr(response, name)[some] for name in ("deflection", "force", "modal")}
-    lines = (_sensor_lines(case, modes, one, carrier[some]) for one in (replace(response, **parts), wider))
-    level, wider_level = (order_level(one) for one in lines)
-    change = np.full(len(frequency), np.nan)
-    change[some] = 20.0 * np.log10(wider_level / level)
-    reached = further.frequency > beyond - frequency[some]
-    return change, np.abs(change[some][reached]).max(initial=0.0)
+    frequency = response.mesh_frequency
+    further = limited(case, frequency, beyond)
+    wider = solve_spectral(modes.modes, modes.excitation, frequency, **further.options(case))
+    level, wider_level = (order_level(_sensor_lines(case, modes, one, carrier)) for one in (response, wider))
+    change = 20.0 * np.log10(wider_level / level)
+    reached = further.frequency > beyond - frequency
+    return change, bool(np.abs(change[reached]).max(initial=0.0) >= NOTICEABLE)
 
 
-def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
-    """Level up to frequencies (n,) over that up to another one, of the slowest speed that reaches it [Hz].
+def _lost_level(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
+    """What the level loses that ends at frequencies (n,) instead of beyond, of the slowest speed [Hz] [dB].
 
     Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
     weaker and closer by the same factor: the share of the level below a frequency depends little on the
@@ -205,7 +213,7 @@ def _level_share(case: Case, modes: ModesResult, frequency, beyond: float, sense
     lines = _sensor_lines(case, modes, response, sense * 2.0 * np.pi * fast / case.ring.teeth)
     power = np.cumsum(np.abs(lines.acceleration[0]) ** 2)
     place = np.searchsorted(lines.frequency[0], frequency, side="right") - 1
-    return np.sqrt(power[place] / power[-1])
+    return -20.0 * np.log10(np.maximum(np.sqrt(power[place] / power[-1]), 1e-10))
 
 
 def _sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np.ndarray) -> SensorLines:
@@ -404,49 +412,78 @@ def solve_dynamics(
         A carrier that runs around the ring faster than its waves (E-SPEED).
     ConvergenceError
     """
+    return next(dynamics_parts(case, static, modes, progress=progress, memory=math.inf))[1]
+
+
+def dynamics_parts(
+    case: Case,
+    static: StaticResult,
+    modes: ModesResult,
+    *,
+    progress: Progress = silent,
+    memory: float = _PART,
+) -> Iterator[tuple[Case, DynamicsResult]]:
+    """Solve as `solve_dynamics` for some speeds after the others, each with the case that has them alone.
+
+    Parameters
+    ----------
+    memory : float
+        Size of the lines and signals of some speeds [bytes].
+    """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
-    gears, basis = static.planetary_set, modes.modes
-    check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
-    all_speeds = _turning_speeds(case, modes)
-    frequency = np.array([s.mesh_frequency for s in all_speeds])
+    check_reach(case, modes.reach, fastest_mesh_frequency(case, static.planetary_set))
+    basis, excitation, turning = modes.modes, modes.excitation, _turning_speeds(case, modes)
+    speeds, carrier = np.array(case.operation.speeds), np.array([one.carrier for one in turning])
+    frequency, some = np.array([one.mesh_frequency for one in turning]), checked_speeds(len(turning))
     given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
     limit = limited(case, frequency, up_to, given=given)
-    response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case))
+    response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
     beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
-    change, largest = _level_change(case, modes, all_speeds, response, beyond)
-    if given is None and case.dynamics.up_to is None and largest >= NOTICEABLE:
+    change, short = _level_change(case, modes, carrier[some], response, beyond)
+    if short and given is None and case.dynamics.up_to is None:
         limit = limited(case, frequency, beyond)
-        response = solve_spectral(basis, modes.excitation, frequency, **limit.options(case))
+        response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
         beyond *= 2.0
-        change, _ = _level_change(case, modes, all_speeds, response, beyond)
+        change, _ = _level_change(case, modes, carrier[some], response, beyond)
+    level_change = np.full(len(speeds), np.nan)
+    level_change[some] = change
     slow = frequency * HARMONICS < beyond - frequency
     if slow.any():
-        share = _level_share(case, modes, limit.frequency[slow], beyond, np.sign(all_speeds[0].carrier))
-        change[slow] = -20.0 * np.log10(np.maximum(share, 1e-10))
-    progress("dynamics", 1, 2)
-    verdict = stability(
-        basis,
-        modes.excitation,
-        response.mesh_frequency,
-        excitation_harmonics=decisive_harmonics(basis, modes.excitation, int(limit.excitation.max())),
-    )
-    progress("dynamics", 2, 2)
-    dte, field = mesh_and_ring_outputs(modes, response)
-    return DynamicsResult(
-        input_speed=np.array(case.operation.speeds),
-        speeds=all_speeds,
-        response=response,
-        stability=verdict,
-        dte=dte,
-        ring_radial=field[0],
-        ring_tangential=field[1],
-        ring_teeth=gears.ring.teeth,
-        excitation_limit=limit.frequency,
-        level_change=change,
-        compared_to=beyond,
-        entries=dynamic_entries(case),
-    )
+        level_change[slow] = _lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
+    short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
+    names, pulls = mesh_names(len(basis.mesh_stiffness) // 2), list[np.ndarray]()
+    decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
+    size = len(speeds) * _harmonic_size(case) * limit.response.max()
+    for own in np.array_split(np.arange(len(speeds)), min(max(math.ceil(size / memory), 1), len(speeds))):
+        whole = len(own) == len(speeds)
+        if not whole or len(own) > len(some):
+            response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
+        told.append(response.without_lines())
+        pulls.append(pulls_of(response.force))
+        if not whole:
+            response = replace(response, message=joint_message(told))
+        part = case if whole else at_speeds(case, speeds[own])
+        dte, field = mesh_and_ring_outputs(modes, response)
+        yield (
+            part,
+            DynamicsResult(
+                input_speed=speeds[own],
+                speeds=tuple(turning[i] for i in own),
+                response=response,
+                stability=stability(basis, excitation, frequency[own], excitation_harmonics=decisive),
+                dte=dte,
+                ring_radial=field[0],
+                ring_tangential=field[1],
+                ring_teeth=static.planetary_set.ring.teeth,
+                excitation_limit=limit.frequency[own],
+                level_change=level_change[own],
+                compared_to=beyond,
+                warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)),
+                entries=dynamic_entries(part),
+            ),
+        )
+        progress("dynamics", float(own[-1] + 1), float(len(speeds)))
 
 
 @one_blas_thread()
@@ -500,6 +537,27 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )
 
 
+def _warnings(case: Case) -> Iterator[Finding]:
+    """List what deserves a look in the case, and the size of the results of many speeds."""
+    yield from case_warnings(case)
+    speeds, teeth, meshes = case.operation.speeds, case.ring.teeth, 2 * planetary_set(case).n_planets
+    first = member_speeds(case, planetary_set(case), speeds[0]).mesh_frequency
+    frequency = first * np.array(speeds) / speeds[0]
+    # whether the excitation is doubled is known with the modes
+    up_to = case.dynamics.up_to or 2.0 * highest_excitation(case, 0.0, float(frequency.max()))
+    harmonics = int(limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics).response.max())
+    lines = 3 * meshes + 4 * max_nodal_diameter(case) + 2
+    size = len(speeds) * harmonics * (120 * teeth + 16 * lines)
+    if size > _NOTICED:
+        yield Finding(
+            "W-SIZE",
+            "operation.speeds",
+            f"{len(speeds)} speeds with up to {harmonics} harmonics each fill about {size / 1e9:.2g} GB and "
+            f"take about {max(len(speeds) * harmonics * _SECONDS / 60.0, 1.0):.0f} min of one core",
+            remedy="fewer speeds, or a lower dynamics.up_to, if that is too much",
+        )
+
+
 def _notices(data: dict, case: Case) -> Iterator[Finding]:
     if "bearing_clearance" in data["planet"] and case.static.members == "fixed":
         yield remark(
@@ -530,6 +588,7 @@ ELASTIC = Train(
             name="dynamics",
             title="Dynamics",
             solve=solve_dynamics,
+            parts=dynamics_parts,
             takes=("static", "modes",),
             options=("progress",),
             verdict=response_verdict,
@@ -547,7 +606,7 @@ ELASTIC = Train(
         ),
     ),
     describe=describe_set,
-    warnings=case_warnings,
+    warnings=_warnings,
     figures=FIGURES,
     notices=_notices,
 )  # fmt: skip

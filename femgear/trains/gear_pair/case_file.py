@@ -96,7 +96,7 @@ class GearPairCase(Section, ReadCase):
     The fields carry the names of the case file; ``source`` is the text that gives this case.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = FORMAT
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
     model: Literal["gear_pair"]
     title: Title
     gears: GearsSection

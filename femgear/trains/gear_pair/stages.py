@@ -32,7 +32,7 @@ from femgear.trains.gear_pair.model import (
     separation_ratios,
     state_regions,
 )
-from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread, silent
+from femgear.trains.protocol import OwnFile, Progress, Stage, Train, blaming_start, one_blas_thread, silent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -199,10 +199,11 @@ def _units(case: GearPairCase, title: str) -> dict[str, Any]:
 def solve_response(case: GearPairCase) -> ResponseResult:
     """Follow periodic motions over the frequency ratio past limit points, with stability and contact."""
     pair, given = pair_of(case), case.response
-    branch = parameter_curve(
-        pair.problem, (given.start, given.to), 1.0, harmonics=given.harmonics, samples=1024, radius=False,
-        options=StepOptions(largest=given.largest_step),
-    )  # fmt: skip
+    with blaming_start(case, "response.from"):
+        branch = parameter_curve(
+            pair.problem, (given.start, given.to), 1.0, harmonics=given.harmonics, samples=1024, radius=False,
+            options=StepOptions(largest=given.largest_step),
+        )  # fmt: skip
     phase = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
     x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
     borders = {level: np.sort(impact_borders(pair, branch, level)) for level in (DRIVE, BACK)}

@@ -18,12 +18,12 @@ from femgear.errors import CaseError
 from femgear.gears import profile
 from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
-from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
 from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
-from femgear.system.system import MeshExcitation
+from femgear.system.system import MeshExcitation, Response
 from femgear.trains.helical.figures import FIGURES
 from femgear.trains.helical.model import (
     SectionStiffness,
@@ -51,16 +51,24 @@ from femgear.trains.protocol import (
     response_verdict,
     silent,
 )
-from femgear.trains.rigid import driving_torque, gear_set_modes, member_speeds, needed, rotation_sense
+from femgear.trains.rigid import (
+    at_speeds,
+    driving_torque,
+    gear_set_modes,
+    member_speeds,
+    needed,
+    rotation_sense,
+)
 from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, mesh_backlash, solve_static
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
-    from femgear.system.system import Response
 
 _NOTHING_EXCITES = "a given helical.mesh_stiffness does not vary: nothing excites the set"
+_TOGETHER = 500
+"""Speeds that are in memory at a time."""
 _SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "tooth_loads")
 
 
@@ -142,27 +150,37 @@ def solve_helical_dynamics(
     ------
     ConvergenceError
     """
+    return next(helical_dynamics_parts(case, modes, progress=progress, most=len(case.operation.speeds)))[1]
+
+
+def helical_dynamics_parts(
+    case: HelicalCase, modes: HelicalModesResult, *, progress: Progress = silent, most: int = _TOGETHER
+) -> Iterator[tuple[HelicalCase, HelicalDynamicsResult]]:
+    """Solve as `solve_helical_dynamics` for ``most`` speeds after the others, with the case of each."""
     if modes.excitation is None:
-        raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness")
-    operation, dynamics = case.operation, case.dynamics
-    turning = tuple(member_speeds(case, modes.planetary_set, speed) for speed in operation.speeds)
-    frequency = np.array([one.mesh_frequency for one in turning])
-    response = solve_spectral(
-        modes.modes,
-        modes.excitation,
-        frequency,
-        excitation_harmonics=case.mesh_harmonics,
-        response_harmonics=case.response_harmonics,
-        tolerance=dynamics.tolerance,
-    )
-    progress("dynamics", 1, 2)
-    verdict = floquet_verdict(
-        modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics
-    )
-    progress("dynamics", 2, 2)
-    return HelicalDynamicsResult(
-        modes, np.array(operation.speeds), turning, response, verdict, _loads(modes, response)
-    )
+        remedy = "leave it out: the static solution then gives a stiffness that varies"
+        raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness", remedy=remedy)
+    speeds, told = np.array(case.operation.speeds), list[Response]()
+    for own in np.array_split(speeds, -(-len(speeds) // most)):
+        turning = tuple(member_speeds(case, modes.planetary_set, float(speed)) for speed in own)
+        frequency = np.array([one.mesh_frequency for one in turning])
+        response = solve_spectral(
+            modes.modes,
+            modes.excitation,
+            frequency,
+            excitation_harmonics=case.mesh_harmonics,
+            response_harmonics=case.response_harmonics,
+            tolerance=case.dynamics.tolerance,
+        )
+        verdict = floquet_verdict(
+            modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics
+        )
+        told.append(response.without_lines())
+        loads = _loads(modes, response)
+        response = replace(response, message=joint_message(told))
+        part = case if len(own) == len(speeds) else at_speeds(case, own)
+        yield part, HelicalDynamicsResult(modes, own, turning, response, verdict, loads)
+        progress("dynamics", sum(len(one.method) for one in told), len(speeds))
 
 
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
@@ -240,6 +258,7 @@ HELICAL = Train(
             name="dynamics",
             title="Dynamics",
             solve=solve_helical_dynamics,
+            parts=helical_dynamics_parts,
             takes=("modes",),
             options=("progress",),
             verdict=response_verdict,

@@ -60,10 +60,11 @@ _REMEDIES = {
 
 
 def _member(value: object) -> str:
+    limit = 'a stage and its carrier, ring or sun, such as "stage 1 sun"'
     if not isinstance(value, str):
-        raise CaseError(f"a member of a stage is needed, not {described(value)}", code="E-TYPE", value=value)
+        message = f"a member of a stage is needed, not {described(value)}"
+        raise CaseError(message, code="E-TYPE", value=value, limit=limit)
     if not _MEMBER.fullmatch(value):
-        limit = 'a stage and its carrier, ring or sun, such as "stage 1 sun"'
         raise CaseError("not a member of a stage", code="E-CHOICE", value=value, limit=limit)
     return value
 
@@ -171,7 +172,7 @@ class MultistageCase(Section, ReadCase):
     The fields carry the names of the case file; ``source`` is the text that gives this case.
     """
 
-    format: Annotated[int, Count(1, 2**31)] = FORMAT
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
     model: Literal["multistage"]
     title: Title
     stage: Annotated[tuple[StageSection, ...], Field(min_length=1, max_length=20)]

@@ -288,7 +288,10 @@ def speed_ratio(data: MultistageSet) -> float:
     """Compute the speed of the input over that of the output; refuses an output that stands (E-MECHANISM)."""
     output = train_speeds(data, 1.0).of(data.output)
     if abs(output) < 1e-12:
-        raise CaseError(f"the output, {data.output}, stands still", code="E-MECHANISM")
+        message = f"the output, {data.output}, stands still"
+        raise CaseError(
+            message, code="E-MECHANISM", key="operation.output", remedy="name a member that turns"
+        )
     return 1.0 / output
 
 

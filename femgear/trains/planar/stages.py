@@ -43,7 +43,15 @@ from femgear.trains.planar.results import (
     response_warnings,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Progress, Stage, Train, modes_verdict, one_blas_thread, silent
+from femgear.trains.protocol import (
+    Progress,
+    Stage,
+    Train,
+    blaming_start,
+    modes_verdict,
+    one_blas_thread,
+    silent,
+)
 from femgear.trains.rigid import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
 from femgear.trains.static.description import describe_set, set_warnings
 from femgear.trains.static.results import StaticResult
@@ -176,9 +184,12 @@ def _bounded_branch(
         if words:
             where = f"at {hertz} of the weight"
             if len(good) < 2 and not solution.converged:
-                raise ConvergenceError(f"{where}: {words}", code="E-CONVERGENCE", key="planar.branch.from")
+                remedy = "begin at another frequency, or raise the damping"
+                raise ConvergenceError(
+                    f"{where}: {words}", code="E-CONVERGENCE", key="planar.branch.from", remedy=remedy
+                )
             if len(good) < 2:
-                raise _moved_too_far(where, words)
+                raise _moved_too_far("planar.branch.from", where, words)
             ending = f"stopped before {hertz}, where {words}" if solution.converged else f"{words} at {hertz}"
             return _cut(branch, len(good), ending), tuple(good)
         good.append(one)
@@ -218,7 +229,7 @@ def _check_response_motions(
         )
     for speed, one in zip(speeds, lines):
         if words := _too_far(one, gears):
-            raise _moved_too_far(f"at {speed / RPM:.6g} rpm", words)
+            raise _moved_too_far("operation.speeds", f"at {speed / RPM:.6g} rpm", words)
 
 
 def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
@@ -234,10 +245,11 @@ def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
     return ""
 
 
-def _moved_too_far(where: str, words: str) -> ConvergenceError:
+def _moved_too_far(key: str, where: str, words: str) -> ConvergenceError:
     return ConvergenceError(
         f"{where} {words}: the model is one of small displacements",
         code="E-MOTION",
+        key=key,
         remedy="raise the damping, stiffen the supports, or leave the resonance out",
     )
 
@@ -302,14 +314,15 @@ def solve_branch(
     model = planar_model(case, gears, static)
     check_smoothing(case, gears, model)
     _check_damping(case, model, [(wanted.start, wanted.to, "planar.branch crosses it")])
-    branch = weight_curve(
-        model.problem,
-        (wanted.start, wanted.to),
-        reduction=model.reduction,
-        harmonics=wanted.harmonics,
-        radius=True,
-        max_points=wanted.points,
-    )
+    with blaming_start(case, "planar.branch.from"):
+        branch = weight_curve(
+            model.problem,
+            (wanted.start, wanted.to),
+            reduction=model.reduction,
+            harmonics=wanted.harmonics,
+            radius=True,
+            max_points=wanted.points,
+        )
     branch, lines = _bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
     if wanted.stability:
         branch = judged_branch(

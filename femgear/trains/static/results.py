@@ -370,7 +370,12 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
     unloaded = (force + back)[: len(force) // 2] <= 0.0
     if unloaded.any() and force.any():
         planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
-        yield Finding("W-OPEN", "", f"planet {planets} carries nothing at some positions")
+        text = (
+            f"planet {planets} carries nothing at some positions: its place and transmission error (*, a "
+            "dash where it never carries) are not determined there; the smallest motion without penetration "
+            "stands for them"
+        )
+        yield Finding("W-OPEN", "", text)
     if ((force > 0) & (back > 0)).any():
         yield Finding("W-WEDGED", "", "some meshes are loaded on both flanks at once")
     if ((back > 0) & ~(force > 0)).any():
@@ -398,10 +403,19 @@ def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
 def describe_static(data: xr.Dataset, module: float) -> Block:
     """Tabulate transmission errors, stiffnesses and load sharing of static.nc; module of the gears [m]."""
     share = data.load_share.values
+
+    def error(one: xr.Dataset, value: float) -> str:
+        """Write a transmission error, marked where the mesh of a loaded set carries nothing at times."""
+        carries = (one.mesh_force + one.back_force).values > 0.0
+        text = f"{value * 1e6:.4f}"
+        if not data.mesh_force.values.any() or carries.all():
+            return text
+        return f"{text}*" if carries.any() else "-"
+
     columns = {
         "mesh": lambda one: str(one.mesh.item()),
-        "STE mean [um]": lambda one: f"{one.ste.values.mean() * 1e6:.4f}",
-        "STE p-p [um]": lambda one: f"{np.ptp(one.ste.values) * 1e6:.4f}",
+        "STE mean [um]": lambda one: error(one, one.ste.values.mean()),
+        "STE p-p [um]": lambda one: error(one, np.ptp(one.ste.values)),
         "k mean [N/um]": lambda one: f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
         "k p-p [N/um]": lambda one: f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
         "force [N]": lambda one: f"{one.mesh_force.values.mean():.3f}",
@@ -452,7 +466,7 @@ def describe_stress(data: xr.Dataset) -> Block:
         notes.append(f"outside the range of ISO 6336: {data.attrs['iso']}")
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
-    header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [°]", "range", "cycles"
+    header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [deg]", "range", "cycles"
     return Block("Stresses", header, (*contact, *roots), tuple(notes))
 
 

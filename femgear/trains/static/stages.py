@@ -94,17 +94,28 @@ def solve_static(
             progress=partial(progress, "contact"),
         ),
     )
-    _check_motions(cycle, gears.sun.module)
+    _check_motions(case, cycle, gears.sun.module)
     return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)
 
 
-def _check_motions(cycle: MeshCycle, module: float) -> None:
+def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:
     """Refuse flanks that approach by half a module, members that move by two: no small displacements."""
-    for name, motion, modules, remedy in (
-        ("the flanks approach", cycle.deflection, LARGEST_APPROACH, "reduce operation.torque or the errors"),
+    moved = np.abs(cycle.member_motion).max(axis=1, initial=0.0)
+    member = cycle.member_names[int(moved.argmax())].split(":")[0] if len(moved) else ""
+    support = {"sun": "sun.support_stiffness", "carrier": "carrier.support_stiffness"}
+    support["ring"] = "ring.foundation_radial"
+    for name, motion, key, modules, remedy in (
         (
-            "a member moves",
+            "the flanks approach",
+            cycle.deflection,
+            "operation.torque",
+            LARGEST_APPROACH,
+            "reduce operation.torque or the errors",
+        ),
+        (
+            f"the {member} moves",
             cycle.member_motion,
+            support.get(member, "planet.bearing_stiffness"),
             LARGEST_MOTION,
             "stiffen the supports and bearings, reduce the clearance or operation.torque",
         ),
@@ -114,6 +125,8 @@ def _check_motions(cycle: MeshCycle, module: float) -> None:
             raise ContactError(
                 f"{name} by {largest * 1e3:.4g} mm: the model is one of small displacements",
                 code="E-MOTION",
+                key=key,
+                file=case.location(key),
                 value=f"{largest * 1e3:.4g} mm",
                 limit=f"{modules:g} modules, {modules * module * 1e3:.4g} mm",
                 remedy=remedy,

@@ -265,3 +265,43 @@ def test_energy_of_two_masses_by_hand():
     )
     with pytest.raises(CaseError, match="E-SHAPE"):
         kinetic_shares(np.eye(2), shape, {"a": [0]})
+
+
+def test_of_modes_of_one_shape_the_nearer_eigenvalue_goes_on():
+    """Order and sign of what the family gives change from value to value; shapes tell nothing."""
+
+    def family(p):
+        turn = round(10 * p) % 2
+        value = 1j * np.array([1.0, 1.5]) * (1.0 + 0.1 * p)
+        shape = np.array([[1.0, 1.0], [0.01, -0.01]])
+        return value[::-1] if turn else value, -shape if turn else shape
+
+    tracked = track_modes(family, np.linspace(0.0, 1.0, 11), np.eye(2))
+    assert tracked.unresolved == ()
+    assert tracked.eigenvalue == pytest.approx(1j * np.outer(1.0 + 0.1 * tracked.value, [1.0, 1.5]))
+
+
+def test_a_jump_of_the_shapes_stays_unresolved():
+    """At p = 1.37 both shapes turn by 45 degrees: no step is small enough, and the smallest one is told."""
+
+    def family(p):
+        angle = 0.0 if p < 1.37 else 0.25 * np.pi
+        return np.array([1j, 2j]), np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+    tracked = track_modes(family, [1.0, 2.0, 3.0], np.eye(2))
+    ((start, end),) = tracked.unresolved
+    assert start < 1.37 <= end and end - start == pytest.approx(2.0**-14)
+    assert tracked.agreement.min() == pytest.approx(0.5)
+
+
+def test_of_modes_of_one_shape_each_goes_on_at_its_own_rate():
+    """They cross between two values: the nearer eigenvalue is that of the other one."""
+
+    def family(p):
+        value, shape = 1j * np.array([1.0 + p, 2.0 - p]), np.array([[1.0, 1.0], [1e-4, -1e-4]])
+        order = np.argsort(value.imag)
+        return value[order], shape
+
+    tracked = track_modes(family, np.linspace(0.0, 0.9, 8), np.eye(2))
+    assert tracked.eigenvalue[:, 0] == pytest.approx(1j * (1.0 + tracked.value))
+    assert tracked.eigenvalue[:, 1] == pytest.approx(1j * (2.0 - tracked.value))

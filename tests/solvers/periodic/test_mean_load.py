@@ -1,5 +1,7 @@
 """One-sided contacts that the mean load pulls apart: no periodic motion, however large the deflection."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_trains import gear_pair
@@ -103,3 +105,53 @@ def test_contacts_that_share_a_load_are_judged_together(share):
     found = solve_harmonic_balance(NonlinearSystem(system, (mesh,)), 1.9, harmonics=6)
     assert found.converged, found.message
     assert W[0] @ found.force[:, 0].real == pytest.approx(share, rel=1e-8)
+
+
+@pytest.mark.parametrize(("load", "steady"), [(1.0, -3.0), (-3.0, 1.0)])
+def test_a_steady_force_is_a_mean_load(load, steady):
+    """A force of order zero adds to the load: -2 N in all part the contact, 2 N press it."""
+    for sign, carried in ((1.0, False), (-1.0, True)):
+        problem = one_mass(sign * load)
+        problem = replace(problem, forces=(HarmonicForce(np.array([sign * steady]), (0,)),))
+        found = solve_harmonic_balance(problem, 1.3, harmonics=4)
+        assert found.converged == carried
+        if carried:
+            assert found.force[0, 0].real == pytest.approx(2.0, rel=1e-8)
+        else:
+            assert NOTE in found.message and "it needs -2 N" in found.message
+
+
+def test_of_two_contacts_the_one_that_is_pulled_is_named():
+    two = MechanicalSystem(
+        np.eye(2), 0.1 * np.eye(2), np.zeros((2, 2)), np.eye(2), np.array([0.4, -0.1]), ("x", "y")
+    )
+    mesh = FourierSeries([[1.0, 0.1]])
+    found = solve_harmonic_balance(
+        NonlinearSystem(two, (GearMeshes([0], mesh), GearMeshes([1], mesh))), 1.3, harmonics=4
+    )
+    assert not found.converged
+    assert "column 2 (mesh 2): it needs -0.1 N, the elements there give no less than 0 N" in found.message
+
+
+def pulled_spring(force):
+    return replace(
+        one_mass(-5.0),
+        elements=(PolynomialSprings([0], [[1.0, 0.0, 4.0]]),),
+        forces=(HarmonicForce(np.array([force]), (1,)),),
+    )
+
+
+def test_a_spring_in_tension_is_not_blamed():
+    """-5 N on a hardening spring that pulls: a tolerance below rounding is another reason not to converge."""
+    found = solve_harmonic_balance(pulled_spring(30.0), 1.3, harmonics=4, tolerance=1e-17)
+    assert not found.converged and "Not converged" in found.message
+    assert "nothing carries" not in found.message
+
+
+def test_every_iteration_after_an_embedding_costs_a_factorisation():
+    loose, tight = (
+        solve_harmonic_balance(pulled_spring(3.0), 1.3, harmonics=4, tolerance=one) for one in (1e-12, 1e-17)
+    )
+    assert "Converged in 0 steps" in loose.message and not tight.converged
+    assert "embedding" in loose.message and "embedding" in tight.message
+    assert tight.factorisations - loose.factorisations == tight.iterations - loose.iterations > 0

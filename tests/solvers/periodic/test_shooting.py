@@ -11,6 +11,7 @@ from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping
+from femgear.solvers.periodic import shooting
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import monodromy
@@ -177,3 +178,41 @@ def test_bad_input_is_refused(duffing):
             solve_shooting(*arguments, **options)
     with pytest.raises(CaseError, match="E-RANGE"):
         solve_free_vibration(duffing, ([1.0], [0.0]), 5.0)
+
+
+def test_a_linear_motion_takes_one_step():
+    """Newton's method is exact for it: two residuals, one matrix; c = 0.05 at the frequency 1."""
+    found = solve_shooting(oscillator(0.05, PolynomialSprings([0], [[1.0]]), force=0.18), 1.0, harmonics=3)
+    assert found.solution.converged and len(found.solution.history) == 2
+    assert found.solution.iterations == found.solution.factorisations == 1
+    assert abs(found.solution.deflection[0, 1]) == pytest.approx(0.18 / 0.05, rel=1e-6)
+
+
+def test_multipliers_come_largest_first(duffing):
+    line = 2.2605488905 * np.exp(1j * np.angle(0.18 / (1.0 + 0.075 * 2.2605488905**2 - 1.2**2 + 0.06j)))
+    found = solve_shooting(duffing, 1.2, start=([line.real], [-1.2 * line.imag]), integration=1e-12)
+    assert found.multipliers.real == pytest.approx(DUFFING[2.2605488905], rel=1e-3)
+
+
+def test_no_start_returns_at_an_undamped_resonance():
+    """From rest ``x = 0.09 t sin t`` grows for ever: one matrix shows that no start does better."""
+    problem = oscillator(0.0, PolynomialSprings([0], [[1.0]]), force=0.18)
+    found = solve_shooting(problem, 1.0, start=([0.0], [0.0])).solution
+    assert not found.converged and found.stable is None
+    assert "no start returns" in found.message
+    assert found.iterations == 0 and found.factorisations == 1
+
+
+def test_a_step_that_never_helps_is_taken_whole(duffing, monkeypatch):
+    """After eight halvings: the way out may lead over a larger defect."""
+    tried = []
+
+    def shoot(moving, y, period, options):
+        tried.append(float(y[0]))
+        return y + 1.0, None
+
+    monkeypatch.setattr(shooting, "shoot", shoot)
+    moving = shooting.flow(duffing, np.array([1.2]), variational=True)
+    found = shooting._improved(moving, np.zeros(2), np.array([0.5, 0.25]), 0.9, 5.0, {})
+    assert found.tolist() == [0.5, 0.25]
+    assert tried == [0.5**k for k in range(1, 9)]

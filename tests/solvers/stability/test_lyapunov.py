@@ -157,3 +157,17 @@ def test_wrong_numbers_are_refused(options, code):
     with pytest.raises(CaseError) as caught:
         lyapunov_exponents(lightly_loaded_pair().problem(1.0), 1.0, **options)
     assert caught.value.code == code
+
+
+def test_the_error_of_the_steps_is_that_beside_the_exact_exponents():
+    """Mathieu's equation again: the error of coarser steps, told without the exact value, bounds its own."""
+    problem = oscillator(GearMeshes([0], FourierSeries([[1.01, -2.0]]), separates=False), 0.2)
+    floquet = np.log(4.15605494) / np.pi
+    errors = []
+    for steps in (50, 100, 200):
+        found = lyapunov_exponents(problem, 2.0, count=2, points=12, skip=12, steps=steps)
+        exact = np.abs(found.exponents - [floquet - 0.1, -floquet - 0.1]).max()
+        assert 0.2 * exact < found.step_error.max() < 20.0 * exact
+        errors.append(found.step_error.max())
+        np.testing.assert_allclose(found.section.time, found.period * (12 + np.arange(12)))
+    assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]

@@ -10,7 +10,7 @@ from femgear.errors import CaseError
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_lines
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.trains.elastic.checks import missing_level
+from femgear.trains.elastic.checks import dynamics_warnings, missing_level, pulling_meshes, pulls_of
 from femgear.trains.elastic.stages import (
     HARMONICS,
     MEMORY,
@@ -192,3 +192,30 @@ def test_datasets_and_results_of_other_stages_are_refused(case, static, modes):
         with pytest.raises(CaseError, match="is needed, not a") as caught:
             stage()
         assert caught.value.code == "E-TYPE" and "compute the stage" in caught.value.remedy
+
+
+def test_a_pull_is_told_with_its_share_of_the_time():
+    """1 + 2 cos(theta) kN is below zero for a third of the period; a mesh that just opens does not pull."""
+    force = np.zeros((3, 2, 2), complex)
+    force[..., 0], force[1, 1, 1], force[2, 0, 1] = 1e3, 2e3, 1.0005e3
+    rpm, names = np.array([100.0, 200.0, 300.0]), ["one", "two"]
+    (found,) = pulling_meshes(rpm, names, [pulls_of(force)])
+    assert (found,) == tuple(pulling_meshes(rpm, names, [pulls_of(force[:2]), pulls_of(force[2:])]))
+    assert found.code == "W-PULL" and "two pulls for" in found.text and "at 200 rpm" in found.text
+    assert "up to 1 kN" in found.text and found.text.endswith("1 of the 3 speeds: 200 rpm")
+    share = float(found.text.split("pulls for ")[1].split("%")[0])
+    assert abs(share - 100 / 3) < 100 / 8 + 0.01  # samples a period: four times the harmonics and one
+    assert list(pulling_meshes(rpm, names, [pulls_of(force[:1])])) == []
+
+
+@pytest.mark.parametrize("torque", ["50 N m", "-50 N m"])
+def test_meshes_that_pull_are_warned_of_by_result_and_file(case, torque):
+    """At a resonance without much damping, whatever flanks carry."""
+    changes = {"dynamics.damping_ratio": 0.002, "dynamics.mesh_harmonics": 6, "static.positions": 16}
+    changes |= {"operation.torque": torque, "operation.speeds": ["250 rpm", "10025.641 rpm"]}
+    case = with_values(case, changes)
+    static = solve_static(case)
+    dynamics = solve_dynamics(case, static, solve_modes(case, static))
+    said = [one for one in dynamics.warnings if one.code == "W-PULL"]
+    assert len(said) == 1 and "1 of the 2 speeds: 10025.6 rpm" in str(said[0])
+    assert said == [one for one in dynamics_warnings(dynamics.dataset()) if one.code == "W-PULL"]

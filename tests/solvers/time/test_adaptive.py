@@ -1,0 +1,64 @@
+"""Parts of the adaptive integrator: samples of its steps, size of a motion, a contact just before the end."""
+
+import numpy as np
+import pytest
+
+from femgear.errors import ConvergenceError
+from femgear.solvers.time.adaptive import flow, motion_scale, sampled, trajectory
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.force_laws import GearMeshes
+from femgear.system.fourier import constant
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+
+ONE = np.eye(1)
+
+
+def one_mass(mass=1.0, load=0.0, force=None, **mesh):
+    system = MechanicalSystem(mass * ONE, 0.0 * ONE, 0.0 * ONE, ONE, np.array([load]), ("x",))
+    forces = () if force is None else (HarmonicForce([force]),)
+    return NonlinearSystem(system, (GearMeshes([0], constant([4.0]), **mesh),), forces)
+
+
+def test_samples_come_from_the_step_that_holds_them():
+    pieces = [(float(k), k + 1.0, lambda t, k=k: np.array([t, 0.0 * t + k])) for k in range(3)]
+    times = np.array([-0.5, 0.0, 0.25, 1.0, 1.5, 2.5, 3.0, 3.0 + 1e-13])
+    found, steps = sampled(iter(pieces), times, np.array([-1.0, -1.0]))
+    assert steps == 3
+    assert found[:2].tolist() == [[-1.0, -1.0]] * 2
+    assert found[2:, 0] == pytest.approx(times[2:], abs=1e-15)
+    # a border belongs to the step that ends there
+    assert found[2:, 1].tolist() == [0, 0, 1, 2, 2, 2]
+
+
+def test_without_a_step_everything_rests_at_the_start():
+    found, steps = sampled(iter(()), np.array([0.0, 0.0]), np.array([2.0]))
+    assert (found.tolist(), steps) == ([[2.0], [2.0]], 0)
+
+
+def test_size_of_a_motion_is_its_start_or_its_answer_to_the_loads():
+    """Held by k + rate^2 m with rate^2 = k/m, so by twice k = 4."""
+    moving = flow(one_mass(mass=0.25, load=0.8, force=2.4j), np.array([1.0]))
+    assert moving.rate == pytest.approx(4.0)
+    assert motion_scale(moving, (np.zeros(1), np.zeros(1))) == pytest.approx(0.3)
+    assert motion_scale(moving, (np.array([-0.5]), np.zeros(1))) == pytest.approx(0.5)
+    assert motion_scale(moving, (np.zeros(1), np.array([-8.0]))) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("beyond", [1e-3, 1e-7])
+def test_a_contact_just_before_the_end_is_taken(beyond):
+    """A mass flies freely into a spring, x = t - 1; after that x = sin(2 (t - 1)) / 2."""
+    found = solve_transient(
+        one_mass(), 1.0, [0.0, 0.5, 1.0 + beyond], start=([-1.0], [1.0]), method="DOP853", events=True
+    )
+    assert found.displacement[:, 0] == pytest.approx([-1.0, -0.5, 0.5 * np.sin(2.0 * beyond)], abs=1e-12)
+    assert found.velocity[:, 0] == pytest.approx([1.0, 1.0, np.cos(2.0 * beyond)], abs=1e-10)
+
+
+def test_too_many_steps_are_refused():
+    moving = flow(one_mass(force=1.0), np.array([1.0]))
+    start = moving.state([0.0], [0.0])
+    taken = len(list(trajectory(moving, start, 0.0, 20.0)))
+    assert taken > 4
+    assert len(list(trajectory(moving, start, 0.0, 20.0, max_steps=taken))) == taken
+    with pytest.raises(ConvergenceError, match=f"more than {taken - 1} steps"):
+        list(trajectory(moving, start, 0.0, 20.0, max_steps=taken - 1))

@@ -1,0 +1,65 @@
+"""The rule of a step and the equations of its columns, each by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femgear.solvers.time import steps, transient
+from femgear.solvers.time.steps import generalised_alpha, stability_limit
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.4, 0.8, 1.0])
+def test_a_generalised_alpha_rule_is_stable_down_to_its_smallest_beta(radius):
+    """Chung and Hulbert (1993), Eq. 15: a_m <= a_f <= 1/2 and beta >= 1/4 + (a_f - a_m)/2."""
+    rule = generalised_alpha(radius)
+    assert stability_limit(rule) == np.inf
+    least = 0.25 + 0.5 * (rule.force - rule.mass)
+    assert stability_limit(replace(rule, beta=least)) == np.inf
+    assert np.isnan(stability_limit(replace(rule, beta=least - 1e-6)))
+
+
+def test_newton_steps_are_halved_until_the_columns_fit_better():
+    """``x + 100 max(x, 0) = 0.1`` from 0, tried at 1: 1/512 is the first half that leaves less than 0.1."""
+    aim, nothing = np.array([0.1]), np.zeros(1)
+
+    def law(i, x):
+        return 100.0 * np.maximum(x, 0.0), 100.0 * (x > 0.0)
+
+    x, g, slope = steps._shortened(law, 0, np.eye(1), aim, np.ones(1), nothing, 0.1**2)
+    assert (x.tolist(), g.tolist(), slope.tolist()) == ([1.0 / 512.0], [100.0 / 512.0], [100.0])
+
+
+@pytest.mark.parametrize("accelerations", [True, False])
+def test_motion_between_steps_is_a_cubic(accelerations):
+    """Exact for q = t^3 - 2 t; without accelerations the velocity runs straight from step to step."""
+    step, t = 0.5, 0.5 * np.arange(5.0)[:, None]
+    q, v, a = t**3 - 2.0 * t, 3.0 * t**2 - 2.0, 6.0 * t
+    at = np.array([0.0, 0.3, 1.0, 2.7, 3.999, 4.0])
+    found, rate = transient._between(at, (q, v, a if accelerations else None), step)
+    assert found[:, 0] == pytest.approx((at * step) ** 3 - 2.0 * at * step, abs=1e-13)
+    wanted = 3.0 * (at * step) ** 2 - 2.0 if accelerations else np.interp(at * step, t[:, 0], v[:, 0])
+    assert rate[:, 0] == pytest.approx(wanted, abs=1e-13)
+
+
+def test_instants_count_from_the_first_one():
+    """Of x'' + x = cos 0.7 t, at rest at t = 2 and not at zero."""
+    one = np.eye(1)
+    system = MechanicalSystem(one, 0.0 * one, one, one, np.zeros(1), ("x",))
+    problem = NonlinearSystem(system, (), (HarmonicForce([1.0]),))
+    times = np.array([2.0, 2.5, 3.75, 6.0])
+    found = solve_transient(problem, 0.7, times, start=([0.0], [0.0]), step=0.005)
+    a, b = np.cos(1.4), -0.7 * np.sin(1.4)
+    exact = (np.cos(0.7 * times) - a * np.cos(times - 2.0) - b * np.sin(times - 2.0)) / 0.51
+    assert found.displacement[:, 0] == pytest.approx(exact, abs=3e-5)
+    assert found.steps == 800
+
+
+def test_size_of_a_marched_motion_is_its_distance_from_the_mean():
+    """About 4 and -1, with masses 4 and 9; what is not finite does not count."""
+    system = MechanicalSystem(np.diag([4.0, 9.0]), np.eye(2), np.eye(2), np.eye(2), np.zeros(2), ("x", "y"))
+    q = np.array([[3.0, -1.0], [5.0, -1.0], [4.0, -2.0], [4.0, 0.0], [np.nan, 7.0]])
+    assert transient._amplitude(NonlinearSystem(system, ()), q) == pytest.approx(3.0)
+    assert transient._amplitude(NonlinearSystem(system, ()), q[4:]) == 0.0

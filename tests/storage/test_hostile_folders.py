@@ -1,0 +1,438 @@
+"""Results folders into which somebody has put links, pipes, folders and files: nothing foreign is lost."""
+
+import json
+import os
+import stat
+import threading
+
+import pytest
+
+from femgear.errors import StorageError
+from femgear.storage import files
+from femgear.storage.files import checksum, exclusive_lock, replace_file, write_text
+from femgear.storage.results import (
+    MANIFEST,
+    additions,
+    finish,
+    folder_lock,
+    prepare_output,
+    read_manifest,
+    record,
+    run_folder,
+)
+from femgear.trains.reading import open_results
+
+PRECIOUS = "years of work"
+
+
+@pytest.fixture
+def elsewhere(tmp_path):
+    """A folder with a file that nobody may touch."""
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    (folder / "thesis.txt").write_text(PRECIOUS)
+    yield folder
+    assert [path.name for path in folder.iterdir()] == ["thesis.txt"]
+    assert (folder / "thesis.txt").read_text() == PRECIOUS
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Complete results of a case file and one stage."""
+    return complete(prepare_output(tmp_path / "out"))
+
+
+def complete(folder, text="old", names=("case.toml", "static.nc")):
+    for name in names:
+        write_text(f"{text} {name}", folder / name)
+    finish(folder, list(names), timings={}, convergence={})
+    return folder
+
+
+def contents(folder):
+    """Every file below a folder with what it holds; links and pipes as such."""
+
+    def what(path):
+        mode = path.lstat().st_mode
+        return path.read_text() if stat.S_ISREG(mode) else stat.filemode(mode)[0]
+
+    return {path.relative_to(folder).as_posix(): what(path) for path in sorted(folder.rglob("*"))}
+
+
+def replaced(folder):
+    with run_folder(folder, force=True) as new:
+        complete(new, "new")
+
+
+def refused(act, code="E-OUTPUT"):
+    with pytest.raises(StorageError) as info:
+        act()
+    assert info.value.code == code and info.value.exit_code == 4
+    assert info.value.remedy
+    return info.value
+
+
+# --- names -----------------------------------------------------------------------------------------
+
+
+def test_temporary_names_cannot_be_foretold_and_what_is_there_is_not_written_into(
+    tmp_path, elsewhere, monkeypatch
+):
+    seen = []
+    for _ in range(2):
+        replace_file(tmp_path / "a.txt", lambda path: seen.append((path.name, path.stat().st_size)))
+    assert seen[0] != seen[1] and all(size == 0 for _, size in seen)
+    monkeypatch.setattr(files.secrets, "token_hex", lambda n: "0" * 2 * n)
+    trap = tmp_path / f".a.{'0' * 16}.tmp.txt"
+    trap.symlink_to(elsewhere / "thesis.txt")
+    with pytest.raises(StorageError, match="File exists"):
+        write_text("mine", tmp_path / "a.txt")
+    assert trap.is_symlink() or not trap.exists()
+
+
+def test_a_link_where_a_result_belongs_is_not_followed(tmp_path, elsewhere):
+    (tmp_path / "a.txt").symlink_to(elsewhere / "thesis.txt")
+    write_text("mine", tmp_path / "a.txt")
+    assert (tmp_path / "a.txt").read_text() == "mine" and not (tmp_path / "a.txt").is_symlink()
+
+
+# --- left-overs ------------------------------------------------------------------------------------
+
+
+def test_temporary_files_of_dead_runs_are_removed_and_nothing_like_them(results, elsewhere):
+    dead = [".static.4711.tmp.nc", ".manifest.0123456789abcdef.tmp.json", ".x.0123456789abcdef.tmp"]
+    alive = [
+        ".static.tmp.nc",
+        "static.4711.tmp.nc",
+        ".notes",
+        ".a.xyz.tmp.txt",
+        ".static.012345678901.tmp.nc",
+    ]
+    for name in dead + alive:
+        (results / name).write_text("half")
+    (results / ".link.4711.tmp.nc").symlink_to(elsewhere / "thesis.txt")
+    (results / ".folder.4711.tmp.nc").mkdir()
+    with folder_lock(results):
+        pass
+    there = contents(results).keys()
+    assert not there & set(dead)
+    assert {*alive, ".link.4711.tmp.nc", ".folder.4711.tmp.nc"} <= there
+
+
+def test_a_run_killed_while_it_wrote_its_first_manifest_may_be_repeated(tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / ".manifest.0123456789abcdef.tmp.json").write_text("{")
+    with run_folder(folder) as working:
+        complete(working)
+    assert contents(folder).keys() == {"case.toml", "static.nc", MANIFEST}
+
+
+# --- planted .running ------------------------------------------------------------------------------
+
+
+def _link(path, elsewhere):
+    path.symlink_to(elsewhere, target_is_directory=True)
+
+
+def _file(path, elsewhere):
+    path.write_text("mine")
+
+
+def _pipe(path, elsewhere):
+    os.mkfifo(path)
+
+
+def _notes(path, elsewhere):
+    path.mkdir()
+    (path / "static.nc").write_text("half")
+    (path / "notes.txt").write_text("mine")
+
+
+def _notes_below(path, elsewhere):
+    (path / "thesis").mkdir(parents=True)
+    (path / "thesis" / "chapter.tex").write_text("mine")
+
+
+def _link_below(path, elsewhere):
+    path.mkdir()
+    (path / "static.nc").symlink_to(elsewhere / "thesis.txt")
+
+
+def _pipe_below(path, elsewhere):
+    path.mkdir()
+    os.mkfifo(path / "static.nc")
+
+
+def _link_to_exported(path, elsewhere):
+    path.mkdir()
+    (path / "exported").symlink_to(elsewhere, target_is_directory=True)
+
+
+PLANTED = [_link, _file, _pipe, _notes, _notes_below, _link_below, _pipe_below, _link_to_exported]
+
+
+@pytest.mark.parametrize("name", [".running", ".finished", ".added"])
+@pytest.mark.parametrize("plant", PLANTED)
+def test_what_no_run_left_is_refused_and_kept(results, elsewhere, name, plant):
+    plant(results / name, elsewhere)
+    before = contents(results)
+    acts = [lambda: replaced(results), lambda: add(results, report="one")]
+    for act in acts[: 1 if name == ".running" else 2]:
+        error = refused(act)
+        assert name in error.file and "move" in error.remedy
+        assert contents(results) == before
+
+
+def test_what_somebody_puts_into_the_folder_of_a_running_run_is_kept(results):
+    def run():
+        with run_folder(results, force=True) as working:
+            (working / "notes.txt").write_text("mine")
+            complete(working, "new")
+
+    assert refused(run).file == str(results / ".finished" / "notes.txt")
+    assert (results / "case.toml").read_text() == "new case.toml"
+    assert (results / ".finished" / "notes.txt").read_text() == "mine"
+
+
+# --- planted .finished -----------------------------------------------------------------------------
+
+
+def finished(results, names=("case.toml", "static.nc", "modes.nc"), text="new"):
+    """What a run leaves that is killed before its results have their places."""
+    (results / ".finished").mkdir()
+    return complete(results / ".finished", text, names)
+
+
+def test_a_finished_run_is_brought_to_its_end_by_whoever_locks_the_folder(results):
+    finished(results)
+    with folder_lock(results):
+        assert contents(results).keys() >= {"case.toml", "static.nc", "modes.nc", MANIFEST}
+        assert (results / "modes.nc").read_text() == "new modes.nc"
+    assert not (results / ".finished").exists() and "modes.nc" in read_manifest(results).files
+
+
+@pytest.mark.parametrize("name", ["modes.nc", "static.nc", "report.html"])
+def test_a_file_of_the_user_is_not_overwritten_by_a_finished_run(results, name):
+    finished(results, ("case.toml", "static.nc", "modes.nc", "report.html"))
+    (results / name).write_text("mine")
+    before = contents(results)
+    error = refused(lambda: replaced(results))
+    assert error.file == str(results / name) and "move it away" in error.remedy
+    assert contents(results) == before
+    (results / name).rename(results.parent / "moved")
+    with folder_lock(results):
+        assert (results / name).read_text() == f"new {name}"
+    assert (results.parent / "moved").read_text() == "mine"
+
+
+def test_results_elsewhere_are_not_taken_through_a_link(results, tmp_path):
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    complete(theirs, "theirs")
+    (results / ".finished").symlink_to(theirs, target_is_directory=True)
+    before = contents(tmp_path)
+    refused(lambda: replaced(results))
+    assert contents(tmp_path) == before
+
+
+def test_a_publication_that_was_interrupted_goes_on(results):
+    source = finished(results)
+    os.replace(source / "case.toml", results / "case.toml")
+    with folder_lock(results):
+        pass
+    assert contents(results)["case.toml"] == "new case.toml" and not source.exists()
+
+
+def test_a_finished_run_whose_files_differ_from_its_manifest_is_refused(results):
+    source = finished(results)
+    (source / "modes.nc").write_text("other")
+    before = contents(results)
+    assert refused(lambda: replaced(results)).file == str(source / "modes.nc")
+    assert contents(results) == before
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{}", '{"femgear_format": 1, "complete": true, "files": {"../x": "0"}}']
+)
+def test_a_finished_run_without_a_valid_manifest_is_refused(results, text):
+    (finished(results) / MANIFEST).write_text(text)
+    before = contents(results)
+    with pytest.raises(StorageError):
+        replaced(results)
+    assert contents(results) == before
+
+
+def test_a_run_that_is_not_complete_is_not_published(results):
+    source = results / ".finished"
+    source.mkdir()
+    write_text("new", source / "case.toml")
+    record(source, ["case.toml"], timings={}, convergence={})
+    before = contents(results)
+    refused(lambda: replaced(results))
+    assert contents(results) == before
+
+
+def test_a_manifest_with_folders_leads_nowhere_through_a_link(results, elsewhere):
+    source = finished(results)
+    (source / "sub").mkdir()
+    (results / "sub").symlink_to(elsewhere, target_is_directory=True)
+    data = json.loads((source / MANIFEST).read_text())
+    for name in ("thesis.txt", "new.txt"):
+        (source / "sub" / name).write_text("new")
+        data["files"] = {f"sub/{name}": checksum(source / "sub" / name)}
+        (source / MANIFEST).write_text(json.dumps(data))
+        refused(lambda: replaced(results))
+
+
+def test_nothing_is_removed_through_a_link(results, elsewhere):
+    data = json.loads((results / MANIFEST).read_text())
+    data["files"]["sub/thesis.txt"] = checksum(elsewhere / "thesis.txt")
+    (results / MANIFEST).write_text(json.dumps(data))
+    (results / "sub").symlink_to(elsewhere, target_is_directory=True)
+    refused(lambda: replaced(results))
+    data["complete"] = False
+    (results / MANIFEST).write_text(json.dumps(data))
+    refused(lambda: prepare_output(results))
+
+
+def test_a_link_in_place_of_a_result_counts_as_changed(results, tmp_path):
+    os.replace(results / "static.nc", tmp_path / "static.nc")
+    (results / "static.nc").symlink_to(tmp_path / "static.nc")
+    assert "static.nc changed" in refused(lambda: replaced(results)).message
+
+
+# --- additions -------------------------------------------------------------------------------------
+
+
+def add(folder, **given):
+    with folder_lock(folder), additions(folder) as new:
+        for name, text in given.items():
+            (new / f"{name}.html").write_text(text)
+
+
+def test_additions_are_listed_and_replaced_while_they_are_unchanged(results):
+    add(results, report="one")
+    assert read_manifest(results).files["report.html"] == checksum(results / "report.html")
+    before = read_manifest(results)
+    add(results, report="two")
+    after = read_manifest(results)
+    assert (results / "report.html").read_text() == "two" and before.versions == after.versions
+    assert {name for name in after.files if after.files[name] != before.files[name]} == {"report.html"}
+    (results / "report.html").write_text("mine")
+    assert "report.html changed" in refused(lambda: add(results, report="three")).message
+    assert (results / "report.html").read_text() == "mine" and read_manifest(results) == after
+
+
+def test_an_addition_replaces_nothing_foreign(results, elsewhere):
+    (results / "report.html").write_text("mine")
+    before = contents(results)
+    assert refused(lambda: add(results, report="one")).file == str(results / "report.html")
+    assert contents(results) == before
+    (results / "report.html").unlink()
+    (results / "report.html").symlink_to(elsewhere / "nothing")
+    refused(lambda: add(results, report="one"))
+    (results / "report.html").unlink()
+    # what was written before a kill but not listed
+    (results / "report.html").write_text("one")
+    add(results, report="one")
+    assert "report.html" in read_manifest(results).files
+
+
+@pytest.mark.parametrize("last", ["report.html", MANIFEST, ".finished"])
+def test_an_addition_that_is_killed_goes_on_with_the_next(results, monkeypatch, last):
+    add(results, report="one")
+    replace = os.replace
+
+    def killed(source, target):
+        if os.path.dirname(target) == str(results) and os.path.basename(target) == last:
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        add(results, report="two")
+    monkeypatch.undo()
+    with folder_lock(results):
+        pass
+    there = contents(results)
+    assert there["report.html"] == ("one" if last == ".finished" else "two")
+    assert read_manifest(results).files["report.html"] == checksum(results / "report.html")
+    assert not any(name.startswith(".") for name in there)
+
+
+def test_an_addition_to_results_that_are_not_complete(results):
+    data = json.loads((results / MANIFEST).read_text()) | {"complete": False}
+    (results / MANIFEST).write_text(json.dumps(data))
+    add(results, report="one")
+    assert "report.html" in read_manifest(results).files and not read_manifest(results).complete
+
+
+def test_an_addition_to_changed_results_is_refused(results):
+    (results / "static.nc").write_text("mine")
+    before = contents(results)
+    assert "static.nc changed" in refused(lambda: add(results, report="one")).message
+    assert contents(results) == before
+
+
+@pytest.mark.parametrize("what", ["pipe", "device"])
+def test_a_pipe_or_device_in_place_of_a_result_is_not_waited_for(results, what):
+    (results / "static.nc").unlink()
+    if what == "pipe":
+        os.mkfifo(results / "static.nc")
+    else:
+        (results / "static.nc").symlink_to("/dev/zero")
+    with pytest.raises(StorageError, match="not a regular file"):
+        _ = open_results(results).static
+    assert "static.nc changed" in refused(lambda: replaced(results)).message
+
+
+# --- the lock --------------------------------------------------------------------------------------
+
+
+def test_a_lock_is_taken_through_no_link(results, elsewhere):
+    (results / ".lock").symlink_to(elsewhere / "thesis.txt")
+    with pytest.raises(StorageError) as info:
+        replaced(results)
+    assert info.value.exit_code == 4
+    (results / ".lock").unlink()
+    (results / ".lock").symlink_to(elsewhere / "new")
+    with pytest.raises(StorageError):
+        replaced(results)
+
+
+def test_a_pipe_or_a_file_in_place_of_the_lock_stays(results):
+    os.mkfifo(results / ".lock")
+    replaced(results)
+    assert contents(results)[".lock"] == "p"
+    (results / ".lock").unlink()
+    (results / ".lock").write_text("mine")
+    replaced(results)
+    assert contents(results)[".lock"] == "mine"
+
+
+def test_many_threads_hold_a_lock_one_after_the_other(tmp_path):
+    inside, most, done = [], [], []
+
+    def work():
+        while len(done) < 200:
+            try:
+                with exclusive_lock(tmp_path / ".lock"):
+                    inside.append(1)
+                    most.append(len(inside))
+                    done.append(1)
+                    inside.pop()
+            except StorageError as error:
+                assert error.code == "E-LOCKED"
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert max(most) == 1 and list(tmp_path.iterdir()) == []
+
+
+def test_no_folder_is_left_behind(results):
+    replaced(results)
+    assert contents(results).keys() == {"case.toml", "static.nc", MANIFEST}

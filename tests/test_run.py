@@ -1,0 +1,253 @@
+"""Runs that are interrupted go on from their stages; many speeds are solved and written some at a time."""
+
+import json
+import re
+from pathlib import Path
+from shutil import disk_usage
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from femgear.errors import StorageError
+from femgear.run import run_case
+from femgear.storage import files
+from femgear.storage.files import append_dataset, checksum, read_dataset, read_result, write_result
+from femgear.storage.results import read_manifest, run_folder
+from femgear.trains.elastic import stages as elastic
+from femgear.trains.helical import stages as helical
+from femgear.trains.reading import read_case, with_values
+
+SPEEDS = [f"{speed} rpm" for speed in range(1000, 3000, 150)]
+CASES = Path(__file__).parents[1] / "cases"
+QUICK = {
+    "planetary_27_40_108": {
+        "static.positions": 14, "static.flank_elements": 6, "static.stresses": False,
+        "operation.speeds": ["2000 rpm", "3100 rpm"], "housing.published": None,
+    },
+    "own_chain": {
+        "simulation.settle": "0.05 s", "simulation.duration": "0.2 s", "simulation.rate": "20 kHz",
+        "simulation.modes": 1,
+    },
+    "four_stage_reducer": {},
+    "helical_30_20_70": {
+        "static.positions": 12, "static.flank_elements": 6, "operation.speeds": ["900 rpm", "9000 rpm"],
+    },
+    "nrel_pgb": {"planar.branch": {"from": "36 Hz", "to": "36.5 Hz", "harmonics": 3}},
+    "gear_pair": {
+        "response.from": 1.1, "response.to": 1.0, "response.harmonics": 4, "chaos": None,
+        "sweep": {"ranges": [{"from": 0.6, "to": 1.0, "count": 3}], "steps": 60, "most_periods": 60},
+    },
+}  # fmt: skip
+
+
+def quick(name):
+    return with_values(read_case(CASES / f"{name}.toml"), QUICK[name])
+
+
+def run(case, folder, *, stop="", only=None, force=False):
+    """Run a case without pictures, interrupted as a stage begins; give the stages that were computed."""
+    begun = []
+
+    def progress(stage, done, total):
+        if stage == stop:
+            raise KeyboardInterrupt
+        if done == 0:
+            begun.append(stage)
+
+    with run_folder(folder, case=case.source, force=force) as place:
+        run_case(case, place, only=only, pictures=False, progress=progress)
+    return begun
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.glob("*.nc")}
+
+
+@pytest.mark.parametrize(
+    "name", [*list(QUICK)[:3], *(pytest.param(name, marks=pytest.mark.slow) for name in list(QUICK)[3:])]
+)
+def test_an_interrupted_run_goes_on_from_its_stages_to_the_same_bits(name, tmp_path):
+    case = quick(name)
+    stages = run(case, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        run(case, tmp_path / "out", stop=stages[-1])
+    assert not read_manifest(tmp_path / "out").complete
+    with pytest.warns(UserWarning, match=f"{', '.join(stages[:-1])}: as the run that was interrupted"):
+        assert run(case, tmp_path / "out") == stages[-1:]
+    assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
+        path.name for path in (tmp_path / "whole").iterdir()
+    )
+
+
+@pytest.fixture
+def interrupted(tmp_path):
+    """A folder with the modes of a run that was interrupted, and its case."""
+    case = quick("four_stage_reducer")
+    with pytest.raises(KeyboardInterrupt):
+        run(case, tmp_path / "out", stop="response")
+    return tmp_path / "out", case
+
+
+def test_another_case_is_kept_out_of_an_interrupted_run(interrupted):
+    folder, case = interrupted
+    other = with_values(case, {"title": "another one"})
+    with pytest.raises(StorageError, match="interrupted run of another case") as info:
+        run(other, folder)
+    assert info.value.code == "E-OUTPUT" and "--force" in info.value.remedy
+    assert run(other, folder, force=True) == ["modes", "response"]
+    assert read_manifest(folder).complete
+
+
+def test_a_run_that_replaces_results_goes_on_too(interrupted):
+    folder, case = interrupted
+    with pytest.warns(UserWarning, match="modes: as the run"):
+        run(case, folder)
+    before = contents(folder)
+    with pytest.raises(KeyboardInterrupt):
+        run(case, folder, stop="response", force=True)
+    assert read_manifest(folder).complete and contents(folder) == before
+    with pytest.warns(UserWarning, match="modes: as the run"):
+        assert run(case, folder, force=True) == ["response"]
+    assert contents(folder) == before and not (folder / ".running").exists()
+
+
+@pytest.mark.parametrize("damage", ["fingerprint", "bytes", "missing"])
+def test_stages_that_do_not_fit_are_computed_again(interrupted, damage):
+    folder, case = interrupted
+    kept = folder / ".stages" / "modes.npz"
+    if damage == "missing":
+        kept.unlink()
+    else:
+        result = read_result(kept, fingerprint=fingerprint_of(kept))
+        write_result(result, kept, fingerprint="0" * 64)
+        manifest = json.loads((folder / "manifest.json").read_text())
+        manifest["files"][".stages/modes.npz"] = checksum(kept)
+        (folder / "manifest.json").write_text(json.dumps(manifest))
+        if damage == "bytes":
+            kept.write_bytes(kept.read_bytes()[:-40])
+            manifest["files"][".stages/modes.npz"] = checksum(kept)
+            (folder / "manifest.json").write_text(json.dumps(manifest))
+    assert run(case, folder) == ["modes", "response"]
+
+
+def fingerprint_of(path):
+    with np.load(path) as file:
+        return json.loads(file["arr_0"].tobytes())["fingerprint"]
+
+
+@pytest.mark.parametrize("module", ["builtins", "os", "subprocess", "femgear.run"])
+def test_a_result_names_classes_of_femgear_alone(tmp_path, module):
+    tree = {"kind": "own", "number": 0, "class": [module, "list" if module == "builtins" else "Popen"]}
+    text = json.dumps({"fingerprint": "", "result": tree | {"items": []}})
+    np.savez(tmp_path / "a.npz", np.frombuffer(text.encode(), np.uint8))
+    with pytest.raises(StorageError, match="no result of this case"):
+        read_result(tmp_path / "a.npz", fingerprint="")
+
+
+def test_a_function_is_no_result(tmp_path):
+    with pytest.raises(TypeError, match="function"):
+        write_result({"f": lambda: 0}, tmp_path / "a.npz", fingerprint="")
+    assert not (tmp_path / "a.npz").exists()
+
+
+def test_results_keep_types_identity_and_what_may_be_written(tmp_path):
+    shared = np.arange(4.0)
+    shared.setflags(write=False)
+    value = {
+        "twice": (shared, [shared]), "set": {1, 2}, "frozen": frozenset({"a"}), "slice": slice(1, None, 2),
+        "nan": float("nan"), "number": np.float32(0.1), "complex": 1 + 2j, 3: None, "big": 10**30,
+    }  # fmt: skip
+    write_result(value, tmp_path / "a.npz", fingerprint="f")
+    found = read_result(tmp_path / "a.npz", fingerprint="f")
+    array = found["twice"][0]
+    assert array is found["twice"][1][0] and not array.flags.writeable and array.tolist() == [0, 1, 2, 3]
+    for name in ("set", "frozen", "slice", "number", "complex", 3, "big"):
+        assert found[name] == value[name] and type(found[name]) is type(value[name])
+    assert np.isnan(found["nan"])
+
+
+@pytest.mark.parametrize(
+    ("name", "parts", "option", "limit"),
+    [
+        ("planetary_27_40_108", elastic.dynamics_parts, "memory", 4e7),
+        pytest.param("helical_30_20_70", helical.helical_dynamics_parts, "most", 5, marks=pytest.mark.slow),
+    ],
+)
+def test_speeds_in_parts_are_those_solved_together(name, parts, option, limit, tmp_path, monkeypatch):
+    case = with_values(quick(name), {"operation.speeds": SPEEDS})
+    run(case, tmp_path / "whole")
+    monkeypatch.setitem(parts.__kwdefaults__, option, limit)
+    run(case, tmp_path / "parts")
+    for stage in set(read_manifest(tmp_path / "whole").timings) & {"dynamics", "housing"}:
+        same(*(read_dataset(tmp_path / way / f"{stage}.nc") for way in ("whole", "parts")))
+    verdict, other = (read_manifest(tmp_path / way).convergence["dynamics"] for way in ("whole", "parts"))
+    assert verdict.pop("residual") == pytest.approx(other.pop("residual"), rel=1e-3)
+    assert verdict == other and verdict["message"].startswith(f"{len(SPEEDS)} speeds: ")
+
+
+def same(whole, parts):
+    """Numbers to rounding, of the size of their variable; texts and units."""
+    texts = ({name: str(value) for name, value in one.attrs.items()} for one in (whole, parts))
+    assert next(texts) == next(texts) and whole.sizes == parts.sizes and [*whole] == [*parts]
+    for name, expected in whole.variables.items():
+        found = parts[name]
+        assert found.attrs == expected.attrs and found.dtype == expected.dtype, name
+        if expected.dtype.kind == "f" and "phase" not in str(name) and name != "residual":
+            size = np.nanmax(np.abs(expected.values))
+            np.testing.assert_allclose(found.values, expected.values, atol=1e-10 * size, err_msg=name)
+        elif expected.dtype.kind != "f":
+            assert (found.values == expected.values).all(), name
+
+
+def test_a_full_disk_is_met_after_the_first_part(tmp_path, monkeypatch):
+    case = with_values(quick("helical_30_20_70"), {"operation.speeds": SPEEDS})
+    monkeypatch.setitem(helical.helical_dynamics_parts.__kwdefaults__, "most", 5)
+
+    def progress(stage, done, total):
+        # room for two of the three parts
+        left = disk_usage(tmp_path)._replace(free=1_150_000)
+        if stage == "dynamics":
+            monkeypatch.setattr(files.shutil, "disk_usage", lambda path: left)
+
+    with pytest.raises(StorageError) as info, run_folder(tmp_path / "out") as place:
+        run_case(case, place, pictures=False, progress=progress)
+    assert info.value.code == "E-DISK-FULL" and info.value.file.endswith("dynamics.nc")
+    assert not [path for path in (tmp_path / "out").rglob("*") if "tmp" in path.name]
+
+
+def test_a_large_file_is_read_where_it_is_asked_for(tmp_path, monkeypatch):
+    attrs = {"units": "m", "long_name": "x"}
+    path = tmp_path / "a.nc"
+    path.touch()
+    for i in range(3):
+        speed = ("speed", [10.0 * i, 10.0 * i + 1], {"units": "rpm", "long_name": "speed"})
+        variables = {
+            "x": (("speed", "k"), np.full((2, 5), float(i)), attrs),
+            "stable": ("speed", [True, i > 0], {"units": "1", "long_name": "verdict"}),
+            "method": ("speed", ["direct", f"part {i}"], {"units": "1", "long_name": "method"}),
+            "k2": ("k", np.arange(5.0), attrs),
+        }
+        append_dataset(xr.Dataset(variables, {"speed": speed}, {"message": f"{i}"}), path, "speed")
+    whole = read_dataset(path)
+    assert whole.attrs["message"] == "2" and whole["method"].values[-1] == "part 2"
+    assert whole["speed"].values.tolist() == [0, 1, 10, 11, 20, 21] and whole["stable"].dtype == bool
+    monkeypatch.setattr(files, "_LARGE", 100)
+    found = read_dataset(path)
+    assert not found["x"].variable._in_memory and whole["x"].variable._in_memory
+    assert found["x"].isel(speed=-1).values.tolist() == [2.0] * 5
+    assert not found["x"].variable._in_memory and found.equals(whole)
+
+
+def test_the_size_of_many_speeds_is_said_before(tmp_path, monkeypatch):
+    case = with_values(quick("planetary_27_40_108"), {"operation.speeds": SPEEDS})
+    assert not [one for one in elastic.ELASTIC.case_warnings(case) if one.code == "W-SIZE"]
+    monkeypatch.setattr(elastic, "_NOTICED", 0.0)
+    (found,) = (one for one in elastic.ELASTIC.case_warnings(case) if one.code == "W-SIZE")
+    said = re.search(r"14 speeds with up to (\d+) harmonics each fill about (\S+) GB", found.text)
+    run(case, tmp_path / "out")
+    size = sum((tmp_path / "out" / f"{stage}.nc").stat().st_size for stage in ("dynamics", "housing"))
+    # whether the excitation is doubled is known with the modes
+    assert 0.95 < 1e9 * float(said[2]) / size < 2.2
+    assert int(said[1]) >= read_dataset(tmp_path / "out" / "dynamics.nc").sizes["harmonic"] - 1
