@@ -315,7 +315,9 @@ def Number(
     return _Reader(convert, schema)
 
 
-PAIR, TRIPLE = (Field(min_length=count, max_length=count) for count in (2, 3))
+Values = partial(Field, fail_fast=True)
+"""Make the limits of a list of numbers, of which the first that is wrong is refused, in `Annotated`."""
+PAIR, TRIPLE = (Values(min_length=count, max_length=count) for count in (2, 3))
 """Of lists with so many entries, in `Annotated`."""
 RIGID = "rigid"
 
