@@ -36,7 +36,7 @@ _HANGS = 20.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run pieces for some time, or the trial that is named; exit code 0, 1 (failures) or 130 (interrupted)."""
+    """Run pieces for some time, or the trial that is named; exit code 0, 1 (failures), 130 (interrupted)."""
     parser = argparse.ArgumentParser(prog="python tests/soak", description=__doc__)
     parser.add_argument("kind", nargs="?", choices=KINDS, help="of the trial to repeat, or to soak alone")
     parser.add_argument("number", nargs="?", type=int, help="of the trial to repeat")
@@ -117,7 +117,7 @@ class Piece:
 
 
 def soak(state: State, folder: Path, minutes: float, processes: int, kinds: Sequence[str]) -> int:
-    """Run pieces in so many processes until the time is over; what is interrupted is run again the next time."""
+    """Run pieces in so many processes until the time is over; the next call repeats interrupted ones."""
     end, running, failed = time.monotonic() + 60.0 * minutes, [], 0
     now, here = commit(), machine()
     spent = {kind: state.seconds(kind, now) for kind in kinds}

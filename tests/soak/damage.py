@@ -75,7 +75,7 @@ def trial(number: int, folder: Path) -> Outcome:
 
 
 def in_process(read: Callable[[], object]) -> tuple[str, object]:
-    """Call a function in a forked process: ("read", value), ("refused CODE", ""), or a crash with its words."""
+    """Call a function in a forked process: ("read", value), ("refused CODE", ""), or how it went wrong."""
     source, sink = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -204,8 +204,12 @@ def _grid(rng, place, folder):
 
 
 _MAKERS = {
-    "results": _results, "own checksums": _own_checksums, "swapped files": _swapped, "journal": _journal, "grid": _grid,
-}  # fmt: skip
+    "results": _results,
+    "own checksums": _own_checksums,
+    "swapped files": _swapped,
+    "journal": _journal,
+    "grid": _grid,
+}
 
 
 # --- what is read ------------------------------------------------------------------------------------------

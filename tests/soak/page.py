@@ -11,37 +11,57 @@ from soak.trials import KINDS, Tally
 HEAD = """# Reliability
 
 What femgear does with hostile case files, damaged results, killed processes and failing systems. The short
-forms run with `make test`; `make soak` goes on for as many minutes as one likes (`make soak MINUTES=60`), each
-time from where it was, and writes this page. Every trial follows from its kind and number:
+forms run with `make test`; `make soak` goes on for as many minutes as one likes (`make soak MINUTES=60`),
+each time from where it was, and writes this page. Every trial follows from its kind and number:
 `python tests/soak KIND NUMBER` repeats it.
 """
 WORDS = {
-    "case_text": ("Case files", "Case files of the repository with changed numbers, units, texts and keys, cut at "
-    "every byte, with lines missing, repeated or exchanged, nested, up to 10 MB. Each is described or refused "
-    "within 1 s of CPU time and 500 MB."),
-    "damage": ("Damaged files", "Results, manifests, cases as run, journals of sweeps and cached grids with changed, "
-    "missing or foreign contents. The numbers are the same as before, or refused; no reader crashes. \"own checksums\": "
-    "the manifest was made to fit the damage, so that numbers may differ, but nothing may crash."),
-    "kills": ("Kills", "Runs, runs over old results, sweeps and searches, ended by SIGKILL, SIGTERM or SIGINT at a random "
-    "moment. The same command then goes on, leaves the same bits as one that nothing disturbed, computes no finished "
-    "stage or design again and leaves nothing behind."),
-    "faults": ("Faults", "Full, read-only and failing disks, no home, no folder for temporary files, standard output closed, "
-    "full or of few letters, limits of memory, file size and open files, clocks that jump, two processes in one folder. "
-    "The number behind the colon is the exit code. Each ends with a documented one and one message, leaves old results whole, "
-    "and the same command works afterwards."),
-    "sets": ("Random planetary sets", "Valid sets beyond those of the tests: equilibrium, symmetry between planets, orders of "
-    "the housing, static limit of the dynamics."),
-    "determinism": ("Bits", "The same files, bit for bit, with one or two BLAS threads, known and new grids, any installed "
-    "locale, hash seed, time zone, level of optimisation and folder. Times are left out: they stand in the manifest, the "
-    "journals and the report."),
-}  # fmt: skip
+    "case_text": (
+        "Case files",
+        """Case files of the repository with changed numbers, units, texts and keys, cut at every byte, with
+lines missing, repeated or exchanged, nested, up to 10 MB. Each is described or refused within 1 s
+of CPU time and 500 MB.""",
+    ),
+    "damage": (
+        "Damaged files",
+        """Results, manifests, cases as run, journals of sweeps and cached grids with changed, missing or
+foreign contents. The numbers are the same as before, or refused; no reader crashes. "Own
+checksums": the manifest was made to fit the damage, so that numbers may differ, but nothing may
+crash.""",
+    ),
+    "kills": (
+        "Kills",
+        """Runs, runs over old results, sweeps and searches, ended by SIGKILL, SIGTERM or SIGINT at a random
+moment. The same command then goes on, leaves the same bits as one that nothing disturbed, computes
+no finished stage or design again and leaves nothing behind.""",
+    ),
+    "faults": (
+        "Faults",
+        """Full, read-only and failing disks, no home, no folder for temporary files, standard output closed,
+full or of few letters, limits of memory, file size and open files, clocks that jump, two processes
+in one folder. The number behind the colon is the exit code. Each ends with a documented one and one
+message, leaves old results whole, and the same command works afterwards.""",
+    ),
+    "sets": (
+        "Random planetary sets",
+        """Valid sets beyond those of the tests: equilibrium, symmetry between planets, orders of the housing,
+static limit of the dynamics.""",
+    ),
+    "determinism": (
+        "Bits",
+        """The same files, bit for bit, with one or two BLAS threads, known and new grids, any installed
+locale, hash seed, time zone, level of optimisation and folder. Times are left out: they stand in
+the manifest, the journals and the report.""",
+    ),
+}
 KNOWN = """## What may differ or fail, and why
 
-* Times differ from run to run. They stand in `manifest.json` (`timings`), in the `seconds` of journals and in the
-  table "Time" of the report, and nowhere else.
-* Other versions of NumPy, SciPy or Gmsh, and other processors, may round differently; the manifest names the versions.
-* Where the memory ends inside OpenBLAS, that library itself ends the process with exit code 1 and a line that begins
-  with "OpenBLAS error"; results on disk are whole, as after a kill.
+* Times differ from run to run. They stand in `manifest.json` (`timings`), in the `seconds` of journals and in
+  the table "Time" of the report, and nowhere else.
+* Other versions of NumPy, SciPy or Gmsh, and other processors, may round differently; the manifest names the
+  versions.
+* Where the memory ends inside OpenBLAS, that library itself ends the process with exit code 1 and a line that
+  begins with "OpenBLAS error"; results on disk are whole, as after a kill.
 """
 # results of a kind that are listed
 _MOST = 40
@@ -67,9 +87,18 @@ def page(state: State) -> str:
     parts.append("## Failures\n")
     if count > len(failures):
         parts.append(f"{count} in all, of which {len(failures)} are listed.\n")
-    parts.append("\n".join(f"* `{' '.join(one.replace('`', chr(39)).split())[:300]}`" for one in failures) + "\n"
-                 if failures else "None.\n")  # fmt: skip
+    parts.append("\n".join(map(_item, failures)) + "\n" if failures else "None.\n")
     return "\n".join([*parts, KNOWN])
+
+
+def _worst(found: list, digits: int) -> str:
+    """The largest value with the number of its trial, nothing where none was measured."""
+    return f"{found[0]:.{digits}f} ({found[1]})" if found[1] >= 0 else ""
+
+
+def _item(failure: str) -> str:
+    """A failure as an item of a list, on one line."""
+    return f"* `{' '.join(failure.replace('`', chr(39)).split())[:300]}`"
 
 
 def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]) -> str:
@@ -81,18 +110,14 @@ def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]
     lines = [
         f"Commit {last}, until {day}, {60 * hours:.0f} minutes of processes on {records[-1]['machine']}.",
         "",
-        "| | pieces | trials | failures | most CPU time | most memory | minutes |",
+        "| | pieces | trials | failures | most CPU time [s] | most memory [MB] | minutes |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
     for kind, (those, tally) in found.items():
         minutes = sum(record["seconds"] for record in those) / 60.0
-        slow, large = tally.worst_seconds, tally.worst_megabytes
-        time_, memory = (f"{value:.{digits}f} {unit} ({number})" if number >= 0 else ""
-                         for (value, number), unit, digits in ((slow, "s", 2), (large, "MB", 0)))  # fmt: skip
-        name = WORDS[kind][0]
-        lines.append(
-            f"| {name} | {len(those)} | {tally.trials} | {tally.failed} | {time_} | {memory} | {minutes:.0f} |"
-        )
+        slow, large = _worst(tally.worst_seconds, 2), _worst(tally.worst_megabytes, 0)
+        cells = (WORDS[kind][0], len(those), tally.trials, tally.failed, slow, large, f"{minutes:.0f}")
+        lines.append(f"| {' | '.join(map(str, cells))} |")
     lines += ["", "Behind times and memory stands the number of their trial."]
     if before:
         trials = sum(record["tally"]["trials"] for record in before)

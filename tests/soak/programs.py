@@ -1,4 +1,4 @@
-"""The programs of femgear as processes that can be watched, killed and starved, and what they leave on disk."""
+"""The programs of femgear as processes that can be watched, killed and starved; what they leave."""
 
 from __future__ import annotations
 
@@ -29,19 +29,7 @@ from femgear.trains.reading import read_case, with_values
 ROOT = Path(__file__).resolve().parents[2]
 # what an undisturbed command may take [s]; loaded machines take longer than idle ones
 _LIMIT = 120.0
-_SLOW = (
-    "femgear.",
-    "h5netcdf",
-    "h5py",
-    "matplotlib",
-    "numpy",
-    "pandas",
-    "rich",
-    "scipy",
-    "xarray",
-    "tomllib",
-    "pint",
-)
+_SLOW = tuple("femgear. h5netcdf h5py matplotlib numpy pandas rich scipy xarray tomllib pint".split())
 """Packages that this process imports for those that it starts."""
 _CRASH = 70
 """Exit code of a program that an exception ended; Python itself has 1."""
@@ -210,22 +198,22 @@ class Command:
 
 
 _RUN = ("run", "CASE", "-o", "OUT", "--no-pictures")
+_TORQUES = "operation.torque=50 N m,100 N m,150 N m,200 N m,250 N m"
+_SWEEP = ("sweep", "CASE", "-o", "OUT", "--of", "ste", "--of", "contact ratio sun-planet", "--over", _TORQUES)
+_OPTIMISE = (
+    *(str(ROOT / "scripts" / "optimise.py"), "CASE", "-o", "OUT", "--method", "simplex", "--no-check"),
+    *("--vary", "planet.profile_shift=-0.05..0.25 +- 0.01", "--objective", "tip thickness planet"),
+    *("--limit", "tip thickness planet >= 0.72", "--of", "contact ratio sun-planet"),
+)
 COMMANDS = {
     "run": Command("chain", _RUN),
     "run over old results": Command("chain", (*_RUN, "--force"), old=True),
-    "sweep": Command(
-        "set", ("sweep", "CASE", "-o", "OUT", "--of", "ste", "--of", "contact ratio sun-planet",
-                "--over", "operation.torque=50 N m,100 N m,150 N m,200 N m,250 N m"),
-    ),
-    "optimise": Command(
-        "shifts", (str(ROOT / "scripts" / "optimise.py"), "CASE", "-o", "OUT", "--vary",
-                   "planet.profile_shift=-0.05..0.25 +- 0.01", "--objective", "tip thickness planet", "--limit",
-                   "tip thickness planet >= 0.72", "--method", "simplex", "--no-check", "--of", "contact ratio sun-planet"),
-    ),
+    "sweep": Command("set", _SWEEP),
+    "optimise": Command("shifts", _OPTIMISE),
     "run with pictures": Command("stages", ("run", "CASE", "-o", "OUT")),
     "run of a set": Command("set", _RUN),
     "run of a set with grids": Command("grids", _RUN),
-}  # fmt: skip
+}
 QUICK = ("run", "run over old results", "sweep", "optimise")
 
 

@@ -12,7 +12,7 @@ from soak.trials import Tally
 
 
 class State:
-    """Records of pieces in a file; each has kind, index, commit, machine, seconds and the tally of its trials."""
+    """Records of pieces in a file: kind, index, commit, machine, seconds, the tally of their trials."""
 
     def __init__(self, path: Path):
         self.path = path

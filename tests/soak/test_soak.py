@@ -127,7 +127,7 @@ def test_records_are_kept_and_pieces_go_on(tmp_path):
     text = page.page(again)
     assert (
         "`python tests/soak case_text 4: too slow`" in text
-        and "| Case files | 3 | 6 | 3 | 0.50 s (3) |" in text
+        and "| Case files | 3 | 6 | 3 | 0.50 (3) |" in text
     )
 
 
