@@ -29,7 +29,7 @@ from soak.trials import Outcome
 PIECE = 12
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 SHORT = (0, 1, 6, 3, 7, 11)
-"""Trials of the tests: run, over old results, sweep, optimise; every signal."""
+"""Trials of the tests: all quick commands, every signal."""
 TWICE_FAILS = True
 """Whether a stage or design that is computed twice is a failure, or only counted."""
 

@@ -31,6 +31,7 @@ ROOT = Path(__file__).resolve().parents[2]
 _LIMIT = 120.0
 _SLOW = tuple("femgear. h5netcdf h5py matplotlib numpy pandas rich scipy xarray tomllib pint".split())
 """Packages that this process imports for those that it starts."""
+_FEW = 30
 _CRASH = 70
 """Exit code of a program that an exception ended; Python itself has 1."""
 
@@ -200,6 +201,10 @@ class Command:
 _RUN = ("run", "CASE", "-o", "OUT", "--no-pictures")
 _TORQUES = "operation.torque=50 N m,100 N m,150 N m,200 N m,250 N m"
 _SWEEP = ("sweep", "CASE", "-o", "OUT", "--of", "ste", "--of", "contact ratio sun-planet", "--over", _TORQUES)
+_GEARS = (
+    *("sweep", "CASE", "-o", "OUT", "--of", "contact ratio sun-planet", "--of", "tip thickness planet"),
+    *("--over", "planet.profile_shift=0..0.2/20"),
+)
 _OPTIMISE = (
     *(str(ROOT / "scripts" / "optimise.py"), "CASE", "-o", "OUT", "--method", "simplex", "--no-check"),
     *("--vary", "planet.profile_shift=-0.05..0.25 +- 0.01", "--objective", "tip thickness planet"),
@@ -208,13 +213,14 @@ _OPTIMISE = (
 COMMANDS = {
     "run": Command("chain", _RUN),
     "run over old results": Command("chain", (*_RUN, "--force"), old=True),
-    "sweep": Command("set", _SWEEP),
+    "sweep of gears": Command("shifts", _GEARS),
     "optimise": Command("shifts", _OPTIMISE),
+    "sweep": Command("set", _SWEEP),
     "run with pictures": Command("stages", ("run", "CASE", "-o", "OUT")),
     "run of a set": Command("set", _RUN),
     "run of a set with grids": Command("grids", _RUN),
 }
-QUICK = ("run", "run over old results", "sweep", "optimise")
+QUICK = ("run", "run over old results", "sweep of gears", "optimise")
 
 
 @cache
@@ -272,7 +278,7 @@ def undisturbed(name: str, folder: Path) -> Undisturbed:
         ended = start(command.arguments(place), place, before=stop_clock, note_modules=True).wait()
         if ended.code or ended.crash:
             raise AssertionError(f"{name} without disturbance ended with {ended.code}: {ended.err}")
-        if not _load(place / "modules"):
+        if _load(place / "modules") < _FEW:
             break
     return Undisturbed(place, contents(place / "out"), ended.seconds)
 
@@ -333,6 +339,8 @@ def _content(path: Path) -> str:
         data = json.dumps(table, sort_keys=True).encode()
     elif path.suffix == ".jsonl":
         data = "\n".join(json.dumps(record) for record in journal_records(path)).encode()
+    elif path.name == ".written":  # checksums of all that was ever written here, some of it with times
+        data = b"\n".join(sorted({line.split()[-1] for line in data.splitlines()}))
     elif path.name == "report.html":
         data = re.sub(rb"(?s)<h3>Time</h3>.*?</table>", b"", data)
     return hashlib.sha256(data).hexdigest()[:16]
