@@ -27,8 +27,6 @@ def trial(number: int, folder: Path) -> Outcome:
     name = rng.choice(
         ("run of a set", "run of a set with grids", "sweep", "run", "optimise", "run with pictures")
     )
-    if number == 0:  # that of the tests
-        name = "run"
     threads = rng.choice(("1", "2"))
     place = trial_workspace(name, folder, f"determinism {number} ä ö")
     if name == "sweep" and rng.random() < 0.3:
