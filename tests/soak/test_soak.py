@@ -55,8 +55,8 @@ def test_damage_that_is_not_seen_yet(number, folder):
 
 
 def test_damaged_files(folder):
-    tally = passed(trials.run_trials("damage", [n for n in range(60) if n not in HOLES], folder))
-    assert sum(count for said, count in tally.said.items() if "refused" in said) > 20
+    tally = passed(trials.run_trials("damage", [n for n in range(36) if n not in HOLES], folder))
+    assert sum(count for said, count in tally.said.items() if "refused" in said) > 12
 
 
 def test_killed_programs_go_on(folder):
@@ -67,10 +67,6 @@ def test_killed_programs_go_on(folder):
 def test_faults(folder):
     tally = passed(trials.run_trials("faults", faults.SHORT, folder))
     assert any(said.endswith(": 4") for said in tally.said)
-
-
-def test_the_same_bits_with_another_environment(folder):
-    passed(trials.run_trials("determinism", [0], folder))
 
 
 # --- the harness ------------------------------------------------------------------------------------------
