@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from importlib import metadata
@@ -50,16 +51,20 @@ def licence(name: str) -> str:
 
 def known_holes() -> str:
     """Ask pip-audit, where it is installed and reaches its data; say so where it does not."""
-    command = [sys.executable, "-m", "pip_audit", "--local", "--progress-spinner", "off"]
+    command = [sys.executable, "-m", "pip_audit", "--local", "--progress-spinner", "off", "--format", "json"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT, check=False)
+        found = json.loads(done.stdout)["dependencies"]
     except subprocess.TimeoutExpired:
         return f"known holes: not looked up, no answer within {_LIMIT:g} s"
-    if "No module named pip_audit" in done.stderr:
-        return "known holes: not looked up, pip-audit is not installed"
-    if done.returncode and not done.stdout.strip():
+    except (ValueError, KeyError, TypeError):
         return "known holes: not looked up, " + (done.stderr.strip().splitlines() or ["no answer"])[-1][:200]
-    return "known holes:\n" + (done.stdout.strip() or "none")
+    holes = [
+        f"  {one['name']} {one['version']}: {hole['id']}" for one in found for hole in one.get("vulns", ())
+    ]
+    unknown = sum("skip_reason" in one for one in found)
+    words = f"known holes of {len(found) - unknown} packages: {len(holes)}"
+    return "\n".join([words + (f"; {unknown} others could not be looked up" if unknown else ""), *holes])
 
 
 def main() -> int:

@@ -3,6 +3,7 @@
 import functools
 import json
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -168,11 +169,22 @@ def test_licences_of_all_that_is_needed_are_stated():
     assert not [name for name in names if supply.licence(name) == "not stated"]
 
 
-def test_pip_audit_without_data_is_said(monkeypatch):
-    monkeypatch.setattr(supply.subprocess, "run", lambda command, **_: programs.subprocess.CompletedProcess(
-        command, 1, "", "ConnectionError: no network"
-    ))  # fmt: skip
-    assert supply.known_holes() == "known holes: not looked up, ConnectionError: no network"
+@pytest.mark.parametrize(
+    ("out", "err", "words"),
+    [
+        ("", "ConnectionError: no network", "known holes: not looked up, ConnectionError: no network"),
+        ("", "No module named pip_audit", "known holes: not looked up, No module named pip_audit"),
+        (
+            '{"dependencies": [{"name": "a", "version": "1", "vulns": [{"id": "CVE-1"}]}, {"skip_reason": "x"}]}',
+            "",
+            "known holes of 1 packages: 1; 1 others could not be looked up\n  a 1: CVE-1",
+        ),
+    ],
+)
+def test_what_pip_audit_says_and_that_it_says_nothing(out, err, words, monkeypatch):
+    done = subprocess.CompletedProcess([], 1, out, err)
+    monkeypatch.setattr(supply.subprocess, "run", lambda *_, **__: done)
+    assert supply.known_holes() == words
 
 
 def test_the_page_of_the_repository_is_one_that_the_harness_writes():
