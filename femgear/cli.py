@@ -348,8 +348,8 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
         return _fail(_wrong_arguments(error, program))
     except FemgearError as error:
         return _fail(error)
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])]), file=sys.stderr)
         return _INTERRUPTED
     except BrokenPipeError:
         return 0

@@ -13,6 +13,8 @@ from script_tools import Progress, print_table, ready_folder, run_script, say_fi
 
 from femgear.errors import CaseError
 
+FILES = ("ring_resonance.csv", "tooth_contact.csv", "ring_resonance.png", "tooth_contact.png")
+
 
 def main(
     *,
@@ -54,7 +56,7 @@ def main(
             f"clearances {plays} m, play {play} m, {harmonics} harmonics", code="E-RANGE",
             limit="clearances of 0 or more, play above 0, two frequencies and points or more",
         )  # fmt: skip
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     with Progress() as progress:
         curves = []
         for text, one in (*zip(clearance, plays), ("no bearing", None)):
@@ -74,7 +76,7 @@ def main(
     write_csv(folder / "ring_resonance.csv", ("clearance", "frequency [Hz]", "ring x r.m.s. [m]"), rows)
     write_csv(folder / "tooth_contact.csv", MAP_HEADER, _map_records(found))
     _print(curves, found, play)
-    say_files(folder, ["ring_resonance.csv", "tooth_contact.csv", "ring_resonance.png", "tooth_contact.png"])
+    say_files(folder, FILES)
 
 
 MAP_HEADER = ("frequency [Hz]", "clearance [m]", "drive flanks in contact [1]", "back flanks in contact [1]")

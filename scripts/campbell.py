@@ -13,6 +13,7 @@ from script_tools import print_table, ready_folder, run_script, say_files, write
 
 from femgear.errors import CaseError
 
+FILES = ("campbell.csv", "campbell.png")
 RPM = np.pi / 30.0
 RING_TEETH = {"A": 99, "B": 68}
 
@@ -56,6 +57,7 @@ def main(
             f"{speeds} speeds up to {highest} rpm, {modes} modes, {harmonics} harmonics", code="E-RANGE",
             limit="5 speeds or more, above 0 rpm, one mode or more",
         )  # fmt: skip
+    folder = ready_folder(output, FILES)
     data = wind_turbine_a() if train == "A" else wind_turbine_b()
     orders = [1.0, *(RING_TEETH[train] * h for h in range(1, harmonics + 1))]
     found = campbell_data(
@@ -65,7 +67,6 @@ def main(
         orders=orders,
         count=modes,
     )
-    folder = ready_folder(output)
     header = ("carrier speed [rpm]", "mode", "frequency [Hz]")
     records = (
         (float(speed / RPM), number + 1, float(value))
@@ -79,7 +80,7 @@ def main(
         for c in found.critical
     ]
     print_table(f"Critical speeds of set {train}", ("order", "mode", "carrier [rpm]", "frequency [Hz]"), rows)
-    say_files(folder, ["campbell.csv", "campbell.png"])
+    say_files(folder, FILES)
 
 
 def _figure(found, train):

@@ -77,7 +77,7 @@ def main(
     blocks = describe_drivetrain(data)  # refuse before the folder is touched
     if gears := bool(data.parallel or data.planetary):
         check_spectrum(data, case_model(data))
-    folder = ready_folder(output)
+    folder = ready_folder(output, _names())
     sets, names = _computed(data, folder, gears=gears)
     _write_forces(folder, sets["transient"])
     names.append("forces.csv")
@@ -93,6 +93,14 @@ def main(
         extras["sensitivity"] = _sensitivity
     names += _draw_extras(folder, extras)
     say_files(folder, names)
+
+
+def _names() -> list[str]:
+    """Names of the files, of pictures of a run as patterns."""
+    from femgear.trains.drivetrain.figures import FIGURES
+
+    pictures = [f"{name}*.png" for figures in FIGURES.values() for name in figures.captions]
+    return ["forces.csv", *(f"{name}.png" for name in FILES.values()), *pictures]
 
 
 def _computed(data, folder: Path, *, gears: bool):

@@ -14,6 +14,7 @@ from script_tools import Progress, print_table, ready_folder, run_script, say_fi
 from femgear.errors import CaseError
 
 FLANKS = ("sun-planet 1, drive", "planet 1-ring, drive", "sun-planet 1, back", "planet 1-ring, back")
+PICTURES = ("gravity_wedging.png", "carrier_orbit.png", "planet_bearings.png", "tooth_contact.png")
 
 
 def main(
@@ -66,7 +67,8 @@ def main(
             f"{harmonics} harmonics from {lowest} to {highest} Hz, play {min(plays, default=0.0)} m",
             code="E-RANGE", limit="one harmonic or more, 0 < lowest < highest, play above 0",
         )  # fmt: skip
-    folder, results = ready_folder(output), []
+    names = ["branches.csv", *PICTURES, *(["sweeps.csv"] if sweep else [])]
+    folder, results = ready_folder(output, names), []
     with Progress() as progress:
         for text, play in zip(backlash, plays):
             progress(f"play {text}")
@@ -82,13 +84,12 @@ def main(
     curves = [(f"play {text}", hertz, rms, stable) for text, _, _, hertz, rms, stable in results]
     figure = response_branches(curves, sweeps, quantity="carrier x, r.m.s.")
     save_figure(figure, folder / "gravity_wedging.png")
-    names = _details(folder, results[0])
-    if compared:
+    _details(folder, results[0])
+    if sweep:
         write_csv(folder / "sweeps.csv", SWEEP_HEADER, compared)
-        names.append("sweeps.csv")
     _print(results)
     _print_sweeps(compared)
-    say_files(folder, ["branches.csv", "gravity_wedging.png", *names])
+    say_files(folder, names)
 
 
 HEADER = ("play", "point", "frequency [Hz]", "carrier x r.m.s. [m]", "stable")
@@ -165,7 +166,7 @@ def _print_sweeps(rows):
         print_table("Integration beside harmonic balance, carrier x r.m.s.", header, shown)
 
 
-def _details(folder, result) -> list[str]:
+def _details(folder, result) -> None:
     """Orbits, planet bearing forces at the peak and contact along the branch, of the first play."""
     from published.wind_turbine_figures import contact_over_frequency
     from published.wind_turbine_response import bearing_history, contact_shares, member_lines
@@ -185,7 +186,6 @@ def _details(folder, result) -> list[str]:
     shares = np.array([contact_shares(problem, one)[[0, 3, 6, 9]] for one in branch.solutions])
     figure = contact_over_frequency(hertz, shares, FLANKS, title=f"play {text}")
     save_figure(figure, folder / "tooth_contact.png")
-    return ["carrier_orbit.png", "planet_bearings.png", "tooth_contact.png"]
 
 
 def _records(results):

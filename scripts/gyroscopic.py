@@ -14,6 +14,7 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 
 from femgear.errors import CaseError
 
+FILES = ("gyroscopic.csv", "gyroscopic.png")
 CLAIM = 0.01
 
 
@@ -61,7 +62,7 @@ def main(
         )  # fmt: skip
     data = read_case(case)
     planetary_set(data)  # refuse before the folder is touched
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     with Progress() as progress:
         progress("modes", 0, 1)
         static = solve_static(data, progress=progress)
@@ -73,7 +74,7 @@ def main(
     _write(folder, branches)
     save_figure(_figure(branches, ring, top), folder / "gyroscopic.png")
     _print(branches, ring, top, highest)
-    say_files(folder, ["gyroscopic.csv", "gyroscopic.png"])
+    say_files(folder, FILES)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 
 from femgear.errors import CaseError
 
+FILES = ("harris_map.csv", "harris_map.png")
 HEADER = (
     "relief [m]",
     "torque [N m]",
@@ -76,7 +77,7 @@ def main(
     inputs = np.array(given or data.operation.torque * np.append(0.1, np.linspace(0.2, 2.0, 10)))
     on_sun = [sun_torque(data, gears, float(value)) for value in inputs]
     back = loads_back(np.array(on_sun))
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     with Progress() as progress:
         progress("compliance", 0, 1)
         basis = replace(design_basis(data, cache=grid_cache()), positions=positions)
@@ -90,7 +91,7 @@ def main(
     save_figure(figure, folder / "harris_map.png")
     _print_summary(amounts, inputs, found)
     print(f"largest residual of all contact problems: {found.residual:.1e}")
-    say_files(folder, ["harris_map.csv", "harris_map.png"])
+    say_files(folder, FILES)
 
 
 def _checked(amount: float, text: str, module: float) -> float:

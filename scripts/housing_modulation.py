@@ -55,7 +55,7 @@ def main(
     # refuse before the folder is touched, and what only the response tells after it
     _check_harmonic(harmonic, data.response_harmonics)
     planetary_set(data)
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     with Progress() as progress:
         static, dynamics, housing = _solve(data, progress)
         _check_harmonic(harmonic, dynamics.response.force.shape[-1] - 1)

@@ -22,7 +22,14 @@ from script_tools import (
 from femgear.errors import CaseError
 
 DAMPING, ERRORS, ECCENTRICITIES = (0.15, 0.09), (0.36, 0.54, 0.72), (0.0, 5e-6, 15e-6)
-STUDIES = ("damping", "errors", "states", "chaos", "eccentricity")
+FILES = {
+    "damping": ("damping.csv", "damping.png"),
+    "errors": ("tooth_error.csv", "tooth_error.png"),
+    "states": ("contact_states.csv", "contact_states.png"),
+    "chaos": ("chaos.csv", "chaos.png", "sections.png"),
+    "eccentricity": ("eccentricity.csv", "eccentricity.png", "sun_path.png", "spectrum.png"),
+}
+STUDIES = tuple(FILES)
 
 
 def main(
@@ -58,20 +65,21 @@ def main(
             f"{frequencies} frequencies", code="E-RANGE",
             limit=f"{', '.join(STUDIES)}; 1 harmonic, 3 ratios, 8 points, 2 frequencies or more",
         )  # fmt: skip
-    folder, names = ready_folder(output), []
+    names = [file for name in dict.fromkeys(study) for file in FILES[name]]
+    folder = ready_folder(output, names)
     with Progress() as progress:
         for name in dict.fromkeys(study):
             progress(name)
             if name == "damping":
-                names += damping_study(folder, harmonics)
+                damping_study(folder, harmonics)
             elif name == "errors":
-                names += error_study(folder, harmonics)
+                error_study(folder, harmonics)
             elif name == "states":
-                names += state_study(folder, harmonics, ratios)
+                state_study(folder, harmonics, ratios)
             elif name == "chaos":
-                names += chaos_study(folder, ratios, points)
+                chaos_study(folder, ratios, points)
             else:
-                names += eccentricity_study(folder, frequencies)
+                eccentricity_study(folder, frequencies)
             progress(name, 1)
     say_files(folder, names)
 
@@ -83,7 +91,7 @@ def read(name: str, values: dict):
     return with_values(read_case(REFERENCE_CASE.with_name(f"{name}.toml")), values)
 
 
-def damping_study(folder: Path, harmonics: int) -> list[str]:
+def damping_study(folder: Path, harmonics: int) -> None:
     """Amplitude and mean for two damping ratios."""
     from femgear.trains.gear_pair.stages import solve_response
 
@@ -98,10 +106,10 @@ def damping_study(folder: Path, harmonics: int) -> list[str]:
         rows.append((f"{zeta}", largest, folds or "none", *(b or "none" for b in borders)))
     header = ("damping ratio", "largest amplitude", "limit points", "x = 1 at", "x = -1 at")
     print_table("Load 0.9, tooth error 0.72, k(t) 10 %", header, rows)
-    return draw_curves(folder, "damping", curves, "load 0.9, tooth error 0.72, k(t) 10 %")
+    draw_curves(folder, "damping", curves, "load 0.9, tooth error 0.72, k(t) 10 %")
 
 
-def error_study(folder: Path, harmonics: int) -> list[str]:
+def error_study(folder: Path, harmonics: int) -> None:
     """Amplitude and mean for several tooth-frequency errors."""
     from femgear.trains.gear_pair.stages import solve_response
 
@@ -109,7 +117,7 @@ def error_study(folder: Path, harmonics: int) -> list[str]:
     for error in ERRORS:
         values = {"mesh.error": [f"{30 * error:.4g} um"], "response.harmonics": harmonics}
         curves.append(curve_of(f"error {error}", solve_response(read("gear_pair", values)).dataset()))
-    return draw_curves(folder, "tooth_error", curves, "load 0.9, ζ = 0.09, k(t) 10 %")
+    draw_curves(folder, "tooth_error", curves, "load 0.9, ζ = 0.09, k(t) 10 %")
 
 
 def curve_of(text: str, data) -> tuple:
@@ -117,7 +125,7 @@ def curve_of(text: str, data) -> tuple:
     return text, *(data[name].values for name in ("ratio", "amplitude", "mean", "stable"))
 
 
-def draw_curves(folder: Path, name: str, curves, title: str) -> list[str]:
+def draw_curves(folder: Path, name: str, curves, title: str) -> None:
     """Picture and table of curves over the frequency ratio."""
     from femgear.report.style import save_figure
     from femgear.trains.gear_pair.figures import amplitude_and_mean
@@ -130,10 +138,9 @@ def draw_curves(folder: Path, name: str, curves, title: str) -> list[str]:
     header = ("curve", "frequency ratio [1]", "amplitude [b]", "mean [b]", "stable")
     write_csv(folder / f"{name}.csv", header, records)
     save_figure(amplitude_and_mean(curves, title=title), folder / f"{name}.png")
-    return [f"{name}.csv", f"{name}.png"]
 
 
-def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
+def state_study(folder: Path, harmonics: int, ratios: int) -> None:
     """Contact states by harmonic balance and by sweeps up and down."""
     from femgear.report.style import save_figure
     from femgear.trains.gear_pair.figures import contact_rows, state_bands
@@ -152,10 +159,9 @@ def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
     print_table("Contact states, ζ = 0.09", ("", "state", "from ratio", "to ratio"), table)
     write_csv(folder / "contact_states.csv", ("route", "state", "from ratio [1]", "to ratio [1]"), table)
     save_figure(state_bands(rows), folder / "contact_states.png")
-    return ["contact_states.csv", "contact_states.png"]
 
 
-def chaos_study(folder: Path, ratios: int, points: int) -> list[str]:
+def chaos_study(folder: Path, ratios: int, points: int) -> None:
     """Bifurcation diagram, exponents and sections of the lightly loaded pair."""
     from femgear.report.style import save_figure
     from femgear.trains.gear_pair.figures import bifurcation_and_exponent, phase_sections
@@ -177,7 +183,6 @@ def chaos_study(folder: Path, ratios: int, points: int) -> list[str]:
                                 "not told", "smallest x"),
         [(str(ratios), str(len(chaotic)), *ends, str(words.count("not told")), f"{min(columns[3]):.3f}")],
     )  # fmt: skip
-    return ["chaos.csv", "chaos.png", "sections.png"]
 
 
 def eccentric_set(eccentricity: float, floating: bool):
@@ -213,7 +218,7 @@ def eccentric_set(eccentricity: float, floating: bool):
     return errors, lambda omega: with_errors(plain, errors, dampers=dampers, mesh_frequency=omega)
 
 
-def eccentricity_study(folder: Path, frequencies: int) -> list[str]:
+def eccentricity_study(folder: Path, frequencies: int) -> None:
     """Sun eccentricity of a planetary set: mesh force over frequency, path of the sun, spectrum."""
     from femgear.report.style import save_figure
     from femgear.trains.gear_pair.figures import amplitude_and_mean
@@ -242,7 +247,6 @@ def eccentricity_study(folder: Path, frequencies: int) -> list[str]:
     save_figure(figure, folder / "eccentricity.png")
     save_figure(orbits(paths, title=f"centre of the sun, {1e-3 * hertz[0]:.1f} kHz"), folder / "sun_path.png")
     save_figure(line_spectrum(spectra, y="force of sun-planet mesh 1 [N]"), folder / "spectrum.png")
-    return ["eccentricity.csv", "eccentricity.png", "sun_path.png", "spectrum.png"]
 
 
 def eccentric_response(eccentricity: float, floating: bool, hertz):

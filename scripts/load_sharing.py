@@ -13,6 +13,8 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 
 from femgear.errors import CaseError
 
+FILES = ("load_sharing.csv", "tooth_loads.csv", "load_sharing.png", "tooth_loads.png")
+
 
 def main(
     case: Path = REFERENCE_CASE,
@@ -55,7 +57,7 @@ def main(
             f"there is no planet {planet}", code="E-PLANET", key="--planet", limit=f"1 to {gears.n_planets}"
         )
     sun_torque(data, gears)
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     with Progress() as progress:
         cycles, plain = _solve(data, gaps, planet, progress)
     names = [str(name) for name in gears.mesh_names]
@@ -64,7 +66,7 @@ def main(
     save_figure(_share_figure(gaps, cycles, planet), folder / "load_sharing.png")
     save_figure(_tooth_figure(gaps, cycles, names, planet), folder / "tooth_loads.png")
     _print_shares(gaps, cycles, planet, plain)
-    say_files(folder, ["load_sharing.csv", "tooth_loads.csv", "load_sharing.png", "tooth_loads.png"])
+    say_files(folder, FILES)
 
 
 SHARE_HEADER = ("gap [m]", "planet", "position [periods]", "share [1]", "sun-planet force [N]")

@@ -11,6 +11,7 @@ import numpy as np
 from cyclopts import Parameter
 from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
 
+FILES = ("mesh_stiffness.csv", "mesh_stiffness.png")
 HEADER = (
     "torque [N m]",
     "mesh",
@@ -59,7 +60,7 @@ def main(
         data = with_value(data, "static.positions", positions)
     variants = [with_value(data, "operation.torque", value) for value in torque] or [data]
     planetary_set(data)  # refuse before the folder is touched
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     with Progress() as progress:
         results = []
         for number, variant in enumerate(variants):
@@ -71,7 +72,7 @@ def main(
     save_figure(_figure(torques, results), folder / "mesh_stiffness.png")
     _print_summary(torques, results)
     print(f"contact: {results[0].attrs['contact']}; {results[0].sizes['position']} positions")
-    say_files(folder, ["mesh_stiffness.csv", "mesh_stiffness.png"])
+    say_files(folder, FILES)
 
 
 def _records(torques, results):

@@ -60,9 +60,13 @@ def main(
     }  # fmt: skip
     values = {f"response.{key}": value for key, value in given.items()}
     case = with_values(four_stage_case(lateral=lateral), values)
-    folder = ready_folder(output)
+    names = ["modes.csv", "forces.csv", "stage_energy.png", "mesh_orders.png", "stage_forces.png"]
+    names = ["published.csv", "published.png"] if published else names
+    folder = ready_folder(output, names)
     if published:
-        return published_readings(folder)
+        published_readings(folder)
+        say_files(folder, names)
+        return
     with Progress() as progress:
         progress("modes")
         modes = stages.solve_multistage_modes(case)
@@ -74,7 +78,6 @@ def main(
     save_figure(figures.stage_forces(response.dataset(), balanced), folder / "stage_forces.png")
     write_tables(folder, modes, np.linspace(lowest, highest, points), response.forces)
     print_train(modes.data, case.operation)
-    names = ["modes.csv", "forces.csv", "stage_energy.png", "mesh_orders.png", "stage_forces.png"]
     say_files(folder, names)
 
 
@@ -113,7 +116,6 @@ def published_readings(folder: Path) -> None:
     save_figure(figure, folder / "published.png")
     header = ("reading", "end", "modes at 0 Hz", "lowest [Hz]", "highest [Hz]", f"within {low} to {high} Hz")
     print_table("Published four-stage table: torsion, rings at rest, rigid shafts", header, rows)
-    say_files(folder, ["published.csv", "published.png"])
 
 
 def write_tables(folder: Path, modes, rpm: np.ndarray, forces: dict[str, np.ndarray]) -> None:

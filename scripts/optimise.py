@@ -20,6 +20,9 @@ ERRORS = ("ste overall", "ste sun-planet", "ste planet-ring")
 FORCES = ("mesh force", "peak mesh force", "housing")
 QUIET = {"static.stresses": False, "housing.published": None}
 COLUMNS = ("quantity", "before", "optimum", "change")
+FILES = ("optimum.toml", "optimum.csv", "tolerances.png")
+FRONT, CHECK = ("front.csv", "front.png"), ("check.csv", "optimum.png")
+JOURNALS, RUNS = ("journal.jsonl", "journal_fine.jsonl"), ("before", "after")
 
 
 @Parameter(name="*")
@@ -109,31 +112,43 @@ def main(
     output
         Folder of the results.
     """
-    from femgear.run import grid_cache
+    from femgear.study.designs import resumable
     from femgear.study.objectives import named_quantity
-    from femgear.study.search import SearchOptions, minimise
-    from femgear.trains.reading import read_case, with_value, with_values
+    from femgear.trains.reading import read_case, with_value
 
     data = read_case(case)
     data = data if task.torque is None else with_value(data, "operation.torque", task.torque)
     _check_request(data, extent)
     data, problem = _problem(data, task, extent)
     another = None if task.second is None else named_quantity(task.second, speeds=task.speeds)
-    folder = ready_folder(output)
+    names = [*FILES, *(FRONT if another else ()), *(CHECK if extent.check else ())]
+    folder = ready_folder(output, names)
+    _refuse_foreign(data, problem, folder, RUNS if extent.check else ())
+    with resumable(folder):
+        rough, found, options = _searched(data, problem, extent, folder)
+        _write(found, data, folder, rough)
+        if another is not None:
+            _front(problem, another, folder, options | {"start": rough.x})
+        if extent.check:
+            _check(found, data, folder, None if data.rigid else task.speeds, rough)
+    say_files(folder, [*names, *JOURNALS, *(RUNS if extent.check else ())])
+
+
+def _searched(data, problem, extent: Extent, folder: Path):
+    """The optimum of the search, that of the refinement, and the options of the search."""
+    from femgear.run import grid_cache
+    from femgear.study.search import SearchOptions, minimise
+    from femgear.trains.reading import with_values
+
     counts = SearchOptions(seed=extent.seed, samples=extent.samples, max_designs=extent.max_designs)
     options = {"options": counts, "cache": grid_cache()}
-    coarsely = options | {"journal": folder / "journal.jsonl"}
+    coarsely = options | {"journal": folder / JOURNALS[0]}
     with Progress() as progress:
         rough = minimise(problem, method=extent.method, sensitivity=False, progress=progress, **coarsely)
         progress("refinement", 0, 1)
         found = _refined(rough, with_values(data, QUIET), folder, options, extent.method)
         progress("refinement", 1, 1)
-    names = _write(found, data, folder, rough)
-    if another is not None:
-        names += _front(problem, another, folder, coarsely | {"start": rough.x})
-    if extent.check:
-        names += _check(found, data, folder, None if data.rigid else task.speeds, rough)
-    say_files(folder, names)
+    return rough, found, coarsely
 
 
 def _problem(data, task: Task, extent: Extent):
@@ -185,11 +200,11 @@ def _refined(rough, case, folder: Path, options, method: str):
     if any(variable.integer for variable in problem.variables):
         local = "global"
     extent = replace(options["options"], samples=0, starts=1)
-    options = options | {"options": extent, "journal": folder / "journal_fine.jsonl"}
+    options = options | {"options": extent, "journal": folder / JOURNALS[1]}
     return minimise(problem, method=local, start=rough.x, **options)
 
 
-def _write(found, data, folder: Path, rough) -> list[str]:
+def _write(found, data, folder: Path, rough) -> None:
     """Tables on the terminal, and the files of the search."""
     from femgear.report.style import save_figure
     from femgear.storage.files import write_text
@@ -215,10 +230,9 @@ def _write(found, data, folder: Path, rough) -> list[str]:
     value = found.after[name] / dimension.scale
     bars = tolerance_bars(labels, less, more, value, quantity=name, unit=dimension.shown.replace("um", "µm"))
     save_figure(bars, folder / "tolerances.png")
-    return ["optimum.toml", "optimum.csv", "tolerances.png", "journal.jsonl", "journal_fine.jsonl"]
 
 
-def _front(problem, second, folder: Path, options) -> list[str]:
+def _front(problem, second, folder: Path, options) -> None:
     from femgear.report.style import save_figure
     from femgear.study.front import pareto_front
 
@@ -239,10 +253,9 @@ def _front(problem, second, folder: Path, options) -> list[str]:
     print(f"front: {len(found.values)} designs of {found.designs}, from")
     for end in (low, found.values[found.compromise], high):
         print("  " + ", ".join(f"{q.name} {q.show(value)}" for q, value in zip(both, end)))
-    return ["front.csv", "front.png"]
 
 
-def _check(found, data, folder: Path, speeds, rough) -> list[str]:
+def _check(found, data, folder: Path, speeds, rough) -> None:
     """Case and optimum anew: a full run each on a finer grid, read back from its files."""
     from femgear.report.style import save_figure
     from femgear.trains.reading import with_values
@@ -253,7 +266,7 @@ def _check(found, data, folder: Path, speeds, rough) -> list[str]:
     only = "static" if speeds is None else "housing"
     runs = [
         _run(with_values(data, values | fine), folder / name, only)
-        for name, values in (("before", {}), ("after", found.values))
+        for name, values in zip(RUNS, ({}, found.values))
     ]
     numbers = [_numbers(results, only) for results in runs]
     rows = [(name, before, numbers[1][name][0], unit) for name, (before, unit) in numbers[0].items()]
@@ -273,7 +286,21 @@ def _check(found, data, folder: Path, speeds, rough) -> list[str]:
         before_and_after(position, errors, **dynamic, costs=_costs(rough)),
         folder / "optimum.png",
     )
-    return ["check.csv", "optimum.png", "before", "after"]
+
+
+def _refuse_foreign(data, problem, folder: Path, runs: Sequence[str]) -> None:
+    """Refuse the journal of the refinement and folders of runs that are another's, before all computing."""
+    from femgear.storage.results import run_folder
+    from femgear.study.designs import open_designs
+    from femgear.trains.reading import with_values
+
+    keys = [variable.keys for variable in problem.variables]
+    with open_designs(with_values(data, QUIET), keys, journal=folder / JOURNALS[1]):
+        pass
+    for name in runs:
+        if (folder / name).exists():
+            with run_folder(folder / name, force=True):
+                pass
 
 
 def _run(case, folder: Path, only: str):

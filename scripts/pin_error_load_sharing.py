@@ -15,6 +15,7 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 
 from femgear.errors import CaseError
 
+FILES = ("load_sharing_samples.csv", "load_sharing_histogram.png")
 QUANTILES = (0.5, 0.9, 0.99)
 _POSITIONS = 16
 """Of one mesh period."""
@@ -81,7 +82,7 @@ def main(
     sigma = [to_si(text, LENGTH) / parts for text in given.values()] * (2 // len(given))
     pins = pin_samples(gears.n_planets, samples=samples, radial=sigma[0], tangential=sigma[1], seed=seed)
     place = round(position * _POSITIONS) % _POSITIONS
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     with Progress() as progress:
         progress("compliance", 0, 1)
         basis = replace(design_basis(data, cache=grid_cache()), positions=_POSITIONS)
@@ -98,7 +99,7 @@ def main(
     factors = [sharing.factor for _, sharing, _ in results]
     figure = sharing_histogram(factors, [names[kind] for kind, *_ in results], gears.n_planets)
     save_figure(figure, folder / "load_sharing_histogram.png")
-    say_files(folder, ["load_sharing_samples.csv", "load_sharing_histogram.png"])
+    say_files(folder, FILES)
 
 
 def _check(texts, lengths, parts: int, module: float) -> None:

@@ -21,6 +21,15 @@ MOST_HARMONICS = 100
 # cases of Table 2 of the paper, four equal planets
 TYPES = {"in-phase": "A", "counter-phased": "C", "sequentially phased": "F"}
 
+FILES = (
+    "phasing.csv",
+    "neighbours.csv",
+    "mesh_forces.csv",
+    "phases.png",
+    "resultants.png",
+    "mesh_forces.png",
+)
+
 
 def main(
     *,
@@ -82,7 +91,7 @@ def main(
         print(f"remark: {remark}")
     choices = neighbouring_teeth(sun, planet, ring, planets, distance=distance, ratio_tolerance=tolerance)
     table = phasing_table(phasing, range(1, harmonics + 1))
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     header, rows = _phasing_rows(table)
     print_table(
         f"{sun}/{planet}/{ring}, {len(psi)} planets at {_degrees(psi)} deg, {convention}", header, rows
@@ -100,8 +109,7 @@ def main(
     meshes = ("sun-planet 1", "sun-planet 2")
     save_figure(mesh_force_spectra(frequency, forces, modes=modes, meshes=meshes), folder / "mesh_forces.png")
     write_csv(folder / "mesh_forces.csv", *_force_rows(frequency, forces, meshes))
-    names = ("phasing.csv", "neighbours.csv", "mesh_forces.csv", "phases.png", "resultants.png")
-    say_files(folder, [*names, "mesh_forces.png"])
+    say_files(folder, FILES)
 
 
 def _phasing_rows(table):

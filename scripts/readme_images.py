@@ -37,6 +37,8 @@ def main(results: Path, /, *, output: Path = FOLDER) -> None:
     from femgear.trains.reading import open_results
 
     folder = open_results(results).folder
+    # the pictures of docs/images are under version control
+    place = FOLDER if output.resolve() == FOLDER else ready_folder(output, IMAGES)
     for name in ready_images(folder):
         with Image.open(folder / name) as picture:
             small = picture.convert("RGB").quantize(256)
@@ -45,7 +47,7 @@ def main(results: Path, /, *, output: Path = FOLDER) -> None:
         data = stream.getvalue()
         if len(data) > LARGEST:
             raise StorageError(f"{name} takes {len(data)} bytes", code="E-RANGE", limit=f"{LARGEST} bytes")
-        write_bytes(data, ready_folder(output) / name)
+        write_bytes(data, place / name)
         print(f"{name}: {len(data) / 1e3:.0f} kB")
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from femgear.cli import Progress as Progress
 from femgear.cli import call
-from femgear.storage.files import storage_errors
+from femgear.storage.files import own_files
 from femgear.storage.files import write_csv as write_csv
 
 REFERENCE_CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
@@ -45,10 +45,9 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
         return call(app, arguments, program=program)
 
 
-def ready_folder(folder: Path) -> Path:
-    """The folder, created where it does not exist."""
-    with storage_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+def ready_folder(folder: Path, names: Sequence[str]) -> Path:
+    """The folder, created where it does not exist; files of these names that are not its own are refused."""
+    own_files(folder, names)
     return folder
 
 

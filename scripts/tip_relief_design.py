@@ -15,6 +15,7 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 
 from femgear.errors import CaseError
 
+FILES = ("tip_relief.csv", "tip_relief.png", "relief.toml")
 HEADER = (
     "torque [N m]",
     "relief [m]",
@@ -76,7 +77,7 @@ def main(
     on_sun = np.array([sun_torque(data, gears, float(value)) for value in inputs])
     loads_back(on_sun)
     top = None if largest is None else _checked(to_si(largest, LENGTH), largest, data.sun.module)
-    folder = ready_folder(output)
+    folder = ready_folder(output, FILES)
     with Progress() as progress:
         progress("compliance", 0, 1)
         basis = replace(design_basis(data, cache=grid_cache()), positions=positions)
@@ -92,7 +93,7 @@ def main(
     print(f"at {2 * positions} positions: {fine:.1%}")
     _print_verdict(best, grid)
     print(f"for the case file (relief.toml):\n\n{snippet}")
-    say_files(folder, ["tip_relief.csv", "tip_relief.png", "relief.toml"])
+    say_files(folder, FILES)
 
 
 def _write(folder: Path, inputs, grid, best, design: float, snippet: str) -> None:

@@ -30,10 +30,13 @@ if sys.platform != "win32":
     import fcntl
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
+# what was written into a folder, as sha256sum lists it
+_WRITTEN = ".written"
 # bytes that a file may declare beyond four times its size
 _MARGIN = 1_000_000
 
@@ -133,6 +136,8 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
             write(temporary)
             with open(temporary, "rb+") as stream:
                 os.fsync(stream.fileno())
+            if _is_regular(path.with_name(_WRITTEN)):
+                _list_own(path, checksum(temporary))
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
@@ -160,14 +165,83 @@ def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Ite
 
 def csv_cell(value: object) -> object:
     """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
-    formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
-    return f"'{value}" if formula else value
+    if not isinstance(value, str) or _NUMBER.fullmatch(value):
+        return value
+    return f"'{value}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 def checksum(path: str | os.PathLike) -> str:
     """Compute the SHA-256 of a file."""
     with storage_errors(path), open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def own_files(folder: Path, names: Iterable[str]) -> None:
+    """Make a folder ready for files of these names or patterns, and replace none that was not written so.
+
+    From now on the folder keeps a list, ``.written``, of the SHA-256 of all that `replace_file` writes there.
+
+    Raises
+    ------
+    StorageError
+        ``E-OUTPUT``: a file of such a name is not on the list, or was changed since; results of a run.
+    """
+    with storage_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.path.lexists(folder / "manifest.json"):
+            raise StorageError(
+                "the folder holds the results of a run",
+                code="E-OUTPUT",
+                file=str(folder),
+                remedy="name another folder",
+            )
+        for name in names:
+            for path in folder.glob(name) if "*" in name else [folder / name]:
+                _refuse_foreign(path)
+        with contextlib.suppress(FileExistsError):
+            open(folder / _WRITTEN, "x").close()
+        if not _is_regular(folder / _WRITTEN):
+            _refuse_foreign(folder / _WRITTEN)
+
+
+def _list_own(path: Path, digest: str) -> None:
+    """Put the checksum of a file on the list of its folder before the file has its name."""
+    entry = _entry(path, digest)
+    listed = _refuse_foreign(path)
+    if entry not in listed.splitlines():
+        with open(path.with_name(_WRITTEN), "ab") as stream:
+            # half a line of a killed process spoils no other
+            stream.write((b"" if listed[-1:] in (b"", b"\n") else b"\n") + entry + b"\n")
+            stream.flush()
+            os.fsync(stream.fileno())
+
+
+def _refuse_foreign(path: Path) -> bytes:
+    """Refuse to replace what the list of the folder has not; the list otherwise."""
+    there = os.path.lexists(path)
+    found = _entry(path, checksum(path)) if _is_regular(path) else b"a link or folder"
+    # read after the file: another process that replaces it lists it first
+    written = path.with_name(_WRITTEN)
+    listed = written.read_bytes() if _is_regular(written) else b""
+    if there and found not in listed.splitlines():
+        raise StorageError(
+            "would be replaced, but was not written here by femgear, or was changed since",
+            code="E-OUTPUT",
+            file=str(path),
+            limit=f"files whose SHA-256 {_WRITTEN} lists",
+            remedy="move it away, or name another folder",
+        )
+    return listed
+
+
+def _entry(path: Path, digest: str) -> bytes:
+    """Write a line of the list, without its end."""
+    return f"{digest}  ".encode() + os.fsencode(path.name)
+
+
+def _is_regular(path: Path) -> bool:
+    """Tell whether a path is a regular file, and no link to one."""
+    return path.is_file() and not path.is_symlink()
 
 
 def checked_name(name: str) -> str:

@@ -3,8 +3,8 @@
 `Designs` computes quantities of points of the design space, `Evaluations` turns them into the costs that a
 search sees, and `tolerances` tells what an optimum loses when its variables are off by their tolerances.
 
-A search that was interrupted goes on from what its `Journal` holds: records by key, one JSON line each,
-appended and forced out. The first line, the header, says what the records belong to.
+A search that was interrupted goes on from what its `Journal` holds: records by key, one JSON line each with
+its number and a checksum, appended and forced out. The first line, the header, says what they belong to.
 """
 
 from __future__ import annotations
@@ -13,26 +13,28 @@ import hashlib
 import json
 import math
 import os
+import stat
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from femgear import __version__
 from femgear.case.dependencies import Steps, compliance_entries
 from femgear.case.sections import Case
-from femgear.errors import ContactError, FemgearError, StorageError
+from femgear.errors import ContactError, FemgearError, Finding, StorageError
 from femgear.storage.files import exclusive_lock, storage_errors
 from femgear.study.objectives import STAGES, Quantity, Variant
 from femgear.study.problem import Point, Problem, Variable, Vector
 from femgear.trains.protocol import Progress
 from femgear.trains.reading import to_toml, with_values
 
-_FORMAT = 1
+_FORMAT = 2
 """Of journals."""
 # what a journal with another entry of the header was written for
 _WRITTEN = {
@@ -48,54 +50,63 @@ OUTSIDE, _REFUSED = 1e6, 1e9
 class Journal(dict[str, dict]):
     """Records by key in their order, in memory and, where `open_designs` made it, on disk."""
 
-    def __init__(self, path: Path | None = None, stream: BinaryIO | None = None):
+    def __init__(self, path: Path | None = None, stream: FileIO | None = None, header: dict | None = None):
         super().__init__()
-        self._path, self._stream = path, stream
+        self._path, self._stream, self._number = path, stream, 0
+        self._header = _sealed(header or {})
 
     def add(self, key: str, record: Mapping[str, object]) -> None:
         """Keep a record; one of the same key is replaced."""
         self[key] = dict(record)
-        self._write({"key": key, "record": self[key]})
+        self._number += 1
+        if self._path is not None and self._stream is not None:
+            line = {"number": self._number, "key": key, "record": self[key]}
+            _append(self._path, self._stream, _sealed(line, self._header))
 
-    def _write(self, line: dict) -> None:
-        """Append a line and force it out."""
-        if self._path is None or self._stream is None:
-            return
-        with storage_errors(self._path):
-            # a number that is not finite is no JSON, and no result either
-            self._stream.write(json.dumps(line, allow_nan=False).encode() + b"\n")
-            self._stream.flush()
-            os.fsync(self._stream.fileno())
-
-    def _read(self, path: Path, stream: BinaryIO, header: dict) -> None:
+    def _read(self, path: Path, stream: FileIO, header: dict) -> None:
         """Take what the file holds; a line that a killed process left half written is cut off."""
         with storage_errors(path):
             stream.seek(0)
             text = stream.read()
-        whole = text.rfind(b"\n") + 1
-        lines = [_line(line, path, number) for number, line in enumerate(text[:whole].splitlines(), 1)]
+        whole, bad = text.rfind(b"\n") + 1, []
+        lines = text[:whole].split(b"\n")[:-1]
         # a file without a whole line is either the beginning of this header or none of ours
-        if not lines and not json.dumps(header).encode().startswith(text):
-            raise _broken(path, 1)
-        for name, expected in header.items():
-            if lines and lines[0].get(name) != expected:
-                raise StorageError(
-                    f"the journal was written {_WRITTEN[name]}",
-                    code="E-JOURNAL",
-                    file=str(path),
-                    value=lines[0].get(name),
-                    limit=str(expected),
-                    remedy="name a new file, or remove this one",
-                )
-        for number, line in enumerate(lines[1:], 2):
-            if not (isinstance(line.get("key"), str) and isinstance(line.get("record"), dict)):
-                raise _broken(path, number)
-            self[line["key"]] = line["record"]
+        if lines or not self._header.startswith(text):
+            _check_header(path, lines[0] if lines else text, header)
+        for place, line in enumerate(lines[1:], 2):
+            found = _unsealed(line, self._header)
+            # numbers rise, but where lines were copied or moved
+            if _is_entry(found, len(header["keys"])) and found["number"] > self._number:
+                self._number, self[found["key"]] = found["number"], found["record"]
+            else:
+                bad.append(str(place))
+        if bad:
+            shown = f"line{'s' * (len(bad) > 1)} {', '.join(bad[:9])}"
+            shown += f" and {len(bad) - 9} more" if len(bad) > 9 else ""
+            finding = Finding(
+                "W-JOURNAL", "", f"{path}: changed or damaged since it was written: {shown}",
+                remedy="what stood there is left out, and computed again where no later line holds it",
+            )  # fmt: skip
+            warnings.warn(str(finding), stacklevel=2)
         if whole < len(text):
             with storage_errors(path):
                 stream.truncate(whole)
         if not lines:
-            self._write(header)
+            _append(path, stream, self._header)
+
+
+def _append(path: Path, stream: FileIO, line: bytes) -> None:
+    """Append a line and force it out; where that fails, no half of it stays."""
+    with storage_errors(path):
+        size = os.fstat(stream.fileno()).st_size
+        try:
+            while line:
+                line = line[stream.write(line) or 0 :]
+            os.fsync(stream.fileno())
+        except OSError:
+            with suppress(OSError):
+                stream.truncate(size)
+            raise
 
 
 @contextmanager
@@ -109,31 +120,97 @@ def _open_journal(path: str | Path | None, header: dict) -> Iterator[Journal]:
         path.parent.mkdir(parents=True, exist_ok=True)
     with exclusive_lock(path.with_name(f".{path.name}.lock")):
         with storage_errors(path):
-            stream = open(path, "a+b")
+            if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
+                raise _broken(path, "it is no regular file")
+            # unbuffered, so that what could not be written is not written later
+            stream = open(path, "a+b", buffering=0)
         with stream:
-            journal = Journal(path, stream)
+            journal = Journal(path, stream, header)
             journal._read(path, stream, header)
             yield journal
 
 
-def _line(text: bytes, path: Path, number: int) -> dict:
-    """Read one line, a table in JSON."""
+@contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """Say with an interruption of the block that the same command goes on from what a folder holds."""
     try:
-        found = json.loads(text)
+        yield
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note(f"the same command goes on from what {folder} holds")
+        raise
+
+
+def _sealed(line: dict, header: bytes = b"") -> bytes:
+    """Write a table as a line of JSON that ends with a checksum of the header and what stands before it."""
+    # a number that is not finite is no JSON, and no result either
+    text = json.dumps(line, allow_nan=False)[:-1].encode()
+    return text + b', "checksum": "' + _check(header + text) + b'"}\n'
+
+
+def _unsealed(line: bytes, header: bytes = b"") -> dict:
+    """Read a line that `_sealed` wrote under the same header; an empty table from any other."""
+    text, _, check = line.rpartition(b', "checksum": "')
+    if check != _check(header + text) + b'"}':
+        return {}
+    try:
+        found = json.loads(text + b"}")
     except (ValueError, RecursionError):
-        raise _broken(path, number) from None
-    if not isinstance(found, dict):
-        raise _broken(path, number)
-    return found
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
-def _broken(path: Path, number: int) -> StorageError:
-    """Make the refusal of a line."""
+def _check(text: bytes) -> bytes:
+    """Compute a checksum of sixteen digits."""
+    return hashlib.sha256(text).hexdigest()[:16].encode()
+
+
+def _check_header(path: Path, line: bytes, header: dict) -> None:
+    """Refuse the journal whose first line is another one."""
+    if line + b"\n" == _sealed(header):
+        return
+    found = _unsealed(line)
+    for name, expected in header.items():
+        if found and found.get(name) != expected:
+            raise StorageError(
+                f"the journal was written {_WRITTEN[name]}",
+                code="E-JOURNAL",
+                file=str(path),
+                value=found.get(name),
+                limit=str(expected),
+                remedy="name a new place, or move this file away",
+            )
+    raise _broken(path, "its first line is not what this version of femgear writes there")
+
+
+def _broken(path: Path, why: str) -> StorageError:
+    """Make the refusal of a file that is no journal."""
     return StorageError(
-        f"line {number} is no entry of a journal",
+        f"not usable as a journal: {why}",
         code="E-JOURNAL",
         file=str(path),
-        remedy="name a new file; this one is not changed",
+        remedy="name a new place, or move this file away; it is not changed",
+    )
+
+
+def _is_entry(line: dict, count: int) -> bool:
+    """Tell whether a line has a number and what `Designs` or `search.signals` keep of so many variables."""
+    key, record = line.get("key"), line.get("record")
+    if not (type(line.get("number")) is int and isinstance(key, str) and isinstance(record, dict)):
+        return False
+    try:
+        if not key.startswith("["):
+            value, slopes = (np.array(record[name]) for name in ("value", "slopes"))
+            fits = value.ndim == 2 and slopes.shape == (count, *value.shape)
+            return bool(fits and np.isfinite(value).all() and np.isfinite(slopes).all())
+        point, values = json.loads(key), record["values"].values()
+        error = record.get("error", {"code": "", "key": None, "message": ""})
+        texts = (error["code"], error["message"], "" if error["key"] is None else error["key"])
+    except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
+        return False
+    return (
+        len(point) in (0, count)
+        and all(type(value) is float and math.isfinite(value) for value in values)
+        and all(isinstance(text, str) for text in texts)
     )
 
 
@@ -230,7 +307,7 @@ class Designs:
         try:
             variant = self.variant(point)
             for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
-                found[quantity.name] = _finite(quantity, quantity.compute(variant))
+                found[quantity.name] = float(_finite(quantity, quantity.compute(variant)))
         except StorageError:
             raise
         except FemgearError as error:
@@ -274,7 +351,7 @@ def open_designs(
     Raises
     ------
     StorageError
-        E-JOURNAL: written for another case, other variables or by another version, or not a journal;
+        E-JOURNAL: written for another case, other variables or by another version, or no journal;
         E-LOCKED: in use.
     """
     fingerprint = hashlib.sha256(to_toml(case).encode()).hexdigest()

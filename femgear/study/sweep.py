@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-import sys
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,8 +19,8 @@ import numpy as np
 from femgear.case.sections import Case
 from femgear.errors import CaseError, Finding
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
-from femgear.storage.files import storage_errors, write_csv
-from femgear.study.designs import Failure, open_designs
+from femgear.storage.files import own_files, write_csv
+from femgear.study.designs import Failure, open_designs, resumable
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
 from femgear.trains.protocol import Progress, one_blas_thread
@@ -156,11 +156,12 @@ def _check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str
 
 
 def _warn_of_time(left: int, seconds: float) -> None:
-    """Say on standard error how long the cases left will take, at so many seconds each."""
+    """Warn of how long the cases left will take, at so many seconds each."""
     total = left * seconds
     shown = f"{total / 3600.0:.1f} h" if total > 5400.0 else f"{total / 60.0:.1f} min"
     text = f"{left} more cases of about {seconds:.2g} s each: {shown}"
-    print(Finding("W-SWEEP", "", text, remedy="an interrupted sweep goes on where it was"), file=sys.stderr)
+    finding = Finding("W-SWEEP", "", text, remedy="an interrupted sweep goes on where it was")
+    warnings.warn(str(finding), stacklevel=3)
 
 
 def parse_over(text: str) -> tuple[str, Sequence[object]]:
@@ -232,21 +233,23 @@ def sweep_into(
     ------
     CaseError
         E-VARIABLE, E-OBJECTIVE: what cannot be computed; nothing is written then.
+    StorageError
+        E-OUTPUT: a table or figure that is not that of a sweep, as `own_files`; E-JOURNAL.
     """
     values = dict(parse_over(text) for text in over)
     if len(values) < len(over):
         raise CaseError("a key is given twice", code="E-VARIABLE", key="--over", value=", ".join(over))
     quantities = [named_quantity(words, speeds=speeds) for words in of]
     _check_sweep(case, values, quantities)
-    with storage_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+    own_files(folder, (_TABLE, _FIGURE))
     options = {"journal": folder / _JOURNAL, "cache": cache, "progress": progress}
-    found = sweep(case, values, quantities, **options)
-    write_csv(folder / _TABLE, found.header, found.records())
-    names = [_TABLE, _JOURNAL]
-    if np.isfinite(found.values).any():
-        _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
-        names.append(_FIGURE)
+    with resumable(folder):
+        found = sweep(case, values, quantities, **options)
+        write_csv(folder / _TABLE, found.header, found.records())
+        names = [_TABLE, _JOURNAL]
+        if np.isfinite(found.values).any():
+            _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
+            names.append(_FIGURE)
     return found, names
 
 

@@ -1,6 +1,13 @@
 """scripts/optimise.py: what it writes, how it goes on, and what it refuses."""
 
 import csv
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -16,18 +23,22 @@ def run(*arguments, folder):
     return run_script("optimise.py", *arguments, folder=folder)
 
 
-def test_a_search_of_the_gears_and_its_continuation(tmp_path):
-    """Contact ratio over the planet's shift, which needs no finite elements; the limit stops it."""
+@pytest.fixture
+def gears(tmp_path):
+    """A search over the planet's shift, which needs no finite elements; the limit stops it."""
     text = CASE.read_text(encoding="utf-8").replace("profile_shift = 0.52681\n", "")
     lines = [line for line in text.splitlines() if not line.startswith("profile_shift = 0.0         #")]
     case = tmp_path / "case.toml"
     case.write_text("\n".join(lines), encoding="utf-8")
-    arguments = [
+    return [
         case,
         *("--vary", "planet.profile_shift=-0.05..0.25 +- 0.01", "--objective", "tip thickness planet"),
-        *("--limit", "tip thickness planet >= 0.72", "--method", "simplex", "--no-check"),
-        *("--of", "contact ratio sun-planet", "-o", tmp_path / "out"),
+        *("--limit", "tip thickness planet >= 0.72", "--no-check", "--of", "contact ratio sun-planet"),
     ]
+
+
+def test_a_search_of_the_gears_and_its_continuation(gears, tmp_path):
+    arguments = [*gears, "--method", "simplex", "-o", tmp_path / "out"]
     done = run(*arguments, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     with open(tmp_path / "out" / "optimum.csv", newline="", encoding="utf-8") as stream:
@@ -41,6 +52,45 @@ def test_a_search_of_the_gears_and_its_continuation(tmp_path):
     assert again.returncode == 0 and ", 0 computed now" in again.stdout
     other = run(*arguments, "--torque", "50 N m", folder=tmp_path)
     assert other.returncode == 4 and "E-JOURNAL" in other.stderr
+
+
+def test_a_search_that_is_killed_goes_on_with_the_same_command(gears, tmp_path):
+    """By SIGTERM and kill -9 at random lines: the same files, nothing computed twice."""
+    words = [sys.executable, str(ROOT / "scripts" / "optimise.py"), *map(str, gears), "--method", "global"]
+    words += ["--samples", "20", "--max-designs", "80", "-o"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+
+    def start(folder):
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        return subprocess.Popen([*words, str(folder)], text=True, env=environment, cwd=tmp_path, **pipes)
+
+    alone = start(tmp_path / "alone")
+    assert alone.wait(timeout=120) == 0, alone.communicate()
+    folder, lines, chance = tmp_path / "killed", 1, random.Random(0)
+    journal = folder / "journal.jsonl"
+    for way in (signal.SIGTERM, signal.SIGKILL):
+        lines += chance.randrange(5, 30)
+        run, until = start(folder), time.monotonic() + 60
+        while not journal.exists() or journal.read_bytes().count(b"\n") < lines:
+            assert run.poll() is None and time.monotonic() < until, run.communicate()
+            time.sleep(0.002)
+        run.send_signal(way)
+        _, errors = run.communicate(timeout=60)
+        assert run.returncode == (-9 if way == signal.SIGKILL else 130) and "Traceback" not in errors
+        assert ("the same command goes on" in errors) == (way == signal.SIGTERM)
+        lines = journal.read_bytes().count(b"\n")
+    last = start(folder)
+    said, errors = last.communicate(timeout=120)
+    assert last.returncode == 0 and "warning" not in errors
+    whole = (tmp_path / "alone" / "journal.jsonl").read_bytes().count(b"\n")
+    assert int(re.search(r"search: .*?(\d+) computed now", said)[1]) <= whole - lines
+    for name in ("optimum.toml", "optimum.csv", "tolerances.png"):
+        assert (folder / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
+    for name in ("journal.jsonl", "journal_fine.jsonl"):
+        texts = [(one / name).read_text() for one in (folder, tmp_path / "alone")]
+        # what each design took is no result
+        first, second = (re.sub(r', "seconds".*', "", text) for text in texts)
+        assert first == second
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import csv
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,57 @@ def test_bad_input_ends_in_a_message(name, arguments, code, message, tmp_path):
     assert message in done.stderr + done.stdout
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("bearing_clearance.py", "tooth_contact.png"),
+        ("campbell.py", "campbell.csv"),
+        ("drivetrain.py", "forces.csv"),
+        ("drivetrain.py", "transient_forces.png"),
+        ("gravity_wedging.py", "carrier_orbit.png"),
+        ("gyroscopic.py", "gyroscopic.png"),
+        ("harris_map.py", "harris_map.csv"),
+        ("housing_modulation.py", "ring_deflection.vtu"),
+        ("impacts.py", "spectrum.png"),
+        ("load_sharing.py", "tooth_loads.csv"),
+        ("mesh_stiffness.py", "mesh_stiffness.png"),
+        ("multistage.py", "forces.csv"),
+        ("optimise.py", "optimum.toml"),
+        ("optimise.py", "check.csv"),
+        ("optimise.py", "before/notes.txt"),
+        ("optimise.py", "journal.jsonl"),
+        ("optimise.py", "journal_fine.jsonl"),
+        ("pin_error_load_sharing.py", "load_sharing_samples.csv"),
+        ("planet_phasing.py", "phases.png"),
+        ("tip_relief_design.py", "relief.toml"),
+    ],
+)
+def test_files_of_others_are_refused_before_anything_is_computed(name, file, tmp_path):
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_text("theirs")
+    start = time.monotonic()
+    done = run(name, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 4 and re.search("E-OUTPUT|E-JOURNAL", done.stderr), done.stderr
+    assert file.split("/")[0] in done.stderr and "remedy" in done.stderr
+    assert (tmp_path / file).read_text() == "theirs" and time.monotonic() < start + 30
+    left = [path for path in tmp_path.rglob("*") if path.is_file() and not path.name.startswith(".")]
+    # the search opens two journals before it computes
+    assert {path.name for path in left} - {"journal_fine.jsonl"} == {Path(file).name} - {"journal_fine.jsonl"}
+    assert all(path.read_bytes().count(b"\n") <= 1 for path in left)
+
+
+def test_a_script_replaces_its_own_files_until_they_are_changed(tmp_path):
+    arguments = ("campbell.py", "--speeds", "5", "-o", tmp_path)
+    for _ in range(2):
+        done = run(*arguments, folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+    with open(tmp_path / "campbell.csv", "a", encoding="utf-8") as stream:
+        stream.write("by hand\n")
+    done = run(*arguments, folder=tmp_path)
+    assert done.returncode == 4 and "changed since" in done.stderr
+    assert (tmp_path / "campbell.csv").read_text().endswith("by hand\n")
 
 
 def test_mesh_stiffness_of_two_torques(quick_case, tmp_path):
@@ -412,7 +464,7 @@ def test_multistage_lists_the_readings_of_the_published_table(tmp_path):
 def test_multistage_writes_its_tables_and_figures(tmp_path):
     done = run("multistage.py", "--points", "40", "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".png"}
+    assert {path.suffix for path in tmp_path.glob("[!.]*")} == {".csv", ".png"}
 
 
 def test_drivetrain_writes_spectra_and_pictures(tmp_path):

@@ -476,9 +476,9 @@ def test_results_and_cases_show_themselves_in_a_line(tmp_path):
 
 
 def test_text_of_a_table_is_no_formula(tmp_path):
-    write_csv(tmp_path / "a.csv", ["=cmd", "level [dB]"], [["@sum", -1.5], ["-3 N m", "+x"], ["fine", 2]])
+    write_csv(tmp_path / "a.csv", ["=cmd", "level [dB]"], [["@sum", -1.5], ["-3 N m", "+x"], ["-0.32", 2]])
     written = (tmp_path / "a.csv").read_text()
-    assert written == "'=cmd,level [dB]\n'@sum,-1.5\n'-3 N m,'+x\nfine,2\n"
+    assert written == "'=cmd,level [dB]\n'@sum,-1.5\n'-3 N m,'+x\n-0.32,2\n"
     data = xr.Dataset({"name": ("m", ["=1", "b"]), "x": ("m", [-1.0, 2.0])}, attrs={"title": "-a", "n": -3})
     names = write_csv_tables(data, tmp_path, "s")
     written = "".join((tmp_path / name).read_text() for name in names)

@@ -92,6 +92,9 @@ MASKS = {
     "run times, pin errors": Mask(r"(?:curves|samples)\s+\d+\.\d\d\s+s\b", r"\d+\.\d\d", ""),
     "versions, manifest": Mask(r'"versions": \{[^}]*\}', r': "[^"]*"', ': ""'),
     "versions, report": Mask(r"(?s)<h3>Versions</h3>.*?</table>", r"<td>[\w.+]*\d</td>", "<td></td>"),
+    "checksums, journal": Mask(r', "checksum": "[0-9a-f]{16}"\}', r'"[0-9a-f]{16}"', '""'),
+    # of files that are compared themselves
+    "checksums, list": Mask(r"(?m)^[0-9a-f]{64}  \S+$", r"^[0-9a-f]{64}", ""),
     "version, journal": Mask(r'"femgear": "[\w.+]+"', r"[\w.+]+(?=\"$)", ""),
     # of files that are compared themselves, and that hold run times
     "checksums, manifest": Mask(r'"files": \{[^}]*\}', r"\b[0-9a-f]{64}\b", ""),
