@@ -56,8 +56,8 @@ def test_damage_that_is_not_seen_yet(number, folder):
 
 
 def test_damaged_files(folder):
-    tally = passed(trials.run_trials("damage", [n for n in range(36) if n not in HOLES], folder))
-    assert sum(count for said, count in tally.said.items() if "refused" in said) > 12
+    tally = passed(trials.run_trials("damage", [n for n in range(28) if n not in HOLES], folder))
+    assert sum(count for said, count in tally.said.items() if "refused" in said) > 8
 
 
 def test_killed_programs_go_on(folder):
@@ -175,9 +175,9 @@ def test_licences_of_all_that_is_needed_are_stated():
         ("", "ConnectionError: no network", "known holes: not looked up, ConnectionError: no network"),
         ("", "No module named pip_audit", "known holes: not looked up, No module named pip_audit"),
         (
-            '{"dependencies": [{"name": "a", "version": "1", "vulns": [{"id": "CVE-1"}]}, {"skip_reason": "x"}]}',
+            '{"dependencies": [{"name": "a", "version": "1", "vulns": [{"id": "X"}]}, {"skip_reason": ""}]}',
             "",
-            "known holes of 1 packages: 1; 1 others could not be looked up\n  a 1: CVE-1",
+            "known holes of 1 packages: 1; 1 others could not be looked up\n  a 1: X",
         ),
     ],
 )
