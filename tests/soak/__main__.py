@@ -78,16 +78,12 @@ class Piece:
         self.start = time.monotonic()
         words = (sys.executable, str(ROOT / "tests" / "soak"), self.kind, "--piece", str(self.index))
         words += ("--folder", str(self.folder))
-        options = {
-            "stdout": subprocess.PIPE,
-            "stderr": subprocess.PIPE,
-            "text": True,
-            "start_new_session": True,
-        }
-        log = self.folder / f"{self.kind} {self.index}.err"
-        log.parent.mkdir(parents=True, exist_ok=True)
-        self.log = log
-        self.process = subprocess.Popen(words, **(options | {"stderr": open(log, "w")}))
+        self.log = self.folder / f"{self.kind} {self.index}.err"
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with open(self.log, "w") as log:
+            self.process = subprocess.Popen(
+                words, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
+            )
 
     @property
     def seconds(self) -> float:
@@ -121,6 +117,7 @@ def soak(state: State, folder: Path, minutes: float, processes: int, kinds: Sequ
     end, running, failed = time.monotonic() + 60.0 * minutes, [], 0
     now, here = commit(), machine()
     spent = {kind: state.seconds(kind, now) for kind in kinds}
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # no piece is left behind
     try:
         while running or time.monotonic() < end:
             while len(running) < processes and time.monotonic() < end:
@@ -151,6 +148,7 @@ def soak(state: State, folder: Path, minutes: float, processes: int, kinds: Sequ
         for piece in running:
             piece.stop()
             piece.process.wait()
+        signal.signal(signal.SIGTERM, before)
     return int(failed > 0)
 
 

@@ -66,7 +66,7 @@ def trial(number: int, folder: Path) -> Outcome:
         failure = _difference(found, expected)
         said = "other numbers" if failure else "the same numbers"
     elif not said.startswith("refused"):
-        failure = found
+        failure = str(found)
     if failure:
         failure = f"{target}, {words}: {failure}"
     elif target == "results" and turn % 10 == 0:

@@ -119,7 +119,7 @@ def read_only(rng: random.Random) -> Fault:
 
 def no_home(rng: random.Random) -> Fault:
     """No home folder, and a user whom the system does not know."""
-    names = dict.fromkeys(("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "USER", "LOGNAME"))
+    names: dict[str, str | None] = dict.fromkeys("HOME XDG_CACHE_HOME XDG_CONFIG_HOME USER LOGNAME".split())
     if rng.random() < 0.5:
         names["FEMGEAR_MESHES"] = None
     return Fault(codes=(0,), environment=names, commands=("run", "run with pictures"), fresh=True)
@@ -131,7 +131,7 @@ def no_folder_for_temporary_files(rng: random.Random) -> Fault:
         return Fault(codes=(0,), environment={"TMPDIR": "/nowhere"}, commands=("run", "sweep"))
 
     def nowhere():
-        tempfile._candidate_tempdir_list = lambda: []
+        setattr(tempfile, "_candidate_tempdir_list", lambda: [])  # noqa: B010
 
     return Fault(nowhere, codes=(0, 3, 4), commands=("run of a set with grids", "sweep"))
 

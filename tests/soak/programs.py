@@ -22,6 +22,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NoReturn
 
 from femgear import cli
 from femgear.trains.reading import read_case, with_values
@@ -172,7 +173,7 @@ def _call(words: list[str]) -> int:
     return 0
 
 
-def _leave(code: int) -> None:
+def _leave(code: int) -> NoReturn:
     """End this process without the cleaning up of the one that it was forked from."""
     try:
         sys.stdout.flush()

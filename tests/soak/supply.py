@@ -43,8 +43,8 @@ def licence(name: str) -> str:
         for one in fields.get_all("Classifier") or ()
         if one.startswith("License ::")
     ]
-    for words in (fields.get("License-Expression"), ", ".join(classified), fields.get("License")):
-        if words and words.strip():
+    for words in (fields.json.get("license_expression"), ", ".join(classified), fields.json.get("license")):
+        if isinstance(words, str) and words.strip():
             return words.strip().splitlines()[0][:60]
     return "not stated"
 
