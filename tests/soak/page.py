@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from soak.programs import ROOT
 from soak.state import State
 from soak.trials import KINDS, Tally
 
@@ -97,8 +98,9 @@ def _worst(found: list, digits: int) -> str:
 
 
 def _item(failure: str) -> str:
-    """A failure as an item of a list, on one line."""
-    return f"* `{' '.join(failure.replace('`', chr(39)).split())[:300]}`"
+    """A failure as an item of a list, on one line, without the place of the clone."""
+    plain = failure.replace("`", "'").replace(f"{ROOT}/", "")
+    return f"* `{' '.join(plain.split())[:300]}`"
 
 
 def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]) -> str:
