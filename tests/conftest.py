@@ -20,6 +20,13 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 # every full collection walks all that hundreds of test modules hold
 gc.set_threshold(100_000, 20, 100)
 
+# the default of 1e-12 is as large as many a compliance in m/N: an expected zero states its own tolerance
+type(pytest.approx(1.0)).DEFAULT_ABSOLUTE_TOLERANCE = 0.0
+if pytest.approx(1e-20) == 2e-20:
+    raise pytest.UsageError(
+        "this pytest keeps the absolute tolerance of approx elsewhere: see tests/conftest.py"
+    )
+
 TESTS = Path(__file__).parent
 
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "scripts")]

@@ -81,10 +81,10 @@ def test_errors_of_members_and_pins():
     one, two = Runout(UM, math.radians(5)), Runout(2 * UM, math.radians(5))
     assert [r.amplitude for r in d.planet_runout] == pytest.approx([1e-6, 2e-6, 1e-6])
     assert [r.phase for r in d.planet_runout] == pytest.approx([one.phase, two.phase, one.phase])
-    assert np.allclose(d.pin_errors, np.array([[0, 0], [0, 0], [-1, 20]]) * UM, rtol=1e-12)
+    np.testing.assert_allclose(d.pin_errors, np.array([[0, 0], [0, 0], [-1, 20]]) * UM, rtol=1e-12)
     assert d.ovality == Ovality(2, pytest.approx(20 * UM), pytest.approx(math.radians(10)), True)
     assert (d.sun_thickness, d.ring_thickness) == (0.0, pytest.approx(3 * UM))
-    assert np.allclose(d.planet_thickness, [0, 8 * UM, 0])
+    np.testing.assert_allclose(d.planet_thickness, [0, 8 * UM, 0])
 
 
 def texts(values):

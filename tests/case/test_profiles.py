@@ -42,7 +42,8 @@ def measured(path):
 
 def test_a_measured_profile_has_material_positive(folder):
     profile, sun = measured(folder(GOOD))
-    assert profile.roll == pytest.approx(np.radians([15, 20, 30]) * sun.base_radius, rel=1e-14)
+    # the points stand in the case with 13 digits
+    assert profile.roll == pytest.approx(np.radians([15, 20, 30]) * sun.base_radius, rel=5e-13)
     assert profile.removed == pytest.approx([2.5 * UM, -1.5 * UM, 4 * UM], rel=1e-14)
 
 

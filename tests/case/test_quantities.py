@@ -22,6 +22,17 @@ def test_common_units_are_those_of_pint():
         assert quantities._root(unit, "common") == quantities._root(unit, "all")
 
 
+def test_units_of_messages_are_what_they_say():
+    """The SI value of one shown unit, as texts with that unit are read."""
+    shown = [one for one in vars(quantities).values() if isinstance(one, quantities.Dimension)]
+    assert len(shown) > 10
+    for dimension in shown:
+        read = quantities.to_si(f"1 {dimension.shown}", dimension)
+        assert dimension.scale == pytest.approx(read, rel=1e-15), dimension.name
+        assert quantities.to_si(f"1 {dimension.si}", dimension) == 1.0
+    assert quantities.MODULUS.window(1e9, 206e9) == "1 GPa to 206 GPa"
+
+
 def test_absorbed_doses_are_no_angles():
     with pytest.raises(CaseError, match="'rads' is not a unit of angle"):
         quantities.to_si("0.3 rads", quantities.ANGLE)

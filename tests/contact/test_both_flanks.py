@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from validation.planetary import reference_set
 
-from femgear.contact.assembly import mesh_windows
+from femgear.contact.assembly import contact_candidates, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.flank_pairs import BACK_SIDE, DRIVE_SIDE, flank_side, mesh_pairs, side_teeth
@@ -93,6 +93,40 @@ def test_teeth_stand_where_their_flanks_touch(gears, direction, angles):
         ):
             off = np.mod(zero_of + teeth_of * gear.pitch_angle - centre + np.pi, 2 * np.pi) - np.pi
             assert np.abs(off).max() < (1e-9 if direction > 0 else slack)
+
+
+def test_every_mesh_carries_on_its_own_flank_of_each_gear(gears, bodies):
+    """Bodies whose compliance tells nothing but the flanks: 1 left-left, 2 left-right, 4 right-right.
+
+    Driving, sun and ring carry on their left flanks, a planet on the left one in the sun and the right one in
+    the ring; on the back side everything is the other way round.
+    """
+
+    def flanks_only(body, unit):
+        n = len(body.roll)
+        return replace(
+            body, regular=unit * np.kron([[1.0, 2.0], [2.0, 4.0]], np.ones((len(body.regular), n, n)))
+        )
+
+    names = ("sun", "planet", "ring")
+    told = replace(bodies, **{n: flanks_only(getattr(bodies, n), 10.0**k) for k, n in enumerate(names)})
+    options = dict(share=2000.0, cells=6, nearest=20e-6, both_flanks=True)
+    found = contact_candidates(mesh_windows(gears, bodies, positions=2, **options), told, [0, 1])
+    right = {
+        "sun": np.repeat([0, -1, 1, -1], 3),
+        "planet": np.repeat([0, 1, 1, 0], 3),
+        "ring": np.repeat([-1, 0, -1, 1], 3),
+    }
+    expected = np.zeros((12, 12))
+    for unit, name in zip((1.0, 10.0, 100.0), names):
+        flank = right[name]
+        same = (flank[:, None] >= 0) & (flank >= 0)
+        if name == "planet":
+            same &= np.arange(12)[:, None] % 3 == np.arange(12) % 3
+        expected += np.where(same, unit * 2.0 ** (flank[:, None] + flank), 0.0)
+    between = found.smooth.transpose(0, 1, 3, 2, 4)
+    wanted = np.broadcast_to(expected[found.mesh[:, None], found.mesh][..., None, None], between.shape)
+    np.testing.assert_allclose(between, wanted, rtol=1e-12)
 
 
 def test_backlash_keeps_the_back_flanks_out(gears, bodies):

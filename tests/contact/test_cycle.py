@@ -61,8 +61,12 @@ def test_identical_planets_share_equally(cycle):
 
 
 def test_stiffness_against_iso_6336(gears, cycle):
-    """c_gamma of method B within 15 % for both meshes (secant of the loaded mesh, as the standard's is)."""
-    for first, pair in enumerate(((gears.sun, gears.planet), (gears.planet, gears.ring))):
+    """c_gamma of method B: its polynomial is a fit to pairs of solid external gears.
+
+    It knows no bore (1 % for sun and planet), and counts a ring on its rim as a rack (7 %).
+    """
+    meshes = ((gears.sun, gears.planet, 0.01), (gears.planet, gears.ring, 0.07))
+    for first, (*pair, apart) in enumerate(meshes):
         ratio = (gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring)[first]
         standard = mesh_stiffness_method_b(
             pair[0].teeth,
@@ -73,7 +77,7 @@ def test_stiffness_against_iso_6336(gears, cycle):
             dedendum=1.25,
         )[1]
         ours = cycle.stiffness[3 * first].mean() / gears.sun.face_width
-        assert ours == pytest.approx(standard, rel=0.15)
+        assert ours == pytest.approx(standard, rel=apart)
 
 
 def solved(gears, bodies, position, *, torque=TORQUE, gaps=(0.0, 0.0, 0.0), coupled=True):

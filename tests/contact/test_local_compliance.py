@@ -1,8 +1,11 @@
 """Half-plane influence functions against equilibrium, quadrature and limits known in closed form."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.linalg import toeplitz
 from validation.reference.hertz import (
     cell_influence,
     contact_modulus,
@@ -13,7 +16,9 @@ from validation.reference.hertz import (
     weber_banaschek,
 )
 
+from femgear.contact.assembly import _window_compliance
 from femgear.contact.local_compliance import depth_displacement, surface_displacement
+from femgear.fe.elasticity import Material
 
 E, NU = 206e9, 0.3
 MU = E / (2 * (1 + NU))
@@ -36,7 +41,9 @@ def test_flamant_field_obeys_hooke(x):
 def test_cell_is_the_mean_of_line_loads(x, nu):
     h, d = 2e-5, 5e-4
     breaks = [x] if abs(x) < h else None
-    mean = quad(lambda s: point_surface_relative_to_depth(x - s, d, MU, nu), -h, h, points=breaks, limit=200)
+    # compliances in m/N are far below the absolute tolerance that quad has by itself
+    options = dict(points=breaks, limit=200, epsabs=0.0, epsrel=1e-11)
+    mean = quad(lambda s: point_surface_relative_to_depth(x - s, d, MU, nu), -h, h, **options)
     got = surface_relative_to_depth(x, h, d, MU, nu)
     assert float(got) == pytest.approx(mean[0] / (2 * h), rel=1e-9)
     assert float(surface_relative_to_depth(-x, h, d, MU, nu)) == pytest.approx(float(got), rel=1e-12)
@@ -48,6 +55,36 @@ def test_cell_relative_to_depth_is_the_difference_of_the_two_displacements():
         below = quad(lambda s, x=x: depth_displacement(x - s, d, MU, NU), -h, h)[0] / (2 * h)
         difference = float(surface_displacement(x, h, MU, NU)) - below
         assert float(surface_relative_to_depth(x, h, d, MU, NU)) == pytest.approx(difference, rel=1e-9)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3])
+def test_surface_displacement_is_the_mean_of_flamants_logarithm(nu):
+    """``-(1 - nu) / (pi mu)`` times the mean of ln |x - s|: in closed form at the middle and at the edge."""
+    h = 2e-5
+    factor = -(1 - nu) / (np.pi * MU)
+    x = np.array([0.0, h, -h])
+    exact = factor * np.array([np.log(h) - 1.0, np.log(2 * h) - 1.0, np.log(2 * h) - 1.0])
+    np.testing.assert_allclose(surface_displacement(x, h, MU, nu), exact, rtol=1e-13)
+    for x in (1.1e-5, 3e-5, -4e-4):
+        breaks = [x] if abs(x) < h else None
+        mean = quad(lambda s, x=x: np.log(abs(x - s)), -h, h, points=breaks, epsabs=0.0, epsrel=1e-12)[0]
+        exact = factor * mean / (2 * h)
+        assert float(surface_displacement(x, h, MU, nu)) == pytest.approx(exact, rel=1e-9)
+
+
+def test_windows_yield_on_both_flanks_as_their_material_and_width_say():
+    """Equal cells inside the flanks: twice Flamant's mean logarithm over the face width, by distance."""
+    cells, width = 4, 3e-4
+    bodies = SimpleNamespace(material=Material(E, NU, 7850.0), face_width=12.5e-3)
+    found = _window_compliance(width, cells, bodies)[0]
+    h, factor = width / cells / 2, -2 * (1 - NU) / (np.pi * MU * 12.5e-3)
+
+    def mean_log(x):
+        # of ln |x - s| over |s| < h, by the antiderivative t ln t - t
+        return ((x + h) * np.log(x + h) - (x - h) * np.log(x - h)) / (2 * h) - 1.0
+
+    row = factor * np.array([np.log(h) - 1.0, *(mean_log(2 * h * k) for k in (1, 2, 3))])
+    np.testing.assert_allclose(found, toeplitz(row), rtol=1e-10)
 
 
 def test_far_from_the_cell_it_is_a_line_load():

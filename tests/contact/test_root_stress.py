@@ -353,7 +353,10 @@ def test_history_of_a_tooth(loaded):
 
 
 def test_order_of_magnitude_is_that_of_the_standard(loaded):
-    """sigma_F0 of ISO 6336-3 within 25 %, with the whole load at the outer point of single pair contact."""
+    """sigma_F0 of ISO 6336-3 within 13 %, with the whole load at the outer point of single pair contact.
+
+    No nearer: the standard's tooth is a beam held at the 30 degree tangents, with a fitted stress correction.
+    """
     gears, *_, roots, _ = loaded
     for gear, root, ratio in (
         (gears.sun, roots.sun, gears.contact_ratio_sun_planet),
@@ -364,7 +367,7 @@ def test_order_of_magnitude_is_that_of_the_standard(loaded):
         nominal = nominal_root_stress(gear, contact_ratio=ratio, tangential_force=LOAD * math.cos(ALPHA))
         roll = math.sqrt(nominal.load_radius**2 - gear.base_radius**2)
         largest = LOAD * root.influence[0, : len(root.arc), : len(root.roll)].max(axis=0)
-        assert np.interp(roll, root.roll, largest) == pytest.approx(nominal.stress, rel=0.25)
+        assert np.interp(roll, root.roll, largest) == pytest.approx(nominal.stress, rel=0.13)
 
 
 @pytest.mark.parametrize("periods", [1, 3])

@@ -54,12 +54,12 @@ def random_planetary(rng, *, n_planets, pairs, cells, gap_size, floating=False, 
 
 
 def by_daqp(H, gap, G, load):
-    """The same loads from the quadratic program, scaled to unit load and mean compliance."""
+    """The same loads and daqp's iterations, of the quadratic program in unit load and mean compliance."""
     n, m = G.shape
     unit, mean = np.abs(load).max(), np.trace(H) / n
     upper, lower = np.r_[np.full(n, 1e30), load / unit], np.r_[np.zeros(n), load / unit]
     sense = np.r_[np.zeros(n), np.full(m, 5)].astype(np.int32)
-    loads, _, flag, _ = daqp.solve(
+    loads, _, flag, info = daqp.solve(
         np.ascontiguousarray(H / mean),
         gap / mean / unit,
         np.ascontiguousarray(G.T),
@@ -70,7 +70,7 @@ def by_daqp(H, gap, G, load):
         dual_tol=1e-12,
     )
     assert flag == 1
-    return loads * unit
+    return loads * unit, info["iterations"]
 
 
 def assert_contact_conditions(state, H, gap, G, load):
@@ -104,7 +104,7 @@ def test_200_random_positions_agree_with_daqp(floating):
         load[n_planets] = 10 ** rng.uniform(0, 4.3)
         state = solve_contact(H, gap, G, load)
         assert_contact_conditions(state, H, gap, G, load)
-        assert np.abs(state.loads - by_daqp(H, gap, G, load)).max() <= 1e-9 * state.loads.max()
+        assert np.abs(state.loads - by_daqp(H, gap, G, load)[0]).max() <= 1e-9 * state.loads.max()
         force = np.bincount(mesh, state.loads, 2 * n_planets)
         unloaded += (force[:n_planets] == 0).any()
         if not floating:
@@ -224,6 +224,8 @@ def test_bounded_steps_hand_over_to_daqp():
     load = np.array([0, 0, 0, 0, 900.0])
     slow, usual = solve_contact(H, gap, G, load, max_steps=1), solve_contact(H, gap, G, load)
     assert slow.method == "daqp" and usual.method == "active set"
+    # one block step, one single pivot, those of daqp, and one linear solution of the set that daqp found
+    assert slow.iterations == 1 + 1 + by_daqp(H, gap, G, load)[1] + 1
     np.testing.assert_allclose(slow.loads, usual.loads, rtol=0, atol=1e-11 * usual.loads.max())
     np.testing.assert_allclose(slow.motions, usual.motions, rtol=0, atol=1e-11 * np.abs(usual.motions).max())
 

@@ -2,15 +2,19 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_array
 
 from femgear.contact.bodies import flank_load_columns, flank_stations
 from femgear.errors import GridError
 from femgear.fe.compliance import (
     condense_sector,
+    cyclic_harmonics,
     dof_pairs,
     interpolation,
     mirror_nodes,
     mirrored_columns,
+    solve_interior,
+    split_sector,
     symmetric_factor,
     tooth_compliance,
 )
@@ -119,6 +123,49 @@ def test_free_body_is_refused(gear, sector):
         tooth_compliance(free)
 
 
+@pytest.mark.parametrize(("axis", "free"), [(1, (1, 17)), (0, (0,))], ids=["translation", "rotation"])
+def test_a_body_held_against_the_other_motion_only_is_refused(gear, sector, axis, free):
+    """Springs on the teeth against their own rotation leave the translation, radial ones the rotation."""
+    middle = np.flatnonzero(mirror_nodes(sector) == np.arange(len(sector.points)))
+    inner, outer = middle[np.argsort(sector.points[middle, 0])][3:5]
+    spring = np.zeros((2 * len(sector.points), 1))
+    spring[2 * outer + axis] = 1.0
+    if axis == 1:
+        spring[2 * inner + axis] = -1.0
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
+    K = K + 1e9 * csc_array(spring) @ csc_array(spring).T
+    loads = flank_load_columns(sector, flank_stations(sector, gear))
+    schur = condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads)
+    for harmonic in (0, 1, 2, 16, 17):
+        if harmonic in free:
+            with pytest.raises(GridError, match="E-GRID-FREE"):
+                cyclic_harmonics(schur, [harmonic])
+        else:
+            assert np.isfinite(cyclic_harmonics(schur, [harmonic])).all()
+
+
+def test_a_solution_that_misses_its_equations_is_refused(gear, sector):
+    """Two nodes off the axis without stiffness of their own: small pivots cost all digits."""
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS).tolil()
+    held = [np.unique(sector.boundaries[name]) for name in ("rim", "cut_left", "cut_right")]
+    free = np.setdiff1d(np.arange(len(sector.points)), np.concatenate(held))
+    node = free[sector.points[free, 1] > 1e-4][5]
+    unit = K.diagonal().mean()
+    for place, sign in ((node, 1.0), (mirror_nodes(sector)[node], -1.0)):
+        both = [2 * place, 2 * place + 1]
+        K[both, :] = 0.0
+        K[:, both] = 0.0
+        K[both[0], both[0]] = K[both[1], both[1]] = 1e-13 * unit
+        K[both[0], both[1]] = K[both[1], both[0]] = sign * unit
+    loads = np.zeros((K.shape[0], 1))
+    # as large as the entries of the stiffness, which are right-hand sides too
+    loads[[2 * node, 2 * node + 1], 0] = unit, 0.3 * unit
+    with pytest.raises(GridError, match="E-RESIDUAL"):
+        condense_sector(sector, csc_array(K), count=18, held="rim", loads=loads, observations=loads)
+    with pytest.raises(GridError, match="E-RESIDUAL"):
+        solve_interior(sector, csc_array(K), split_sector(sector, "rim"), loads)
+
+
 def test_load_on_a_cut_is_refused(gear, sector):
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))
@@ -171,6 +218,13 @@ def test_cyclic_modes_are_those_of_the_whole_body(gear, sector, whole):
     values = eigsh(K_whole, k=16, M=M_whole, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
     reference = np.sort(np.sqrt(values)) / (2 * np.pi)
     assert np.abs(sector_frequencies[:16] / reference - 1).max() < 1e-4
+    # a lower limit leaves out what lies above it, but for the lowest mode of every nodal diameter
+    low = {"nodal_diameters": range(10), "loads": loads, "outputs": loads, "static_correction": False}
+    for limit in (30e3, 40e3, 50e3):
+        lowest = np.append(True, np.diff(modes.nodal_diameter) > 0)
+        expected = modes.frequency[lowest | (modes.frequency <= limit)]
+        found = cyclic_modes(basis, max_frequency=limit, **low).frequency
+        np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_reduced_ring_is_statically_complete(gear, sector):
@@ -179,8 +233,6 @@ def test_reduced_ring_is_statically_complete(gear, sector):
     K = K + foundation(sector, "rim", 1e11, 1e11, thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))[:, 3:4]
     basis = sector_basis(sector, K, mass(sector, STEEL, THICKNESS), count=gear.teeth, loads=loads)
-    from femgear.fe.compliance import cyclic_harmonics
-
     exact = cyclic_harmonics(
         condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads),
         np.arange(10),

@@ -126,11 +126,13 @@ def test_copies_close_the_circle(half):
 def test_jacobian_bounds_of_a_straight_and_a_bulged_triangle():
     straight = np.array([[0, 0], [2, 0], [0, 3], [1, 0], [1, 1.5], [0, 1.5]], dtype=float)
     grid = Grid(straight, [[0, 1, 2, 3, 4, 5]])
-    assert np.allclose(jacobian_bounds(grid), 6.0, rtol=1e-14)
+    np.testing.assert_allclose(jacobian_bounds(grid), 6.0, rtol=1e-14)
     # x = 2 xi, y = 3 eta + 4 b xi (1 - xi - eta): the determinant is 2 (3 - 4 b xi), between 6 - 8 b and 6
     bulged = straight.copy()
     bulged[3, 1] = 0.5
-    assert np.allclose(jacobian_bounds(Grid(bulged, [[0, 1, 2, 3, 4, 5]])), [[6 - 8 * 0.5, 6.0]], rtol=1e-13)
+    np.testing.assert_allclose(
+        jacobian_bounds(Grid(bulged, [[0, 1, 2, 3, 4, 5]])), [[6 - 8 * 0.5, 6.0]], rtol=1e-13
+    )
 
 
 def test_quality_of_the_equilateral_triangle_is_one():

@@ -98,7 +98,7 @@ def test_stress_concentration_at_a_hole_converges():
 
 
 def test_bending_of_a_curved_bar():
-    """Golovin: a = 1, b = 2, M = 1: hoop stress 7.7552436 inside and -4.9170168 outside.
+    """Golovin: a = 1, b = 2, M = 1 that bends further: hoop stress -7.7552436 inside, 4.9170168 outside.
 
     The moment acts as the tractions of the exact field on the end (Timoshenko and Goodier, section 29).
     """
@@ -120,9 +120,8 @@ def test_bending_of_a_curved_bar():
     for name in ("u=0", "u=1"):
         along = tangential_stress(grid, STEEL, name, state="plane stress")
         values[name] = (along.columns.T @ u)[len(along.arc) // 2]
-    assert abs(values["u=0"]) == pytest.approx(7.7552436, rel=3e-3)
-    assert abs(values["u=1"]) == pytest.approx(4.9170168, rel=3e-3)
-    assert values["u=0"] * values["u=1"] < 0
+    assert values["u=0"] == pytest.approx(-7.7552436, rel=3e-3)
+    assert values["u=1"] == pytest.approx(4.9170168, rel=3e-3)
 
 
 def test_a_linear_field_is_exact():

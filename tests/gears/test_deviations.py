@@ -134,8 +134,10 @@ def test_single_pitches_add_up_and_tooth_zero_stays():
 def test_tooth_numbers_are_taken_around_the_gear():
     d = replace(no_deviations(SET), sun_pitch=np.arange(27) * UM, ring_pitch=np.arange(108) * UM)
     got = tooth_separation(d, 1, np.array([[-1, 27], [28, 5]]), 0)
-    assert np.allclose(got, np.array([[26, 0], [1, 5]]) * UM, rtol=1e-12)
-    assert np.allclose(tooth_separation(d, 5, 0, np.array([109, -2])), np.array([1, 106]) * UM, rtol=1e-12)
+    np.testing.assert_allclose(got, np.array([[26, 0], [1, 5]]) * UM, rtol=1e-12)
+    np.testing.assert_allclose(
+        tooth_separation(d, 5, 0, np.array([109, -2])), np.array([1, 106]) * UM, rtol=1e-12
+    )
     assert tooth_separation(d, 0, 2, 2, back=True) == pytest.approx(-2 * UM)
 
 

@@ -53,11 +53,11 @@ def test_flank_points_lie_on_the_involute(gear):
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
     points = flank_points(gear, rolls)
     foot = np.abs(np.sum(points * tangent, axis=1)), np.abs(np.sum(points * normal, axis=1))
-    assert np.allclose(foot[0], gear.base_radius, rtol=1e-8)
+    np.testing.assert_allclose(foot[0], gear.base_radius, rtol=1e-8)
     assert np.allclose(foot[1], rolls, rtol=0, atol=1e-8 * gear.base_radius)
     radius = np.hypot(*points.T)
     assert np.allclose(np.arctan2(points[:, 1], points[:, 0]), half_thickness_angle(gear, radius), atol=1e-14)
-    assert np.allclose(roll_length(gear, radius), rolls, rtol=1e-12)
+    np.testing.assert_allclose(roll_length(gear, radius), rolls, rtol=1e-12)
 
 
 def test_undercut_is_what_the_tool_does():

@@ -36,7 +36,7 @@ def test_arcinv_is_the_inverse_to_rounding_on_the_whole_range():
     assert iv.arcinv(0.0) == 0.0
 
 
-@pytest.mark.parametrize("value", [-1e-9, math.nan, math.inf])
+@pytest.mark.parametrize("value", [-1e-9, math.nan, math.inf, [0.01, math.nan, 0.02], [0.01, -1e-9]])
 def test_arcinv_refuses_what_has_no_angle(value):
     with pytest.raises(GeometryError) as caught:
         iv.arcinv(value)

@@ -91,6 +91,6 @@ def test_mirroring_twice_gives_the_set_back():
     twice = mirrored_deviations(mirrored_deviations(d, s, mirrored, order), mirrored, again, back)
     tau = np.linspace(0, 3, 7)
     assert np.allclose(body_separation(twice, s, tau), body_separation(d, s, tau), atol=1e-17)
-    assert np.allclose(twice.sun_pitch, d.sun_pitch) and np.allclose(twice.ring_pitch, d.ring_pitch)
-    assert np.allclose(twice.planet_pitch, d.planet_pitch)
+    for name in ("sun_pitch", "ring_pitch", "planet_pitch"):
+        np.testing.assert_allclose(getattr(twice, name), getattr(d, name), rtol=1e-12)
     assert twice.planet_sun_side == d.planet_sun_side

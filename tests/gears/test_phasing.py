@@ -18,6 +18,7 @@ from femgear.gears.phasing import (
     phase_factors,
     phasing_of_set,
     phasing_table,
+    planet_sums,
     standard_lag,
 )
 from femgear.gears.planetary import close_set, equal_planet_angles
@@ -192,6 +193,21 @@ def test_far_harmonics_stay_exact():
     assert table.members[0, :, 1] == pytest.approx(1, abs=1e-14)
 
 
+def test_whirl_goes_against_the_phase_that_the_planets_gain():
+    """Four planets and z_s = 29, each a quarter period later: q = -1 (or 3) adds up, -2 in harmonic 2."""
+    sums = planet_sums(29, np.array([0, 25, 50, 75]), 100, [1, 2, 3], [0, 1, -1, 2, 3])
+    assert sums == pytest.approx(
+        np.array([[0, 0, 1, 0, 1], [0, 0, 0, 1, 0], [0, 1, 0, 0, 0]], complex), abs=1e-12
+    )
+    # the other way round, and unequal spacing, planet by planet
+    positions = np.array([0, 17, 45, 60, 81])
+    psi = 2 * np.pi * positions / 103
+    for turns in (31, -31):
+        for h, q in ((1, 1), (1, -1), (2, 3)):
+            exact = np.exp(1j * (h * turns + q) * psi).mean()
+            assert planet_sums(turns, positions, 103, [h], [q])[0, 0] == pytest.approx(exact, abs=1e-12)
+
+
 def test_factors_turn_with_the_phases():
     phasing = MeshPhasing(29, 71, (0, 25, 50, 75))
     assert phase_factors(phasing, [1])[0, :4] == pytest.approx([1, -1j, -1, 1j], abs=1e-12)
@@ -203,6 +219,7 @@ def test_factors_turn_with_the_phases():
     [
         (dict(sun_teeth=30.0), "E-RANGE"),
         (dict(sun_teeth=2), "E-RANGE"),
+        (dict(ring_teeth=5001), "E-RANGE"),
         (dict(rotation=0), "E-RANGE"),
         (dict(flank=2), "E-RANGE"),
         (dict(convention="other"), "E-RANGE"),

@@ -86,7 +86,7 @@ def test_points_lie_on_their_curves(name):
         radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
         if curve in ("tip", "root", "rim"):
             expected = {"tip": gear.tip_radius, "root": gear.root_radius, "rim": gear.rim_radius}[curve]
-            assert np.allclose(radius, expected, rtol=1e-14)
+            np.testing.assert_allclose(radius, expected, rtol=1e-14)
         elif curve == "cut":
             assert np.allclose(angle, math.pi / gear.teeth, rtol=0, atol=1e-14)
         elif curve == "symmetry":

@@ -100,7 +100,7 @@ def test_many_speeds_at_once_are_the_speeds_one_by_one():
         for i, speed in enumerate(speeds):
             alone = lines_of(field[i], Z_RING, speed, SENSOR)
             assert np.array_equal(together.displacement[i], alone.displacement)
-            assert np.allclose(together.acceleration[i], alone.acceleration, rtol=1e-14)
+            np.testing.assert_allclose(together.acceleration[i], alone.acceleration, rtol=1e-14)
             assert np.allclose(signals.displacement[i], fixed_sensor_signal(alone).displacement, atol=1e-13)
 
 

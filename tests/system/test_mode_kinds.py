@@ -242,6 +242,23 @@ def test_names_of_both_models_give_the_same_classes():
     assert energies == pytest.approx(class_shares(data, shape), abs=1e-12)
 
 
+def test_energies_of_whirling_motions_are_those_of_both_parts():
+    """A sun that whirls, x = 1 and y = i, has twice the energy of x = 1; squares without moduli cancel."""
+    names = ("sun: x", "sun: y", "sun: u", *(f"planet {n + 1}: u" for n in range(3)))
+    psi, mass = 2 * np.pi * np.arange(3) / 3, np.array([2.0, 2.0, 5.0, 3.0, 3.0, 3.0])
+    shape = np.array([[1.0, 0.0], [1j, 0.0], [0.0, 1j], [0.0, 1j], [0.0, 1j], [0.0, 1j]])
+    whirl = set_motions(shape, mass, names, psi)
+    assert class_energies(whirl) == pytest.approx(np.array([[0, 5 + 9], [4, 0], [0, 0]]), abs=1e-12)
+    # planets that hardly move beside a sun that whirls are at rest
+    faint = set_motions(np.array([[1.0], [1j], [0.0], [1e-7], [1e-7], [1e-7]]), mass, names, psi)
+    assert phasing(faint) == ("at rest",)
+    data = lin_parker_set(4)
+    real, other = gear_set_modes(data).shape[:, 3:8], gear_set_modes(data).shape[:, 8:13]
+    # modes of unit energy a part: the shares are the mean of both
+    mean = 0.5 * (class_shares(data, real) + class_shares(data, other))
+    assert class_shares(data, real + 1j * other) == pytest.approx(mean, abs=1e-12)
+
+
 def test_planes_of_motion():
     dofs = ("sun: x", "sun: u", "sun: y", "ring: x", "planet 1: radial", "planet 1: tangential")
     assert motion_planes(dofs).tolist() == [[0, 2], [4, 5]]

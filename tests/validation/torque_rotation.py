@@ -218,7 +218,7 @@ def corner_by_rotation(positions, *, edges: int = 12, refine: float = 0.7) -> To
 
 def corner_differences(ours: PairStiffness, other: TorqueRotation, force: float) -> tuple[float, float]:
     """Largest difference of the deflections, relative, and of the loads of tooth pairs, of the mesh force."""
-    assert np.allclose(ours.fraction, other.fraction)
+    np.testing.assert_allclose(ours.fraction, other.fraction)
     deflection = np.abs(other.secant / ours.secant - 1.0).max()
     loads = [
         abs(mine.get(i, 0.0) - theirs.get(i, 0.0))

@@ -40,6 +40,23 @@ def test_ends_of_the_range_are_hit_exactly(direction, end):
     assert min(asked) >= -0.3 - 1e-15 and max(asked) <= 0.9 + 1e-15
 
 
+@pytest.mark.parametrize("largest", [0.1, 1.0])
+@pytest.mark.parametrize("short", [1e-10, 1e-12])
+def test_range_that_ends_just_before_a_limit_point(short, largest):
+    """The step passes both: the curve ends at the bound, not at the limit point beyond."""
+    end = 1.0 - short
+    options = StepOptions(first=largest, largest=largest)
+    found = continue_curve(circle, [1.0], 0.0, limits=(-0.3, end), options=options)
+    assert found.parameter[-1] == found.parameter.max() == end and found.complete and not len(found.folds)
+    assert found.points[-1, 0] == pytest.approx(np.sqrt(1.0 - end**2), rel=1e-4)
+
+
+def test_curve_that_starts_at_the_bound_and_leaves_at_once():
+    found = continue_curve(circle, [np.sqrt(0.19)], 0.9, limits=(0.0, 0.9), direction=1)
+    assert found.complete and found.parameter.tolist() == [0.9, 0.9]
+    np.testing.assert_allclose(found.points[:, 0], np.sqrt(0.19), rtol=1e-15)
+
+
 def test_limit_load_of_the_von_mises_truss_is_passed():
     half_span, height, stiffness = 1.0, 0.1, 1.0
     rest = np.hypot(half_span, height)

@@ -93,6 +93,25 @@ def test_quasi_static_state_does_not_depend_on_the_stiffness_in_the_modes(geared
     )
 
 
+@pytest.mark.parametrize(
+    ("lines", "share"),
+    [
+        # energies 9, 16, 4, 1 of harmonics 1 to 4: 3 and 4 are above 2
+        ([[90, 3, 0, 0, 1], [0, 0, 4, 2j, 0]], 5 / 30),
+        # energies 9, 16, 4, 1, 4 of harmonics 1 to 5: 3, 4 and 5 are above 2.5
+        ([[90, 3, 0, 0, 1, 0], [0, 0, 4, 2j, 0, -2]], 9 / 34),
+        # one harmonic is the whole fluctuation
+        ([[90, 3], [0, 4j]], 1.0),
+        # no fluctuation, or rounding of the mean
+        ([[90, 0, 0], [1, 0, 0]], 0.0),
+        ([[90, 0, 3e-11], [1, 0, 0]], 0.0),
+    ],
+)
+def test_tail_is_the_amplitude_above_half_of_the_harmonics(lines, share):
+    found = spectral._tail(np.array([lines, np.roll(lines, 1, axis=0)], complex))
+    np.testing.assert_allclose(found, np.sqrt([share, share]), rtol=1e-14)
+
+
 @pytest.mark.parametrize("depth", [0.1, 0.3])
 def test_fixed_point_equals_direct_solution_where_it_contracts(geared_chain, chain_excitation, depth):
     excitation = chain_excitation(depth)

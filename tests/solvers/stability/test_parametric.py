@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
@@ -73,6 +75,31 @@ def test_chart_of_a_modal_basis_equals_the_linear_solver(geared_chain, chain_exc
             modes, chain_excitation(depth), frequency, frequency_ratio=1e3, steps=400
         ).modulus
         np.testing.assert_allclose(np.abs(chart.multiplier[:, column]), expected, rtol=1e-7)
+
+
+def test_modes_left_out_keep_their_own_decay(geared_chain, chain_excitation):
+    """Constant stiffness: the largest multiplier is exp(-zeta omega T) of the slowest decay."""
+    excitation = chain_excitation(0.0)
+    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.1)
+    frequency = 1.5 * modes.frequency[1] * np.array([1.0, 1.01])
+    natural = 2 * np.pi * modes.frequency
+    options = {"frequency_ratio": 1.0, "excitation_harmonics": 1}
+    for ratio in ([0.1, 0.1, 1e-3, 1e-2], [0.1, 0.1, 1e-2, 1e-3], [1e-3, 0.1, 0.1, 0.1]):
+        damped = replace(modes, damping_ratio=np.array(ratio))
+        found = stability(damped, excitation, frequency, **options)
+        assert found.modes_kept.tolist() == [2, 2]
+        exact = np.exp(-np.min(natural * ratio) / frequency)
+        np.testing.assert_allclose(found.modulus, exact, rtol=1e-9)
+
+
+def test_slow_speeds_of_a_batch_get_the_steps_that_they_need(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.6)
+    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.005)
+    frequency = np.array([0.01, 0.5])
+    found = stability(modes, excitation, frequency, excitation_harmonics=3, frequency_ratio=1e3)
+    assert found.steps[0] == found.steps[1] >= 2 * np.pi * modes.frequency.max() / 0.01
+    exact = np.abs(stability_chart(modes, excitation, 2 * np.pi * frequency, [1.0]).multiplier[:, 0])
+    np.testing.assert_allclose(found.modulus, exact, rtol=1e-3)
 
 
 def test_refusals():

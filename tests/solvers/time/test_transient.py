@@ -15,6 +15,7 @@ from femgear.solvers.time.steps import (
     LINEAR_ACCELERATION,
     StepRule,
     generalised_alpha,
+    highest_frequency,
     stability_limit,
 )
 from femgear.solvers.time.transient import solve_transient
@@ -363,6 +364,26 @@ def test_bad_input_is_refused():
     for method in ("average acceleration", "DOP853"):
         with pytest.raises(ConvergenceError, match="E-MASS"):
             solve_transient(oscillator(-1.0, 0.0, 1.0), 1.0, [0.0, 1.0], step=0.1, method=method)
+
+
+def test_highest_frequency_is_that_of_masses_between_springs():
+    """Two masses m on springs k with k_m between them against each other: (k + 2 k_m) / m."""
+    system = MechanicalSystem(
+        0.7 * np.eye(2), np.zeros((2, 2)), 3.0 * np.eye(2), np.array([[1.0], [-1.0]]), np.zeros(2), ("a", "b")
+    )
+    problem = NonlinearSystem(system, ())
+    assert highest_frequency(problem, np.array([5.0])) == pytest.approx(np.sqrt(13.0 / 0.7), rel=1e-13)
+    assert highest_frequency(problem, np.array([0.0])) == pytest.approx(np.sqrt(3.0 / 0.7), rel=1e-13)
+    # softer than free: nothing vibrates
+    assert highest_frequency(oscillator(k=-1.0), np.zeros(1)) == 0.0
+
+
+@pytest.mark.filterwarnings("ignore:Diagonal number 1 is exactly zero")
+def test_a_singular_matrix_of_the_step_is_refused():
+    """A negative spring as large as the inertia of a step: 1 - 400 (0.1)^2 / 4 = 0."""
+    with pytest.raises(ConvergenceError, match="matrix of the time step is singular") as refused:
+        solve_transient(oscillator(k=-400.0), 1.0, [0.0, 1.0], step=0.1, method="average acceleration")
+    assert refused.value.code == "E-MASS"
 
 
 def test_a_step_that_does_not_converge_ends_the_motion_with_a_message():

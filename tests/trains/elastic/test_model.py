@@ -39,6 +39,7 @@ PLANET = SimpleNamespace(mass=0.355, inertia=2.17e-4, bearing_stiffness=3e8)
 MOTOR = SimpleNamespace(inertia=0.02, coupling_stiffness=400.0)
 BRAKE = SimpleNamespace(inertia=0.2, coupling_stiffness=5000.0)
 TORQUE = 100.0
+SPRING = np.repeat([5e8, 7e8], 3)
 
 
 def gear_set(planets=3):
@@ -332,6 +333,29 @@ def test_ring_field_is_the_displacement_of_the_sectors(ring, output):
     assert ours == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_ring_turns_and_widens_the_way_its_teeth_are_pushed(ring, back_ring, side):
+    """Planets push the ring by z_r / z_s of the sun's torque against its sense, and outwards, at rest."""
+    gears = gear_set()
+    own = ring if side > 0 else back_ring
+    model = make(gears, own, torque=side * TORQUE)
+    system = model.system
+    # the free rotation of the mechanism moves no ring
+    K = system.K + (system.W * SPRING) @ system.W.T
+    q = np.linalg.lstsq(K, system.load)[0][model.ring_slice]
+    radial, around = (ring_field(model, own.modes, q, output, 26)[26] for output in (RADIAL, TANGENTIAL))
+    # foundation of 1e10 N/m^3 on the outer surface
+    turned = -side * 4 * TORQUE / (1e10 * 2 * np.pi * 0.1**2 * gears.ring.face_width)
+    assert around == pytest.approx(turned, rel=1e-6)
+    # Lame's tube from the roots to the outer surface under the radial forces; the teeth count as none
+    outer, inner, angle = 0.1, gears.ring.root_radius, gears.working_pressure_angle_planet_ring
+    line = 4 * TORQUE / gears.ring.base_radius * np.sin(angle) / (2 * np.pi * gears.ring.face_width)
+    apart = outer**2 - inner**2
+    free = 2 * line * inner * outer / (206e9 * apart)
+    softer = 1 + 1e10 * outer / 206e9 * ((outer**2 + inner**2) / apart - 0.3)
+    assert radial == pytest.approx(free / softer, rel=0.02)
+
+
 def test_spring_and_ring_in_series_are_the_static_mesh():
     rng = np.random.default_rng(2)
     k, force = rng.uniform(4e8, 6e8, (6, 8)), rng.uniform(1e3, 2e3, (6, 8))
@@ -375,9 +399,6 @@ def test_motor_and_brake_follow_the_driven_member():
     assert system.K[brake, place["sun: rotation"]] == -5000.0
     assert system.load[motor] == pytest.approx(100.0)
     assert system.load[brake] == pytest.approx(-20.0)
-
-
-SPRING = np.repeat([5e8, 7e8], 3)
 
 
 def turning(model, speed):

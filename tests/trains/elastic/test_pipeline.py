@@ -130,6 +130,14 @@ def test_mesh_harmonics_of_the_force_balance_the_torque(dynamics, static):
     assert np.all(np.abs(dynamics.stability.multiplier) < 1)
 
 
+def test_the_ring_turns_against_the_sun_at_rest(case, dynamics):
+    """T z_r / z_s over k R 2 pi R b: clockwise under a positive torque of the sun, and outwards."""
+    zero = dynamics.ring_tangential.shape[-1] // 2
+    turned = -case.operation.torque * 4.0 / (case.ring.foundation_tangential * 2 * np.pi * 0.1**2 * 0.025)
+    assert dynamics.ring_tangential[:, 0, zero] == pytest.approx(turned, rel=1e-5)
+    assert np.all(dynamics.ring_radial[:, 0, zero].real > 0.0)
+
+
 def test_negative_torque_runs_the_cycle_backwards(case, static, modes, steps):
     """The back flanks of a symmetric set are its mirror image."""
     back_case = with_value(case, "operation.torque", "-100 N m")

@@ -241,7 +241,8 @@ def test_forces_and_moments_balance_at_every_harmonic_of_rest(results):
     beta_b, distance = math.radians(20.0), planetary_set(results.case).centre_distance
     np.testing.assert_allclose(force[:4].sum() * math.cos(beta_b) * 0.024, 150.0, rtol=1e-6)
     pins = data["pin_force_real"].sel(harmonic=0, direction="tangential").values
-    np.testing.assert_allclose(np.abs(pins.sum()) * distance, 500.0, rtol=1e-6)
+    # the sun is driven: the pins hold the planets back
+    np.testing.assert_allclose(pins.sum() * distance, -500.0, rtol=1e-6)
     assert float(data["support_moment_real"].sel(member="ring", axis="z", harmonic=0)) == pytest.approx(350.0)
     axial = data["support_force_real"].sel(harmonic=0, axis="z").values
     assert abs(axial.sum()) < 1e-6 * np.abs(axial).max()

@@ -310,7 +310,10 @@ def test_bearing_columns_carry_what_left_the_stiffness():
         ({"pressure_angle_sun_planet": 24.6}, "E-RANGE", "radians"),
         ({"stiffness_planet_ring": [1e8, 1e8]}, "E-RANGE", "2 values"),
         ({"stiffness_sun_planet": 0.0}, "E-RANGE", "above 0"),
+        # one wrong value among others is the one that is named
+        ({"stiffness_planet_ring": [1e8, -2e8, 3e8]}, "E-RANGE", "stiffness planet ring of -2"),
         ({"planet_bearing": -1e8}, "E-RANGE", "above 0, or infinite"),
+        ({"planet_bearing": [1e8, 2e8, -3e8]}, "E-RANGE", "planet bearing of -3"),
         ({"centre_distance": 0.0}, "E-RANGE", "centre distance"),
     ],
 )
@@ -318,6 +321,13 @@ def test_impossible_data_are_refused(changes, code, word):
     with pytest.raises(CaseError, match=word) as error:
         uneven(**changes)
     assert error.value.code == code
+
+
+def test_data_of_a_set_are_read_only():
+    data = uneven()
+    for name in ("planet_angles", "stiffness_sun_planet", "stiffness_planet_ring", "planet_bearing"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(data, name)[0] = 1.0
 
 
 def test_impossible_requests_are_refused():

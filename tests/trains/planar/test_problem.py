@@ -12,6 +12,7 @@ from validation.planar import sharing_set, static_mesh_forces, sun_forces
 from femgear.errors import CaseError
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.mesh_directions import (
+    dof_names,
     gear_set_system,
     mesh_directions,
     mesh_elements,
@@ -153,6 +154,19 @@ def test_bearings_with_no_clearance_are_the_linear_ones():
         parts.append((K @ q + W @ force, K + W @ tangent @ W.T, problem.system.C))
     for one, two in zip(*parts):
         assert two == pytest.approx(one, rel=1e-12, abs=1e-12 * np.abs(one).max())
+
+
+def test_columns_of_a_bearing_are_the_inner_less_the_outer_member():
+    data, names = supported(planet_angles=ANGLES), dof_names(supported())
+    members = (MemberBearing(1e8, None, "carrier"), MemberBearing(1e8, None, "sun", "ring"))
+    bearings = Bearings(members=members)
+    system = bearings.join(data, gear_set_system(data))
+    columns = bearings.columns(data, back_flanks=False)["members"]
+    q = np.zeros(len(names))
+    moved = {"carrier: x": 1.0, "carrier: y": 2.0, "ring: x": 30.0, "ring: y": 40.0, "sun: x": 500.0}
+    for name, value in moved.items():
+        q[names.index(name)] = value
+    assert (system.W.T @ q)[columns].tolist() == [[1.0, 2.0], [500.0 - 30.0, -40.0]]
 
 
 def test_carrier_drops_through_its_clearance():
