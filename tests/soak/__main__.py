@@ -49,11 +49,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.kind and given.piece is not None:
         size = module(given.kind).PIECE
         numbers = range(given.piece * size, (given.piece + 1) * size)
-        tally = run_trials(given.kind, numbers, given.folder / "work" / f"{given.kind} {given.piece}")
+        tally = run_trials(given.kind, numbers, given.folder / "trials" / f"{given.kind} {given.piece}")
         print(json.dumps(tally.record()))
         return 0
     if given.kind and given.number is not None:
-        tally = run_trials(given.kind, [given.number], given.folder / "work" / "again")
+        tally = run_trials(given.kind, [given.number], given.folder / "trials" / "again")
         print(*tally.said, *tally.failures, sep="\n")
         return int(tally.failed > 0)
     state, code = State(given.folder / "state.jsonl"), 0
@@ -107,7 +107,7 @@ class Piece:
         except (IndexError, ValueError):
             tally = Tally(self.kind)
             tally.fail(command, f"ended with {self.process.returncode}: {said[-500:]}")
-        work = self.folder / "work" / f"{self.kind} {self.index}"
+        work = self.folder / "trials" / f"{self.kind} {self.index}"
         shutil.rmtree(work, ignore_errors=True)
         return tally
 
