@@ -273,7 +273,8 @@ def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, A
         raise TypeError(f"a {kind.__qualname__} cannot be written")
     # a dataclass keeps its fields alone, without what it has computed from them
     names = [one.name for one in fields(value)] if is_dataclass(value) else None
-    state: Any = kind.__getstate__(value) if names is None else {name: getattr(value, name) for name in names}
+    own: Any = value
+    state = own.__getstate__() if names is None else {name: getattr(own, name) for name in names}
     return found | {"kind": "own", "class": [kind.__module__, kind.__qualname__], "items": pairs(state)}
 
 
