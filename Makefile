@@ -1,6 +1,6 @@
 # Everything a user or a maintainer does, by name. Needs git, python3 (3.11 or newer) and make.
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test lint validate bench mutants clean
+.PHONY: help environment demo test lint validate soak bench mutants clean
 
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -14,12 +14,15 @@ CASE := cases/planetary_27_40_108.toml
 OUT := out/demo
 # Further arguments, most for pytest: make test ARGS="tests/gears -k fillet"
 ARGS :=
+# How long make soak begins further pieces
+MINUTES := 60
 
 help:
 	@echo "make demo      run the reference planetary set ($(CASE)) and write its report"
 	@echo "make test      run the tests"
 	@echo "make lint      check style and formatting (ruff) and types (basedpyright)"
 	@echo "make validate  recompute docs/validation.md and run the slow verification tests"
+	@echo "make soak      fuzz, damage, kill and starve femgear for MINUTES=60, write docs/reliability.md"
 	@echo "make bench     measure time and memory of every stage"
 	@echo "make mutants   change single expressions of the core and see whether a test notices"
 	@echo "make clean     delete results, caches and generated grids (.venv stays)"
@@ -43,6 +46,10 @@ lint: environment
 validate: environment
 	$(PY) tests/validation -o docs/validation.md
 	$(PY) -m pytest -m slow --benchmark-disable $(ARGS)
+	$(PY) tests/soak/supply.py
+
+soak: environment
+	$(PY) tests/soak --minutes $(MINUTES) --page docs/reliability.md
 
 bench: environment
 	$(PY) -m pytest benchmarks -o python_files="test_*.py bench_*.py" $(ARGS)

@@ -9,14 +9,14 @@ import warnings
 from collections import defaultdict
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from femgear.case.dependencies import fingerprint
 from femgear.errors import StorageError
-from femgear.report.page import page, write_pictures, write_report
+from femgear.report.page import page, write_pictures
 from femgear.storage.files import (
     append_dataset,
     checksum,
@@ -29,8 +29,10 @@ from femgear.storage.files import (
     write_text,
 )
 from femgear.storage.results import (
+    KEPT,
     MANIFEST,
     Manifest,
+    Results,
     additions,
     discard,
     folder_lock,
@@ -39,15 +41,11 @@ from femgear.storage.results import (
     versions,
 )
 from femgear.trains.protocol import Drawn, Progress, Stage, joint_verdict, one_blas_thread, silent
-from femgear.trains.reading import open_results
+from femgear.trains.reading import open_results, read_case
 from femgear.trains.registry import check_case, stages_of, train_of
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
-
-
-_KEPT = ".stages"
-"""Folder of results that a run goes on from when it was interrupted."""
 
 
 def grid_cache() -> Path:
@@ -125,7 +123,7 @@ class _Run:
     timings: dict[str, float] = field(default_factory=dict)
     convergence: dict[str, Any] = field(default_factory=dict)
 
-    def record(self, *names: str, complete: bool = False) -> None:
+    def record(self, *names: str, complete: bool = False) -> Manifest:
         """Write the manifest with some more files."""
         known = {name: digest for name, digest in self.files.items() if name not in names}
         told = {"timings": self.timings, "convergence": self.convergence, "known": known}
@@ -133,6 +131,7 @@ class _Run:
             self.folder, list({**self.files, **dict.fromkeys(names)}), **told, complete=complete
         )
         self.files = dict(manifest.files)
+        return manifest
 
 
 def run_case(
@@ -163,7 +162,7 @@ def run_case(
     write_text(case.source, folder / "case.toml")
     run.record("case.toml")
     with storage_errors(folder):
-        (folder / _KEPT).mkdir(exist_ok=True)
+        (folder / KEPT).mkdir(exist_ok=True)
     with one_blas_thread():
         for stage in stages:
             if stage.name not in run.timings:
@@ -176,13 +175,12 @@ def run_case(
         )
         names = write_pictures(folder, train_of(case), drawn, progress=progress)
         run.timings["pictures"] = time.perf_counter() - start
-        run.record(*names)
-    kept = {name: digest for name, digest in run.files.items() if name.startswith(_KEPT)}
+        manifest = replace(run.record(*names), complete=True)
+        write_text(page(train_of(case), Results(folder, manifest, read_case)), folder / "report.html")
+        run.record("report.html")
+    kept = {name: digest for name, digest in run.files.items() if name.startswith(KEPT)}
     run.files = {name: digest for name, digest in run.files.items() if name not in kept}
     run.record(complete=True)
-    if pictures:
-        write_report(train_of(case), open_results(folder))
-        run.record("report.html", complete=True)
     discard(folder, kept)
 
 
@@ -229,7 +227,7 @@ def _compute(
 
 def _file_names(stage: Stage) -> tuple[str, str]:
     """Files of a stage: its results, and what a run goes on from when it was interrupted."""
-    return f"{stage.name}.nc", f"{_KEPT}/{stage.name}.npz"
+    return f"{stage.name}.nc", f"{KEPT}/{stage.name}.npz"
 
 
 def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, dict[str, Any]]:

@@ -88,6 +88,7 @@ def test_this_system_has_what_is_needed():
         ("test", "-m pytest"),
         ("lint", "-m ruff check"),
         ("validate", "python tests/validation -o docs/validation.md"),
+        ("soak", "python tests/soak --minutes 60 --page docs/reliability.md"),
         ("bench", "-m pytest benchmarks"),
         ("mutants", "python tests/tools/mutation.py"),
         ("clean", "rm -rf out"),

@@ -56,10 +56,9 @@ def cache(tmp_path_factory):
     return tmp_path_factory.mktemp("grids")
 
 
-@pytest.fixture(scope="module")
-def solved(request, cache):
+def solve_set(seed: int, cache) -> Solved:
     """The set of a seed, solved without a warning of the libraries."""
-    drawn = random_set(request.param)
+    drawn = random_set(seed)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         static = solve_static(drawn.case, cache=cache)
@@ -67,6 +66,11 @@ def solved(request, cache):
         dynamics = solve_dynamics(drawn.case, static, modes)
         housing = solve_housing(drawn.case, dynamics)
     return Solved(drawn, static, modes, dynamics, housing, cache)
+
+
+@pytest.fixture(scope="module")
+def solved(request, cache):
+    return solve_set(request.param, cache)
 
 
 every_set = pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from femgear.errors import printable
 from femgear.report.style import save_figure
 from femgear.report.tables import Block
-from femgear.storage.files import checksum, storage_errors, write_text
+from femgear.storage.files import checksum, storage_errors
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -101,33 +101,17 @@ class _Picture:
     data: bytes
 
 
-def write_report(train: Train, results: Results) -> Path:
-    """Write ``report.html`` from what a results folder holds.
+def page(train: Train, results: Results) -> str:
+    """Make the page of a run as HTML text: tables, warnings, pictures, provenance.
 
-    Parameters
-    ----------
-    train : Train
-        Of the case.
-    results : Results
-        Of a run; the pictures that its manifest names are embedded.
-
-    Returns
-    -------
-    Path
-        The page: one file that loads nothing else. The same results give the same bytes.
+    The pictures that its manifest names are embedded; the page loads nothing else. The same results give the
+    same text.
 
     Raises
     ------
     StorageError
-        When files were changed since the run, or the page cannot be written.
+        When files were changed since the run.
     """
-    path = results.folder / "report.html"
-    write_text(_CONTROLS.sub(lambda found: printable(found[0]), page(train, results)), path)
-    return path
-
-
-def page(train: Train, results: Results) -> str:
-    """Make the page of a run as HTML text: tables, warnings, pictures, provenance; see `write_report`."""
     case = results.case
     pictures, skipped = _pictures(train, results)
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
@@ -144,7 +128,7 @@ def page(train: Train, results: Results) -> str:
         )
     )
     body = "".join(_section(name, numbers, pictures, train, results) for name in sections)
-    return (
+    text = (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
         "style-src 'unsafe-inline'\">\n"
@@ -152,6 +136,7 @@ def page(train: Train, results: Results) -> str:
         f"<title>{escape(case.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
         f"{head}{body}{_provenance(results, numbers)}</body>\n</html>\n"
     )
+    return _CONTROLS.sub(lambda found: printable(found[0]), text)
 
 
 def _lead(results: Results) -> str:

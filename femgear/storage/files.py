@@ -17,6 +17,7 @@ import re
 import secrets
 import shutil
 import stat
+import sys
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -171,9 +172,10 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     with storage_errors(path):
         if not os.path.isfile(path):
             raise StorageError("no such file", code="E-STORAGE", file=name)
-        _refuse_hostile(path)
     options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
     try:
+        with storage_errors(path):
+            _refuse_hostile(path)
         large = os.path.getsize(path) > _LARGE
         dataset = xr.open_dataset(path, cache=False, **options) if large else xr.load_dataset(path, **options)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
@@ -196,7 +198,7 @@ def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -
     Parameters
     ----------
     result : object
-        Made of dataclasses and sections of femgear, arrays, sparse matrices, tables, sequences and numbers.
+        Made of dataclasses, sections of cases, arrays, sparse matrices, tables, sequences and numbers.
     fingerprint : str
         Of all that the result depends on.
 
@@ -214,7 +216,7 @@ def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -
 
 
 def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
-    """Read the result that `write_result` wrote with a fingerprint: numbers and objects of femgear alone.
+    """Read the result that `write_result` wrote with a fingerprint: numbers and dataclasses alone.
 
     Raises
     ------
@@ -267,11 +269,12 @@ def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, A
     if kind.__module__.startswith("scipy.sparse") and value.format in ("csc", "csr"):
         parts = value.data, value.indices, value.indptr, value.shape
         return found | {"items": [inner(item) for item in parts]}
-    if not kind.__module__.startswith(_OWN):
+    if not (is_dataclass(value) or kind.__module__.startswith(_OWN)):
         raise TypeError(f"a {kind.__qualname__} cannot be written")
-    state = value.__getstate__()
-    if is_dataclass(value):
-        state = {one.name: getattr(value, one.name) for one in fields(value)}
+    # a dataclass keeps its fields alone, without what it has computed from them
+    names = [one.name for one in fields(value)] if is_dataclass(value) else None
+    own: Any = value
+    state = own.__getstate__() if names is None else {name: getattr(own, name) for name in names}
     return found | {"kind": "own", "class": [kind.__module__, kind.__qualname__], "items": pairs(state)}
 
 
@@ -321,10 +324,11 @@ def _made(node: dict, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
 
 
 def _own_object(module: str, name: str, state: dict) -> Any:
-    """Make an object of one of femgear's classes as it was; its checks have been passed before."""
-    found = getattr(importlib.import_module(module), name) if module.startswith(_OWN) else None
-    if not isinstance(found, type):
-        raise TypeError(f"{module} has no class {name}")
+    """Make an object of a dataclass or of femgear as it was; its checks have been passed before."""
+    place = importlib.import_module(module) if module.startswith(_OWN) else sys.modules[module]
+    found = getattr(place, name)
+    if not isinstance(found, type) or not (is_dataclass(found) or module.startswith(_OWN)):
+        raise TypeError(f"{module} has no such class {name}")
     made = object.__new__(found)
     if is_dataclass(found):
         vars(made).update(state)

@@ -44,8 +44,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
-_FORMAT = 1
+_FORMAT = 2
 MANIFEST = "manifest.json"
+KEPT = ".stages"
+"""Folder of results that a run goes on from when it was interrupted."""
 _CASE, _LOCK = "case.toml", ".lock"
 _RUNNING, _FINISHED, _ADDED, EXPORTED = ".running", ".finished", ".added", "exported"
 _WRITTEN = re.compile(r"manifest\.json|case\.toml|[\w.-]+\.(nc|npz|png|gif|vtu|html|csv)")
@@ -360,7 +362,7 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
             return
         _refuse_changed(folder, read_manifest(folder))
         try:
-            if case is None or not (running / MANIFEST).is_file():
+            if case is None or not (running / MANIFEST).is_file() or read_manifest(running).complete:
                 _remove_tree(running)
             with storage_errors(folder):
                 running.mkdir(exist_ok=True)
@@ -389,6 +391,8 @@ def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
         remove_temporaries(folder)
         _publish(folder)
         _remove_tree(folder / _ADDED)
+        if (folder / MANIFEST).is_file() and read_manifest(folder).complete:
+            _remove_tree(folder / KEPT)
         yield
 
 
@@ -532,14 +536,23 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
         text = path.read_bytes() if path.is_file() and path.stat().st_size <= 10_000_000 else b""
     try:
         data = json.loads(text)
+        seal, right = data.pop("checksum", None), _seal(data)
         written = data.pop("femgear_format")
-        if type(written) is not int or not 1 <= written <= _FORMAT:
+        if type(written) is not int or written != _FORMAT:
             raise StorageError(
                 "written by another version of femgear",
                 code="E-FORMAT",
                 file=str(path),
                 value=written,
-                limit=f"1 to {_FORMAT}",
+                limit=str(_FORMAT),
+                remedy="run the case again",
+            )
+        if seal != right:
+            raise StorageError(
+                "changed since femgear wrote it (its checksum does not fit)",
+                code="E-FORMAT",
+                file=str(path),
+                remedy="run the case again in a new folder",
             )
         manifest = Manifest(**data)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
@@ -558,10 +571,16 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
 def _write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
     """Write ``manifest.json``; the last file of a run."""
     data = _plain({"femgear_format": _FORMAT, **vars(manifest)})
-    write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
+    sealed = {**data, "checksum": _seal(data)}
+    write_text(json.dumps(sealed, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
 
 
-def _plain(value: Any) -> object:
+def _seal(data: dict) -> str:
+    """Compute the SHA-256 of what a manifest says."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
     """Turn nested tables, lists, arrays and numbers into a JSON value."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}

@@ -1,11 +1,11 @@
 """Results folders into which somebody has put links, pipes, folders and files: nothing foreign is lost."""
 
-import json
 import os
 import stat
 import threading
 
 import pytest
+from edited_manifests import edit_manifest
 
 from femgear.errors import StorageError
 from femgear.storage import files
@@ -253,7 +253,7 @@ def test_a_finished_run_whose_files_differ_from_its_manifest_is_refused(results)
 
 
 @pytest.mark.parametrize(
-    "text", ["", "{}", '{"femgear_format": 1, "complete": true, "files": {"../x": "0"}}']
+    "text", ["", "{}", '{"femgear_format": 2, "complete": true, "files": {"../x": "0"}}']
 )
 def test_a_finished_run_without_a_valid_manifest_is_refused(results, text):
     (finished(results) / MANIFEST).write_text(text)
@@ -277,22 +277,18 @@ def test_a_manifest_with_folders_leads_nowhere_through_a_link(results, elsewhere
     source = finished(results)
     (source / "sub").mkdir()
     (results / "sub").symlink_to(elsewhere, target_is_directory=True)
-    data = json.loads((source / MANIFEST).read_text())
     for name in ("thesis.txt", "new.txt"):
         (source / "sub" / name).write_text("new")
-        data["files"] = {f"sub/{name}": checksum(source / "sub" / name)}
-        (source / MANIFEST).write_text(json.dumps(data))
+        edit_manifest(source, files={f"sub/{name}": checksum(source / "sub" / name)})
         refused(lambda: replaced(results))
 
 
 def test_nothing_is_removed_through_a_link(results, elsewhere):
-    data = json.loads((results / MANIFEST).read_text())
-    data["files"]["sub/thesis.txt"] = checksum(elsewhere / "thesis.txt")
-    (results / MANIFEST).write_text(json.dumps(data))
+    listed = {"sub/thesis.txt": checksum(elsewhere / "thesis.txt")}
+    edit_manifest(results, files={**read_manifest(results).files, **listed})
     (results / "sub").symlink_to(elsewhere, target_is_directory=True)
     refused(lambda: replaced(results))
-    data["complete"] = False
-    (results / MANIFEST).write_text(json.dumps(data))
+    edit_manifest(results, complete=False)
     refused(lambda: prepare_output(results))
 
 
@@ -362,8 +358,7 @@ def test_an_addition_that_is_killed_goes_on_with_the_next(results, monkeypatch, 
 
 
 def test_an_addition_to_results_that_are_not_complete(results):
-    data = json.loads((results / MANIFEST).read_text()) | {"complete": False}
-    (results / MANIFEST).write_text(json.dumps(data))
+    edit_manifest(results, complete=False)
     add(results, report="one")
     assert "report.html" in read_manifest(results).files and not read_manifest(results).complete
 
