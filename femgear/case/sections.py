@@ -35,6 +35,7 @@ from femgear.case.quantities import (
     Section,
     Title,
     Values,
+    at_most,
 )
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError, Finding, remark
@@ -219,7 +220,7 @@ class SetSection(Section):
     planets: Annotated[int, Count(1, 1000)]
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-3, 10.0)] | None = None
     face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
-    planet_angles: Annotated[tuple[Angle, ...], Values(max_length=1000)] | None = None
+    planet_angles: Annotated[tuple[Angle, ...], at_most(1000)] | None = None
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
     pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
 

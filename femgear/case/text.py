@@ -17,19 +17,22 @@ from pydantic import BaseModel, PrivateAttr
 from femgear.errors import MOST_SHOWN, CaseError, Finding, printable
 
 _MAX_BYTES = 1_000_000
-_MAX_DEPTH = 10
+_MAX_DEPTH = 32
 """Levels of tables and lists."""
 _MOST_TABLES, _MOST_ENTRIES = 1000, 120_000
-"""Entries of a table or a list of tables, and of all tables and lists: pydantic reads all, then counts them."""
+"""Entries of a table or list of tables, and of all together: pydantic reads them before it counts them."""
+_MOST_KEYS, _MOST_LONG_KEYS = 30_000, 100
+"""Keys of a text, and those of seven parts or more."""
 _LONGEST_KEY = 200
 """Characters of a key that messages show."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _HEADER = re.compile(r"\s*(\[\[?)([^\[\]#]+)\]")
 _ENTRY = re.compile(r"\s*+([A-Za-z0-9_.\"' -]++)\s*+=")
+_KEY = re.compile(r"=+|^[ \t]*\[", re.MULTILINE)
 # tomllib needs a time that grows with the square of the parts of a dotted key.
 _LONG_KEY = re.compile(
-    r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){11}"
+    r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){7}"
 )
 
 
@@ -92,8 +95,11 @@ def parse(text: str, name: str) -> dict:
         ``E-TOML``: syntax, with line and column; a key given twice, with both lines; nested too deeply.
         ``E-FINITE``, with keys and lines.
     """
-    if _LONG_KEY.search(text):
+    if len(_LONG_KEY.findall(text)) > _MOST_LONG_KEYS:
         raise _too_deep(name)
+    if (count := len(_KEY.findall(text))) > _MOST_KEYS:
+        limit = f"{_MOST_KEYS} keys and tables"
+        raise CaseError(f"{count} keys are too many", code="E-RANGE", file=name, limit=limit)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -108,7 +114,7 @@ def parse(text: str, name: str) -> dict:
         ) from error
     except RecursionError:
         raise _too_deep(name) from None
-    infinite = _check_tree(data, name)
+    infinite = check_tree(data, name)
     if infinite:
         (key, value), *others = ((dotted(path), value) for path, value in infinite[:MOST_SHOWN])
         line = line_of(text, key)
@@ -125,8 +131,8 @@ def parse(text: str, name: str) -> dict:
     return data
 
 
-def _check_tree(data: dict, name: str) -> list[tuple[tuple[str | int, ...], float]]:
-    """Paths and values of the numbers that are not finite; refuses what is too deep or too long."""
+def check_tree(data: dict, name: str) -> list[tuple[tuple[str | int, ...], float]]:
+    """Find paths and values of the numbers that are not finite; refuse what is too deep or too long."""
     infinite, pending, count = [], [((), data)], 0
     while pending:
         path, value = pending.pop()

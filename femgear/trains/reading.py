@@ -70,8 +70,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     train = _train_of_file(data, lines, name)
     own_file = train.own_file or _SET_FILE
     files, unread = _embedded_files(own_file, data, name)
-    if files:
-        text = text_with_points(data, name, points=own_file.points, remedy=own_file.remedy)
+    case_text.check_tree(data, name)
     try:
         case = train.model.model_validate(data)
     except ValidationError as error:
@@ -82,6 +81,8 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         raise combine([*unread, *problems], lines, name, error.error_count()) from None
     if unread:
         raise combine(unread, lines, name)
+    if files:
+        text = text_with_points(data, name, points=own_file.points, remedy=own_file.remedy)
     try:
         more = train.cross_check(case)
         problems = cross_check(case, more) if own_file is _SET_FILE else list(more)
