@@ -488,7 +488,8 @@ def test_an_interrupt_that_python_drops_comes_once_more(tmp_path, capsys, pipeli
 
     def interrupted(*_, **__):
         Cleared()
-        time.sleep(5.0)
+        for _ in range(500):
+            time.sleep(0.01)
 
     pipeline(interrupted)
     start = time.monotonic()
