@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import os
 import signal
@@ -14,7 +15,7 @@ _INTERRUPTED = 130
 
 try:
     from pathlib import Path
-    from typing import Annotated
+    from typing import Annotated, Any
 
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
@@ -431,10 +432,20 @@ def _termination_interrupts() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    before, hook = signal.signal(signal.SIGTERM, signal.default_int_handler), sys.unraisablehook
+
+    def again(lost: Any) -> None:
+        # Python drops what is raised while it clears an object up: the interrupt comes once more
+        if issubclass(lost.exc_type, KeyboardInterrupt):
+            threading.Timer(0.02, _thread.interrupt_main).start()
+        else:
+            hook(lost)
+
+    sys.unraisablehook = again
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         signal.signal(signal.SIGTERM, before)
 
 

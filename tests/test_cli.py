@@ -479,3 +479,19 @@ def test_check_says_what_a_run_would_refuse(check):
     code, out, _ = check(to_toml(swapped))
     assert code == 0 and "femgear run without --only refuses this case" in out and "E-FIXED-MEMBER" in out
     assert "refuses" not in check(TEXT)[1]
+
+
+def test_an_interrupt_that_python_drops_comes_once_more(tmp_path, capsys, pipeline):
+    class Cleared:
+        def __del__(self):
+            raise KeyboardInterrupt
+
+    def interrupted(*_, **__):
+        Cleared()
+        for _ in range(500):
+            time.sleep(0.01)
+
+    pipeline(interrupted)
+    start = time.monotonic()
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out")]) == 130
+    assert time.monotonic() - start < 4.0 and "ignored" not in capsys.readouterr().err
