@@ -178,10 +178,8 @@ def run_case(
         manifest = replace(run.record(*names), complete=True)
         write_text(page(train_of(case), Results(folder, manifest, read_case)), folder / "report.html")
         run.record("report.html")
-    kept = {name: digest for name, digest in run.files.items() if name.startswith(KEPT)}
-    run.files = {name: digest for name, digest in run.files.items() if name not in kept}
+    run.files = {name: digest for name, digest in run.files.items() if not name.startswith(KEPT)}
     run.record(complete=True)
-    discard(folder, kept)
 
 
 def _compute(

@@ -359,18 +359,17 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
         if not (force and (folder / MANIFEST).is_file() and read_manifest(folder).complete):
             _remove_tree(running)
             yield prepare_output(folder, case=case, force=force)
+            _remove_kept(folder)
             return
         _refuse_changed(folder, read_manifest(folder))
         try:
-            if case is None or not (running / MANIFEST).is_file() or read_manifest(running).complete:
+            _publish_running(folder)
+            if case is None or not (running / MANIFEST).is_file():
                 _remove_tree(running)
             with storage_errors(folder):
                 running.mkdir(exist_ok=True)
             yield prepare_output(running, case=case, force=True)
-            if read_manifest(running).complete:
-                with storage_errors(folder):
-                    os.replace(running, folder / _FINISHED)
-                _publish(folder)
+            _publish_running(folder)
         except BaseException as error:
             # what a user interrupts goes on with the next run
             if case is None or isinstance(error, Exception) or not read_manifest(running).files:
@@ -391,9 +390,23 @@ def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
         remove_temporaries(folder)
         _publish(folder)
         _remove_tree(folder / _ADDED)
-        if (folder / MANIFEST).is_file() and read_manifest(folder).complete:
-            _remove_tree(folder / KEPT)
+        _remove_kept(folder)
         yield
+
+
+def _publish_running(folder: Path) -> None:
+    """Give the files of a run that replaces results their places, where it has come to its end."""
+    running = folder / _RUNNING
+    if not running.is_symlink() and (running / MANIFEST).is_file() and read_manifest(running).complete:
+        with storage_errors(folder):
+            os.replace(running, folder / _FINISHED)
+        _publish(folder)
+
+
+def _remove_kept(folder: Path) -> None:
+    """Remove what only an interrupted run goes on from, where the run has come to its end."""
+    if (folder / MANIFEST).is_file() and read_manifest(folder).complete:
+        _remove_tree(folder / KEPT)
 
 
 @contextmanager

@@ -100,8 +100,8 @@ def _finished(out: Path) -> set[str]:
     for manifest in (out / "manifest.json", out / ".running" / "manifest.json"):
         if manifest.is_file():
             table = json.loads(manifest.read_bytes())
-            if manifest.parent == out and table["complete"]:
-                continue  # those of old results
+            if table["complete"]:
+                continue  # old results, or new ones that the same command replaces once more
             stages |= {file.removesuffix(".nc") for file in table["files"] if file.endswith(".nc")}
     return stages
 
@@ -140,3 +140,5 @@ def trace_stages(path: Path) -> None:
     for train in TRAINS:
         for stage in train.stages:
             object.__setattr__(stage, "solve", traced(stage.name, stage.solve))
+            if stage.parts is not None:
+                object.__setattr__(stage, "parts", traced(stage.name, stage.parts))
