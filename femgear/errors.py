@@ -103,6 +103,8 @@ CODES = {
     "E-VARIABLE": "There is no such variable, or it has no such values.",
 }
 """Meaning of every code; docs/errors.md lists the messages that carry it."""
+MOST_SHOWN = 10
+"""Mistakes of a case file that one message lists."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +194,7 @@ class FemgearError(Exception):
             lines.append(f"  allowed: {self.limit}")
         if self.remedy:
             lines.append(f"  remedy:  {self.remedy}")
-        several = self.problems if len(self.problems) > 1 else ()
+        several = self.problems[:MOST_SHOWN] if len(self.problems) > 1 else ()
         return "\n".join([*map(printable, lines), *map(str, several)])
 
 

@@ -22,6 +22,7 @@ from femgear.case.sections import MOST_POINTS
 from femgear.errors import CaseError
 
 _HEADING = re.compile(r"\s*(?P<name>[A-Za-z_ ]+?)[\s_]*[\[(](?P<unit>[^\])]+)[\])]\s*")
+_LONGEST_TITLE = 200
 _COMMAS = "decimal commas need semicolons or tabs between the columns, or write decimal points"
 
 _PROFILE_ENTRIES = {"roll angle": "roll_angles", "diameter": "diameters", "deviation": "deviations"}
@@ -120,8 +121,8 @@ def _cells(line: str, divider: str) -> list[str]:
 def _heading(cells, dimensions, problem: Callable[..., CaseError], remedy: str) -> dict[str, float]:
     """Titles of the columns and the SI values of their units."""
     found = {}
-    for cell in cells:
-        match = _HEADING.fullmatch(cell)
+    for cell in cells[:3]:
+        match = _HEADING.fullmatch(cell) if len(cell) < _LONGEST_TITLE else None
         title = " ".join(match["name"].lower().replace("_", " ").split()) if match else ""
         if match is None or title not in dimensions:
             raise problem("a column has no known name with its unit", value=cell, remedy=remedy)
@@ -132,7 +133,7 @@ def _heading(cells, dimensions, problem: Callable[..., CaseError], remedy: str) 
             words = "the units of the two columns seem to be swapped" if swapped else remedy
             raise problem(error.message, value=cell, remedy=words) from None
     if len(cells) != 2 or len(found) != 2:
-        raise problem(f"the columns are {', '.join(cells)}", limit="two", remedy=remedy)
+        raise problem(f"the columns are {', '.join(cells[:3])}", limit="two", remedy=remedy)
     return found
 
 
@@ -213,15 +214,17 @@ def embed_points(
         A path that leads out of the folder (E-FILE), and what `read` raises, with the key.
     """
     section, _, last = entry.partition(".")
-    tables, found = data.get(section), {}
+    tables, found, known = data.get(section), {}, {}
     tables = tables.get(last) if isinstance(tables, dict) else None
     for i, table in enumerate(tables if isinstance(tables, list) else ()):
         if isinstance(table, dict) and isinstance(table.get("file"), str) and plain(table):
             key, file = f"{entry}[{i}]", table.pop("file")
-            points = _embedded(file, name, f"{key}.file", read)
-            table |= {
-                one: [f"{value:.13g} {units[one]}" for value in values] for one, values in points.items()
-            }
+            if (path := PurePath(file)) not in known:
+                points = _embedded(file, name, f"{key}.file", read)
+                known[path] = {
+                    one: [f"{value:.13g} {units[one]}" for value in values] for one, values in points.items()
+                }
+            table |= known[path]
             found[key] = text.printable(file)
     return found
 

@@ -11,6 +11,7 @@ import difflib
 import math
 import re
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -18,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 from femgear.case import text as case_text
 from femgear.case.quantities import ANGLE, LENGTH
 from femgear.case.sections import Case, RackSection
-from femgear.errors import CaseError, Finding, GeometryError, printable, remark
+from femgear.errors import MOST_SHOWN, CaseError, Finding, GeometryError, remark
 
 _DIMENSIONS = {
     "centre_distance": LENGTH,
@@ -33,21 +34,23 @@ _DIMENSIONS = {
 _WANTED = dict.fromkeys(("tuple_type", "list_type"), "a list")
 _WANTED |= {"bool_type": "true or false", "string_type": "a text"}
 """What pydantic needed, by the kind of its error."""
+_MOST = 100
 
 
 def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") -> list[CaseError]:
     """Make a `CaseError` of each mistake that pydantic found.
 
     The field names of ``model`` are the valid keys, ``prefix`` is the key of the table that was validated.
+    Of very many mistakes it is the first hundred.
     """
     problems = []
     details: Any = error.errors(include_url=False)
-    for item in details:
-        # a list whose entries are refused has too few left
-        inside = [one["loc"][: len(item["loc"])] for one in details if len(one["loc"]) > len(item["loc"])]
+    # a list whose entries are refused has too few left
+    inside = {one["loc"][:length] for one in details for length in range(len(one["loc"]))}
+    for item in details[:_MOST]:
         if item["type"] == "too_short" and item["loc"] in inside:
             continue
-        key = _dotted(item["loc"], prefix)
+        key = case_text.dotted(item["loc"], prefix)
         nested = item.get("ctx", {}).get("error")
         if isinstance(nested, ValidationError):
             problems += translate(nested, model, key)
@@ -117,12 +120,17 @@ def _unknown_key(location: tuple, key: str, model: type[BaseModel]) -> CaseError
 def _description(model: type[BaseModel], location: tuple) -> str:
     """What the schema says about the entry."""
     section = _section(model, location[:-1]) or model
-    schema = section.model_json_schema()["properties"].get(str(location[-1]), {})
+    schema = _properties(section).get(str(location[-1]), {})
     choices = " or ".join(str(choice) for choice in schema.get("enum", ()))
     kind = str(schema.get("type", ""))
     return str(
         schema.get("description") or choices or {"string": "a text", "array": "a list"}.get(kind, kind)
     )
+
+
+@cache
+def _properties(section: type[BaseModel]) -> dict[str, dict]:
+    return section.model_json_schema()["properties"]
 
 
 def _keys(section: type[BaseModel] | None) -> list[str]:
@@ -142,20 +150,10 @@ def _section(model: type[BaseModel], location: tuple) -> type[BaseModel] | None:
     return current
 
 
-def _dotted(location: tuple, prefix: str) -> str:
-    """Key such as ``sun.modifications[0].amount``."""
-    key = prefix
-    for part in location:
-        if isinstance(part, int):
-            key += f"[{part}]"
-        else:
-            key += ("." if key else "") + (printable(part) or '""')
-    return key
-
-
-def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
+def combine(problems: list[CaseError], text: str, name: str, count: int = 0) -> CaseError:
     """Make one error that lists all (at least one); its ``problems`` holds them one by one.
 
+    ``count`` is their number where `translate` left some out.
     ``text`` is the file, for line numbers (empty where the text is not the user's), ``name`` its name.
     """
     for problem in problems:
@@ -165,7 +163,9 @@ def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
     if len(problems) == 1:
         combined = problems[0]
     else:
-        combined = CaseError(f"{len(problems)} problems", file=name)
+        count = count if count > _MOST else len(problems)
+        first = f", the first {MOST_SHOWN} of them" if count > MOST_SHOWN else ""
+        combined = CaseError(f"{count} problems{first}", file=name)
         combined.code = problems[0].code if len({p.code for p in problems}) == 1 else "E-CASE"
     combined.problems = tuple(problems)
     return combined

@@ -315,7 +315,22 @@ def Number(
     return _Reader(convert, schema)
 
 
-PAIR, TRIPLE = (Field(min_length=count, max_length=count) for count in (2, 3))
+Values = partial(Field, fail_fast=True)
+"""Make the limits of a list of numbers, of which the first that is wrong is refused, in `Annotated`."""
+
+
+def at_most(count: int) -> BeforeValidator:
+    """Make the reader of a list that is refused before its entries are read, where it has more."""
+
+    def few(value: object) -> object:
+        if isinstance(value, list) and len(value) > count:
+            raise CaseError(f"{len(value)} entries are too many", code="E-RANGE", limit=f"at most {count}")
+        return value
+
+    return BeforeValidator(few)
+
+
+PAIR, TRIPLE = (Values(min_length=count, max_length=count) for count in (2, 3))
 """Of lists with so many entries, in `Annotated`."""
 RIGID = "rigid"
 

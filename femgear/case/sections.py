@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from femgear.case.quantities import (
@@ -33,6 +34,8 @@ from femgear.case.quantities import (
     Quantity,
     Section,
     Title,
+    Values,
+    at_most,
 )
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError, Finding, remark
@@ -58,7 +61,7 @@ PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(4
 Diameter = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 RollAngle = Annotated[float, Quantity(ANGLE, 0.0, 4 * math.pi)]
 RollLength = Annotated[float, Quantity(LENGTH, 0.0, 10.0)]
-Points = Field(max_length=MOST_POINTS)
+Points, Pitches = (Values(max_length=most) for most in (MOST_POINTS, 5000))
 Member = Literal["sun", "ring", "carrier"]
 Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
 Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
@@ -166,8 +169,8 @@ class GearErrors(CarrierErrors):
     positive, ``pitch`` the deviations of the pitches between tooth i - 1 and tooth i, which add up to zero.
     """
 
-    pitch: Annotated[tuple[Deviation, ...], Field(max_length=5000)] | None = None
-    cumulative_pitch: Annotated[tuple[Deviation, ...], Field(max_length=5000)] | None = None
+    pitch: Annotated[tuple[Deviation, ...], Pitches] | None = None
+    cumulative_pitch: Annotated[tuple[Deviation, ...], Pitches] | None = None
     thickness_reduction: Deviation | None = None
 
     @model_validator(mode="after")
@@ -217,7 +220,7 @@ class SetSection(Section):
     planets: Annotated[int, Count(1, 1000)]
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-3, 10.0)] | None = None
     face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
-    planet_angles: tuple[Angle, ...] | None = None
+    planet_angles: Annotated[tuple[Angle, ...], at_most(1000)] | None = None
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
     pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
 
@@ -360,7 +363,7 @@ class OperationSection(Section):
     input: Member
     fixed: Member
     torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
-    speeds: Annotated[tuple[_Speed, ...], BeforeValidator(_speed_range), Field(max_length=100_000)]
+    speeds: Annotated[tuple[_Speed, ...], Values(max_length=100_000), BeforeValidator(_speed_range)]
 
 
 class StaticSection(Section):
@@ -395,7 +398,7 @@ class PublishedLines(Section):
 
     speed: _Speed
     harmonic: Annotated[int, Count(1, 1000)]
-    orders: Annotated[tuple[Annotated[int, Count(0, 10_000_000)], ...], Field(min_length=1, max_length=20)]
+    orders: Annotated[tuple[Annotated[int, Count(0, 10_000_000)], ...], Values(min_length=1, max_length=20)]
     lobes: Annotated[int, Count(0, 10_000)] | None = None
     source: Title
 
@@ -410,7 +413,7 @@ class HousingSection(Section):
     form: Literal["exact", "linear"] = "exact"
     points: Annotated[int, Count(3, 100_000)] = 54
     sensor_angle: Angle = 0.0
-    published: tuple[PublishedLines, ...] = ()
+    published: Annotated[tuple[PublishedLines, ...], Field(max_length=100)] = ()
 
 
 class Case(Section, ReadCase):
@@ -497,9 +500,10 @@ def output_member(case: Case) -> str:
 
 def check_published(case: Case) -> Iterator[CaseError]:
     """Refuse published lines that nothing could be compared with."""
+    speeds = np.array(case.operation.speeds)
     for i, entry in enumerate(case.housing.published):
         key = f"housing.published[{i}]"
-        if not any(math.isclose(entry.speed, speed, rel_tol=1e-9) for speed in case.operation.speeds):
+        if not np.isclose(speeds, entry.speed, rtol=1e-9, atol=0.0).any():
             yield CaseError(
                 "this speed is not computed",
                 code=_CODE,

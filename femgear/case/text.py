@@ -9,22 +9,30 @@ import re
 import stat
 import tomllib
 from datetime import date, time
+from functools import lru_cache
 from html import escape
 
 from pydantic import BaseModel, PrivateAttr
 
-from femgear.errors import CaseError, Finding, printable
+from femgear.errors import MOST_SHOWN, CaseError, Finding, printable
 
 _MAX_BYTES = 1_000_000
 _MAX_DEPTH = 32
 """Levels of tables and lists."""
+_MOST_TABLES, _MOST_ENTRIES = 1000, 120_000
+"""Entries of a table or list of tables, and of all together: pydantic reads them before it counts them."""
+_MOST_KEYS, _MOST_LONG_KEYS = 30_000, 100
+"""Keys of a text, and those of seven parts or more."""
+_LONGEST_KEY = 200
+"""Characters of a key that messages show."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _HEADER = re.compile(r"\s*(\[\[?)([^\[\]#]+)\]")
-_ENTRY = re.compile(r"\s*([A-Za-z0-9_.\"' -]+?)\s*=")
+_ENTRY = re.compile(r"\s*+([A-Za-z0-9_.\"' -]++)\s*+=")
+_KEY = re.compile(r"=+|^[ \t]*\[", re.MULTILINE)
 # tomllib needs a time that grows with the square of the parts of a dotted key.
 _LONG_KEY = re.compile(
-    r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){33}"
+    r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){7}"
 )
 
 
@@ -87,8 +95,11 @@ def parse(text: str, name: str) -> dict:
         ``E-TOML``: syntax, with line and column; a key given twice, with both lines; nested too deeply.
         ``E-FINITE``, with keys and lines.
     """
-    if _LONG_KEY.search(text):
+    if len(_LONG_KEY.findall(text)) > _MOST_LONG_KEYS:
         raise _too_deep(name)
+    if (count := len(_KEY.findall(text))) > _MOST_KEYS:
+        limit = f"{_MOST_KEYS} keys and tables"
+        raise CaseError(f"{count} keys are too many", code="E-RANGE", file=name, limit=limit)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -103,11 +114,12 @@ def parse(text: str, name: str) -> dict:
         ) from error
     except RecursionError:
         raise _too_deep(name) from None
-    infinite = _check_tree(data, name)
+    infinite = check_tree(data, name)
     if infinite:
-        (key, value), *others = infinite.items()
+        (key, value), *others = ((dotted(path), value) for path, value in infinite[:MOST_SHOWN])
         line = line_of(text, key)
         also = "".join(f", nor is {other} (line {line_of(text, other)})" for other, _ in others)
+        also += f", nor are {len(infinite) - MOST_SHOWN} others" if len(infinite) > MOST_SHOWN else ""
         raise CaseError(
             f"not a finite number{also}",
             code="E-FINITE",
@@ -119,21 +131,41 @@ def parse(text: str, name: str) -> dict:
     return data
 
 
-def _check_tree(data: dict, name: str) -> dict[str, float]:
-    """Keys and values of the numbers that are not finite; refuses what is too deep (without recursion)."""
-    infinite, pending = {}, [("", data, 1)]
+def check_tree(data: dict, name: str) -> list[tuple[tuple[str | int, ...], float]]:
+    """Find paths and values of the numbers that are not finite; refuse what is too deep or too long."""
+    infinite, pending, count = [], [((), data)], 0
     while pending:
-        key, value, depth = pending.pop()
-        if depth > _MAX_DEPTH:
+        path, value = pending.pop()
+        if isinstance(value, float):
+            infinite.append((path, value))
+            continue
+        if len(path) + bool(value) >= _MAX_DEPTH:
             raise _too_deep(name)
-        if isinstance(value, dict):
-            prefix = f"{key}." if key else ""
-            pending += [(prefix + printable(k), v, depth + 1) for k, v in reversed(value.items())]
-        elif isinstance(value, list):
-            pending += [(f"{key}[{i}]", v, depth + 1) for i, v in reversed(list(enumerate(value)))]
-        elif isinstance(value, float) and not math.isfinite(value):
-            infinite[key] = value
+        count += len(value)
+        tables = isinstance(value, dict) or any(isinstance(one, dict) for one in value)
+        if count > _MOST_ENTRIES or (tables and len(value) > _MOST_TABLES):
+            raise CaseError(
+                f"{len(value)} entries are too many", code="E-RANGE", key=dotted(path), file=name,
+                limit=f"at most {_MOST_TABLES} of a table or list of tables, {_MOST_ENTRIES} of all together",
+            )  # fmt: skip
+        items = list(value.items() if isinstance(value, dict) else enumerate(value))
+        pending += [
+            ((*path, k), v)
+            for k, v in reversed(items)
+            if isinstance(v, (dict, list)) or (isinstance(v, float) and not math.isfinite(v))
+        ]
     return infinite
+
+
+def dotted(location: tuple, prefix: str = "") -> str:
+    """Make a key such as ``sun.modifications[0].amount``."""
+    key = prefix
+    for part in location:
+        if isinstance(part, int):
+            key += f"[{part}]"
+        else:
+            key += ("." if key else "") + (printable(part[:_LONGEST_KEY]) or '""')
+    return key
 
 
 def _too_deep(name: str) -> CaseError:
@@ -150,7 +182,7 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
     if "Cannot overwrite a value" in message or "Cannot declare" in message:
         key, lines = _duplicate(text, line)
         if len(lines) > 1:
-            places = " and ".join(str(number) for number in lines)
+            places = " and ".join(str(number) for number in lines[:MOST_SHOWN])
             return CaseError(
                 f"given twice, in lines {places}",
                 code="E-TOML",
@@ -186,12 +218,16 @@ def line_of(text: str, key: str) -> int | None:
 
     Of an entry of a list it is the line of the entry, of its table, or of the list.
     """
-    lines: dict[str, int] = {}
-    for found, number in _entries(text):
-        lines.setdefault(found, number)
+    lines = _lines(text)
     table = key.rpartition("]")
     wanted = (key, re.sub(r"(\[\d+\])+$", "", key), table[0] + table[1], key.split("[")[0], f"{key}[0]")
     return next((lines[name] for name in wanted if name in lines), None)
+
+
+@lru_cache(maxsize=2)
+def _lines(text: str) -> dict[str, int]:
+    """First line of every key."""
+    return {key: number for key, number in reversed(list(_entries(text)))}
 
 
 def _entries(text: str):
@@ -211,15 +247,18 @@ def _entries(text: str):
         entry = _ENTRY.match(line)
         if header:
             table = _clean(header[2])
-            for name, count in list(counts.items()):
-                if table.startswith(f"{name}."):
-                    table = f"{name}[{count}]{table[len(name) :]}"
+            *above, last = table[:_LONGEST_KEY].split(".", _MAX_DEPTH)
+            table = ""
+            for part in above:
+                table += part
+                table += f"[{counts[table]}]." if table in counts else "."
+            table += last
             if header[1] == "[[":
                 counts[table] = counts.get(table, -1) + 1
                 table = f"{table}[{counts[table]}]"
             yield table, number
         elif entry:
-            yield ".".join(part for part in (table, _clean(entry[1])) if part), number
+            yield ".".join(part for part in (table, _clean(entry[1])[:_LONGEST_KEY]) if part), number
 
 
 def _clean(key: str) -> str:

@@ -70,6 +70,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     train = _train_of_file(data, lines, name)
     own_file = train.own_file or _SET_FILE
     files, unread = _embedded_files(own_file, data, name)
+    case_text.check_tree(data, name)
     try:
         case = train.model.model_validate(data)
     except ValidationError as error:
@@ -77,7 +78,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         # tables whose files cannot be read have no points
         tables = {(problem.key or "").rpartition(".")[0] for problem in unread}
         problems = [problem for problem in translate(error, keys) if problem.key not in tables]
-        raise combine([*unread, *problems], lines, name) from None
+        raise combine([*unread, *problems], lines, name, error.error_count()) from None
     if unread:
         raise combine(unread, lines, name)
     if files:

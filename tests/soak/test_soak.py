@@ -1,6 +1,5 @@
 """Short forms of the soak tests, and the harness itself: it goes on, repeats a trial and lists what fails."""
 
-import functools
 import json
 import signal
 import subprocess
@@ -9,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case import mistakes
 from femgear.errors import CaseError
 from soak import __main__ as program
 from soak import case_text, damage, faults, kills, page, programs, state, supply, trials
@@ -27,9 +25,7 @@ def passed(tally: trials.Tally) -> trials.Tally:
     return tally
 
 
-def test_two_thousand_mutated_case_files(folder, monkeypatch):
-    # the schema of one section takes as long as a hundred mutants
-    monkeypatch.setattr(mistakes, "_description", functools.cache(mistakes._description))
+def test_two_thousand_mutated_case_files(folder):
     tally = passed(trials.run_trials("case_text", case_text.short(2000), folder))
     assert tally.said["described"] > 50 and len(tally.said) > 12
 
@@ -77,7 +73,7 @@ def test_a_mutant_follows_from_its_number_and_every_case_is_cut_everywhere():
 def test_what_must_not_come_out_of_a_case_file_is_a_failure(happens, words, folder, monkeypatch):
     monkeypatch.setattr(case_text, "_STOP", 0.2)
     monkeypatch.setattr(case_text, "MEGABYTES", 50.0)
-    case_text._warm(folder)
+    case_text._warm(folder, 7)
     monkeypatch.setattr(case_text, "_described", happens)
     tally = trials.run_trials("case_text", [7], folder)
     assert tally.failed == 1 and words in tally.failures[0]

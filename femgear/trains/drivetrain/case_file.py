@@ -28,6 +28,7 @@ from femgear.case.quantities import (
     Quantity,
     Section,
     Title,
+    Values,
 )
 from femgear.case.sections import FORMAT
 from femgear.case.text import ReadCase
@@ -45,6 +46,7 @@ from femgear.trains.drivetrain.parts import (
 FASTEST_RATE = 1e7
 _MOST_PARTS = 200
 _MOST_POINTS = 20_000
+_POINTS = Values(min_length=1, max_length=_MOST_POINTS)
 _LARGEST_TORQUE, _LATEST = 1e9, 1e6
 
 # Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
@@ -89,8 +91,8 @@ class TorqueSection(Section):
     body: str
     torque: _Torque | None = None
     file: Title | None = None
-    times: Annotated[tuple[_Time, ...], Field(min_length=1, max_length=_MOST_POINTS)] | None = None
-    torques: Annotated[tuple[_Torque, ...], Field(min_length=1, max_length=_MOST_POINTS)] | None = None
+    times: Annotated[tuple[_Time, ...], _POINTS] | None = None
+    torques: Annotated[tuple[_Torque, ...], _POINTS] | None = None
     share: Annotated[float, Number(0.0, 10.0)] | None = None
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, StrictBool, ValidationInfo
 
 from femgear.case.quantities import (
     ANGLE,
@@ -32,6 +32,7 @@ from femgear.case.quantities import (
     Quantity,
     Section,
     StiffnessOrRigid,
+    Values,
 )
 from femgear.case.sections import Angle, PressureAngle
 from femgear.case.text import described
@@ -240,7 +241,7 @@ class PlanetarySection(Part):
     planet_base_radius: Radius | None = None
     module: Module | None = None
     planets: Annotated[int, Count(1, 24)] = 3
-    planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
+    planet_angles: Annotated[tuple[Angle, ...], Values(min_length=1, max_length=24)] | None = None
     """Ascending, from x when the carrier's phase is zero."""
     planet_mass: Mass
     planet_inertia: Inertia

@@ -10,7 +10,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from femgear.case.quantities import LENGTH, PAIR, STIFFNESS, TORQUE, Count, Number, Quantity, Section, Title
+from femgear.case.quantities import (
+    LENGTH,
+    PAIR,
+    STIFFNESS,
+    TORQUE,
+    Count,
+    Number,
+    Quantity,
+    Section,
+    Title,
+    Values,
+)
 from femgear.case.sections import FORMAT, Angle, Inertia, Mass, Radius, Stiffness
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError
@@ -39,15 +50,15 @@ class MeshSection(Section):
 
     stiffness: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
     stiffness_waves: Annotated[
-        tuple[Annotated[float, Number(-1.0, 1.0)], ...], Field(max_length=_MOST_WAVES)
+        tuple[Annotated[float, Number(-1.0, 1.0)], ...], Values(max_length=_MOST_WAVES)
     ] = ()
-    stiffness_angles: Annotated[tuple[Angle, ...], Field(max_length=_MOST_WAVES)] = ()
+    stiffness_angles: Annotated[tuple[Angle, ...], Values(max_length=_MOST_WAVES)] = ()
     backlash: Annotated[float, Quantity(LENGTH, 1e-7, 0.05)]
     damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)]
     error: Annotated[
-        tuple[Annotated[float, Quantity(LENGTH, -1e-3, 1e-3)], ...], Field(max_length=_MOST_WAVES)
+        tuple[Annotated[float, Quantity(LENGTH, -1e-3, 1e-3)], ...], Values(max_length=_MOST_WAVES)
     ] = ()
-    error_angles: Annotated[tuple[Angle, ...], Field(max_length=_MOST_WAVES)] = ()
+    error_angles: Annotated[tuple[Angle, ...], Values(max_length=_MOST_WAVES)] = ()
 
 
 class OperationSection(Section):
@@ -87,7 +98,7 @@ class ChaosSection(RatioRange):
     points: Annotated[int, Count(8, 100_000)] = 100
     skip: Annotated[int, Count(0, 100_000)] = 60
     steps: Steps = 100
-    sections: Annotated[tuple[Ratio, ...], Field(max_length=6)] = ()
+    sections: Annotated[tuple[Ratio, ...], Values(max_length=6)] = ()
 
 
 class GearPairCase(Section, ReadCase):

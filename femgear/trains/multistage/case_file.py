@@ -24,6 +24,7 @@ from femgear.case.quantities import (
     Section,
     StiffnessOrRigid,
     Title,
+    Values,
 )
 from femgear.case.sections import FORMAT, Angle, Inertia, Mass, MeshStiffnessSection, PressureAngle, Radius
 from femgear.case.text import ReadCase, described
@@ -120,7 +121,7 @@ class StageSection(Section):
     """A planetary set."""
 
     planets: Annotated[int, Count(1, 24)] = 3
-    planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
+    planet_angles: Annotated[tuple[Angle, ...], Values(min_length=1, max_length=24)] | None = None
     gears: GearsSection | None = None
     radii: RadiiSection | None = None
     fixed: Literal["carrier", "ring", "sun", "none"] = "ring"

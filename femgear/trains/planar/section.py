@@ -21,6 +21,7 @@ from femgear.case.quantities import (
     Quantity,
     Section,
     Title,
+    Values,
     printable_line,
 )
 from femgear.case.sections import Inertia, Mass, MeshStiffnessSection, RigidCase, Stiffness, output_member
@@ -147,7 +148,7 @@ class PlanarSection(Section):
     line_backlash: Clearance | None = None
     smoothing: Annotated[float, Quantity(LENGTH, 0.0, 1e-3)] = _SMOOTHING
     back_flanks: StrictBool = False
-    damping_ratios: Annotated[tuple[Ratio, ...], AfterValidator(_some), Field(max_length=1000)] | None = None
+    damping_ratios: Annotated[tuple[Ratio, ...], Values(max_length=1000), AfterValidator(_some)] | None = None
     gyroscopic: StrictBool = False
     reaction: Literal["supports", "output"] = "output"
     ring: PlanarRingSection

@@ -1,0 +1,107 @@
+"""Case files that would take long, or much memory, to refuse: each is refused within a second of CPU time."""
+
+import re
+from pathlib import Path
+
+import pytest
+from soak.trials import metered
+
+from femgear.errors import MOST_SHOWN, CaseError
+from femgear.trains.reading import parse_case, read_case
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
+SET = (CASES / "planetary_27_40_108.toml").read_text(encoding="utf-8")
+SECONDS, MEGABYTES = 1.0, 100.0
+
+
+def refused(text: str, name: str = "case.toml") -> CaseError:
+    """The refusal of a text, asserted to come soon and to be short."""
+    with metered(5.0) as meter, pytest.raises(CaseError) as caught:
+        parse_case(text, name=name)
+    shown = str(caught.value)
+    assert meter.seconds < SECONDS and meter.megabytes < MEGABYTES and len(shown) < 5000
+    assert len(re.findall(r"^\[E-", shown, re.MULTILINE)) <= 1 + MOST_SHOWN
+    return caught.value
+
+
+def many(count: int, line: str) -> str:
+    """So many lines with their numbers."""
+    return "".join(line.format(i=i) + "\n" for i in range(count))
+
+
+def letters(i: int) -> str:
+    """A number in letters, as a name of a unit has them."""
+    return "".join("abcdefghij"[int(digit)] for digit in str(i))
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        (many(30_000, "[[sun.modifications]]"), "E-RANGE"),
+        ('model = "drivetrain"\n' + many(300, "[[parallel]]"), "E-KEY-MISSING"),
+        ("[[planet.individual]]\n" + many(5_000, "[[planet.individual]]"), "E-RANGE"),
+        (many(900, "[[planet.individual]]\nk{i} = 1\nl = 1\nm = 1\nn = 1\no = 1\np = 1"), "E-CASE"),
+        (many(900, "[[housing.published]]\norders = []"), "E-CASE"),
+        ("a = [\n" + " " * 30_000, "E-TOML"),
+        ("x\n" + (" " * 3_000 + "\n") * 9 + "a = [\n" + " " * 30_000, "E-TOML"),
+        (many(15_000, "[[k{i}]]") + "a = [", "E-TOML"),
+        (many(50_000, "[k{i}]"), "E-RANGE"),
+        (many(900, "k{i} = nan"), "E-FINITE"),
+        ("k = [" + "nan, " * 100_000 + "]", "E-FINITE"),
+        ("[" + "k" * 200_000 + "]\na = [" + "nan, " * 20_000 + "]", "E-FINITE"),
+        ("[" + "k" * 200_000 + "]\n" + many(900, "k{i} = 1"), "E-CASE"),
+        ("k = [" + "1, " * 130_000 + "]", "E-RANGE"),
+        (many(13_000, "a{i}." + "a." * 30 + "b = 1"), "E-TOML"),
+        ("title = [" + "1, " * 119_000 + "]", "E-CASE"),
+        ("[sun]\nmodifications = [" + "1, " * 60_000 + "]", "E-CASE"),
+        ("[operation]\nspeeds = [" + ", ".join(f'"1 z{letters(i)}"' for i in range(40_000)) + "]", "E-CASE"),
+        ("[set]\nplanet_angles = [" + ", ".join(f'"1 z{letters(i)}"' for i in range(40_000)) + "]", "E-CASE"),
+        ("[sun]\n" + "k" * 900_000 + " = 1", "E-CASE"),
+        ('# """\nx = """\n' + many(20_000, "a = 1") + '"""\na = 1\na = 1', "E-TOML"),
+    ],
+    ids=range(21),
+)
+def test_what_takes_long_to_refuse(text, code):
+    assert refused(text).code == code
+
+
+def test_the_first_of_many_mistakes_are_shown_with_their_number():
+    error = refused(SET + many(500, '[[set.pin_errors]]\nplanet = 999\nradial = "1 um"'))
+    assert f": 999 problems, the first {MOST_SHOWN} of them\n" in str(error) and len(error.problems) == 999
+    error = refused(SET + many(500, "[[set.pin_errors]]\nplanet = 'x'\nradial = 1"))
+    assert f": 1000 problems, the first {MOST_SHOWN} of them\n" in str(error)
+    assert (
+        "set.pin_errors[0].planet" in str(error)
+        and error.problems[0].file == f"case.toml:{SET.count(chr(10)) + 2}"
+    )
+    error = refused("k = [" + "nan, " * 20 + "]")
+    assert "nor is k[9] (line 1), nor are 10 others" in str(error)
+
+
+def test_published_lines_are_so_many():
+    published = '[[housing.published]]\nspeed = "7 rpm"\nharmonic = 1\norders = [1]\nsource = "x"'
+    speeds = re.sub(r"(?m)^speeds = .*", 'speeds = { from = "1 rpm", to = "9 rpm", count = 30000 }', SET)
+    assert refused(speeds + many(600, published)).key == "housing.published"
+    assert refused(speeds + many(97, published)).code == "E-PUBLISHED"
+
+
+@pytest.mark.parametrize("name", ["a" + "_" * 130_000 + "a", "a" + " " * 130_000 + "a"])
+def test_a_heading_that_takes_long(name, tmp_path):
+    (tmp_path / "table.csv").write_text(f"{name},deviation [um]\n1,1\n2,2\n")
+    table = '[[sun.modifications]]\nkind = "measured profile"\nfile = "table.csv"\n'
+    error = refused(SET + table, str(tmp_path / "case.toml"))
+    assert error.code == "E-FILE" and "no known name" in str(error)
+
+
+def test_a_file_that_is_named_many_times(tmp_path):
+    points = "".join(f"{10 + i / 1000},{i % 7}\n" for i in range(2000))
+    (tmp_path / "table.csv").write_text("roll angle [deg],deviation [um]\n" + points)
+    table = '[[sun.modifications]]\nkind = "measured profile"\nfile = "table.csv"'
+    assert refused(SET + many(900, table), str(tmp_path / "case.toml")).code == "E-RANGE"
+
+
+def test_usual_cases_are_far_from_the_limits():
+    for path in sorted(CASES.glob("*.toml")):
+        with metered(5.0) as meter:
+            read_case(path)
+        assert meter.seconds < SECONDS
