@@ -7,7 +7,7 @@ import os
 import time
 import warnings
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -175,11 +175,17 @@ def run_case(
         )
         names = write_pictures(folder, train_of(case), drawn, progress=progress)
         run.timings["pictures"] = time.perf_counter() - start
-        manifest = replace(run.record(*names), complete=True)
-        write_text(page(train_of(case), Results(folder, manifest, read_case)), folder / "report.html")
+        manifest = run.record(*names)
+        shown = replace(manifest, complete=True, files=_without_kept(manifest.files))
+        write_text(page(train_of(case), Results(folder, shown, read_case)), folder / "report.html")
         run.record("report.html")
-    run.files = {name: digest for name, digest in run.files.items() if not name.startswith(KEPT)}
+    run.files = _without_kept(run.files)
     run.record(complete=True)
+
+
+def _without_kept(files: Mapping[str, str]) -> dict[str, str]:
+    """Files of a run, but for those that only an interrupted one goes on from."""
+    return {name: digest for name, digest in files.items() if not name.startswith(KEPT)}
 
 
 def _compute(
