@@ -1,5 +1,6 @@
 """Short forms of the soak tests, and the harness itself: it goes on, repeats a trial and lists what fails."""
 
+import gc
 import json
 import signal
 import subprocess
@@ -75,6 +76,7 @@ def test_what_must_not_come_out_of_a_case_file_is_a_failure(happens, words, fold
     monkeypatch.setattr(case_text, "MEGABYTES", 50.0)
     case_text._warm(folder, 7)
     monkeypatch.setattr(case_text, "_described", happens)
+    gc.collect()  # memory that is freed meanwhile would hide what is asked for
     tally = trials.run_trials("case_text", [7], folder)
     assert tally.failed == 1 and words in tally.failures[0]
     assert tally.failures[0].startswith("python tests/soak case_text 7: ")
