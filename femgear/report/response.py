@@ -5,7 +5,7 @@ They draw datasets of results, of whatever train; helpers for figures over the m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -373,11 +373,15 @@ def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure
     return figures
 
 
+def some_at_a_time(dynamics: xr.Dataset) -> Iterator[xr.Dataset]:
+    """Give a dataset over speeds in parts that the memory holds, in their order."""
+    return (dynamics.isel(speed=slice(i, i + _READ)) for i in range(0, dynamics.sizes["speed"], _READ))
+
+
 def fluctuation_rms(dynamics: xr.Dataset) -> np.ndarray:
     """Compute the RMS of the transmission errors less their means (speeds, meshes) [m]."""
-    fluctuating, count = dynamics["harmonic"].values > 0, dynamics.sizes["speed"]
-    parts = (dynamics.isel(speed=slice(i, i + _READ)) for i in range(0, count, _READ))
-    squares = (np.abs(harmonics_of(part, "dte")[..., fluctuating]) ** 2 for part in parts)
+    fluctuating = dynamics["harmonic"].values > 0
+    squares = (np.abs(harmonics_of(one, "dte")[..., fluctuating]) ** 2 for one in some_at_a_time(dynamics))
     return np.sqrt(0.5 * np.concatenate([one.sum(axis=2) for one in squares]))
 
 

@@ -18,7 +18,7 @@ from femgear.case.quantities import RPM
 from femgear.case.sections import Case, output_member
 from femgear.errors import CaseError, Finding
 from femgear.gears.kinematics import torques
-from femgear.report.response import harmonics_of
+from femgear.report.response import harmonics_of, some_at_a_time
 from femgear.report.tables import first_speeds, response_warnings
 from femgear.system.fourier import sample
 from femgear.trains.elastic.model import MAX_DIAMETER
@@ -230,9 +230,7 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if "level_change" in data:
         change, limit = data["level_change"].values, data["excitation_limit"].values
         yield from missing_level(data["speed"].values, change, limit, float(data.attrs["compared_to"]))
-    # one speed after the other: those of many may fill the memory
-    speeds = (data.isel(speed=[s]) for s in range(data.sizes["speed"]))
-    pulls = [pulls_of(harmonics_of(one, "mesh_force")) for one in speeds]
+    pulls = [pulls_of(harmonics_of(one, "mesh_force")) for one in some_at_a_time(data)]
     yield from pulling_meshes(data["speed"].values, data["mesh"].values, pulls)
     yield from response_warnings(data)
 
