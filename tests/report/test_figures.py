@@ -156,6 +156,7 @@ def test_transmission_error_is_drawn_in_micrometres_over_a_closed_period(figures
 
 def test_stiffness_axes_agree(figures):
     """500 N/µm on 25 mm are 20 N/(mm µm)."""
+    figures["stiffness"].draw_without_rendering()
     ax = figures["stiffness"].axes[0]
     second = next(child for child in ax.child_axes)
     low, high = ax.get_ylim()
