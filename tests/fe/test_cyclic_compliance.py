@@ -1,11 +1,15 @@
 """The sector route against the same grid solved as a whole gear."""
 
+import itertools
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, diags_array
 
 from femgear.contact.bodies import flank_load_columns, flank_stations
 from femgear.errors import GridError
+from femgear.fe import compliance
 from femgear.fe.compliance import (
     condense_sector,
     cyclic_harmonics,
@@ -161,12 +165,45 @@ def test_a_solution_that_misses_its_equations_is_refused(gear, sector):
         K[both[0], both[0]] = K[both[1], both[1]] = 1e-13 * unit
         K[both[0], both[1]] = K[both[1], both[0]] = sign * unit
     loads = np.zeros((K.shape[0], 1))
-    # as large as the entries of the stiffness, which are right-hand sides too
-    loads[[2 * node, 2 * node + 1], 0] = unit, 0.3 * unit
+    # also as large as the entries of the stiffness, which are right-hand sides too
+    for size in (1.0, unit):
+        loads[[2 * node, 2 * node + 1], 0] = size, 0.3 * size
+        with pytest.raises(GridError, match="E-RESIDUAL"):
+            condense_sector(sector, csc_array(K), count=18, held="rim", loads=loads, observations=loads)
+        with pytest.raises(GridError, match="E-RESIDUAL"):
+            solve_interior(sector, csc_array(K), split_sector(sector, "rim"), loads)
+
+
+def test_a_load_of_nothing_moves_nothing(sector):
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
+    solution = solve_interior(sector, K, split_sector(sector, "rim"), np.zeros((K.shape[0], 2)))
+    assert solution.loads.shape[1] == 2 and not solution.loads.any()
+
+
+WRONG = {
+    "solution": (lambda x: x - [1.0, 0.0, 0.0], (1.0, 1.0)),
+    **{f"factor {rows}": (lambda x: x, rows) for rows in itertools.product((0.9, 1.1), repeat=2)},
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_residual_counts_whatever_its_sign(wrong, monkeypatch):
+    """The wrong solution misses three equations by -2, -1 and 0; rows of a wrong factor by either sign."""
+    change, rows = WRONG[wrong]
+    matrix, columns = csc_array([[2.0, 1.0], [1.0, 2.0]]), csc_array([[0.0], [1.0]])
+
+    def factored(whole, **options):
+        factor = symmetric_factor(whole, **options)
+        scale = diags_array([1.0, *rows])
+        return SimpleNamespace(
+            L=csc_array(scale @ factor.L), U=factor.U, solve=lambda b: change(factor.solve(b))
+        )
+
+    found = compliance._schur_complement(matrix, columns, 1)
+    np.testing.assert_allclose(found, [[1.5, 1.0], [1.0, 0.0]], rtol=0, atol=1e-15)
+    monkeypatch.setattr(compliance, "symmetric_factor", factored)
     with pytest.raises(GridError, match="E-RESIDUAL"):
-        condense_sector(sector, csc_array(K), count=18, held="rim", loads=loads, observations=loads)
-    with pytest.raises(GridError, match="E-RESIDUAL"):
-        solve_interior(sector, csc_array(K), split_sector(sector, "rim"), loads)
+        compliance._schur_complement(matrix, columns, 1)
 
 
 def test_load_on_a_cut_is_refused(gear, sector):
