@@ -1,11 +1,13 @@
 """Case files that would take long, or much memory, to refuse: each is refused within a second of CPU time."""
 
+import os
 import re
 from pathlib import Path
 
 import pytest
 from soak.trials import metered
 
+from femgear.case.text import read_text
 from femgear.errors import MOST_SHOWN, CaseError
 from femgear.trains.reading import parse_case, read_case
 
@@ -105,3 +107,11 @@ def test_usual_cases_are_far_from_the_limits():
         with metered(5.0) as meter:
             read_case(path)
         assert meter.seconds < SECONDS
+
+
+def test_a_system_that_always_waits_for_files_reads_them(tmp_path, monkeypatch):
+    """Windows has no O_NONBLOCK."""
+    monkeypatch.delattr(os, "O_NONBLOCK")
+    path = tmp_path / "case.toml"
+    path.write_text("a = 1\n")
+    assert read_text(path) == "a = 1\n"

@@ -1,12 +1,13 @@
 """Contents of the four result files: names, dimensions, units, and that they say what was computed."""
 
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from page_examples import check_documented
 
-from femgear.storage.results import _attribute
+from femgear.storage.results import _attribute, response_entries
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.stages import solve_static
@@ -164,3 +165,10 @@ def test_housing_signal_is_the_sum_of_its_lines(datasets):
 def test_results_cannot_be_changed(results, stage):
     with pytest.raises(AttributeError):
         results[stage].extra = 1
+
+
+def test_a_multiplier_is_stored_as_its_size():
+    """Where a period doubles the multiplier is a negative number."""
+    multiplier = np.array([-1.2, 0.3 + 0.4j])
+    result = MagicMock(speeds=[], stability=MagicMock(multiplier=multiplier))
+    np.testing.assert_allclose(response_entries(result)["floquet_multiplier"][1], [1.2, 0.5], rtol=1e-15)

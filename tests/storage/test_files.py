@@ -196,12 +196,23 @@ def _group_loop(file, folder):
 
 
 @pytest.mark.parametrize(
-    "make", [_external_link, _soft_link, _external_storage, _virtual, _bomb, _compound, _group_loop]
+    ("make", "what"),
+    [
+        (_external_link, "is a link, a group or a named type"),
+        (_soft_link, "is a link, a group or a named type"),
+        (_external_storage, "keeps its data in other files"),
+        (_virtual, "keeps its data in other files"),
+        (_bomb, "declares 8e"),
+        (_compound, "has the type"),
+        (_group_loop, "is a link, a group or a named type"),
+    ],
 )
-def test_hostile_files_are_refused_before_reading(tmp_path, make):
+def test_hostile_files_are_refused_before_reading(tmp_path, make, what, monkeypatch):
     with h5py.File(tmp_path / "static.nc", "w") as file:
         make(file, tmp_path)
-    with pytest.raises(StorageError) as info:
+    for name in ("open_dataset", "load_dataset"):
+        monkeypatch.delattr(f"xarray.{name}")
+    with pytest.raises(StorageError, match=what) as info:
         read_dataset(tmp_path / "static.nc")
     assert info.value.code == "E-FORMAT"
 
