@@ -17,6 +17,10 @@ import pytest
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+# a shell starts what goes on in the background deaf to Ctrl-C, which many tests send
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 # every full collection walks all that hundreds of test modules hold
 gc.set_threshold(100_000, 20, 100)
 
@@ -62,4 +66,15 @@ def gmsh_is_loaded_once():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(meshing, "subprocess", Within)
+        yield
+
+
+@pytest.fixture(scope="module")
+def coarse_states():
+    """Loaded states of few positions, for files whose tests compare runs, whatever the numbers."""
+    from femgear.contact import loaded_period
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (("SHORTEST", 0.02), ("SMOOTHEST", 0.05), ("STEEP", 0.2), ("MISSED", 0.05)):
+            patch.setattr(loaded_period, name, value)
         yield

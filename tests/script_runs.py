@@ -6,6 +6,7 @@ import os
 import runpy
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
@@ -39,3 +40,13 @@ def _code(path: str) -> int:
     except SystemExit as end:
         return end.code or 0
     return 0
+
+
+def wait_for_lines(journal, lines, program, *, seconds=60.0):
+    """Wait until a program (`soak.programs.Program`) that runs has written so many lines of a journal."""
+    until = time.monotonic() + seconds
+    while not journal.exists() or journal.read_bytes().count(b"\n") < lines:
+        ended = os.waitid(os.P_PID, program.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+        if ended or time.monotonic() > until:
+            raise AssertionError(f"{journal.name} has no {lines} lines: {program.wait()}")
+        time.sleep(0.002)

@@ -125,6 +125,7 @@ def test_motions_that_are_too_large_name_their_entry_with_its_line(changes, key)
     assert caught.value.limit and caught.value.remedy and caught.value.file
 
 
+@pytest.mark.usefixtures("coarse_states")
 def test_meshes_that_never_carry_are_refused_before_the_modes():
     """A pin circle 300 um off its centre leaves the load to one planet: no linear dynamic model."""
     coarse = {"static.flank_elements": 4, "static.positions": 8, "static.stresses": False}

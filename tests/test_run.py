@@ -2,8 +2,9 @@
 
 import json
 import re
+from functools import cache
 from pathlib import Path
-from shutil import disk_usage
+from shutil import copytree, disk_usage
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from femgear.trains.reading import read_case, with_values
 
 SPEEDS = [f"{speed} rpm" for speed in range(1000, 3000, 150)]
 CASES = Path(__file__).parents[1] / "cases"
+pytestmark = pytest.mark.usefixtures("coarse_states")
 QUICK = {
     "planetary_27_40_108": {
         "static.positions": 14, "static.flank_elements": 6, "static.stresses": False,
@@ -166,6 +168,28 @@ def test_results_keep_types_identity_and_what_may_be_written(tmp_path):
     assert np.isnan(found["nan"])
 
 
+@pytest.fixture(scope="module")
+def many_speeds(tmp_path_factory):
+    """Of a name: its case at many speeds, a run of it interrupted before its dynamics, and that run whole."""
+
+    @cache
+    def of(name):
+        case, folder = with_values(quick(name), {"operation.speeds": SPEEDS}), tmp_path_factory.mktemp(name)
+        with pytest.raises(KeyboardInterrupt):
+            run(case, folder / "begun", stop="dynamics")
+        return case, folder / "begun", gone_on(case, folder / "begun", folder / "whole")
+
+    return of
+
+
+def gone_on(case, begun, folder):
+    """A copy of a run that was interrupted, ended."""
+    copytree(begun, folder)
+    with pytest.warns(UserWarning, match="as the run that was interrupted"):
+        run(case, folder)
+    return folder
+
+
 @pytest.mark.parametrize(
     ("name", "parts", "option", "limit"),
     [
@@ -173,14 +197,15 @@ def test_results_keep_types_identity_and_what_may_be_written(tmp_path):
         pytest.param("helical_30_20_70", helical.helical_dynamics_parts, "most", 5, marks=pytest.mark.slow),
     ],
 )
-def test_speeds_in_parts_are_those_solved_together(name, parts, option, limit, tmp_path, monkeypatch):
-    case = with_values(quick(name), {"operation.speeds": SPEEDS})
-    run(case, tmp_path / "whole")
+def test_speeds_in_parts_are_those_solved_together(
+    name, parts, option, limit, many_speeds, tmp_path, monkeypatch
+):
+    case, begun, whole = many_speeds(name)
     monkeypatch.setitem(parts.__kwdefaults__, option, limit)
-    run(case, tmp_path / "parts")
-    for stage in set(read_manifest(tmp_path / "whole").timings) & {"dynamics", "housing"}:
-        same(*(read_dataset(tmp_path / way / f"{stage}.nc") for way in ("whole", "parts")))
-    verdict, other = (read_manifest(tmp_path / way).convergence["dynamics"] for way in ("whole", "parts"))
+    ways = whole, gone_on(case, begun, tmp_path / "parts")
+    for stage in set(read_manifest(whole).timings) & {"dynamics", "housing"}:
+        same(*(read_dataset(way / f"{stage}.nc") for way in ways))
+    verdict, other = (read_manifest(way).convergence["dynamics"] for way in ways)
     assert verdict.pop("residual") == pytest.approx(other.pop("residual"), rel=1e-3)
     assert verdict == other and verdict["message"].startswith(f"{len(SPEEDS)} speeds: ")
 
@@ -238,14 +263,13 @@ def test_a_large_file_is_read_where_it_is_asked_for(tmp_path, monkeypatch):
     assert not found["x"].variable._in_memory and found.equals(whole)
 
 
-def test_the_size_of_many_speeds_is_said_before(tmp_path, monkeypatch):
-    case = with_values(quick("planetary_27_40_108"), {"operation.speeds": SPEEDS})
+def test_the_size_of_many_speeds_is_said_before(many_speeds, monkeypatch):
+    case, _, folder = many_speeds("planetary_27_40_108")
     assert not [one for one in elastic.ELASTIC.case_warnings(case) if one.code == "W-SIZE"]
     monkeypatch.setattr(elastic, "_NOTICED", 0.0)
     (found,) = (one for one in elastic.ELASTIC.case_warnings(case) if one.code == "W-SIZE")
     said = re.search(r"14 speeds with up to (\d+) harmonics each fill about (\S+) GB", found.text)
-    run(case, tmp_path / "out")
-    size = sum((tmp_path / "out" / f"{stage}.nc").stat().st_size for stage in ("dynamics", "housing"))
+    size = sum((folder / f"{stage}.nc").stat().st_size for stage in ("dynamics", "housing"))
     # whether the excitation is doubled is known with the modes
     assert 0.95 < 1e9 * float(said[2]) / size < 2.2
-    assert int(said[1]) >= read_dataset(tmp_path / "out" / "dynamics.nc").sizes["harmonic"] - 1
+    assert int(said[1]) >= read_dataset(folder / "dynamics.nc").sizes["harmonic"] - 1

@@ -1,17 +1,14 @@
 """scripts/optimise.py: what it writes, how it goes on, and what it refuses."""
 
 import csv
-import os
 import random
 import re
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
-from script_runs import run_script
+from script_runs import run_script, wait_for_lines
+from soak import programs
 
 from femgear.trains.reading import read_case
 
@@ -56,34 +53,25 @@ def test_a_search_of_the_gears_and_its_continuation(gears, tmp_path):
 
 def test_a_search_that_is_killed_goes_on_with_the_same_command(gears, tmp_path):
     """By SIGTERM and kill -9 at random lines: the same files, nothing computed twice."""
-    words = [sys.executable, str(ROOT / "scripts" / "optimise.py"), *map(str, gears), "--method", "global"]
-    words += ["--samples", "20", "--max-designs", "80", "-o"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-
-    def start(folder):
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        return subprocess.Popen([*words, str(folder)], text=True, env=environment, cwd=tmp_path, **pipes)
-
-    alone = start(tmp_path / "alone")
-    assert alone.wait(timeout=120) == 0, alone.communicate()
+    words = [ROOT / "scripts" / "optimise.py", *gears, "--method", "global", "--samples", "20"]
+    words += ["--max-designs", "60", "-o"]
+    alone = programs.start([*words, "alone"], tmp_path).wait()
+    assert alone.code == 0, alone.err
     folder, lines, chance = tmp_path / "killed", 1, random.Random(0)
     journal = folder / "journal.jsonl"
     for way in (signal.SIGTERM, signal.SIGKILL):
-        lines += chance.randrange(5, 30)
-        run, until = start(folder), time.monotonic() + 60
-        while not journal.exists() or journal.read_bytes().count(b"\n") < lines:
-            assert run.poll() is None and time.monotonic() < until, run.communicate()
-            time.sleep(0.002)
-        run.send_signal(way)
-        _, errors = run.communicate(timeout=60)
-        assert run.returncode == (-9 if way == signal.SIGKILL else 130) and "Traceback" not in errors
-        assert ("the same command goes on" in errors) == (way == signal.SIGTERM)
+        lines += chance.randrange(5, 20)
+        run = programs.start([*words, "killed"], tmp_path)
+        wait_for_lines(journal, lines, run)
+        run.kill(way)
+        ended = run.wait()
+        assert ended.code == (-9 if way == signal.SIGKILL else 130) and not ended.crash
+        assert ("the same command goes on" in ended.err) == (way == signal.SIGTERM)
         lines = journal.read_bytes().count(b"\n")
-    last = start(folder)
-    said, errors = last.communicate(timeout=120)
-    assert last.returncode == 0 and "warning" not in errors
+    last = programs.start([*words, "killed"], tmp_path).wait()
+    assert last.code == 0 and "warning" not in last.err
     whole = (tmp_path / "alone" / "journal.jsonl").read_bytes().count(b"\n")
-    assert int(re.search(r"search: .*?(\d+) computed now", said)[1]) <= whole - lines
+    assert int(re.search(r"search: .*?(\d+) computed now", last.out)[1]) <= whole - lines
     for name in ("optimum.toml", "optimum.csv", "tolerances.png"):
         assert (folder / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
     for name in ("journal.jsonl", "journal_fine.jsonl"):

@@ -30,6 +30,7 @@ from femgear.trains.static.stages import solve_static
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 RANGE = (1000.0 * SPEED.scale, 3500.0 * SPEED.scale, 6)
 SPEEDS = ("1000 rpm", "3500 rpm")
+pytestmark = pytest.mark.usefixtures("coarse_states")
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,14 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from script_runs import wait_for_lines
+from soak import programs
 
 from femgear.errors import ContactError, StorageError
 from femgear.storage import files
@@ -468,43 +469,32 @@ def test_the_list_of_what_was_written_may_be_damaged_and_half_written(free, tmp_
 
 # --- kills -----------------------------------------------------------------------------------------
 
-POINTS = 80
-
-
-def started(case, folder):
-    words = [sys.executable, "-m", "femgear.cli", "sweep", str(case), "-o", str(folder)]
-    words += ["--over", f"planet.profile_shift=0..0.1/{POINTS}", "--of", *OF]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment, cwd=folder.parent
-    )
+POINTS = 60
 
 
 def test_a_sweep_that_is_killed_goes_on_with_the_same_command(free, tmp_path):
     """By Ctrl-C, SIGTERM and kill -9 in turn, at random lines: the same table, nothing computed twice."""
-    case, chance = tmp_path / "case.toml", random.Random(SEED)
-    case.write_text(to_toml(free), encoding="utf-8")
-    alone = started(case, tmp_path / "alone")
-    assert f"{POINTS} computed now" in alone.communicate(timeout=120)[0]
+    chance = random.Random(SEED)
+    (tmp_path / "case.toml").write_text(to_toml(free), encoding="utf-8")
+    words = ["sweep", "case.toml", "--over", f"planet.profile_shift=0..0.1/{POINTS}", "--of", *OF, "-o"]
+    alone = programs.start([*words, "alone"], tmp_path).wait()
+    assert f"{POINTS} computed now" in alone.out
     folder, lines = tmp_path / "killed", 1
     journal = folder / "sweep.jsonl"
     for way in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
         lines += chance.randrange(2, 10)
-        run, until = started(case, folder), time.monotonic() + 60
-        while not journal.exists() or journal.read_bytes().count(b"\n") < lines:
-            assert run.poll() is None and time.monotonic() < until, run.communicate()
-            time.sleep(0.002)
-        run.send_signal(way)
-        _, errors = run.communicate(timeout=60)
+        run = programs.start([*words, "killed"], tmp_path)
+        wait_for_lines(journal, lines, run)
+        run.kill(way)
+        ended = run.wait()
         if way == signal.SIGKILL:
-            assert run.returncode == -9
+            assert ended.code == -9
         else:
-            assert run.returncode == 130 and "interrupted; the same command goes on" in errors
-        assert "Traceback" not in errors and not (folder / "sweep.csv").exists()
+            assert ended.code == 130 and "interrupted; the same command goes on" in ended.err
+        assert not ended.crash and not (folder / "sweep.csv").exists()
         lines = journal.read_bytes().count(b"\n")
-    last = started(case, folder)
-    said, errors = last.communicate(timeout=120)
-    assert last.returncode == 0 and f"{POINTS + 1 - lines} computed now" in said and "warning" not in errors
+    last = programs.start([*words, "killed"], tmp_path).wait()
+    assert last.code == 0 and f"{POINTS + 1 - lines} computed now" in last.out and "warning" not in last.err
     for name in ("sweep.csv", "sweep.png"):
         assert (folder / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
     keys = [json.loads(line)["key"] for line in journal.read_bytes().splitlines()[1:]]
