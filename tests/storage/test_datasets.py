@@ -12,6 +12,8 @@ from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_m
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.stages import solve_static
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 ROOT = Path(__file__).parents[2]
 PLACES = {
     "static": {

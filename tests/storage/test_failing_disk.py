@@ -3,9 +3,11 @@
 import errno
 import io
 import os
+import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,7 +43,7 @@ data = xr.Dataset({"a": numbers, "b": ("x", ["text"] * 300, named)})
 import pyvista as pv
 grid = pv.ImageData(dimensions=(20, 20, 20)).cast_to_unstructured_grid()
 grid["u"] = random.normal(size=grid.n_points)
-images = [random.integers(0, 255, (200, 200, 3), dtype=np.uint8) for _ in range(3)]
+images = [random.integers(0, 255, (130, 130, 3), dtype=np.uint8) for _ in range(3)]
 writers = {
     "static.nc": lambda path: write_dataset(data, path),
     "set.vtu": lambda path: write_vtu(grid, path),
@@ -129,44 +131,43 @@ def test_an_interrupt_at_any_call_of_hdf5_is_not_lost(tmp_path, monkeypatch, cal
     assert (tmp_path / "static.nc").read_bytes() == before and len(list(tmp_path.iterdir())) == 1
 
 
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-import numpy as np
-import xarray as xr
-from femgear.storage import files
-from femgear.storage.files import write_dataset, write_text
-from femgear.storage.results import finish, run_folder
-
-where, folder, force = sys.argv[1], Path(sys.argv[2]), sys.argv[3] == "force"
-
-
-class Killed(files._Disk):
-    def write(self, data):
-        if where == "write":
-            os.kill(os.getpid(), signal.SIGKILL)
-        return super().write(data)
-
-
 def kill(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-files._Disk = Killed
-with run_folder(folder, force=force) as working:
-    write_text("new", working / "case.toml")
-    data = xr.Dataset({"a": ("x", np.arange(9.0), {"units": "1", "long_name": "a"})})
-    write_dataset(data, working / "static.nc")
-    if where == "picture":
-        write_text("png", working / "picture.png")
-        kill()
-    finish(working, ["case.toml", "static.nc"], timings={}, convergence={})
-    last = {"publish": "static.nc", "manifest": "manifest.json"}.get(where)
-    replace, os.replace = os.replace, lambda a, b: kill() if Path(b).name == last else replace(a, b)
-    if where == "clear":
-        import shutil
-        shutil.rmtree = kill
-"""
+def run_and_die(where, folder, force):
+    """Write a run into a folder as another process does, which is killed at some place."""
+
+    class Killed(files._Disk):
+        def write(self, data):
+            if where == "write":
+                kill()
+            return super().write(data)
+
+    files._Disk = Killed
+    with run_folder(folder, force=force == "force") as working:
+        write_text("new", working / "case.toml")
+        write_dataset(xr.Dataset({"a": ("x", np.arange(9.0), NAMED)}), working / "static.nc")
+        if where == "picture":
+            write_text("png", working / "picture.png")
+            kill()
+        finish(working, ["case.toml", "static.nc"], timings={}, convergence={})
+        last = {"publish": "static.nc", "manifest": MANIFEST}.get(where)
+        replace = os.replace
+        os.replace = lambda a, b: kill() if Path(b).name == last else replace(a, b)
+        if where == "clear":
+            shutil.rmtree = kill
+
+
+def killed(work, *arguments):
+    """How a process ends that does some work: minus the number of the signal."""
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    try:
+        work(*arguments)
+    finally:
+        os._exit(0)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
@@ -181,8 +182,8 @@ def test_a_killed_run_leaves_nothing_that_the_next_does_not_remove(tmp_path, whe
         with run_folder(folder) as working:
             write_text("old", working / "case.toml")
             finish(working, ["case.toml"], timings={}, convergence={})
-    run = subprocess.run([sys.executable, "-c", KILLED, where, str(folder), force], timeout=120)
-    assert run.returncode == -signal.SIGKILL and read_manifest(folder).complete == (force == "force")
+    assert killed(run_and_die, where, folder, force) == -signal.SIGKILL
+    assert read_manifest(folder).complete == (force == "force")
     published = where in ("publish", "manifest", "clear")
     with folder_lock(folder):
         if published:

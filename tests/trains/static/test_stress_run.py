@@ -16,6 +16,8 @@ from femgear.trains.reading import open_results, read_case, with_value
 from femgear.trains.registry import stages_of
 from femgear.trains.static.stages import solve_static, solve_stress
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 ROOT = Path(__file__).parents[3]
 ONLY_LONG = {"tooth_root_maximum", "tooth_root_minimum"}
 ONLY_SHORT = {f"pressure_{name}" for name in ("distribution", "offset", "centre", "path")}
