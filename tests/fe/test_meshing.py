@@ -18,9 +18,15 @@ from femgear.fe import meshing
 from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_outline, mesh_outlines
 
 
+@pytest.fixture
+def in_this_process():
+    """The cache is what is tested, whoever makes its grids."""
+
+
 @pytest.fixture(autouse=True)
-def a_process_for_every_grid(monkeypatch):
-    monkeypatch.setattr(meshing, "subprocess", subprocess)
+def a_process_for_every_grid(request, monkeypatch):
+    if "in_this_process" not in request.fixturenames:
+        monkeypatch.setattr(meshing, "subprocess", subprocess)
 
 
 def polygon(corners, *, name="edge", divide=1):
@@ -74,6 +80,7 @@ def test_any_thread_may_mesh():  # bad input 58
     assert result[0].n_nodes > 8
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_cache_is_used_and_damaged_files_are_made_again(tmp_path, monkeypatch):
     outline = polygon(SQUARE, divide=4)
     first = mesh_outline(outline, cache=tmp_path / "meshes")
@@ -181,6 +188,7 @@ def _no_triangle(path, grid, elsewhere):
     )
 
 
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(
     "damage",
     [
@@ -205,6 +213,7 @@ def test_a_grid_in_the_cache_that_is_not_that_of_the_outline_is_said_and_made_ag
         assert np.array_equal(mesh_outline(outline, cache=cache).points, first.points)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_grid_is_written_through_no_link_and_what_dead_processes_left_is_removed(tmp_path, monkeypatch):
     outline, elsewhere = polygon(SQUARE, divide=2), tmp_path / "elsewhere"
     elsewhere.write_text("mine")
@@ -238,6 +247,7 @@ def test_gmsh_leaves_nothing_in_the_folder_of_temporary_files(tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     outline = polygon(SQUARE, divide=4)
     (tmp_path / "file").write_text("")
@@ -258,6 +268,7 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
         assert list((tmp_path / "meshes").iterdir()) == []
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_the_sealed_file_is_read_by_others(tmp_path):
     import meshio
 

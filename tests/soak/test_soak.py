@@ -2,6 +2,7 @@
 
 import gc
 import json
+import mmap
 import signal
 import subprocess
 import sys
@@ -24,6 +25,11 @@ def passed(tally: trials.Tally) -> trials.Tally:
     """The tally, asserted to be without failures."""
     assert not tally.failed, "\n".join(tally.failures)
     return tally
+
+
+def fill(memory: mmap.mmap) -> int:
+    """Write to all of some memory that nothing else had before, and count it."""
+    return sum(memory.write(b"x" * 1_000_000) for _ in range(len(memory) // 1_000_000))
 
 
 def test_two_thousand_mutated_case_files(folder):
@@ -68,7 +74,7 @@ def test_a_mutant_follows_from_its_number_and_every_case_is_cut_everywhere():
     [
         (lambda path: [][0], "IndexError"),
         (lambda path: [None for _ in iter(int, 1)], "does not end within"),
-        (lambda path: b"x" * 80_000_000 and "described", "MB, described"),
+        (lambda path: fill(mmap.mmap(-1, 80_000_000)) and "described", "MB, described"),
     ],
 )
 def test_what_must_not_come_out_of_a_case_file_is_a_failure(happens, words, folder, monkeypatch):
@@ -76,7 +82,7 @@ def test_what_must_not_come_out_of_a_case_file_is_a_failure(happens, words, fold
     monkeypatch.setattr(case_text, "MEGABYTES", 50.0)
     case_text._warm(folder, 7)
     monkeypatch.setattr(case_text, "_described", happens)
-    gc.collect()  # memory that is freed meanwhile would hide what is asked for
+    gc.collect()  # memory that is freed meanwhile would hide what is taken
     tally = trials.run_trials("case_text", [7], folder)
     assert tally.failed == 1 and words in tally.failures[0]
     assert tally.failures[0].startswith("python tests/soak case_text 7: ")

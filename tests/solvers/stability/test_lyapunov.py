@@ -67,7 +67,7 @@ def test_stable_impacts_have_the_exponent_of_their_multiplier():
 
 def test_chaotic_pair_by_tangents_and_by_neighbours():
     problem = lightly_loaded_pair().problem(1.5)
-    found = lyapunov_exponents(problem, 1.0, points=1000, skip=40, steps=100)
+    found = lyapunov_exponents(problem, 1.0, points=600, skip=40, steps=100)
     assert found.chaotic and found.section.repeats_after(1e-3) == 0
     # two motions, a nanounit apart, without any derivative
     rates, times = [], 2.0 * np.pi * np.arange(13)
