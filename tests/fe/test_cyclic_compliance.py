@@ -47,7 +47,7 @@ def gear():
 
 @pytest.fixture(scope="module")
 def sector(gear):
-    return mirror(mesh_outline(half_sector(gear, flank_elements=8)))
+    return mirror(mesh_outline(half_sector(gear, flank_elements=6)))
 
 
 @pytest.fixture(scope="module")

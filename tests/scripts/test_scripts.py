@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from script_runs import run_script as run
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = (
     "mesh_stiffness.py",
