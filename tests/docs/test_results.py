@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 PATH = Path(__file__).parents[1] / "tools" / "results_page.py"
 
 

@@ -18,6 +18,8 @@ from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
 
+import pytest
+
 import femgear
 from femgear.case.quantities import to_si
 from femgear.contact.cycle import walk_mesh_cycle
@@ -27,6 +29,8 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.results import DynamicsResult, HousingResult
 from femgear.trains.reading import parse_case, read_case
+
+pytestmark = pytest.mark.usefixtures("coarse_states")
 
 ROOT = Path(__file__).parents[3]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
