@@ -187,7 +187,8 @@ SLOW = [(theme, part) for theme in validation_themes.THEMES for part in theme.sl
 # parts whose dear checks a test in the named file makes as well; rows of "information" alone cannot fail
 ELSEWHERE = {
     "stops": "solvers/continuation/test_branches.py::test_two_masses_with_stops_against_integration_in_time",
-    "two_tones": "solvers/periodic/test_harmonic_balance_integration.py::test_two_tones_against_long_integration",
+    "two_tones": "solvers/periodic/test_harmonic_balance_integration.py::"
+    "test_two_tones_against_long_integration",
     "turning_carrier": "validation/test_plane_vibration.py::"
     "test_changes_with_the_carrier_speed_are_those_of_the_page",
     "toothed_ring": "information",
