@@ -316,10 +316,10 @@ def test_run_of_one_stage(tmp_path, capsys, pipeline):
 
 def test_run_again_needs_force(tmp_path, capsys, pipeline):
     out = tmp_path / "out"
-    assert cli.main(["run", str(CASE), "-o", str(out)]) == 0
-    assert cli.main(["run", str(CASE), "-o", str(out)]) == 4
+    assert cli.main(["run", str(CASE), "-o", str(out), "--only", "static"]) == 0
+    assert cli.main(["run", str(CASE), "-o", str(out), "--only", "static"]) == 4
     assert "--force" in capsys.readouterr().err
-    assert cli.main(["run", str(CASE), "-o", str(out), "--force"]) == 0
+    assert cli.main(["run", str(CASE), "-o", str(out), "--only", "static", "--force"]) == 0
 
 
 def test_run_into_somebody_elses_folder(tmp_path, capsys, pipeline):
@@ -355,7 +355,7 @@ def test_two_runs_on_one_folder(tmp_path, capsys, pipeline):
         fake_run(case, out, **options)
 
     pipeline(second)
-    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out")]) == 0
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out"), "--only", "static"]) == 0
     assert "E-LOCKED" in capsys.readouterr().err
 
 
@@ -437,7 +437,7 @@ def test_exit_codes(tmp_path, capsys, pipeline, function, code, words):
     assert words in printed.err and "Traceback" not in printed.err
     # what an interrupted run leaves behind does not stand in the way of the next
     pipeline(fake_run)
-    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out")]) == 0
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out"), "--only", "static"]) == 0
 
 
 def test_report_of_no_results(tmp_path, capsys):
