@@ -438,7 +438,9 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
     except KeyboardInterrupt as interrupt:
         print(printable("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])])), file=sys.stderr)
         return _INTERRUPTED
-    except MemoryError as error:
+    except (MemoryError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "new thread" not in str(error):
+            raise
         return _fail(
             FemgearError(
                 f"the memory of this machine does not suffice: {error}".removesuffix(": "),

@@ -454,6 +454,10 @@ def _exhaust(*_, **__):
     np.empty(2**50)
 
 
+def _crowd(*_, **__):
+    raise RuntimeError("can't start new thread")
+
+
 def _lack(*_, **__):
     raise ImportError("No module named 'h5py'")
 
@@ -467,6 +471,7 @@ def _fill(*_, **__):
     [
         (_diverge, 3, "no solution"),
         (_exhaust, 3, "E-MEMORY"),
+        (_crowd, 3, "E-MEMORY"),
         (_lack, 3, "E-LIBRARY"),
         (_interrupt, 130, "interrupted"),
         (_terminate, 130, "interrupted"),

@@ -128,6 +128,10 @@ def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object])
         try:
             # signals interrupt the main thread alone: raised within HDF5 they would be lost
             pool.submit(write, disk).result()
+        except RuntimeError as error:  # of HDF5 itself
+            raise StorageError(
+                str(error), file=os.fspath(path), remedy="see that disk and memory suffice"
+            ) from error
         finally:
             if disk.failure is not None:
                 raise disk.failure
