@@ -63,7 +63,7 @@ class Fault:
 
 
 def file_size(rng: random.Random) -> Fault:
-    """Files that cannot grow beyond some size (``ulimit -f``), but for the messages, which are a file here."""
+    """Files that cannot grow beyond some size (``ulimit -f``), which the messages do not reach."""
     size = int(10 ** rng.uniform(3.5, 6.5))
     return Fault(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)), fresh=rng.random() < 0.3)
 
@@ -181,7 +181,7 @@ def little_memory(rng: random.Random) -> Fault:
 
 def less_memory(rng: random.Random) -> Fault:
     """Memory that is short from some moment on, behind the begin of the computation."""
-    moment, more = rng.uniform(0.0, 1.0), int(10 ** rng.uniform(4, 8.5))
+    moment, more = rng.uniform(0.0, 1.0), int(10 ** rng.uniform(7.3, 8.5))
 
     def start():
         with one_blas_thread():
