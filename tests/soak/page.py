@@ -71,7 +71,7 @@ _MOST = 40
 
 
 def write_page(state: State, path: Path, mutants: Path) -> None:
-    """Write the page of the last commit of a state, with the report of ``make mutants`` where there is one."""
+    """Write the page of the last commit of a state, with the report of ``make mutants`` if there is one."""
     report = mutants.read_text(encoding="utf-8") if mutants.exists() else ""
     path.write_text(page(state, report), encoding="utf-8")
 
