@@ -529,9 +529,8 @@ def report(results: dict[Mutant, dict], reasons: dict, seed: int) -> tuple[str, 
     page = [
         "# Mutants",
         "",
-        "Single expressions of the core are changed, one at a time; what no test notices survives. Drawn",
-        f"with seed {seed} at commit {_commit()}. Score: killed of those that are not equivalent; the time limit",
-        "kills too.",
+        f"Single expressions of the core are changed, one at a time: commit {_commit()}, seed {seed}.",
+        "Score: killed of those that are not equivalent; the time limit kills too.",
         "",
     ]
     page += [f"| {head} |", "|" + "---|" * 8]
