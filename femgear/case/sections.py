@@ -68,7 +68,8 @@ Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
 Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
 Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
 Shift = Annotated[float, Number(-5.0, 5.0)]
-_Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
+_OTHER_FLANKS = "give speeds above zero: a negative operation.torque loads the other flanks"
+_Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM, remedy=_OTHER_FLANKS)]
 
 _MEASURED = ("file", "roll_angles", "diameters", "deviations")
 _PLACES = ("diameter", "roll_angle", "roll_length")
@@ -354,7 +355,7 @@ class _SpeedRange(Section):
 
     start: _Speed = Field(alias="from")
     to: _Speed
-    count: Annotated[int, Count(2, 100_000)]
+    count: Annotated[int, Count(2, 100_000, remedy="take fewer; a single speed stands in a list")]
 
 
 class OperationSection(Section):

@@ -315,7 +315,7 @@ def spectral_radius(problem: HarmonicProblem, *, exact_limit: int = 80) -> np.nd
 
     Eigenvalues of the full matrices of at most `exact_limit` rows; otherwise the largest Ritz value of 20
     Arnoldi steps from one random vector (Saad, Numerical Methods for Large Eigenvalue Problems, algorithm
-    6.1), all speeds together but none dependent on the others.
+    6.1), all speeds together; but for rounding none depends on the others.
     """
     n, speeds, size = problem.source.shape
     if 2 * n * size <= exact_limit:

@@ -46,7 +46,7 @@ from femgear.housing.sensor import (
     fixed_sensor_signal,
     heaviside_linear_lines,
 )
-from femgear.report.tables import describe_modes, describe_response
+from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
@@ -65,8 +65,6 @@ from femgear.trains.elastic.checks import (
     fastest_mesh_frequency,
     max_nodal_diameter,
     missing_level,
-    pulling_meshes,
-    pulls_of,
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
@@ -424,6 +422,8 @@ def dynamics_parts(
     memory: float = _PART,
 ) -> Iterator[tuple[Case, DynamicsResult]]:
     """Solve as `solve_dynamics` for some speeds after the others, each with the case that has them alone.
+
+    The numbers are those of all speeds at once but for rounding.
 
     Parameters
     ----------

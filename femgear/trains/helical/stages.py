@@ -156,7 +156,10 @@ def solve_helical_dynamics(
 def helical_dynamics_parts(
     case: HelicalCase, modes: HelicalModesResult, *, progress: Progress = silent, most: int = _TOGETHER
 ) -> Iterator[tuple[HelicalCase, HelicalDynamicsResult]]:
-    """Solve as `solve_helical_dynamics` for ``most`` speeds after the others, with the case of each."""
+    """Solve as `solve_helical_dynamics`, but for rounding, for ``most`` speeds after the others.
+
+    Each result comes with the case that has these speeds alone.
+    """
     if modes.excitation is None:
         remedy = "leave it out: the static solution then gives a stiffness that varies"
         raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness", remedy=remedy)
