@@ -39,7 +39,6 @@ class RoundSection:
         [m]
     young : float
         [Pa]
-    poisson : float
     density : float
         [kg/m^3]; zero for a shaft without mass.
 
@@ -113,7 +112,6 @@ def joint_springs(section: RoundSection, length: float) -> JointSprings:
 
     Parameters
     ----------
-    section : RoundSection
     length : float
         [m]
     """

@@ -385,7 +385,6 @@ class TorqueHistory:
 
     Parameters
     ----------
-    body : str
     times : (m,) array
         Ascending [s].
     values : (m,) array

@@ -140,7 +140,6 @@ def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> f
 
     Parameters
     ----------
-    case : Case
     mesh_mode : float
         Highest natural frequency of the rigid gears on their meshes [Hz].
     mesh_frequency : float
@@ -156,7 +155,6 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
 
     Parameters
     ----------
-    case : Case
     mesh_frequency : (n_speeds,) array
         [Hz]
     up_to : float
@@ -227,7 +225,6 @@ def mesh_and_ring_outputs(
 
     Parameters
     ----------
-    result : ModesResult
     response : Response
         At S speeds, H harmonics.
 
@@ -275,8 +272,6 @@ def solve_modes(
 
     Parameters
     ----------
-    case : Case
-    static : StaticResult
     progress : callable, optional
         Called with (stage, done, total).
     steps : Steps, optional
@@ -461,8 +456,7 @@ def dynamics_parts(
             response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
         pulls.append(pulls_of(response.force))
-        if not whole:
-            response = replace(response, message=joint_message(told))
+        response = replace(response, message=joint_message(told))
         part = case if whole else at_speeds(case, speeds[own])
         dte, field = mesh_and_ring_outputs(modes, response)
         yield (
