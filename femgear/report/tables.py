@@ -10,7 +10,7 @@ import numpy as np
 
 from femgear.errors import Finding, remark
 from femgear.report.response import harmonics_of, some_at_a_time
-from femgear.system.fourier import sample
+from femgear.system.fourier import fluctuation, sample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,7 +96,7 @@ def describe_response(data: xr.Dataset) -> Block:
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.2f}",
         "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.2f}",
         "excited up to [kHz]": lambda i: f"{data.excitation_limit.values[i] / 1e3:.2f}",
-        "DTE rms [um]": lambda i: f"{_largest_rms(data.isel(speed=i)) * 1e6:.4f}",
+        "DTE rms [um]": lambda i: f"{fluctuation(harmonics_of(data.isel(speed=i), 'dte')).max() * 1e6:.4f}",
         "method": lambda i: str(data.method.values[i]),
         "iterations": lambda i: str(int(data.iterations[i])),
         "radius": lambda i: f"{float(data.spectral_radius[i]):.4f}",
@@ -118,12 +118,6 @@ def describe_response(data: xr.Dataset) -> Block:
             f"{np.nanmax(change):.2g} dB away at most, at {int(np.isfinite(change).sum())} speeds looked at"
         )
     return tabulate("Dynamics", chosen(data.sizes["speed"]), columns, notes)
-
-
-def _largest_rms(one: xr.Dataset) -> float:
-    """RMS of the transmission error [m] of one speed less its mean, the largest of all meshes."""
-    dte = np.hypot(one.dte_real.values, one.dte_imag.values)
-    return np.sqrt(0.5 * (dte[:, 1:] ** 2).sum(axis=1)).max()
 
 
 def chosen(count: int) -> Iterator[int]:

@@ -87,7 +87,6 @@ def speed_range(
 
     Parameters
     ----------
-    torques : sequence of TorqueHistory
     duration, start : float
         End and begin of the range [s].
     speed : float

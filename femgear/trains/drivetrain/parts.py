@@ -331,10 +331,6 @@ class Drivetrain:
 
     Parameters
     ----------
-    bodies : tuple of BodySection
-    shafts : tuple of ShaftSection
-    parallel : tuple of ParallelSection
-    planetary : tuple of PlanetarySection
     bearings : tuple of BearingSection
         Several of a body add.
     gravity : float

@@ -81,14 +81,12 @@ class DrivetrainRun:
     ----------
     time : (n,) array
         [s]
-    outputs : tuple of str
     motion, velocity : (n, n_outputs) arrays
         Deviations from the free spin [m, rad].
     approach, force : (n, n_meshes) arrays
         Of the drive flanks [m]; of the meshes, drive less back flank [N].
     spin, spin_speed : (n,) arrays
         Angle and speed of the first body without its deviation [rad], [rad/s].
-    meshes : tuple of str
     drift : float
         Largest spin found in the deviations after a block, before it was taken out [rad].
     momentum : float
@@ -147,7 +145,6 @@ def march_drivetrain(
 
     Parameters
     ----------
-    torques : sequence of TorqueHistory
     duration, step : float
         [s]. Any step is taken; cases are refused below four steps a mesh period
         (`femgear.trains.drivetrain.checks.check_drivetrain`, E-RATE), and warned of below thirty and of modes

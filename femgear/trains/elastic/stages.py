@@ -95,7 +95,7 @@ from femgear.trains.protocol import (
     response_verdict,
     silent,
 )
-from femgear.trains.rigid import at_speeds, member_speeds
+from femgear.trains.rigid import member_speeds, parts_of_speeds
 from femgear.trains.static.description import describe_set
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS, case_supports, mesh_backlash, ring_foundation
@@ -450,14 +450,12 @@ def dynamics_parts(
     names, pulls = mesh_names(len(basis.mesh_stiffness) // 2), list[np.ndarray]()
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     size = len(speeds) * _harmonic_size(case) * limit.response.max()
-    for own in np.array_split(np.arange(len(speeds)), min(max(math.ceil(size / memory), 1), len(speeds))):
-        whole = len(own) == len(speeds)
-        if not whole or len(own) > len(some):
+    for own, part in parts_of_speeds(case, min(max(math.ceil(size / memory), 1), len(speeds))):
+        if len(own) < len(speeds) or len(own) > len(some):
             response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
         pulls.append(pulls_of(response.force))
         response = replace(response, message=joint_message(told))
-        part = case if whole else at_speeds(case, speeds[own])
         dte, field = mesh_and_ring_outputs(modes, response)
         yield (
             part,

@@ -137,7 +137,6 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
 
     Parameters
     ----------
-    modes : xarray.Dataset
     scale : float
         Largest displacement of each view as a share of the ring's radius.
 
