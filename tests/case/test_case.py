@@ -525,7 +525,7 @@ def test_integers_are_shown_as_numbers(tmp_path):
 @pytest.mark.parametrize(
     ("speeds", "remedy"),
     [
-        (["100 rpm", "0 rpm"], "a negative operation.torque loads the other flanks"),
+        (["100 rpm", "0 rpm"], "a negative torque loads the other flanks"),
         ({"from": "-5 rpm", "to": "100 rpm", "count": 3}, "give speeds above zero"),
         ([f"{speed} rpm" for speed in range(1, 100_002)], "leave some out"),
         ({"from": "1 rpm", "to": "2 rpm", "count": 100_001}, "take fewer"),
