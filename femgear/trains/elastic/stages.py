@@ -455,7 +455,8 @@ def dynamics_parts(
             response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
         pulls.append(pulls_of(response.force))
-        response = replace(response, message=joint_message(told))
+        if part is not case:
+            response = replace(response, message=joint_message(told))
         dte, field = mesh_and_ring_outputs(modes, response)
         yield (
             part,
