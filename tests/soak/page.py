@@ -61,8 +61,10 @@ KNOWN = """## What may differ or fail, and why
   the table "Time" of the report, and nowhere else.
 * Other versions of NumPy, SciPy or Gmsh, and other processors, may round differently; the manifest names the
   versions.
-* Where the memory ends inside OpenBLAS, that library itself ends the process with exit code 1 and a line that
-  begins with "OpenBLAS error"; results on disk are whole, as after a kill.
+* With a limit below 600 MB (`ulimit -v`, `-d`) femgear does not begin: loading its libraries would end or
+  stop the process. Scripts import NumPy first, whose own message then comes. Where memory ends later,
+  E-MEMORY says so; within compiled libraries (BLAS, HDF5) it may also end the process; results on disk are
+  whole then, as after a kill.
 """
 # results of a kind that are listed
 _MOST = 40
