@@ -89,7 +89,6 @@ class MeshWindows(Windows):
 
     Parameters
     ----------
-    n_planets : int
     tooth : (2, meshes, pairs) int array
         Tooth numbers on gear 1 and gear 2 in the first mesh period.
     turns : (P,) int array
@@ -141,7 +140,6 @@ class ContactProblem:
 
     Parameters
     ----------
-    n_planets : int
     H : (n, n) array
         Compliance of the gears [m/N].
     gap, area : (n,) arrays
@@ -151,7 +149,6 @@ class ContactProblem:
     supports : (2N, 2N) or, with back flanks, (4N, 4N) array
         Compliance of sprung members between the meshes [m/N], part of `compliance`.
     mesh, pair, cell : (n,) int arrays
-    position : int
     """
 
     n_planets: int
@@ -196,7 +193,6 @@ class Candidates:
 
     Parameters
     ----------
-    setup, bodies : MeshWindows, Bodies
     position : (P,) int array
         Indices of the positions in `setup`.
     mesh : (W,) int array
@@ -302,7 +298,6 @@ def mesh_windows(
 
     Parameters
     ----------
-    planetary_set, bodies : PlanetarySet, Bodies
     share, nearest : float
         Mesh force that sizes the windows [N]; pairs are candidates whose separation exceeds that of the
         nearest pair of their mesh by less than `nearest` [m].
@@ -311,7 +306,6 @@ def mesh_windows(
     contact : {"profile", "line_of_action"}
     cells : int
         Pressure cells in a window.
-    deviations : SetDeviations, optional
     both_flanks : bool
         Back flanks as well, as meshes 2N .. 4N - 1.
     """
@@ -400,7 +394,6 @@ def windows(
 
     Parameters
     ----------
-    pair : FlankPair
     zeta : (...) array
         Path coordinates [m].
     width : float
@@ -482,7 +475,6 @@ def contact_candidates(
 
     Parameters
     ----------
-    setup, bodies : MeshWindows, Bodies
     positions : (P,) int array
         Indices of the positions in `setup`.
     members : MovingMembers, optional

@@ -39,7 +39,6 @@ class RoundSection:
         [m]
     young : float
         [Pa]
-    poisson : float
     density : float
         [kg/m^3]; zero for a shaft without mass.
 
@@ -113,7 +112,6 @@ def joint_springs(section: RoundSection, length: float) -> JointSprings:
 
     Parameters
     ----------
-    section : RoundSection
     length : float
         [m]
     """
@@ -249,7 +247,6 @@ def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1
     ----------
     steps : sequence of ShaftStep
         From the held end to the coupled one.
-    material : Material
     refine : float
         Divides the element size.
 

@@ -64,7 +64,6 @@ def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, plane
         Mode shapes.
     mass : (n,) array
         Diagonal mass matrix [kg, kg m^2].
-    dofs : tuple of str
     frequency : (m,) array
         [Hz], zero for rigid-body modes.
     ring_diameter : (n_ring,) int array
@@ -161,10 +160,6 @@ def class_energies(motions: SetMotions) -> np.ndarray:
 
 def phase_shares(motions: SetMotions) -> np.ndarray:
     """Compute the shares of the cyclic harmonics in the planets' kinetic energy, 0 to 1.
-
-    Parameters
-    ----------
-    motions : SetMotions
 
     Returns
     -------
@@ -288,7 +283,6 @@ def gear_set_motions(data: RigidSet, shape) -> SetMotions:
 
     Parameters
     ----------
-    data : RigidSet
     shape : (n, m) array
         In the coordinates of `gear_set_system`.
 
@@ -320,7 +314,6 @@ def gear_set_kinds(data: RigidSet, shape, *, frequency) -> tuple[str, ...]:
 
     Parameters
     ----------
-    data : RigidSet
     shape : (n, m) array
         In the coordinates of `gear_set_system`.
     frequency : (m,) array

@@ -60,7 +60,6 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
 
     Parameters
     ----------
-    text : str
     name : str
         File name for messages.
     numbered : bool
@@ -115,7 +114,6 @@ def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
 
     Parameters
     ----------
-    folder : path-like
     partial : bool
         Accept the results of an interrupted run.
 
@@ -138,7 +136,6 @@ def with_value(case: Case, key: str, value: object) -> Case:
 
     Parameters
     ----------
-    case : Case
     key : str
         Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
         ``"sun.modifications[0].amount"``.
@@ -155,7 +152,6 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
     Parameters
     ----------
-    case : Case
     values : mapping
         Keys and values as of `with_value`, as in
         ``{"operation.input": "carrier", "operation.fixed": "ring"}``.

@@ -53,7 +53,6 @@ class ComplexModes:
         Whether the conjugate pole belongs to it.
     speed : float
         That multiplies the gyroscopic matrix [rad/s].
-    dofs : tuple of str
     """
 
     eigenvalue: NDArray[np.complex128]
@@ -177,7 +176,6 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
 
     Parameters
     ----------
-    system : MechanicalSystem
     modes : Modes
         Of that system.
     outputs : (n_outputs, n) array

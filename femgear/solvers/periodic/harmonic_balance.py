@@ -51,7 +51,6 @@ def solve_harmonic_balance(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s], not negative.
     start : PeriodicSolution or (n_columns, L) complex array, optional
@@ -60,7 +59,6 @@ def solve_harmonic_balance(
         springs turn into the elements, and the message says so.
     tolerance : float
         Largest residual relative to the largest deflection.
-    max_iterations : int
     stability : bool
         Floquet verdict and spectral radius of the fixed point. With several base frequencies or the frequency
         zero the verdict says "not covered". Loops that need neither are quicker without.
@@ -108,7 +106,6 @@ def displacements(
 
     Parameters
     ----------
-    problem, solution : NonlinearSystem, PeriodicSolution
     outputs : (n_outputs, n) array, optional
         ``L``; all degrees of freedom when not given.
     reduction : Reduction, optional
@@ -128,12 +125,7 @@ def displacements(
 
 @dataclass(frozen=True)
 class PeriodicResponse:
-    """A periodic solution and short names of what it says about itself.
-
-    Parameters
-    ----------
-    solution : PeriodicSolution
-    """
+    """A periodic solution and short names of what it says about itself."""
 
     solution: PeriodicSolution
 

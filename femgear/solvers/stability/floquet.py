@@ -169,7 +169,6 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
 
     Parameters
     ----------
-    problem : NonlinearSystem
     modes : int
         Most modes kept, lowest first; all where there are no more.
 
@@ -228,7 +227,6 @@ def passage(
 
     Parameters
     ----------
-    frame : Frame
     period : (p,) array
         [s]
     tangents : callable
@@ -383,7 +381,6 @@ def floquet_verdicts(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     solutions : sequence of PeriodicSolution
         All with the same lines. With two base frequencies or the frequency zero the verdict is "not
         covered"; "not determined" where the fastest mode would need more than 20000 steps in a period.

@@ -226,7 +226,6 @@ class MeshGeometry:
 
     Parameters
     ----------
-    names : tuple of str
     basic : (n, m) array
         ``U``, among all coordinates or the free ones.
     fixed : (m, n_meshes) array
@@ -416,8 +415,6 @@ def flank_contacts(
 
     Parameters
     ----------
-    train : Drivetrain
-    place : Coordinates
     spin : (n_all,) array
         Of `rigid_rotation`.
     T : (n_all, n) array

@@ -70,7 +70,6 @@ class PlanetaryStage:
 
     Parameters
     ----------
-    data : PlanarSet
     teeth : (3,) tuple of int, optional
         Of sun, planet and ring (positive); speeds and mesh frequencies need them.
     fixed : {"carrier", "ring", "sun"}, optional
@@ -152,7 +151,6 @@ class MultistageSet:
 
     Parameters
     ----------
-    stages : tuple of PlanetaryStage
     couplings : tuple of StageCoupling
         `in_series` makes those of a plain train. None: stages side by side.
     input, output : Member
@@ -190,7 +188,6 @@ def in_series(
 
     Parameters
     ----------
-    stages : sequence of PlanetaryStage
     torsional, lateral : float
         Of every coupling [N m/rad], [N/m], see `StageCoupling`.
     """
@@ -269,7 +266,6 @@ def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) ->
 
     Parameters
     ----------
-    data : MultistageSet
     torque : float
         On the input [N m].
     radii : bool
@@ -370,7 +366,6 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
 
     Parameters
     ----------
-    data : MultistageSet
     torque : float
         On the input [N m]; it reacts on the output and on the fixed members, and chooses the loaded flanks
         of every stage. Zero: flanks of suns that drive counter-clockwise.
@@ -440,7 +435,6 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
 
     Parameters
     ----------
-    data : MultistageSet
     speed : float
         Of the input [rad/s].
 

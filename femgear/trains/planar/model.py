@@ -22,7 +22,7 @@ from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import constant, line_tail
+from femgear.system.fourier import constant, fluctuation, line_tail
 from femgear.system.mesh_directions import free_motions, mesh_elements, pin_directions
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
 from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
@@ -67,11 +67,8 @@ class PlanarModel:
 
     Parameters
     ----------
-    data : PlanarSet
-    problem : NonlinearSystem
     back_flanks : bool
         The back flanks have columns of their own.
-    bearings : Bearings
     """
 
     data: PlanarSet
@@ -100,8 +97,6 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
 
     Parameters
     ----------
-    case : Case
-    gears : PlanetarySet
     static : StaticResult, optional
         Its mean stiffnesses are taken where the case gives none.
     """
@@ -133,8 +128,6 @@ def planar_model(
 
     Parameters
     ----------
-    case : Case
-    gears : PlanetarySet
     static : StaticResult, optional
         Needed where the case gives no mesh stiffness.
     mesh_frequency : bool
@@ -274,7 +267,6 @@ def weight_curve(
         As for `frequency_response_curve`.
     largest : float
         Longest step, see `StepOptions`.
-    max_points : int
     """
     return frequency_response_curve(
         problem,
@@ -297,7 +289,6 @@ def judged_branch(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     branch : Branch
         Followed without stability.
     progress : callable, optional
@@ -371,8 +362,6 @@ def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple
 
     Parameters
     ----------
-    model : PlanarModel
-    solution : PeriodicSolution
     theta : (n, n_bases) array
         Phases of the base frequencies [rad].
     """
@@ -430,11 +419,6 @@ def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[
         free = np.flatnonzero(back[:top] == 0.0)
         points += [(int(free[-1]), "before back flanks touch")] if len(free) and free[-1] else []
     return [*points, (top, words)]
-
-
-def fluctuation(lines: np.ndarray) -> np.ndarray:
-    """Compute the root mean square (...) about the mean of lines (..., L), mean first."""
-    return np.sqrt(0.5 * (np.abs(lines[..., 1:]) ** 2).sum(axis=-1))
 
 
 def merged_folds(frequency: np.ndarray, fold: np.ndarray) -> np.ndarray:
