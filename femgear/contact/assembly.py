@@ -89,6 +89,7 @@ class MeshWindows(Windows):
 
     Parameters
     ----------
+    n_planets : int
     tooth : (2, meshes, pairs) int array
         Tooth numbers on gear 1 and gear 2 in the first mesh period.
     turns : (P,) int array
@@ -140,6 +141,7 @@ class ContactProblem:
 
     Parameters
     ----------
+    n_planets : int
     H : (n, n) array
         Compliance of the gears [m/N].
     gap, area : (n,) arrays
@@ -149,6 +151,7 @@ class ContactProblem:
     supports : (2N, 2N) or, with back flanks, (4N, 4N) array
         Compliance of sprung members between the meshes [m/N], part of `compliance`.
     mesh, pair, cell : (n,) int arrays
+    position : int
     """
 
     n_planets: int
@@ -306,6 +309,7 @@ def mesh_windows(
     contact : {"profile", "line_of_action"}
     cells : int
         Pressure cells in a window.
+    deviations : SetDeviations, optional
     both_flanks : bool
         Back flanks as well, as meshes 2N .. 4N - 1.
     """
@@ -394,6 +398,7 @@ def windows(
 
     Parameters
     ----------
+    pair : FlankPair
     zeta : (...) array
         Path coordinates [m].
     width : float

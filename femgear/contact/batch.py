@@ -58,6 +58,7 @@ def solve_batch(found: Candidates, load, springs: BearingSprings | None = None) 
 
     Parameters
     ----------
+    found : Candidates
     load : (m,) array
         External load on the motions, the same at all positions [N].
     springs : BearingSprings, optional

@@ -130,6 +130,7 @@ class MeshCycle:
         ``"profile"`` or ``"line_of_action"``.
     unknowns : int
         Largest number of pressure cells at one position.
+    message : str
     pressure : (2N, T, C, P) array, optional
         Pressure in the cells of the drive flanks [Pa], where it was asked for.
     pressure_offset : (2N, C) array, optional
@@ -265,6 +266,7 @@ def walk_mesh_cycle(
 
     Parameters
     ----------
+    planetary_set : PlanetarySet
     bodies : Bodies
         Flank compliances and material.
     sun_torque : float
@@ -280,6 +282,7 @@ def walk_mesh_cycle(
     periods : int
         Mesh periods in the record; errors that belong to teeth or turn with a member need
         `gears.deviations.common_period` of them.
+    options : CycleOptions, optional
 
     Raises
     ------

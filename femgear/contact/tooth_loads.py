@@ -140,6 +140,7 @@ def load_spectrum(teeth: LoadedTeeth, *, closes: bool = True) -> LoadSpectrum:
 
     Parameters
     ----------
+    teeth : LoadedTeeth
     closes : bool
         Whether the record repeats after its end; otherwise engagements that its ends cut off do not count,
         unless the record is too short to hold another.

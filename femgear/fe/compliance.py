@@ -101,6 +101,7 @@ def interpolation(grid: Grid, points: np.ndarray):
 
     Parameters
     ----------
+    grid : Grid
     points : (m, 2) array
         Points inside the grid [m].
 
@@ -323,6 +324,7 @@ def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> _Interior
 
     Parameters
     ----------
+    grid : Grid
     stiffness : (2n, 2n) sparse matrix
         [N/m].
     parts : tuple of three arrays

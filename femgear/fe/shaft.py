@@ -39,6 +39,7 @@ class RoundSection:
         [m]
     young : float
         [Pa]
+    poisson : float
     density : float
         [kg/m^3]; zero for a shaft without mass.
 
@@ -112,6 +113,7 @@ def joint_springs(section: RoundSection, length: float) -> JointSprings:
 
     Parameters
     ----------
+    section : RoundSection
     length : float
         [m]
     """

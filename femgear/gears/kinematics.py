@@ -78,6 +78,7 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
 
     Parameters
     ----------
+    planetary : PlanetarySet
     input, fixed : {"sun", "carrier", "ring"}
         Driven and held member; they differ.
     speed : float
@@ -177,6 +178,7 @@ def unheld_members(
 
     Parameters
     ----------
+    planetary_set : PlanetarySet
     floating : sequence of str
         Members without a radial support: any of "sun", "carrier" and "ring".
     both_flanks : bool

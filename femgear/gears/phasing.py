@@ -42,6 +42,7 @@ class MeshPhasing:
 
     Parameters
     ----------
+    sun_teeth, ring_teeth : int
     positions : tuple of int
         m_n, assembly positions of the planets counted from the first.
     rotation : {1, -1}
@@ -294,6 +295,7 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
 
     Parameters
     ----------
+    phasing : MeshPhasing
     harmonics : (H,) sequence of int
 
     Raises
@@ -465,6 +467,7 @@ def neighbouring_teeth(
 
     Parameters
     ----------
+    sun_teeth, planet_teeth, ring_teeth, planets : int
     distance : int
         Largest change of each tooth number, up to 30.
     ratio_tolerance : float
@@ -504,6 +507,7 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     ----------
     phasing : MeshPhasing
         With the teeth of sun and ring and the positions of the planets.
+    planet_teeth : int
 
     Returns
     -------

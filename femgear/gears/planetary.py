@@ -196,6 +196,7 @@ def close_set(
 
     Parameters
     ----------
+    sun, planet, ring : Gear
     planet_angles : tuple of float
         [rad]
     centre_distance : float, optional

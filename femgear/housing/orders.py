@@ -200,6 +200,7 @@ def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: i
 
     Parameters
     ----------
+    spectrum : OrderSpectrum
     low, high : float
         Carrier orders, both included.
     count : int

@@ -197,6 +197,7 @@ def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str
     order_names : sequence of str
     critical : sequence of (speed, frequency)
         Intersections to mark, in `speed_unit` and [Hz].
+    speed_unit : str
     """
     figure, (ax,) = new_figure(height=5.4)
     for one in np.transpose(frequency):

@@ -337,6 +337,7 @@ def planar_from_set(planetary_set: PlanetarySet, **data: Any) -> PlanarSet:
 
     Parameters
     ----------
+    planetary_set : PlanetarySet
     **data
         Bodies, mesh stiffnesses and planet bearing of `PlanarSet`.
     """
@@ -374,6 +375,8 @@ def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -
 
     Parameters
     ----------
+    data : RigidSet
+    torque : PlanarTorque, optional
     kept : (n,) bool array
         Coordinates that no infinite stiffness holds; as many a body, ``u`` being the last.
 

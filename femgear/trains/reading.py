@@ -60,6 +60,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
 
     Parameters
     ----------
+    text : str
     name : str
         File name for messages.
     numbered : bool
@@ -136,6 +137,7 @@ def with_value(case: Case, key: str, value: object) -> Case:
 
     Parameters
     ----------
+    case : Case
     key : str
         Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
         ``"sun.modifications[0].amount"``.
@@ -152,6 +154,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
     Parameters
     ----------
+    case : Case
     values : mapping
         Keys and values as of `with_value`, as in
         ``{"operation.input": "carrier", "operation.fixed": "ring"}``.

@@ -176,6 +176,7 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
 
     Parameters
     ----------
+    system : MechanicalSystem
     modes : Modes
         Of that system.
     outputs : (n_outputs, n) array

@@ -55,6 +55,7 @@ def modal_response(system: MechanicalSystem, modes: Modes, frequency, inputs, ou
 
     Parameters
     ----------
+    system : MechanicalSystem
     modes : Modes
         Of that system.
     frequency : (F,) array

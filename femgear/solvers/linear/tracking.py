@@ -80,6 +80,7 @@ class CriticalSpeed:
         [rad/s]
     frequency : float
         [Hz]
+    branch : int
     order : float
         Of the line, in multiples of the speed.
     """

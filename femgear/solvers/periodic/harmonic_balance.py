@@ -51,6 +51,7 @@ def solve_harmonic_balance(
 
     Parameters
     ----------
+    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s], not negative.
     start : PeriodicSolution or (n_columns, L) complex array, optional
@@ -59,6 +60,7 @@ def solve_harmonic_balance(
         springs turn into the elements, and the message says so.
     tolerance : float
         Largest residual relative to the largest deflection.
+    max_iterations : int
     stability : bool
         Floquet verdict and spectral radius of the fixed point. With several base frequencies or the frequency
         zero the verdict says "not covered". Loops that need neither are quicker without.
@@ -125,7 +127,12 @@ def displacements(
 
 @dataclass(frozen=True)
 class PeriodicResponse:
-    """A periodic solution and short names of what it says about itself."""
+    """A periodic solution and short names of what it says about itself.
+
+    Parameters
+    ----------
+    solution : PeriodicSolution
+    """
 
     solution: PeriodicSolution
 

@@ -57,6 +57,7 @@ def solve_spectral(
     ----------
     modes : Modes
         Basis with mesh stiffnesses near the mean of the excitation.
+    excitation : MeshExcitation
     mesh_frequency : float or (n_speeds,) array
         [Hz], not negative; zero gives the static response.
     excitation_harmonics, response_harmonics : int or (n_speeds,) int array
@@ -138,6 +139,7 @@ def compliance(modes: Modes, omega: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
+    modes : Modes
     omega : (...) array
         Angular frequencies [rad/s].
 

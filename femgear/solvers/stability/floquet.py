@@ -169,6 +169,7 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
 
     Parameters
     ----------
+    problem : NonlinearSystem
     modes : int
         Most modes kept, lowest first; all where there are no more.
 
@@ -227,6 +228,7 @@ def passage(
 
     Parameters
     ----------
+    frame : Frame
     period : (p,) array
         [s]
     tangents : callable
@@ -381,6 +383,7 @@ def floquet_verdicts(
 
     Parameters
     ----------
+    problem : NonlinearSystem
     solutions : sequence of PeriodicSolution
         All with the same lines. With two base frequencies or the frequency zero the verdict is "not
         covered"; "not determined" where the fastest mode would need more than 20000 steps in a period.

@@ -38,6 +38,7 @@ class Flow:
 
     Parameters
     ----------
+    problem : NonlinearSystem
     frequency : (n_bases,) array
         [rad/s].
     rate : float

@@ -415,6 +415,8 @@ def flank_contacts(
 
     Parameters
     ----------
+    train : Drivetrain
+    place : Coordinates
     spin : (n_all,) array
         Of `rigid_rotation`.
     T : (n_all, n) array

@@ -380,6 +380,7 @@ class TorqueHistory:
 
     Parameters
     ----------
+    body : str
     times : (m,) array
         Ascending [s].
     values : (m,) array

@@ -76,6 +76,7 @@ def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
 
     Parameters
     ----------
+    case : Case
     reach : float
         Frequency up to which the basis carries excitation [Hz].
     mesh_frequency : float
@@ -106,6 +107,7 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
 
     Parameters
     ----------
+    ring_modes : CyclicModes
     carrier_speeds : (n_speeds,) sequence of float
         [rad/s]
 

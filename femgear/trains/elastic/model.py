@@ -39,6 +39,7 @@ class ElasticSet:
 
     Parameters
     ----------
+    system : MechanicalSystem
     rigid_directions : (n, 2N) array
         Mesh directions without the ring's own displacement: ``rigid_directions^T q`` is the dynamic
         transmission error of the gears, ring deflection included.
@@ -78,6 +79,8 @@ def elastic_set(
     case : Case
         Bodies with their supports and bearings; the input, at which the motor turns, and the brake at the
         output. Without one of these its torque acts on the member itself.
+    planetary_set : PlanetarySet
+    ring : RingModel
     sun_torque : float
         Torque on the sun [N m]; its sign tells which flanks carry.
     flexibility : (2N, 2N) array, optional
@@ -121,6 +124,7 @@ def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.nd
 
     Parameters
     ----------
+    ring : CyclicModes
     ring_mode, ring_phase : (n_ring,) int arrays
         Mode and kind (0 cosine, 1 sine) of every coordinate.
     angles : (N,) array
@@ -377,6 +381,7 @@ def ring_model(
 
     Parameters
     ----------
+    planetary_set : PlanetarySet
     grid : Grid
         Sector of the ring.
     stiffness, mass, foundation : (2n, 2n) sparse matrices

@@ -140,6 +140,7 @@ def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> f
 
     Parameters
     ----------
+    case : Case
     mesh_mode : float
         Highest natural frequency of the rigid gears on their meshes [Hz].
     mesh_frequency : float
@@ -155,6 +156,7 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
 
     Parameters
     ----------
+    case : Case
     mesh_frequency : (n_speeds,) array
         [Hz]
     up_to : float
@@ -225,6 +227,7 @@ def mesh_and_ring_outputs(
 
     Parameters
     ----------
+    result : ModesResult
     response : Response
         At S speeds, H harmonics.
 
@@ -272,6 +275,8 @@ def solve_modes(
 
     Parameters
     ----------
+    case : Case
+    static : StaticResult
     progress : callable, optional
         Called with (stage, done, total).
     steps : Steps, optional

@@ -67,8 +67,11 @@ class PlanarModel:
 
     Parameters
     ----------
+    data : PlanarSet
+    problem : NonlinearSystem
     back_flanks : bool
         The back flanks have columns of their own.
+    bearings : Bearings
     """
 
     data: PlanarSet
@@ -97,6 +100,8 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
 
     Parameters
     ----------
+    case : Case
+    gears : PlanetarySet
     static : StaticResult, optional
         Its mean stiffnesses are taken where the case gives none.
     """
@@ -128,6 +133,8 @@ def planar_model(
 
     Parameters
     ----------
+    case : Case
+    gears : PlanetarySet
     static : StaticResult, optional
         Needed where the case gives no mesh stiffness.
     mesh_frequency : bool
@@ -267,6 +274,7 @@ def weight_curve(
         As for `frequency_response_curve`.
     largest : float
         Longest step, see `StepOptions`.
+    max_points : int
     """
     return frequency_response_curve(
         problem,
@@ -289,6 +297,7 @@ def judged_branch(
 
     Parameters
     ----------
+    problem : NonlinearSystem
     branch : Branch
         Followed without stability.
     progress : callable, optional
@@ -362,6 +371,8 @@ def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple
 
     Parameters
     ----------
+    model : PlanarModel
+    solution : PeriodicSolution
     theta : (n, n_bases) array
         Phases of the base frequencies [rad].
     """
