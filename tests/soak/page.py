@@ -70,13 +70,14 @@ KNOWN = """## What may differ or fail, and why
 _MOST = 40
 
 
-def write_page(state: State, path: Path) -> None:
-    """Write the page of the last commit of a state."""
-    path.write_text(page(state), encoding="utf-8")
+def write_page(state: State, path: Path, mutants: Path) -> None:
+    """Write the page of the last commit of a state, with the report of ``make mutants`` if there is one."""
+    report = mutants.read_text(encoding="utf-8") if mutants.exists() else ""
+    path.write_text(page(state, report), encoding="utf-8")
 
 
-def page(state: State) -> str:
-    """Make the text of the page."""
+def page(state: State, mutants: str = "") -> str:
+    """Make the text of the page, with the report of mutants as its last section but one."""
     if not state.records:
         return f"{HEAD}\nNothing has run yet.\n\n{KNOWN}"
     last = state.records[-1]["commit"]
@@ -91,6 +92,8 @@ def page(state: State) -> str:
     if count > len(failures):
         parts.append(f"{count} in all, of which {len(failures)} are listed.\n")
     parts.append("\n".join(map(_item, failures)) + "\n" if failures else "None.\n")
+    if mutants:
+        parts.append(mutants.replace("\n## ", "\n### ").replace("# Mutants", "## Mutants of the core"))
     return "\n".join([*parts, KNOWN])
 
 
