@@ -30,11 +30,10 @@ from femgear.trains.static.stages import solve_static
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 RANGE = (1000.0 * SPEED.scale, 3500.0 * SPEED.scale, 6)
 SPEEDS = ("1000 rpm", "3500 rpm")
-pytestmark = pytest.mark.usefixtures("coarse_states")
 
 
 @pytest.fixture(scope="module")
-def coarse():
+def coarse(coarse_states):
     """The reference set with reliefs of no amount, coarse."""
     case, _ = tip_reliefs(read_case(CASE))
     return with_values(case, {"static.flank_elements": 4, "static.positions": 14, "static.stresses": False})
