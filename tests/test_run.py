@@ -137,8 +137,8 @@ def fingerprint_of(path):
 
 @pytest.mark.parametrize("module", ["builtins", "os", "subprocess", "femgear.run"])
 def test_a_result_names_classes_of_femgear_alone(tmp_path, module):
-    tree = {"kind": "own", "number": 0, "class": [module, "list" if module == "builtins" else "Popen"]}
-    text = json.dumps({"fingerprint": "", "result": tree | {"items": []}})
+    tree = ["own", 0, module, "list" if module == "builtins" else "Popen", ["dict", 1]]
+    text = json.dumps({"fingerprint": "", "result": tree})
     np.savez(tmp_path / "a.npz", np.frombuffer(text.encode(), np.uint8))
     with pytest.raises(StorageError, match="no result of this case"):
         read_result(tmp_path / "a.npz", fingerprint="")

@@ -10,8 +10,7 @@ import json
 import math
 import os
 import platform
-import re
-import shutil
+import shlex
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -28,13 +27,17 @@ import numpy as np
 from femgear import __version__
 from femgear.errors import StorageError
 from femgear.storage.files import (
+    WRITTEN,
     checked_name,
     checksum,
     csv_cell,
     exclusive_lock,
+    foreign,
     is_safe_path,
     is_temporary,
+    list_own,
     read_dataset,
+    remove_own,
     remove_temporaries,
     storage_errors,
     write_text,
@@ -50,8 +53,6 @@ KEPT = ".stages"
 """Folder of results that a run goes on from when it was interrupted."""
 _CASE, _LOCK = "case.toml", ".lock"
 _RUNNING, _FINISHED, _ADDED, EXPORTED = ".running", ".finished", ".added", "exported"
-_WRITTEN = re.compile(r"manifest\.json|case\.toml|[\w.-]+\.(nc|npz|png|gif|vtu|html|csv)")
-"""Names of the files that femgear writes; a folder of its own that holds others is not removed."""
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
     "axis": ("1", "axis of the frame of the carrier"),
@@ -297,18 +298,14 @@ class Results:
         if name not in self.manifest.files:
             _refuse_incomplete(self)
             raise StorageError(
-                "the run did not write this file",
-                code="E-RESULTS-MISSING",
-                file=str(path),
+                "the run did not write this file", code="E-RESULTS-MISSING", file=str(path),
                 limit=", ".join(self.manifest.files) or "nothing was written",
-            )
+            )  # fmt: skip
         if checksum(path) != self.manifest.files[name]:
             raise StorageError(
                 "the file is not the one that the run wrote (SHA-256 differs from the manifest)",
-                code="E-RESULTS-CHANGED",
-                file=str(path),
-                remedy="run the case again",
-            )
+                code="E-RESULTS-CHANGED", file=str(path), remedy="run the case again",
+            )  # fmt: skip
         return path
 
 
@@ -356,24 +353,22 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
     _make(folder)
     with folder_lock(folder):
         running = folder / _RUNNING
-        if not (force and (folder / MANIFEST).is_file() and read_manifest(folder).complete):
-            _remove_tree(running)
+        if not (force and _is_complete(folder)):
+            remove_own(running)
             yield prepare_output(folder, case=case, force=force)
             _remove_kept(folder)
             return
         _refuse_changed(folder, read_manifest(folder))
         try:
-            _publish_running(folder)
             if case is None or not (running / MANIFEST).is_file():
-                _remove_tree(running)
-            with storage_errors(folder):
-                running.mkdir(exist_ok=True)
+                remove_own(running)
+            list_own(running)
             yield prepare_output(running, case=case, force=True)
-            _publish_running(folder)
+            _publish(folder)
         except BaseException as error:
             # what a user interrupts goes on with the next run
             if case is None or isinstance(error, Exception) or not read_manifest(running).files:
-                _remove_tree(running)
+                remove_own(running)
             raise
 
 
@@ -389,24 +384,20 @@ def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
     with exclusive_lock(folder / _LOCK):
         remove_temporaries(folder)
         _publish(folder)
-        _remove_tree(folder / _ADDED)
+        remove_own(folder / _ADDED)
         _remove_kept(folder)
         yield
 
 
-def _publish_running(folder: Path) -> None:
-    """Give the files of a run that replaces results their places, where it has come to its end."""
-    running = folder / _RUNNING
-    if not running.is_symlink() and (running / MANIFEST).is_file() and read_manifest(running).complete:
-        with storage_errors(folder):
-            os.replace(running, folder / _FINISHED)
-        _publish(folder)
+def _is_complete(folder: Path) -> bool:
+    """Tell whether a folder holds the results of a run that came to its end."""
+    return (folder / MANIFEST).is_file() and read_manifest(folder).complete
 
 
 def _remove_kept(folder: Path) -> None:
     """Remove what only an interrupted run goes on from, where the run has come to its end."""
-    if (folder / MANIFEST).is_file() and read_manifest(folder).complete:
-        _remove_tree(folder / KEPT)
+    if _is_complete(folder):
+        remove_own(folder / KEPT)
 
 
 @contextmanager
@@ -427,10 +418,9 @@ def additions(folder: Path) -> Iterator[Path]:
     _refuse_changed(folder, manifest)
     added = folder / _ADDED
     try:
-        with storage_errors(added):
-            added.mkdir()
+        list_own(added)
         yield added
-        paths = sorted(path for path in added.rglob("*") if path.is_file())
+        paths = sorted(path for path in added.rglob("*") if path.is_file() and path.name != WRITTEN)
         files = {path.relative_to(added).as_posix(): checksum(path) for path in paths}
         _movable(added, folder, files, manifest.files)  # refused before it counts as finished
         _write_manifest(added, replace(manifest, files={**manifest.files, **files}))
@@ -438,7 +428,7 @@ def additions(folder: Path) -> Iterator[Path]:
             os.replace(added, folder / _FINISHED)
         _publish(folder)
     finally:
-        _remove_tree(added)
+        remove_own(added)
 
 
 def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force: bool = False) -> Path:
@@ -469,22 +459,18 @@ def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force:
         manifest = read_manifest(folder)
         if manifest.complete:
             raise StorageError(
-                "the folder holds results already",
-                code="E-OUTPUT",
-                file=str(folder),
+                "the folder holds results already", code="E-OUTPUT", file=str(folder),
                 remedy="name a new folder, or replace them with --force",
-            )
+            )  # fmt: skip
         _refuse_changed(folder, manifest)
         own = case is not None and manifest.files.get(_CASE) == hashlib.sha256(case.encode()).hexdigest()
         if own:
             return folder
         if case is not None and _CASE in manifest.files and not force:
             raise StorageError(
-                "the folder holds an interrupted run of another case",
-                code="E-OUTPUT",
-                file=str(folder),
+                "the folder holds an interrupted run of another case", code="E-OUTPUT", file=str(folder),
                 remedy="name a new folder, or replace it with --force",
-            )
+            )  # fmt: skip
         discard(folder, manifest.files)
     _write_manifest(folder, Manifest(complete=False))
     return folder
@@ -493,7 +479,11 @@ def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force:
 def discard(folder: Path, files: Mapping[str, str]) -> None:
     """Remove files of a run that are unchanged, names with checksums, and folders that are empty then."""
     with storage_errors(folder):
-        _remove_unchanged(folder, files)
+        for path in [folder / name for name, digest in files.items() if _is_unchanged(folder, name, digest)]:
+            path.unlink()
+            if path.parent != folder:
+                with suppress(OSError):
+                    path.parent.rmdir()
 
 
 def record(
@@ -553,28 +543,20 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
         written = data.pop("femgear_format")
         if type(written) is not int or written != _FORMAT:
             raise StorageError(
-                "written by another version of femgear",
-                code="E-FORMAT",
-                file=str(path),
-                value=written,
-                limit=str(_FORMAT),
-                remedy="run the case again",
-            )
+                "written by another version of femgear", code="E-FORMAT", file=str(path), value=written,
+                limit=str(_FORMAT), remedy="run the case again",
+            )  # fmt: skip
         if seal != right:
             raise StorageError(
-                "changed since femgear wrote it (its checksum does not fit)",
-                code="E-FORMAT",
-                file=str(path),
-                remedy="run the case again in a new folder",
-            )
+                "changed since femgear wrote it (its checksum does not fit)", code="E-FORMAT",
+                file=str(path), remedy="run the case again in a new folder",
+            )  # fmt: skip
         manifest = Manifest(**data)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
         raise StorageError(
-            "no femgear manifest of reasonable size",
-            code="E-FORMAT",
-            file=str(path),
+            "no femgear manifest of reasonable size", code="E-FORMAT", file=str(path),
             remedy="name a folder that femgear run wrote",
-        ) from None
+        ) from None  # fmt: skip
     for name in manifest.files:
         if not is_safe_path(name):
             raise StorageError("names a file outside the folder", code="E-FORMAT", file=str(path), value=name)
@@ -620,11 +602,9 @@ def _refuse_incomplete(results: Results) -> None:
     folder = results.folder
     case = folder / _CASE if _CASE in results.manifest.files else "CASE"
     raise StorageError(
-        _interrupted(results),
-        code="E-RESULTS-INCOMPLETE",
-        file=str(folder),
-        remedy=f"run it again: femgear run {case} -o {folder}",
-    )
+        _interrupted(results), code="E-RESULTS-INCOMPLETE", file=str(folder),
+        remedy=f"run it again: femgear run {shlex.quote(str(case))} -o {shlex.quote(str(folder))}",
+    )  # fmt: skip
 
 
 def _refuse_changed(folder: Path, manifest: Manifest) -> None:
@@ -634,10 +614,8 @@ def _refuse_changed(folder: Path, manifest: Manifest) -> None:
     if changed:
         raise StorageError(
             f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
-            code="E-OUTPUT",
-            file=str(folder),
-            remedy="move the changed files away, or name a new folder",
-        )
+            code="E-OUTPUT", file=str(folder), remedy="move the changed files away, or name a new folder",
+        )  # fmt: skip
 
 
 def _interrupted(results: Results) -> str:
@@ -655,31 +633,30 @@ def _make(folder: Path) -> None:
             message, remedy = "exists and is not a folder", "name another folder"
             raise StorageError(message, code="E-OUTPUT", file=str(folder), remedy=remedy)
         folder.mkdir(parents=True, exist_ok=True)
-        foreign = any(path.name != _LOCK and not is_temporary(path) for path in folder.iterdir())
-    if foreign and not (folder / MANIFEST).is_file():
+        others = [path for path in folder.iterdir() if path.name != _LOCK and not is_temporary(path)]
+    if others and not (folder / MANIFEST).is_file():
         raise StorageError(
-            "the folder holds files but no femgear results",
-            code="E-OUTPUT",
-            file=str(folder),
+            "the folder holds files but no femgear results", code="E-OUTPUT", file=str(folder),
             remedy="name a new folder",
-        )
+        )  # fmt: skip
 
 
 def _publish(folder: Path) -> None:
     """Give the files of a finished run their places, the manifest last; repeated after an interruption."""
-    source = folder / _FINISHED
-    if not source.is_symlink() and (source / MANIFEST).is_file():
-        new, old = read_manifest(source), read_manifest(folder)
-        if old.complete and not new.complete:
-            raise _foreign(source)
-        moved = _movable(source, folder, new.files, old.files)
-        with storage_errors(folder):
-            for name in moved:
+    source, running = folder / _FINISHED, folder / _RUNNING
+    with storage_errors(folder):
+        if not (os.path.lexists(source) or running.is_symlink()) and _is_complete(running):
+            os.replace(running, source)
+        if not source.is_symlink() and (source / MANIFEST).is_file():
+            new, old = read_manifest(source), read_manifest(folder)
+            if old.complete and not new.complete:
+                raise foreign(source)
+            for name in _movable(source, folder, new.files, old.files):
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 os.replace(source / name, folder / name)
-            _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
+            discard(folder, {name: digest for name, digest in old.files.items() if name not in new.files})
             os.replace(source / MANIFEST, folder / MANIFEST)
-    _remove_tree(source)
+    remove_own(source)
 
 
 def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mapping[str, str]) -> list[str]:
@@ -687,44 +664,12 @@ def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mappin
     moved = [name for name in files if os.path.lexists(source / name)]
     for name in moved:
         if not _is_unchanged(source, name, files[name]):
-            raise _foreign(source / name)
+            raise foreign(source / name)
         place, known = folder / name, owned.get(name, files[name])
         led_away = place.parent.resolve() != folder.resolve() / Path(name).parent
         if led_away or (os.path.lexists(place) and not _is_unchanged(folder, name, known)):
-            raise _foreign(place)
+            raise foreign(place)
     return moved
-
-
-def _remove_tree(path: Path) -> None:
-    """Remove a folder that a run left, where there is one; refuses one that holds what no run has written."""
-    with storage_errors(path):
-        if not os.path.lexists(path):
-            return
-        for one in (path, *path.rglob("*")):
-            own = one.is_dir() or (one != path and one.is_file() and _WRITTEN.fullmatch(one.name))
-            if one.is_symlink() or not (own or is_temporary(one)):
-                raise _foreign(one)
-        shutil.rmtree(path)
-
-
-def _foreign(path: Path) -> StorageError:
-    """Make the refusal to replace or remove what no run has written, or somebody has changed."""
-    return StorageError(
-        "no run has written this, or it was changed since",
-        code="E-OUTPUT",
-        file=str(path),
-        remedy="move it away and repeat the command",
-    )
-
-
-def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
-    """Remove those of some files that are as the run wrote them, and folders that are empty then."""
-    for name, digest in files.items():
-        if _is_unchanged(folder, name, digest):
-            (folder / name).unlink()
-            if (folder / name).parent != folder:
-                with suppress(OSError):
-                    (folder / name).parent.rmdir()
 
 
 def _is_unchanged(folder: Path, name: str, digest: str) -> bool:

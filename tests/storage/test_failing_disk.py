@@ -163,16 +163,17 @@ with run_folder(folder, force=force) as working:
     finish(working, ["case.toml", "static.nc"], timings={}, convergence={})
     last = {"publish": "static.nc", "manifest": "manifest.json"}.get(where)
     replace, os.replace = os.replace, lambda a, b: kill() if Path(b).name == last else replace(a, b)
-    if where == "clear":
-        import shutil
-        shutil.rmtree = kill
+    if where.startswith("clear"):
+        remove, os.unlink = os.unlink, lambda a: kill() if Path(a).name == ".written" else remove(a)
+    if where == "clear folder":
+        os.unlink, os.rmdir = remove, kill
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 @pytest.mark.parametrize(
     ("where", "force"),
-    [(where, "force") for where in ("write", "picture", "publish", "manifest", "clear")]
+    [(where, "force") for where in ("write", "picture", "publish", "manifest", "clear", "clear folder")]
     + [("write", "new"), ("picture", "new")],
 )
 def test_a_killed_run_leaves_nothing_that_the_next_does_not_remove(tmp_path, where, force):
@@ -183,7 +184,7 @@ def test_a_killed_run_leaves_nothing_that_the_next_does_not_remove(tmp_path, whe
             finish(working, ["case.toml"], timings={}, convergence={})
     run = subprocess.run([sys.executable, "-c", KILLED, where, str(folder), force], timeout=120)
     assert run.returncode == -signal.SIGKILL and read_manifest(folder).complete == (force == "force")
-    published = where in ("publish", "manifest", "clear")
+    published = where in ("publish", "manifest", "clear", "clear folder")
     with folder_lock(folder):
         if published:
             assert (folder / "case.toml").read_text() == "new" and read_manifest(folder).complete
