@@ -49,10 +49,11 @@ _TEMPORARY = re.compile(r"\.femgear-[0-9a-f]{16}\..+")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
-_CONTAINERS: dict[type, Callable[[list], Any]] = {one: one for one in (tuple, list, set, frozenset, dict)} | {
-    MappingProxyType: lambda items: MappingProxyType(dict(items)),
-    slice: lambda items: slice(*items),
-    complex: lambda items: complex(*items),
+_CONTAINERS: dict[str, Callable[[list], Any]] = {
+    **{"tuple": tuple, "list": list, "set": set, "frozenset": frozenset, "dict": dict},
+    "mappingproxy": lambda items: MappingProxyType(dict(items)),
+    "slice": lambda parts: slice(*parts),
+    "complex": lambda parts: complex(*parts),
 }
 _PACKAGE = "femgear."
 # what was written into a folder, as sha256sum lists it; half a line of a killed process is one too
@@ -269,15 +270,16 @@ def _parts(value: Any) -> tuple[str, Sequence]:
         return kind.__name__, (value.real, value.imag)
     if kind is MethodType:
         return "method", (value.__self__, value.__name__)
-    if kind in _CONTAINERS:
+    if kind.__module__ == "builtins" and kind.__name__ in _CONTAINERS:
         return kind.__name__, tuple(value.items() if isinstance(value, Mapping) else value)
     if kind.__module__.startswith("scipy.sparse") and value.format in ("csc", "csr"):
         return "sparse", (kind.__name__, value.data, value.indices, value.indptr, value.shape)
-    if not (is_dataclass(value) or kind.__module__.startswith(_PACKAGE)):
+    if is_dataclass(value):  # its fields alone, without what it has computed from them
+        state = {one.name: getattr(value, one.name) for one in fields(value)}
+    elif kind.__module__.startswith(_PACKAGE):
+        state = value.__getstate__()
+    else:
         raise TypeError(f"a {kind.__qualname__} cannot be written")
-    # a dataclass keeps its fields alone, without what it has computed from them
-    names = [one.name for one in fields(value)] if is_dataclass(value) else None
-    state = value.__getstate__() if names is None else {name: getattr(value, name) for name in names}
     return "own", (kind.__module__, kind.__qualname__, state)
 
 
@@ -307,7 +309,7 @@ def _made(kind: str, parts: list, arrays: list[np.ndarray]) -> Any:
             return getattr(importlib.import_module("scipy.sparse"), name)(tuple(stored), shape=shape)
         case "own":
             return _own_object(*parts)
-    return {one.__name__: make for one, make in _CONTAINERS.items()}[kind](parts)
+    return _CONTAINERS[kind](parts)
 
 
 def _own_object(module: str, name: str, state: dict) -> Any:

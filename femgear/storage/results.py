@@ -52,7 +52,7 @@ MANIFEST = "manifest.json"
 KEPT = ".stages"
 """Folder of results that a run goes on from when it was interrupted."""
 _CASE, _LOCK = "case.toml", ".lock"
-_RUNNING, _FINISHED, _ADDED, EXPORTED = ".running", ".finished", ".added", "exported"
+_RUNNING, _ADDED, EXPORTED = ".running", ".added", "exported"
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
     "axis": ("1", "axis of the frame of the carrier"),
@@ -364,12 +364,12 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
                 remove_own(running)
             list_own(running)
             yield prepare_output(running, case=case, force=True)
-            _publish(folder)
         except BaseException as error:
             # what a user interrupts goes on with the next run
             if case is None or isinstance(error, Exception) or not read_manifest(running).files:
                 remove_own(running)
             raise
+        _publish(folder)
 
 
 @contextmanager
@@ -424,11 +424,10 @@ def additions(folder: Path) -> Iterator[Path]:
         files = {path.relative_to(added).as_posix(): checksum(path) for path in paths}
         _movable(added, folder, files, manifest.files)  # refused before it counts as finished
         _write_manifest(added, replace(manifest, files={**manifest.files, **files}))
-        with storage_errors(folder):
-            os.replace(added, folder / _FINISHED)
-        _publish(folder)
-    finally:
+    except BaseException:
         remove_own(added)
+        raise
+    _publish(folder)
 
 
 def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force: bool = False) -> Path:
@@ -642,21 +641,20 @@ def _make(folder: Path) -> None:
 
 
 def _publish(folder: Path) -> None:
-    """Give the files of a finished run their places, the manifest last; repeated after an interruption."""
-    source, running = folder / _FINISHED, folder / _RUNNING
-    with storage_errors(folder):
-        if not (os.path.lexists(source) or running.is_symlink()) and _is_complete(running):
-            os.replace(running, source)
-        if not source.is_symlink() and (source / MANIFEST).is_file():
-            new, old = read_manifest(source), read_manifest(folder)
-            if old.complete and not new.complete:
-                raise foreign(source)
+    """Give new files their places, the manifest last, if it is there; repeated after an interruption."""
+    for source in (folder / _RUNNING, folder / _ADDED):
+        if source.is_symlink() or not (source / MANIFEST).is_file():
+            continue
+        new, old = read_manifest(source), read_manifest(folder)
+        if old.complete and not new.complete:
+            continue
+        with storage_errors(folder):
             for name in _movable(source, folder, new.files, old.files):
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 os.replace(source / name, folder / name)
             discard(folder, {name: digest for name, digest in old.files.items() if name not in new.files})
             os.replace(source / MANIFEST, folder / MANIFEST)
-    remove_own(source)
+        remove_own(source)
 
 
 def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mapping[str, str]) -> list[str]:

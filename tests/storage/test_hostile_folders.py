@@ -203,7 +203,7 @@ PLANTED = [_link, _file, _pipe, _notes, _notes_below, _link_below, _pipe_below, 
 PLANTED += [_files_like_ours, _temporary_name, _list, _picture_in_ours, _ours_changed]
 
 
-@pytest.mark.parametrize("name", [".running", ".finished", ".added", ".stages"])
+@pytest.mark.parametrize("name", [".running", ".added", ".stages"])
 @pytest.mark.parametrize("plant", PLANTED)
 def test_what_no_run_left_is_refused_and_kept(results, elsewhere, name, plant):
     plant(results / name, elsewhere)
@@ -222,10 +222,10 @@ def test_what_somebody_puts_into_the_folder_of_a_running_run_is_kept(results, na
             (working / name).write_text("mine")
             complete(working, "new")
 
-    assert refused(run).file == str(results / ".finished" / name)
+    assert refused(run).file == str(results / ".running" / name)
     assert (results / "case.toml").read_text() == "new case.toml"
-    assert contents(results / ".finished").keys() == {".written", name}
-    assert (results / ".finished" / name).read_text() == "mine"
+    assert contents(results / ".running").keys() == {".written", name}
+    assert (results / ".running" / name).read_text() == "mine"
 
 
 def test_what_a_run_has_written_is_removed_with_its_folder(results):
@@ -262,13 +262,13 @@ def test_what_a_living_process_writes_is_not_removed(results):
     assert (results / "modes.nc").read_text() == "whole"
 
 
-# --- planted .finished -----------------------------------------------------------------------------
+# --- planted results that have not yet their places --------------------------------------------------
 
 
 def finished(results, names=("case.toml", "static.nc", "modes.nc"), text="new"):
     """What a run leaves that is killed before its results have their places."""
-    (results / ".finished").mkdir()
-    return complete(results / ".finished", text, names)
+    (results / ".running").mkdir()
+    return complete(results / ".running", text, names)
 
 
 def test_a_finished_run_is_brought_to_its_end_by_whoever_locks_the_folder(results):
@@ -276,7 +276,7 @@ def test_a_finished_run_is_brought_to_its_end_by_whoever_locks_the_folder(result
     with folder_lock(results):
         assert contents(results).keys() >= {"case.toml", "static.nc", "modes.nc", MANIFEST}
         assert (results / "modes.nc").read_text() == "new modes.nc"
-    assert not (results / ".finished").exists() and "modes.nc" in read_manifest(results).files
+    assert not (results / ".running").exists() and "modes.nc" in read_manifest(results).files
 
 
 @pytest.mark.parametrize("name", ["modes.nc", "static.nc", "report.html"])
@@ -320,8 +320,9 @@ def test_a_finished_run_without_a_valid_manifest_is_refused(results, text):
     assert contents(results) == before
 
 
-def test_a_run_that_is_not_complete_is_not_published(results):
-    source = results / ".finished"
+@pytest.mark.parametrize("name", [".running", ".added"])
+def test_a_run_that_is_not_complete_is_not_published(results, name):
+    source = results / name
     source.mkdir()
     write_text("new", source / "case.toml")
     record(source, ["case.toml"], timings={}, convergence={})
@@ -392,13 +393,13 @@ def test_an_addition_replaces_nothing_foreign(results, elsewhere):
     assert "report.html" in read_manifest(results).files
 
 
-@pytest.mark.parametrize("last", ["report.html", MANIFEST, ".finished"])
+@pytest.mark.parametrize("last", ["report.html", MANIFEST, f".added/{MANIFEST}"])
 def test_an_addition_that_is_killed_goes_on_with_the_next(results, monkeypatch, last):
     add(results, report="one")
     replace = os.replace
 
     def killed(source, target):
-        if os.path.dirname(target) == str(results) and os.path.basename(target) == last:
+        if os.path.relpath(target, results) == last:
             raise KeyboardInterrupt
         replace(source, target)
 
@@ -409,7 +410,7 @@ def test_an_addition_that_is_killed_goes_on_with_the_next(results, monkeypatch, 
     with folder_lock(results):
         pass
     there = contents(results)
-    assert there["report.html"] == ("one" if last == ".finished" else "two")
+    assert there["report.html"] == ("one" if last.startswith(".") else "two")
     assert read_manifest(results).files["report.html"] == checksum(results / "report.html")
     assert not any(name.startswith(".") for name in there)
 
@@ -485,7 +486,7 @@ def test_many_threads_hold_a_lock_one_after_the_other(tmp_path):
     assert max(most) == 1 and list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", [".running", ".finished"])
+@pytest.mark.parametrize("name", [".running", ".added"])
 def test_results_elsewhere_are_not_published_through_a_link(results, tmp_path, name):
     theirs = tmp_path / "theirs"
     theirs.mkdir()
@@ -508,6 +509,15 @@ def test_a_complete_run_that_was_killed_takes_its_place_whoever_locks_the_folder
     with folder_lock(results):
         pass
     assert contents(results)["case.toml"] == "new case.toml" and not (results / ".running").exists()
+
+
+def test_a_folder_of_another_name_is_left_alone(results):
+    for path in (results / ".finished", results / ".mine"):
+        _files_like_ours(path, None)
+    before = contents(results)
+    replaced(results)
+    add(results, report="one")
+    assert all(contents(results)[name] == before[name] for name in before if name.startswith("."))
 
 
 def test_no_folder_is_left_behind(results):
