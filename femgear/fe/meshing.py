@@ -102,8 +102,9 @@ def check_outline(outline) -> Plan:
     every = np.vstack([points for _, points in curves])
     size = np.ptp(every, axis=0).max()
     if not size > 0:
-        remedy = "give points that enclose an area"
-        raise GridError("all points of the outline coincide", code="E-GRID", remedy=remedy)
+        raise GridError(
+            "all points of the outline coincide", code="E-GRID", remedy="give points that enclose an area"
+        )
     points, segments, mids, names = _join(curves, inner, size)
     n_boundary = sum(len(p) // 2 for _, p in curves)
     if len(segments) > MAX_SEGMENTS:
@@ -211,8 +212,10 @@ def _check_area(polygon, size):
         message = f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit"
         raise GridError(message, code="E-GRID", remedy="give an outline with a body inside")
     if area < 0:
-        limit, remedy = "counter-clockwise, the body on the left", "reverse curves and points"
-        raise GridError("the outline runs clockwise", code="E-GRID", limit=limit, remedy=remedy)
+        raise GridError(
+            "the outline runs clockwise", code="E-GRID", limit="counter-clockwise, the body on the left",
+            remedy="reverse the order of curves and points",
+        )  # fmt: skip
 
 
 def _faces(segments, n_boundary, inner):

@@ -183,7 +183,7 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     name = os.fspath(path)
     with storage_errors(path):
         if not os.path.isfile(path):
-            raise StorageError("no such file", code="E-STORAGE", file=name)
+            raise StorageError("no such file", code="E-STORAGE", file=name, remedy="run the case again")
     options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
     try:
         with storage_errors(path):
@@ -195,10 +195,10 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
         raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
     version = dataset.attrs.get("femgear_format")
     if not isinstance(version, int | np.integer) or version > _FORMAT:
-        limit = f"femgear_format up to {_FORMAT}"
         raise StorageError(
-            "not written by this version of femgear", code="E-FORMAT", file=name, value=version, limit=limit
-        )
+            "not written by this version of femgear", code="E-FORMAT", file=name, value=version,
+            limit=f"femgear_format up to {_FORMAT}", remedy="run the case again",
+        )  # fmt: skip
     return dataset
 
 
@@ -241,7 +241,9 @@ def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
             return _decoded(tree["result"], arrays[1:], {})
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, ImportError, BadZipFile):
         pass
-    raise StorageError("no result of this case", code="E-FORMAT", file=os.fspath(path))
+    raise StorageError(
+        "no result of this case", code="E-FORMAT", file=os.fspath(path), remedy="run the case again"
+    )
 
 
 def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, Any]]) -> Any:
@@ -653,7 +655,10 @@ def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path:
     labels = coordinate and variable.dtype.kind in "OUS"
     missing = [key for key in ("units", "long_name") if key not in variable.attrs]
     if missing and not labels:
-        raise StorageError(f"{name} lacks {' and '.join(missing)}", code="E-FORMAT", file=os.fspath(path))
+        raise StorageError(
+            f"{name} lacks {' and '.join(missing)}", code="E-FORMAT", file=os.fspath(path),
+            remedy="give every variable attributes units and long_name",
+        )  # fmt: skip
 
 
 def _hostility(path: str | os.PathLike) -> str:

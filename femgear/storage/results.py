@@ -558,7 +558,10 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
         ) from None  # fmt: skip
     for name in manifest.files:
         if not is_safe_path(name):
-            raise StorageError("names a file outside the folder", code="E-FORMAT", file=str(path), value=name)
+            raise StorageError(
+                "names a file outside the folder", code="E-FORMAT", file=str(path), value=name,
+                remedy="run the case again in a new folder",
+            )  # fmt: skip
     return manifest
 
 
