@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 import synthetic_results
 import xarray as xr
+from edited_manifests import finish
 
 from femgear import cli
 from femgear.errors import StorageError
 from femgear.report import style
 from femgear.storage.files import checksum, write_dataset, write_text
 from femgear.storage.results import (
-    finish,
     prepare_output,
     read_manifest,
     record,

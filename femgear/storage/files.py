@@ -40,11 +40,10 @@ except ImportError:  # Windows, where no open file can be removed
 if TYPE_CHECKING:
     import xarray as xr
 
-_NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 _RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
 """Names that some file system gives a meaning of its own, or takes for others."""
-# what `replace_file` writes under; nobody else has such names
+# what `replaced_file` writes under; nobody else has such names
 _TEMPORARY = re.compile(r"\.femgear-[0-9a-f]{16}\..+")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
@@ -80,7 +79,8 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     StorageError
         ``E-FORMAT``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
     """
-    replace_file(path, lambda temporary: _to_netcdf(dataset, temporary), size=int(dataset.nbytes))
+    with replaced_file(path, size=dataset.nbytes) as temporary:
+        _to_netcdf(dataset, temporary)
 
 
 def _to_netcdf(dataset: xr.Dataset, path: Path, **options: Any) -> None:
@@ -221,8 +221,8 @@ def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -
     arrays: list[np.ndarray] = []
     tree = {"fingerprint": fingerprint, "result": _encoded(result, arrays, {})}
     text = np.frombuffer(json.dumps(tree).encode(), np.uint8)
-    size = sum(array.nbytes for array in arrays)
-    replace_file(path, lambda new: np.savez(new, text, *arrays), size=size)  # type: ignore[arg-type]
+    with replaced_file(path, size=sum(array.nbytes for array in arrays)) as temporary:
+        np.savez(temporary, text, *arrays)  # type: ignore[arg-type]
 
 
 def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
@@ -328,12 +328,6 @@ def _own_object(module: str, name: str, state: dict) -> Any:
     return made
 
 
-def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
-    """Write a file by ``write(path)`` into an empty one of another name; see `replaced_file`."""
-    with replaced_file(path, size=size) as temporary:
-        write(temporary)
-
-
 @contextlib.contextmanager
 def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Path]:
     """Have an empty file of another name filled in the block, force it to the disk, then give it its name.
@@ -342,7 +336,7 @@ def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Pat
 
     Parameters
     ----------
-    size : int
+    size : float
         What the disk must have room for [bytes].
 
     Raises
@@ -398,13 +392,14 @@ def _lock(stream: io.BufferedIOBase, *, alone: bool) -> bool:
 
 
 def is_temporary(path: Path) -> bool:
-    """Tell whether a regular file has a name that `replace_file` writes under."""
+    """Tell whether a regular file has a name that `replaced_file` writes under."""
     return bool(_TEMPORARY.fullmatch(path.name)) and _is_regular(path)
 
 
 def write_bytes(data: bytes, path: str | os.PathLike) -> None:
     """Write bytes so that the file is either the old or the new one, whole."""
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+    with replaced_file(path, size=len(data)) as temporary:
+        temporary.write_bytes(data)
 
 
 def write_text(text: str, path: str | os.PathLike) -> None:
@@ -458,7 +453,7 @@ def own_files(folder: Path, names: Iterable[str]) -> None:
 
 
 def list_own(folder: Path) -> None:
-    """Make a folder that lists the SHA-256 of all that `replace_file` writes there from now on, ``.written``.
+    """Make a folder whose list, ``.written``, has the SHA-256 of all that `replaced_file` writes there.
 
     What dead processes left half written there is removed.
     """
@@ -553,16 +548,6 @@ def checked_name(name: str) -> str:
             remedy="name another folder",
         )
     return name
-
-
-def is_safe_path(name: str) -> bool:
-    """Tell whether a relative path stays in its folder and has plain names only."""
-    path = Path(name)
-    return (
-        bool(path.parts)
-        and not path.is_absolute()
-        and all(_NAME.fullmatch(p) and p != ".." for p in path.parts)
-    )
 
 
 @contextlib.contextmanager

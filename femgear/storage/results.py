@@ -10,12 +10,13 @@ import json
 import math
 import os
 import platform
+import re
 import shlex
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -33,7 +34,6 @@ from femgear.storage.files import (
     csv_cell,
     exclusive_lock,
     foreign,
-    is_safe_path,
     is_temporary,
     list_own,
     read_dataset,
@@ -53,6 +53,7 @@ KEPT = ".stages"
 """Folder of results that a run goes on from when it was interrupted."""
 _CASE, _LOCK = "case.toml", ".lock"
 _RUNNING, _ADDED, EXPORTED = ".running", ".added", "exported"
+_NAME = re.compile(r"(?!\.\.?$)[A-Za-z0-9._-]{1,100}")
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
     "axis": ("1", "axis of the frame of the carrier"),
@@ -335,19 +336,15 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
     folder : path-like
         Created where it does not exist (its last name must be safe, see `checked_name`).
     case : str, optional
-        Text of the case, as for `prepare_output`.
+        Text of the case: what an interrupted run of it left stays, for this one to go on from.
     force : bool
-        Replace the results of an earlier run.
-
-    Yields
-    ------
-    Path
-        Made ready as by `prepare_output`.
+        Replace the results of an earlier run, or what an interrupted one of another case left.
 
     Raises
     ------
     StorageError
-        As `prepare_output`; ``E-LOCKED`` while another run writes into the folder.
+        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, files of an
+        interrupted run of another case, or files that were changed. ``E-LOCKED``: another run writes there.
     """
     folder = Path(folder)
     _make(folder)
@@ -404,15 +401,8 @@ def _remove_kept(folder: Path) -> None:
 def additions(folder: Path) -> Iterator[Path]:
     """Add files to results, whose folder is locked; the manifest lists them.
 
-    Yields
-    ------
-    Path
-        Folder inside. At the end its files take the places that they have in it.
-
-    Raises
-    ------
-    StorageError
-        ``E-OUTPUT``: a file of the manifest was changed, or one that it does not list is in the way.
+    At the end the files of the folder that is given take the places that they have in it. Refused (E-OUTPUT)
+    where a file of the manifest was changed, or one that it does not list is in the way.
     """
     manifest = read_manifest(folder)
     _refuse_changed(folder, manifest)
@@ -431,26 +421,9 @@ def additions(folder: Path) -> Iterator[Path]:
 
 
 def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force: bool = False) -> Path:
-    """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
+    """Make a folder ready for a run as `run_folder`; its manifest says that the run is not complete.
 
-    Parameters
-    ----------
-    folder : path-like
-    case : str, optional
-        Text of the case to run: what an interrupted run of it left stays, for this one to go on from.
-    force : bool
-        Replace what an interrupted run of another case left.
-
-    Returns
-    -------
-    Path
-        The folder, created where there is none, with a manifest that says that the run is not complete.
-
-    Raises
-    ------
-    StorageError
-        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, files of an
-        interrupted run of another case, or files of one that were changed.
+    Only unchanged files of an interrupted run are ever removed, those of another case with ``force`` alone.
     """
     folder = Path(folder)
     _make(folder)
@@ -462,8 +435,7 @@ def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force:
                 remedy="name a new folder, or replace them with --force",
             )  # fmt: skip
         _refuse_changed(folder, manifest)
-        own = case is not None and manifest.files.get(_CASE) == hashlib.sha256(case.encode()).hexdigest()
-        if own:
+        if case is not None and manifest.files.get(_CASE) == hashlib.sha256(case.encode()).hexdigest():
             return folder
         if case is not None and _CASE in manifest.files and not force:
             raise StorageError(
@@ -494,7 +466,7 @@ def record(
     known: Mapping[str, str] = MappingProxyType({}),
     complete: bool = False,
 ) -> Manifest:
-    """Write the manifest of what a run has written so far.
+    """Write the manifest of what a run has written so far; see `Manifest`.
 
     Parameters
     ----------
@@ -502,21 +474,13 @@ def record(
         Files that the run wrote, as paths inside the folder.
     known : mapping of str to str
         Checksums of those that are as they were, which saves reading them.
-    timings : mapping of str to float
-        Seconds a stage.
     convergence : mapping
         Numbers, texts, arrays and tables of these; numbers that are not finite are stored as null.
-    complete : bool
-        Whether the run came to its end.
     """
     files = {name: known.get(name) or checksum(Path(folder) / name) for name in names}
     manifest = Manifest(complete, files, timings, convergence, versions())
     _write_manifest(folder, manifest)
     return manifest
-
-
-finish = partial(record, complete=True)
-"""`record` of a run that came to its end."""
 
 
 def versions() -> dict[str, str]:
@@ -557,7 +521,7 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
             remedy="name a folder that femgear run wrote",
         ) from None  # fmt: skip
     for name in manifest.files:
-        if not is_safe_path(name):
+        if not all(_NAME.fullmatch(part) for part in name.split("/")):
             raise StorageError(
                 "names a file outside the folder", code="E-FORMAT", file=str(path), value=name,
                 remedy="run the case again in a new folder",
@@ -591,10 +555,10 @@ def _plain(value: Any) -> Any:
 def _refuse_missing(folder: Path) -> None:
     """Refuse a folder that is not there."""
     if not folder.is_dir():
-        remedy = "name a folder that femgear run wrote"
         raise StorageError(
-            "no such results folder", code="E-RESULTS-MISSING", file=str(folder), remedy=remedy
-        )
+            "no such results folder", code="E-RESULTS-MISSING", file=str(folder),
+            remedy="name a folder that femgear run wrote",
+        )  # fmt: skip
 
 
 def _refuse_incomplete(results: Results) -> None:

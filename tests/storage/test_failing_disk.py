@@ -10,11 +10,12 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from edited_manifests import finish
 
 from femgear.errors import StorageError
 from femgear.storage import files
 from femgear.storage.files import read_dataset, write_dataset, write_text
-from femgear.storage.results import MANIFEST, finish, folder_lock, read_manifest, run_folder
+from femgear.storage.results import MANIFEST, folder_lock, read_manifest, run_folder
 
 NAMED = {"units": "1", "long_name": "something"}
 LIMITED = """
@@ -136,7 +137,7 @@ import numpy as np
 import xarray as xr
 from femgear.storage import files
 from femgear.storage.files import write_dataset, write_text
-from femgear.storage.results import finish, run_folder
+from femgear.storage.results import record, run_folder
 
 where, folder, force = sys.argv[1], Path(sys.argv[2]), sys.argv[3] == "force"
 
@@ -160,7 +161,7 @@ with run_folder(folder, force=force) as working:
     if where == "picture":
         write_text("png", working / "picture.png")
         kill()
-    finish(working, ["case.toml", "static.nc"], timings={}, convergence={})
+    record(working, ["case.toml", "static.nc"], timings={}, convergence={}, complete=True)
     last = {"publish": "static.nc", "manifest": "manifest.json"}.get(where)
     replace, os.replace = os.replace, lambda a, b: kill() if Path(b).name == last else replace(a, b)
     if where.startswith("clear"):

@@ -11,13 +11,13 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from edited_manifests import finish
 
 from femgear.errors import StorageError
 from femgear.storage import files
 from femgear.storage.files import checksum, list_own, read_dataset, write_csv, write_dataset, write_text
 from femgear.storage.results import (
     MANIFEST,
-    finish,
     folder_lock,
     prepare_output,
     read_manifest,

@@ -5,15 +5,14 @@ import stat
 import threading
 
 import pytest
-from edited_manifests import edit_manifest
+from edited_manifests import edit_manifest, finish
 
 from femgear.errors import StorageError
 from femgear.storage import files
-from femgear.storage.files import checksum, exclusive_lock, list_own, own_files, replace_file, write_text
+from femgear.storage.files import checksum, exclusive_lock, list_own, own_files, replaced_file, write_text
 from femgear.storage.results import (
     MANIFEST,
     additions,
-    finish,
     folder_lock,
     prepare_output,
     read_manifest,
@@ -80,7 +79,8 @@ def test_temporary_names_cannot_be_foretold_and_what_is_there_is_not_written_int
 ):
     seen = []
     for _ in range(2):
-        replace_file(tmp_path / "a.txt", lambda path: seen.append((path.name, path.stat().st_size)))
+        with replaced_file(tmp_path / "a.txt") as path:
+            seen.append((path.name, path.stat().st_size))
     assert seen[0] != seen[1] and all(size == 0 for _, size in seen)
     monkeypatch.setattr(files.secrets, "token_hex", lambda n: "0" * 2 * n)
     trap = tmp_path / f".femgear-{'0' * 16}.a.txt"
@@ -253,7 +253,7 @@ def test_a_folder_of_stages_that_somebody_made_is_refused_before_a_run(tmp_path)
 
 @pytest.mark.skipif(os.name == "nt", reason="no open file can be removed there")
 def test_what_a_living_process_writes_is_not_removed(results):
-    with files.replaced_file(results / "modes.nc") as new:
+    with replaced_file(results / "modes.nc") as new:
         new.write_text("whole")
         with folder_lock(results):
             pass
