@@ -239,7 +239,7 @@ def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
         tree = json.loads(arrays[0].tobytes())
         if tree["fingerprint"] == fingerprint:
             return _decoded(tree["result"], arrays[1:], {})
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, ImportError, BadZipFile):
+    except (ValueError, LookupError, TypeError, RecursionError, AttributeError, ImportError, BadZipFile):
         pass
     raise StorageError(
         "no result of this case", code="E-FORMAT", file=os.fspath(path), remedy="run the case again"
@@ -255,10 +255,12 @@ def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, A
     number = len(known)
     # the value itself is kept, so that no other one gets its id
     known[id(value)] = number, value
-    if isinstance(value, np.ndarray | np.generic) and value.dtype != object:
+    if type(value) is np.ndarray and value.dtype != object:
+        arrays.append(value)
+        return ["array", number, len(arrays) - 1, not value.flags.writeable]
+    if isinstance(value, np.generic):
         arrays.append(np.asarray(value))
-        fixed = not value.flags.writeable if isinstance(value, np.ndarray) else None
-        return ["array", number, len(arrays) - 1, fixed]
+        return ["generic", number, len(arrays) - 1]
     kind, parts = _parts(value)
     return [kind, number, *(_encoded(part, arrays, known) for part in parts)]
 
@@ -275,7 +277,7 @@ def _parts(value: Any) -> tuple[str, Sequence]:
     if kind.__module__ == "builtins" and kind.__name__ in _CONTAINERS:
         return kind.__name__, tuple(value.items() if isinstance(value, Mapping) else value)
     if kind.__module__.startswith("scipy.sparse") and value.format in ("csc", "csr"):
-        return "sparse", (kind.__name__, value.data, value.indices, value.indptr, value.shape)
+        return kind.__name__, (value.data, value.indices, value.indptr, value.shape)
     if is_dataclass(value):  # its fields alone, without what it has computed from them
         state = {one.name: getattr(value, one.name) for one in fields(value)}
     elif kind.__module__.startswith(_PACKAGE):
@@ -299,16 +301,16 @@ def _made(kind: str, parts: list, arrays: list[np.ndarray]) -> Any:
     """Make a value of its parts."""
     match kind:
         case "array":
-            array, fixed = arrays[parts[0]], parts[1]
-            if fixed is None:
-                return array[()]
-            array.setflags(write=not fixed)
+            array = arrays[parts[0]]
+            array.setflags(write=not parts[1])
             return array
+        case "generic":
+            return arrays[parts[0]][()]
         case "method":
             return getattr(*parts)
-        case "sparse":
-            name, *stored, shape = parts
-            return getattr(importlib.import_module("scipy.sparse"), name)(tuple(stored), shape=shape)
+        case "csc_array" | "csr_array" | "csc_matrix" | "csr_matrix":
+            *stored, shape = parts
+            return getattr(importlib.import_module("scipy.sparse"), kind)(tuple(stored), shape=shape)
         case "own":
             return _own_object(*parts)
     return _CONTAINERS[kind](parts)

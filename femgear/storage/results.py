@@ -134,22 +134,21 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
     """
     import pandas as pd
 
-    flat, tables = data.reset_coords(), {}
+    flat, names = data.reset_coords(), []
     single = [
         *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
         *(_attribute(str(name), value) for name, value in data.attrs.items()),
     ]
-    if single:
-        tables[()] = pd.DataFrame(single, columns=["name", "value", "unit"])
-    for dims in dict.fromkeys(one.dims for one in flat.values() if one.dims):
-        chosen = [name for name, one in flat.items() if one.dims == dims]
-        frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
-        tables[dims] = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
-    names = []
-    for dims, frame in tables.items():
+    for dims in dict.fromkeys([(), *(one.dims for one in flat.values())]):
+        if dims:
+            chosen = [name for name, one in flat.items() if one.dims == dims]
+            frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
+            frame = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
+        else:
+            frame = pd.DataFrame(single, columns=["name", "value", "unit"])
         if frame.empty:
             continue
-        names.append(checked_name("_".join((stage, *dims)) + ".csv"))
+        names.append(checked_name("_".join((stage, *map(str, dims))) + ".csv"))
         text = frame.select_dtypes(["object", "str"]).map(csv_cell)
         frame[text.columns] = text
         write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])
