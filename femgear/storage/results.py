@@ -362,7 +362,8 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
             yield prepare_output(running, case=case, force=True)
         except BaseException as error:
             # what a user interrupts goes on with the next run
-            if case is None or isinstance(error, Exception) or not read_manifest(running).files:
+            interrupted = case is not None and not isinstance(error, Exception)
+            if not (interrupted and (running / MANIFEST).is_file() and read_manifest(running).files):
                 remove_own(running)
             raise
         _publish(folder)

@@ -520,6 +520,16 @@ def test_a_folder_of_another_name_is_left_alone(results):
     assert all(contents(results)[name] == before[name] for name in before if name.startswith("."))
 
 
+def test_an_interrupt_before_the_first_manifest_is_told_as_such(results, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("femgear.storage.results.list_own", interrupt)
+    with pytest.raises(KeyboardInterrupt), run_folder(results, case="new", force=True):
+        pass
+    assert contents(results).keys() == {"case.toml", "static.nc", MANIFEST}
+
+
 def test_no_folder_is_left_behind(results):
     replaced(results)
     assert contents(results).keys() == {"case.toml", "static.nc", MANIFEST}
