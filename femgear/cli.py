@@ -12,6 +12,22 @@ import warnings
 from collections.abc import Iterator, Sequence
 
 _INTERRUPTED = 130
+_MEMORY = 600_000_000
+"""Memory that a process needs to load the libraries of a run [bytes]; with less they end or stop it."""
+_LOADING = "install femgear with its libraries; where memory is limited (ulimit -v, -d), raise the limit"
+
+with contextlib.suppress(ImportError):  # Windows has no such limits
+    import resource
+
+    for _limit, _option in ((resource.RLIMIT_AS, "-v"), (resource.RLIMIT_DATA, "-d")):
+        if 0 <= resource.getrlimit(_limit)[0] < _MEMORY:  # none is negative
+            sys.stderr.write(
+                "[E-MEMORY] this process may use too little memory\n"
+                f"  found:   {resource.getrlimit(_limit)[0] / 1e6:.0f} MB\n"
+                f"  allowed: {_MEMORY / 1e6:.0f} MB or more\n"
+                f"  remedy:  raise the limit (ulimit {_option})\n"
+            )
+            raise SystemExit(3)
 
 try:
     from pathlib import Path
@@ -25,6 +41,11 @@ try:
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
     raise SystemExit(_INTERRUPTED) from None
+except (ImportError, MemoryError) as error:
+    sys.stderr.write(
+        f"[E-LIBRARY] {type(error).__name__}: {' '.join(str(error).split())}\n  remedy:  {_LOADING}\n"
+    )
+    raise SystemExit(3) from None
 
 app = App(
     name="femgear",
@@ -179,7 +200,7 @@ def run(
     """
     from femgear.run import run_case
     from femgear.storage.files import resumable
-    from femgear.storage.results import run_folder
+    from femgear.storage.results import completed_since_now, run_folder
     from femgear.trains.reading import open_results, read_case
     from femgear.trains.registry import TRAINS, check_case, train_of
 
@@ -198,14 +219,15 @@ def run(
     train = train_of(data)
     _warn(train.case_warnings(data))
     place = run_folder(output, case=data.source, force=force)
-    with resumable(output), place as folder, Progress() as progress:
-        run_case(data, folder, only=only, pictures=pictures, progress=progress)
-    results = open_results(output)
-    _print(train.describe_results(results))
-    _warn(train.result_warnings(results))
-    _say(f"results: {output}")
-    if "report.html" in results.manifest.files:
-        _say(f"report:  {output / 'report.html'}")
+    with resumable(output, completed_since_now(output)):
+        with place as folder, Progress() as progress:
+            run_case(data, folder, only=only, pictures=pictures, progress=progress)
+        results = open_results(output)
+        _print(train.describe_results(results))
+        _warn(train.result_warnings(results))
+        _say(f"results: {output}")
+        if "report.html" in results.manifest.files:
+            _say(f"report:  {output / 'report.html'}")
     return 0
 
 
@@ -372,6 +394,8 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
             failure.remedy = "free some space where it goes, or send it elsewhere"
             code = _fail(failure)
         errors.flush()
+    if arguments is None:  # the process ends: nothing is left to interrupt but the interpreter
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     return code
 
 
@@ -416,7 +440,9 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
     except KeyboardInterrupt as interrupt:
         print(printable("; ".join(["interrupted", *getattr(interrupt, "__notes__", [])])), file=sys.stderr)
         return _INTERRUPTED
-    except MemoryError as error:
+    except (MemoryError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "new thread" not in str(error):
+            raise
         return _fail(
             FemgearError(
                 f"the memory of this machine does not suffice: {error}".removesuffix(": "),
@@ -424,6 +450,9 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
                 remedy="ask for fewer speeds, positions, harmonics or elements",
             )
         )
+    except ImportError as error:
+        message = f"a library cannot be loaded: {' '.join(str(error).split())}"
+        return _fail(FemgearError(message, code="E-LIBRARY", remedy=_LOADING))
     except OSError as error:
         return _fail(storage_error(error, error.filename))
 

@@ -53,6 +53,7 @@ CODES = {
     "E-JOURNAL": "The journal of a search or sweep is broken, or belongs to another one.",
     "E-KEY-MISSING": "A needed entry of the case file is missing.",
     "E-KEY-UNKNOWN": "The case file has a key that nobody reads.",
+    "E-LIBRARY": "A library that femgear needs cannot be loaded: not installed, or no memory for it.",
     "E-LOAD-BALANCE": "Constant loads do work on a motion that nothing holds.",
     "E-LOCKED": "Another run is writing into the folder.",
     "E-MASS": "A mass matrix is not positive definite.",

@@ -387,16 +387,54 @@ def test_an_interrupted_run_says_how_far_it_came(tmp_path, capsys, monkeypatch):
     assert results.static.sizes["planet"] == 3 and results.case.title == "Planetary set 27/40/108"
 
 
-def test_ctrl_c_while_the_program_is_loaded(tmp_path):
-    (tmp_path / "cyclopts.py").write_text("raise KeyboardInterrupt\n")
-    done = subprocess.run(
-        [sys.executable, "-c", "import sys; from femgear.cli import main; sys.exit(main())"],
-        env=os.environ | {"PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=False,
+def _started(program="import sys; from femgear.cli import main; sys.exit(main())", *words, **options):
+    return subprocess.run(
+        [sys.executable, "-c", program, *words], capture_output=True, text=True, check=False, **options
     )
-    assert done.returncode == 130 and done.stderr == "interrupted\n"
+
+
+@pytest.mark.parametrize(
+    ("failure", "code", "said"),
+    [
+        ("raise KeyboardInterrupt", 130, "interrupted\n"),
+        ("raise ImportError('libx.so: no such file')", 3, "[E-LIBRARY] ImportError: libx.so: no such file\n"),
+        ("raise MemoryError", 3, "[E-LIBRARY] MemoryError: \n"),
+    ],
+)
+def test_failures_while_the_program_is_loaded(tmp_path, failure, code, said):
+    (tmp_path / "cyclopts.py").write_text(f"{failure}\n")
+    done = _started(env=os.environ | {"PYTHONPATH": str(tmp_path)})
+    remedy = f"  remedy:  {cli._LOADING}\n" if code == 3 else ""
+    assert done.returncode == code and done.stderr == said + remedy
+
+
+@pytest.mark.parametrize("limit", ["RLIMIT_AS", "RLIMIT_DATA"])
+def test_a_process_that_may_use_too_little_memory_does_not_begin(limit):
+    resource = pytest.importorskip("resource")
+    number = getattr(resource, limit)
+    done = _started(preexec_fn=lambda: resource.setrlimit(number, (200_000_000, resource.RLIM_INFINITY)))
+    assert done.returncode == 3 and "[E-MEMORY]" in done.stderr and "found:   200 MB" in done.stderr
+    assert "ulimit" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_ctrl_c_when_the_command_has_ended_changes_nothing():
+    program = (
+        "import atexit, os, sys; from femgear.cli import main; atexit.register(os.kill, os.getpid(), 2);"
+        "sys.exit(main())"
+    )
+    done = _started(program, "--version")
+    assert done.returncode == 0 and not done.stderr
+
+
+def test_an_interrupt_behind_the_results_says_that_they_are_complete(tmp_path, capsys, pipeline, monkeypatch):
+    out = tmp_path / "out"
+    monkeypatch.setattr(cli, "_print", _interrupt)
+    assert cli.main(["run", str(CASE), "-o", str(out)]) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == f"interrupted; the results in {out} are complete"
+    pipeline(_interrupt)
+    assert cli.main(["run", str(CASE), "-o", str(out), "--force"]) == 130
+    said = f"interrupted; the same command goes on from what {out} holds"
+    assert capsys.readouterr().err.splitlines()[-1] == said
 
 
 def _diverge(*_, **__):
@@ -416,6 +454,14 @@ def _exhaust(*_, **__):
     np.empty(2**50)
 
 
+def _crowd(*_, **__):
+    raise RuntimeError("can't start new thread")
+
+
+def _lack(*_, **__):
+    raise ImportError("No module named 'h5py'")
+
+
 def _fill(*_, **__):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "static.nc")
 
@@ -425,6 +471,8 @@ def _fill(*_, **__):
     [
         (_diverge, 3, "no solution"),
         (_exhaust, 3, "E-MEMORY"),
+        (_crowd, 3, "E-MEMORY"),
+        (_lack, 3, "E-LIBRARY"),
         (_interrupt, 130, "interrupted"),
         (_terminate, 130, "interrupted"),
         (_fill, 4, "E-DISK-FULL"),

@@ -26,6 +26,9 @@ from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
 from femgear.storage.files import write_bytes, write_text
 
+if sys.platform == "linux":
+    import resource
+
 if TYPE_CHECKING:
     import pyvista as pv
 
@@ -42,6 +45,8 @@ _OUTLINE = {
 }
 _LARGEST = 0.03
 """Largest displacement of a picture as a share of the largest radius."""
+# address space that VTK needs before it has drawn anything [bytes]
+_MEMORY = 1_100_000_000
 _SECONDS = 6.0
 """Length of an animation."""
 _LARGEST_ANIMATED = 0.09
@@ -61,9 +66,11 @@ def load_pyvista():
     Raises
     ------
     FemgearError
-        ``E-SYSTEM-LIBRARY`` where the machine lacks the OpenGL library that drawing needs: VTK would
-        end the process without a word.
+        ``E-SYSTEM-LIBRARY`` where the machine lacks the OpenGL library that drawing needs, ``E-MEMORY``
+        where the memory of the process is limited too far: VTK would end it without a word.
     """
+    if "pyvista" not in sys.modules:
+        _refuse_little_memory()
     if sys.platform.startswith("linux"):
         if not _loads("libEGL.so.1"):
             raise FemgearError(
@@ -76,6 +83,22 @@ def load_pyvista():
     import pyvista
 
     return pyvista
+
+
+def _refuse_little_memory() -> None:
+    """Refuse to draw within less memory than VTK needs beside what the process has (``ulimit -v``)."""
+    if sys.platform != "linux":  # the others tell no use, or know no limit
+        return
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    used = int(Path("/proc/self/statm").read_text("ascii").split()[0]) * resource.getpagesize()
+    if 0 <= limit < used + _MEMORY:
+        raise FemgearError(
+            "pictures of grids need more memory than this process may use",
+            code="E-MEMORY",
+            value=f"{limit / 1e9:.1f} GB",
+            limit=f"{(used + _MEMORY) / 1e9:.1f} GB or more",
+            remedy="raise the limit (ulimit -v), or run with --no-pictures",
+        )
 
 
 def _loads(library: str) -> bool:

@@ -12,11 +12,13 @@ import hashlib
 import importlib
 import io
 import json
+import mmap
 import os
 import re
 import secrets
 import shutil
 import stat
+import struct
 import sys
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -138,6 +140,9 @@ def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object])
         try:
             # signals interrupt the main thread alone: raised within HDF5 they would be lost
             pool.submit(write, disk).result()
+        except RuntimeError as error:  # of HDF5 itself
+            remedy = "see that disk and memory suffice"
+            raise StorageError(str(error), file=os.fspath(path), remedy=remedy) from error
         finally:
             if disk.failure is not None:
                 raise disk.failure
@@ -585,12 +590,13 @@ def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def resumable(folder: Path) -> Iterator[None]:
-    """Say with an interruption of the block that the same command goes on from what a folder holds."""
+def resumable(folder: Path, complete: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    """Say with an interruption of the block how the command goes on, or that its results are complete."""
     try:
         yield
     except KeyboardInterrupt as interrupt:
-        interrupt.add_note(f"the same command goes on from what {folder} holds")
+        goes_on = f"the same command goes on from what {folder} holds"
+        interrupt.add_note(f"the results in {folder} are complete" if complete() else goes_on)
         raise
 
 
@@ -649,6 +655,8 @@ def _hostility(path: str | os.PathLike) -> str:
     """Tell why an HDF5 file is no result: it points out of itself, or holds what none has, as groups."""
     import h5py
 
+    if _heap_without_end(path):
+        return "holds a heap without end"
     size, declared = os.path.getsize(path), 0
     with h5py.File(path, "r") as file:
         for name in file:
@@ -663,3 +671,24 @@ def _hostility(path: str | os.PathLike) -> str:
                 return f"{name!a} has the type {item.dtype}"
             declared += item.size * item.dtype.itemsize
     return f"declares {declared:.3g} bytes in a file of {size}" if declared > 4 * size + _MARGIN else ""
+
+
+def _heap_without_end(path: str | os.PathLike) -> bool:
+    """Tell whether a global heap of an HDF5 file has empty space of no size: HDF5 would never leave it.
+
+    Source: HDF5 File Format Specification 3.0, III.E: a header, then objects of 16 bytes and their data.
+    """
+    if not os.path.getsize(path):
+        return False
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        start = data.find(b"GCOL\x01")
+        while 0 <= start <= len(data) - 16:
+            place, end = start + 16, min(start + struct.unpack_from("<8xQ", data, start)[0], len(data))
+            while place + 16 <= end:
+                number, size = struct.unpack_from("<H6xQ", data, place)
+                step = -(-size // 8) * 8 + 16 if number else size
+                if not step:
+                    return True
+                place += step
+            start = data.find(b"GCOL\x01", start + 1)
+    return False

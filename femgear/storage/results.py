@@ -369,6 +369,19 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
         _publish(folder)
 
 
+def completed_since_now(folder: str | os.PathLike) -> Callable[[], bool]:
+    """Make a function that tells whether a run into a folder was completed after this call."""
+
+    def written() -> tuple[int, int] | None:
+        with suppress(OSError):
+            found = os.stat(Path(folder) / MANIFEST)
+            return found.st_ino, found.st_mtime_ns
+        return None
+
+    before = written()
+    return lambda: written() != before and read_manifest(folder).complete
+
+
 @contextmanager
 def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
     """Lock a results folder: in this context no other process writes into it (readers need no lock).

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-# only libraries that are loaded can be limited to one thread, and SciPy brings a BLAS of its own
-import scipy.linalg  # noqa: F401
+import scipy.linalg
 
 from femgear.errors import FemgearError
 from femgear.report.tables import Block
@@ -41,7 +39,10 @@ def one_blas_thread() -> Iterator[None]:
     """
     from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(1):
+    with threadpool_limits(1):  # of the libraries that are loaded: SciPy brings a BLAS of its own
+        # OpenBLAS keeps the buffers that it takes now; where memory is short later, it would try without end
+        for solve in (np.linalg.solve, scipy.linalg.solve_triangular):
+            solve(np.eye(2), np.ones(2))
         yield
 
 

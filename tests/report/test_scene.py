@@ -99,6 +99,15 @@ def test_picture_of_a_deformed_grid(tmp_path):
     assert (image[:3] == 255).all()  # white border
 
 
+@pytest.mark.skipif(scene.sys.platform != "linux", reason="only Linux tells limit and use")
+def test_too_little_memory_is_said_before_vtk_ends_the_process(monkeypatch):
+    monkeypatch.delitem(scene.sys.modules, "pyvista", raising=False)
+    monkeypatch.setattr("resource.getrlimit", lambda _: (1_400_000_000, -1))
+    with pytest.raises(FemgearError, match="may use") as caught:
+        scene.load_pyvista()
+    assert caught.value.code == "E-MEMORY" and "--no-pictures" in caught.value.remedy
+
+
 def test_missing_opengl_library_is_named(monkeypatch):
     monkeypatch.setattr(scene.sys, "platform", "linux")
     monkeypatch.setattr(scene, "_loads", lambda name: False)

@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             state, given.folder, given.minutes, given.processes, (given.kind,) if given.kind else KINDS
         )
     if given.page:
-        write_page(state, given.page)
+        write_page(state, given.page, ROOT / "out" / "mutants" / "report.md")
     return code
 
 

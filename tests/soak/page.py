@@ -61,20 +61,23 @@ KNOWN = """## What may differ or fail, and why
   the table "Time" of the report, and nowhere else.
 * Other versions of NumPy, SciPy or Gmsh, and other processors, may round differently; the manifest names the
   versions.
-* Where the memory ends inside OpenBLAS, that library itself ends the process with exit code 1 and a line that
-  begins with "OpenBLAS error"; results on disk are whole, as after a kill.
+* With a limit below 600 MB (`ulimit -v`, `-d`) femgear does not begin: loading its libraries would end or
+  stop the process. Scripts import NumPy first, whose own message then comes. Where memory ends later,
+  E-MEMORY says so; within compiled libraries (BLAS, HDF5) it may also end the process; results on disk are
+  whole then, as after a kill.
 """
 # results of a kind that are listed
 _MOST = 40
 
 
-def write_page(state: State, path: Path) -> None:
-    """Write the page of the last commit of a state."""
-    path.write_text(page(state), encoding="utf-8")
+def write_page(state: State, path: Path, mutants: Path) -> None:
+    """Write the page of the last commit of a state, with the report of ``make mutants`` if there is one."""
+    report = mutants.read_text(encoding="utf-8") if mutants.exists() else ""
+    path.write_text(page(state, report), encoding="utf-8")
 
 
-def page(state: State) -> str:
-    """Make the text of the page."""
+def page(state: State, mutants: str = "") -> str:
+    """Make the text of the page, with the report of mutants as its last section but one."""
     if not state.records:
         return f"{HEAD}\nNothing has run yet.\n\n{KNOWN}"
     last = state.records[-1]["commit"]
@@ -89,6 +92,8 @@ def page(state: State) -> str:
     if count > len(failures):
         parts.append(f"{count} in all, of which {len(failures)} are listed.\n")
     parts.append("\n".join(map(_item, failures)) + "\n" if failures else "None.\n")
+    if mutants:
+        parts.append(mutants.replace("\n## ", "\n### ").replace("# Mutants", "## Mutants of the core"))
     return "\n".join([*parts, KNOWN])
 
 

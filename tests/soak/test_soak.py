@@ -119,7 +119,12 @@ def test_records_are_kept_and_pieces_go_on(tmp_path):
     records, total = state.State(path).of("case_text", "abc")
     assert len(records) == 3 and total.trials == 6 and total.failed == 3
     assert total.worst_seconds == [0.5, 3] and total.counts["kills"] == 6
-    text = page.page(again)
+    page.write_page(again, tmp_path / "page.md", tmp_path / "absent.md")
+    text = (tmp_path / "page.md").read_text()
+    assert (
+        page.page(again, "# Mutants\n\n| **all** | 7 |\n\n## Survivors\n\nNone.\n").count("\n### Survivors")
+        == 1
+    )
     assert (
         "`python tests/soak case_text 4: too slow`" in text
         and "| Case files | 3 | 6 | 3 | 0.50 (3) |" in text

@@ -98,6 +98,16 @@ def test_a_disk_that_fails_at_any_call_of_hdf5(tmp_path, monkeypatch, code, call
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_hdf5_cannot_do_is_a_storage_error(tmp_path, monkeypatch):
+    def fail(*_):
+        raise RuntimeError("Unspecified error in H5Pset_cache (return value <0)")
+
+    monkeypatch.setattr(files, "_to_netcdf", lambda _, path: files.write_hdf5(path, fail))
+    with pytest.raises(StorageError, match="H5Pset_cache") as info:
+        write_dataset(xr.Dataset(), tmp_path / "a.nc")
+    assert info.value.remedy == "see that disk and memory suffice" and not list(tmp_path.iterdir())
+
+
 def test_bytes_that_are_written_in_pieces_are_all_there(tmp_path):
     class Pieces(io.FileIO):
         def write(self, data):

@@ -195,6 +195,18 @@ def _group_loop(file, folder):
     file.create_group("x")["again"] = file["/"]
 
 
+def test_a_heap_that_hdf5_would_never_leave_is_refused(tmp_path):
+    path = tmp_path / "static.nc"
+    write_dataset(dataset(), path)
+    content = bytearray(path.read_bytes())
+    start = content.index(b"GCOL") + 16
+    content[start : start + 16] = bytes(16)
+    path.write_bytes(content)
+    with pytest.raises(StorageError, match="a heap without end") as info:
+        read_dataset(path)
+    assert info.value.code == "E-FORMAT"
+
+
 @pytest.mark.parametrize(
     "make", [_external_link, _soft_link, _external_storage, _virtual, _bomb, _compound, _group_loop]
 )

@@ -29,6 +29,7 @@ import os
 import resource
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -496,6 +497,12 @@ def equivalents(path: Path = EQUIVALENT) -> dict[tuple[str, str, str, str], str]
     return reasons
 
 
+def _commit() -> str:
+    """Name the commit of the tree, empty outside of git."""
+    words = ("git", "rev-parse", "--short", "HEAD")
+    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
+
+
 def report(results: dict[Mutant, dict], reasons: dict, seed: int) -> tuple[str, bool]:
     """A page of scores by module, survivors and equivalents; and whether the aims are met."""
 
@@ -522,7 +529,8 @@ def report(results: dict[Mutant, dict], reasons: dict, seed: int) -> tuple[str, 
     page = [
         "# Mutants",
         "",
-        f"Drawn with seed {seed}. Score: killed of those that are not equivalent; the time limit kills too.",
+        f"Single expressions of the core are changed, one at a time: commit {_commit()}, seed {seed}.",
+        "Score: killed of those that are not equivalent; the time limit kills too.",
         "",
     ]
     page += [f"| {head} |", "|" + "---|" * 8]

@@ -1,6 +1,8 @@
 """A train is one folder and one line in the registry: an oscillator with its own case file."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 from oscillator.stages import OSCILLATOR
@@ -76,3 +78,20 @@ def test_stages_are_solved_in_memory(path):
     assert list(solve(read_case(path), "modes")) == ["modes"]
     with pytest.raises(CaseError, match="no stage of an oscillator"):
         solve(read_case(path), "housing")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks /proc for the memory in use")
+def test_blas_that_finds_no_more_memory_does_not_hang():
+    program = """
+import resource
+import numpy as np
+from scipy.linalg import solve_triangular
+from femgear.trains.protocol import one_blas_thread
+with one_blas_thread():
+    used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + 2**24, resource.RLIM_INFINITY))
+    print(solve_triangular(np.eye(200), np.ones((200, 3))).sum(), (np.eye(200) @ np.eye(200)).sum())
+"""
+    options = {"capture_output": True, "text": True, "timeout": 20, "check": True}
+    done = subprocess.run([sys.executable, "-c", program], **options)
+    assert done.stdout.split() == ["600.0", "200.0"]
