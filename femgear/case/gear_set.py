@@ -158,16 +158,21 @@ def _normal_modules(case: Case) -> float:
     return 1.0 if case.helix_angle is None else math.cos(case.helix_angle)
 
 
+def _refusal(case: Case) -> str:
+    """Code of what is wrong with the gears of a case; empty where nothing is."""
+    try:
+        _checked_set(case)
+    except GeometryError as error:
+        return error.code
+    return ""
+
+
 def _name_backlash(error: GeometryError, case: Case) -> None:
     """Let a refusal of teeth that the backlash thins too far name it, and its largest value in whole um."""
 
     def code(steps: int) -> str:
         less = case.set.model_copy(update={"backlash": 1e-6 * steps})
-        try:
-            _checked_set(case.model_copy(update={"set": less}))
-        except GeometryError as other:
-            return other.code
-        return ""
+        return _refusal(case.model_copy(update={"set": less}))
 
     without = code(0)
     if error.code != without:
@@ -208,11 +213,7 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
         rack = rack_at(case, key).model_copy(update={"root_radius": steps / 1e4})
         gear = key.partition(".")[0]
         owner = {} if gear == "rack" else {gear: getattr(case, gear).model_copy(update={"rack": rack})}
-        try:
-            _checked_set(case.model_copy(update=owner or {"rack": rack}))
-        except GeometryError as other:
-            return other.code in codes
-        return False
+        return _refusal(case.model_copy(update=owner or {"rack": rack})) in codes
 
     first = bisect_left(range(round(1e4 * rack_at(case, key).root_radius)), True, key=refused)
     return (first - 1) / 1e4 if first else None

@@ -17,7 +17,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from femgear.case import text as case_text
-from femgear.case.quantities import ANGLE, LENGTH
+from femgear.case.quantities import ANGLE, LENGTH, wrong_length
 from femgear.case.sections import Case, RackSection
 from femgear.errors import MOST_SHOWN, CaseError, Finding, GeometryError, remark
 
@@ -94,8 +94,9 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
     if kind in ("too_long", "too_short"):
         many = kind == "too_long"
         limit = f"at most {context['max_length']}" if many else f"{context['min_length']} or more"
-        message = f"{context['actual_length']} entries are too {'many' if many else 'few'}"
-        return CaseError(message, code="E-RANGE", key=key, limit=limit)
+        error = wrong_length(context["actual_length"], limit, many=many)
+        error.key = key
+        return error
     return CaseError(f"not what is needed here: {item['msg'].lower()}", key=key, value=value)
 
 

@@ -105,6 +105,7 @@ def to_si(
     *,
     low: float = -math.inf,
     high: float = math.inf,
+    remedy: str | None = None,
 ) -> float:
     """Convert to SI a quantity such as ``"1.5 mm"``, ``"20 deg"`` or ``"1e-4 kg m^2"``.
 
@@ -115,6 +116,8 @@ def to_si(
         ``"5 Hz"`` passes as a speed of rotation nor ``"20 %"`` as an angle.
     low, high : float
         Plausible window, in ``dimension.si``.
+    remedy : str, optional
+        What to do about a value outside that no mistaken unit explains.
 
     Returns
     -------
@@ -152,7 +155,7 @@ def to_si(
             code="E-RANGE",
             value=value,
             limit=dimension.window(low, high),
-            remedy=_factor_hint(number, low, high, dimension, value),
+            remedy=_factor_hint(number, low, high, dimension, value) or remedy,
         )
     return number
 
@@ -268,12 +271,12 @@ class _Reader:
         return dict(self.schema)
 
 
-def Quantity(dimension: Dimension, low: float, high: float) -> _Reader:
+def Quantity(dimension: Dimension, low: float, high: float, *, remedy: str | None = None) -> _Reader:
     """Make the reader of a quantity given with its unit, an SI float in the model.
 
-    ``low`` and ``high`` are the ends of the plausible window in SI units.
+    ``low`` and ``high`` are the ends of the plausible window in SI units; ``remedy`` as in `to_si`.
     """
-    read = partial(to_si, dimension=dimension, low=low, high=high)
+    read = partial(to_si, dimension=dimension, low=low, high=high, remedy=remedy)
     schema = {
         "type": "string",
         "description": f"{dimension.name} with its unit, {dimension.window(low, high)}",
@@ -324,10 +327,18 @@ def at_most(count: int) -> BeforeValidator:
 
     def few(value: object) -> object:
         if isinstance(value, list) and len(value) > count:
-            raise CaseError(f"{len(value)} entries are too many", code="E-RANGE", limit=f"at most {count}")
+            raise wrong_length(len(value), f"at most {count}", many=True)
         return value
 
     return BeforeValidator(few)
+
+
+def wrong_length(length: int, limit: str, *, many: bool) -> CaseError:
+    """Make the refusal of a list with too many entries, or too few."""
+    message = f"{length} entries are too {'many' if many else 'few'}"
+    return CaseError(
+        message, code="E-RANGE", limit=limit, remedy="leave some out" if many else "add what is missing"
+    )
 
 
 PAIR, TRIPLE = (Values(min_length=count, max_length=count) for count in (2, 3))
@@ -345,7 +356,7 @@ def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
     return _Reader(rigid_too, {"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
 
 
-def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Reader:
+def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: str | None = None) -> _Reader:
     """Make the reader of a whole number within a window; 27.0, "27" and true are refused.
 
     Parameters
@@ -354,13 +365,15 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
         Why more is refused, for the message.
     signed : bool
         Accept the negative of the number too, as ISO 21771 writes the teeth of internal gears.
+    remedy : str, optional
+        What to do about a number outside.
     """
 
     def convert(value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
-            remedy = "write it without quotes" if isinstance(value, str) else None
+            plain = "write it without quotes" if isinstance(value, str) else None
             message = f"a whole number is needed, not {described(value)}"
-            raise CaseError(message, code="E-TYPE", value=value, limit=f"{low} to {high}", remedy=remedy)
+            raise CaseError(message, code="E-TYPE", value=value, limit=f"{low} to {high}", remedy=plain)
         number = abs(value) if signed else value
         if not low <= number <= high:
             why = note if number > high else ""
@@ -369,6 +382,7 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> _Read
                 code="E-RANGE",
                 value=found(value),
                 limit=f"{low} to {high}",
+                remedy=remedy,
             )
         return number
 

@@ -68,7 +68,12 @@ Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
 Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
 Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
 Shift = Annotated[float, Number(-5.0, 5.0)]
-_Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
+Teeth = Annotated[int, Count(4, 5000)]
+"""Of gears without a tooth form; `SunSection` and others say what their form allows."""
+FaceWidth = Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
+DampingRatio = Annotated[float, Number(0.0, 1.0, open_high=True)]
+_OTHER_FLANKS = "give speeds above zero: a negative torque loads the other flanks"
+Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM, remedy=_OTHER_FLANKS)]
 
 _MEASURED = ("file", "roll_angles", "diameters", "deviations")
 _PLACES = ("diameter", "roll_angle", "roll_length")
@@ -219,7 +224,7 @@ class SetSection(Section):
 
     planets: Annotated[int, Count(1, 1000)]
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-3, 10.0)] | None = None
-    face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
+    face_width: FaceWidth
     planet_angles: Annotated[tuple[Angle, ...], at_most(1000)] | None = None
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
     pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
@@ -352,9 +357,9 @@ def _speed_range(value: object) -> object:
 class _SpeedRange(Section):
     """Equally spaced speeds, both ends among them."""
 
-    start: _Speed = Field(alias="from")
-    to: _Speed
-    count: Annotated[int, Count(2, 100_000)]
+    start: Speed = Field(alias="from")
+    to: Speed
+    count: Annotated[int, Count(2, 100_000, remedy="take fewer; a single speed stands in a list")]
 
 
 class OperationSection(Section):
@@ -363,7 +368,7 @@ class OperationSection(Section):
     input: Member
     fixed: Member
     torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
-    speeds: Annotated[tuple[_Speed, ...], Values(max_length=100_000), BeforeValidator(_speed_range)]
+    speeds: Annotated[tuple[Speed, ...], Values(max_length=100_000), BeforeValidator(_speed_range)]
 
 
 class StaticSection(Section):
@@ -386,7 +391,7 @@ class DynamicsSection(Section):
     where neither is given it reaches so far that the level of the housing no longer changes.
     """
 
-    damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)] = 0.05
+    damping_ratio: DampingRatio = 0.05
     up_to: Annotated[float, Quantity(FREQUENCY, 10.0, 200e3)] | None = None
     mesh_harmonics: Annotated[int, Count(1, 512)] | None = None
     response_harmonics: Annotated[int, Count(1, 1000)] | None = None
@@ -396,7 +401,7 @@ class DynamicsSection(Section):
 class PublishedLines(Section):
     """Lines and lobes around a mesh harmonic that somebody published; the report compares them."""
 
-    speed: _Speed
+    speed: Speed
     harmonic: Annotated[int, Count(1, 1000)]
     orders: Annotated[tuple[Annotated[int, Count(0, 10_000_000)], ...], Values(min_length=1, max_length=20)]
     lobes: Annotated[int, Count(0, 10_000)] | None = None

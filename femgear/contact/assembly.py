@@ -196,7 +196,6 @@ class Candidates:
 
     Parameters
     ----------
-    setup, bodies : MeshWindows, Bodies
     position : (P,) int array
         Indices of the positions in `setup`.
     mesh : (W,) int array
@@ -302,7 +301,6 @@ def mesh_windows(
 
     Parameters
     ----------
-    planetary_set, bodies : PlanetarySet, Bodies
     share, nearest : float
         Mesh force that sizes the windows [N]; pairs are candidates whose separation exceeds that of the
         nearest pair of their mesh by less than `nearest` [m].
@@ -482,7 +480,6 @@ def contact_candidates(
 
     Parameters
     ----------
-    setup, bodies : MeshWindows, Bodies
     positions : (P,) int array
         Indices of the positions in `setup`.
     members : MovingMembers, optional

@@ -155,7 +155,6 @@ def make_bodies(
 
     Parameters
     ----------
-    sectors, material : Sectors, Material
     depth : float, optional
         Largest depth at which body and half plane are joined [m].
     ring_foundation : (2n, 2n) sparse matrix, optional
@@ -193,7 +192,6 @@ def flank_compliance(
     ----------
     grid : Grid
         Mirror-symmetric sector with boundaries ``flank_left``, ``cut_left``, ``cut_right`` and `held`.
-    gear, material : Gear, Material
     stiffness : (2n, 2n) sparse matrix
         Stiffness of the sector [N/m].
     held : str

@@ -200,7 +200,6 @@ def root_stress(
     grid : Grid
         Mirror-symmetric sector with boundaries ``flank_left``, ``fillet_left``, ``cut_left``, ``cut_right``
         and `held`.
-    gear, material : Gear, Material
     held : str, optional
         Boundary that cannot move; None when `support` holds the body.
     support : (2n, 2n) sparse matrix, optional

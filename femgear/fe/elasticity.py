@@ -79,7 +79,6 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
 
     Parameters
     ----------
-    grid, material : Grid, Material
     state : str or mapping of region to str
         ``"plane strain"`` or ``"plane stress"``.
     thickness : float or mapping of region to float
@@ -139,7 +138,6 @@ def foundation(grid: Grid, boundary: str, radial: float, tangential: float, *, t
 
     Parameters
     ----------
-    grid, boundary : Grid, str
     radial, tangential : float
         Moduli [N/m^3]: traction per displacement towards and around the origin, not negative.
     thickness : float
@@ -224,7 +222,6 @@ def tangential_stress(grid: Grid, material: Material, boundary, *, state: str) -
 
     Parameters
     ----------
-    grid, material : Grid, Material
     boundary : str or tuple of str
         Names of boundaries, each beginning where the one before ends; two edges or more in all.
     state : str

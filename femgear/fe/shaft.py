@@ -249,7 +249,6 @@ def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1
     ----------
     steps : sequence of ShaftStep
         From the held end to the coupled one.
-    material : Material
     refine : float
         Divides the element size.
 

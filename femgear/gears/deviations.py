@@ -188,7 +188,6 @@ def profile_separation(
 
     Parameters
     ----------
-    deviations, planetary_set : SetDeviations, PlanetarySet
     kind : int
         0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
     roll_1, roll_2 : arrays that broadcast
@@ -352,7 +351,6 @@ def mirrored_deviations(
 
     Parameters
     ----------
-    deviations, planetary_set : SetDeviations, PlanetarySet
     mirrored : PlanetarySet
         Planet angles ``2 psi_1 - psi``, ascending from the first planet.
     order : (N,) integer array

@@ -67,7 +67,6 @@ class Gear:
         [m]
     rim_radius : float
         Bore radius of an external, outer radius of an internal gear [m].
-    internal, rack : bool, BasicRack
     cutter : PinionCutter, optional
         For internal gears; None takes the cutter of `cutter_of`.
     tip_diameter, root_diameter : float, optional

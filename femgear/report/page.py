@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 _LARGEST_PICTURE = 8_000_000
 """Bytes of a picture on the page."""
 _OTHER = "Other pictures"
+"""Section of those that no stage describes."""
 # what HTML and UTF-8 do not hold, and what reverses the order of the text around it
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Section of those that no stage describes."""
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
 _STYLE = """
 body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;

@@ -31,6 +31,7 @@ from femgear.report.style import (
     rpm,
     xy,
 )
+from femgear.system.fourier import fluctuation
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -380,9 +381,7 @@ def some_at_a_time(dynamics: xr.Dataset) -> Iterator[xr.Dataset]:
 
 def fluctuation_rms(dynamics: xr.Dataset) -> np.ndarray:
     """Compute the RMS of the transmission errors less their means (speeds, meshes) [m]."""
-    fluctuating = dynamics["harmonic"].values > 0
-    squares = (np.abs(harmonics_of(one, "dte")[..., fluctuating]) ** 2 for one in some_at_a_time(dynamics))
-    return np.sqrt(0.5 * np.concatenate([one.sum(axis=2) for one in squares]))
+    return np.concatenate([fluctuation(harmonics_of(one, "dte")) for one in some_at_a_time(dynamics)])
 
 
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:

@@ -402,15 +402,11 @@ def look_down(plotter: pv.Plotter, half_height: float) -> None:
 
 def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
     """Render, close the plotter, and write the picture whole or not at all."""
-    import imageio.v3 as iio
-
     try:
         image = np.asarray(plotter.screenshot(filename=None, return_img=True))
     finally:
         plotter.close()
-    stream = io.BytesIO()
-    iio.imwrite(stream, image, extension=".png")
-    write_bytes(stream.getvalue(), path)
+    _write_image(path, image, extension=".png")
 
 
 def animate_operating_deflection(
@@ -625,8 +621,12 @@ def _plane(points) -> np.ndarray:
 
 def _write_gif(path, images) -> None:
     """Write the frames, whole or not at all."""
+    _write_image(path, images, extension=".gif", duration=1000.0 * _SECONDS / len(images), loop=0)
+
+
+def _write_image(path, image, **options) -> None:
     import imageio.v3 as iio
 
     stream = io.BytesIO()
-    iio.imwrite(stream, images, extension=".gif", duration=1000.0 * _SECONDS / len(images), loop=0)
+    iio.imwrite(stream, image, **options)
     write_bytes(stream.getvalue(), path)

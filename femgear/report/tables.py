@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.errors import Finding, remark
+from femgear.report.response import harmonics_of, some_at_a_time
+from femgear.system.fourier import fluctuation, sample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,6 +19,8 @@ MANY = 8
 """Rows of a table that shows the speeds, and speeds that a warning names."""
 _MODES = 16
 """Rows of the table of modes."""
+_NOTHING = 1e-3
+"""Pull that is no more than the end of the harmonics, in mean mesh forces."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,7 @@ def describe_response(data: xr.Dataset) -> Block:
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.2f}",
         "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.2f}",
         "excited up to [kHz]": lambda i: f"{data.excitation_limit.values[i] / 1e3:.2f}",
-        "DTE rms [um]": lambda i: f"{_largest_rms(data.isel(speed=i)) * 1e6:.4f}",
+        "DTE rms [um]": lambda i: f"{fluctuation(harmonics_of(data.isel(speed=i), 'dte')).max() * 1e6:.4f}",
         "method": lambda i: str(data.method.values[i]),
         "iterations": lambda i: str(int(data.iterations[i])),
         "radius": lambda i: f"{float(data.spectral_radius[i]):.4f}",
@@ -116,20 +120,16 @@ def describe_response(data: xr.Dataset) -> Block:
     return tabulate("Dynamics", chosen(data.sizes["speed"]), columns, notes)
 
 
-def _largest_rms(one: xr.Dataset) -> float:
-    """RMS of the transmission error [m] of one speed less its mean, the largest of all meshes."""
-    dte = np.hypot(one.dte_real.values, one.dte_imag.values)
-    return np.sqrt(0.5 * (dte[:, 1:] ** 2).sum(axis=1)).max()
-
-
 def chosen(count: int) -> Iterator[int]:
     """Choose all indices of a short list, the first and last of a long one."""
     return (i for i in range(count) if count <= MANY or i < MANY // 2 or i >= count - MANY // 2)
 
 
 def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """Name the speeds [rpm] whose periodic responses in dynamics.nc are not converged or not stable."""
+    """Name the speeds [rpm] of dynamics.nc at which meshes pull, and those not converged or not stable."""
     speed = data["speed"].values
+    pulls = [pulls_of(harmonics_of(one, "mesh_force")) for one in some_at_a_time(data)]
+    yield from pulling_meshes(speed, data["mesh"].values, pulls)
     for bad, text in (
         (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),
         (~data["stable"].values.astype(bool), "the periodic solution is unstable at"),
@@ -137,6 +137,57 @@ def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         if bad.any():
             rest = np.count_nonzero(bad) - MANY
             yield remark(f"{text} {first_speeds(speed[bad])}{f' and {rest} more speeds' if rest > 0 else ''}")
+
+
+def pulls_of(forces: np.ndarray) -> np.ndarray:
+    """Find the lowest force [N] and the share of the time with a pull, (2, n_speeds, n_meshes).
+
+    Of harmonics (n_speeds, n_meshes, H + 1) of mesh forces [N], whose springs know no contact loss.
+    """
+    found = np.empty((2, *forces.shape[:2]))
+    for s, harmonics in enumerate(forces):
+        record, nothing = sample(harmonics, 4 * harmonics.shape[-1]), _NOTHING * np.abs(harmonics[:, 0]).max()
+        found[:, s] = record.min(axis=-1), (record < -nothing).mean(axis=-1)
+    return found
+
+
+def pulling_meshes(rpm, names, pulls: Sequence[np.ndarray]) -> Iterator[Finding]:
+    """Warn where the force of a mesh turns into a pull.
+
+    Parameters
+    ----------
+    rpm, names : (n_speeds,) and (n_meshes,) arrays
+        Speeds of the input [rpm], of which the first ones are known, and names of the meshes.
+    pulls : sequence of arrays
+        From `pulls_of`, for some speeds after the other.
+    """
+    least, share = np.concatenate(pulls, axis=1)
+    pulling, rpm = share.any(axis=1), rpm[: len(share)]
+    if pulling.any():
+        s = int(np.nanargmin(least.min(axis=1)))
+        more = f"; meshes pull at {pulling.sum()} of the {len(rpm)} speeds: {first_speeds(rpm[pulling])}"
+        remedy = "raise the damping, leave these speeds out, or let meshes lose contact in a section [planar]"
+        yield pull(f"at {rpm[s]:.6g} rpm", names, least[s], share[s], more=more, remedy=remedy)
+
+
+def pull(where: str, names, least, share, *, more: str = "", remedy: str) -> Finding:
+    """Make the warning of forces of linear meshes that turn into pulls (W-PULL), with the largest of them.
+
+    Parameters
+    ----------
+    where : str
+        Speed or variant at which they do.
+    names, least, share : (n_meshes,) arrays
+        Names of the meshes, their lowest forces [N] and shares of the time with a pull.
+    more : str
+        What else is to be said of it.
+    """
+    mesh = int(np.argmin(least))
+    text = (
+        f"{where}: {names[mesh]} pulls for {share[mesh]:.2%} of the time, with up to "
+        f"{-1e-3 * least[mesh]:.4g} kN: real teeth would part{more}"
+    )
+    return Finding("W-PULL", "", text, remedy=remedy)
 
 
 def first_speeds(speeds: np.ndarray) -> str:

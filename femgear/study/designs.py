@@ -217,7 +217,6 @@ class Designs:
 
     Attributes
     ----------
-    case, journal : Case, Journal
     seconds : float
         What the designs computed now took, all together.
     """
@@ -363,7 +362,6 @@ class Evaluations:
 
     Attributes
     ----------
-    problem, designs : Problem, Designs
     best : (x, cost)
         The best point of the objective so far; infinite cost before any.
     course : list of float

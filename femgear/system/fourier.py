@@ -72,6 +72,11 @@ def sample(amplitudes, positions: int) -> np.ndarray:
     return np.fft.irfft(spectrum, n=positions, axis=-1)
 
 
+def fluctuation(lines: np.ndarray) -> np.ndarray:
+    """Compute the root mean square (...) about the mean of lines (..., L), mean first."""
+    return np.sqrt(0.5 * (np.abs(lines[..., 1:]) ** 2).sum(axis=-1))
+
+
 def pad(amplitudes: np.ndarray, count: int) -> np.ndarray:
     """Fill the harmonics ``amplitudes`` (..., h + 1) up with zeros, or cut them, to (..., count + 1)."""
     out = np.zeros((*amplitudes.shape[:-1], count + 1), dtype=complex)

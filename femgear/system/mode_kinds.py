@@ -64,7 +64,6 @@ def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, plane
         Mode shapes.
     mass : (n,) array
         Diagonal mass matrix [kg, kg m^2].
-    dofs : tuple of str
     frequency : (m,) array
         [Hz], zero for rigid-body modes.
     ring_diameter : (n_ring,) int array

@@ -306,7 +306,6 @@ class NonlinearSystem:
         ``W`` holds one column for every deflection of an element.
     elements : tuple of Element
         They may share columns; their forces add.
-    forces : tuple of HarmonicForce
     speed : float
         Speed that multiplies the gyroscopic matrix [rad/s].
     """

@@ -115,7 +115,6 @@ def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
 
     Parameters
     ----------
-    folder : path-like
     partial : bool
         Accept the results of an interrupted run.
 

@@ -31,7 +31,6 @@ def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:
 
     Parameters
     ----------
-    case : case of any train
     only : str, optional
         Last stage; it is computed with what it needs, whatever the case says of it.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -183,10 +183,12 @@ def member_speeds(case: Case, gears: PlanetarySet, speed: float = 1.0) -> Speeds
     return speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
 
 
-def at_speeds(case: AnyCase, speeds: Iterable[float]) -> AnyCase:
-    """Make the case that has these speeds of the input member [rad/s] and no others."""
-    operation = case.operation.model_copy(update={"speeds": tuple(map(float, speeds))})
-    return case.model_copy(update={"operation": operation})
+def parts_of_speeds(case: AnyCase, count: int) -> Iterator[tuple[np.ndarray, AnyCase]]:
+    """Split the speeds of a case into parts: their numbers, and the case that has them alone."""
+    speeds = case.operation.speeds
+    for own in np.array_split(np.arange(len(speeds)), count):
+        operation = case.operation.model_copy(update={"speeds": tuple(speeds[i] for i in own)})
+        yield own, case if count == 1 else case.model_copy(update={"operation": operation})
 
 
 def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:

@@ -522,6 +522,21 @@ def test_integers_are_shown_as_numbers(tmp_path):
     assert "found:   99\n" in str(refused(replaced("format = 1", "format = 99"), tmp_path))
 
 
+@pytest.mark.parametrize(
+    ("speeds", "remedy"),
+    [
+        (["100 rpm", "0 rpm"], "a negative torque loads the other flanks"),
+        ({"from": "-5 rpm", "to": "100 rpm", "count": 3}, "give speeds above zero"),
+        ([f"{speed} rpm" for speed in range(1, 100_002)], "leave some out"),
+        ({"from": "1 rpm", "to": "2 rpm", "count": 100_001}, "take fewer"),
+        ({"from": "1 rpm", "to": "2 rpm", "count": 1}, "a single speed stands in a list"),
+    ],
+)
+def test_refused_speeds_come_with_what_to_do(speeds, remedy):
+    error = changed("operation.speeds", speeds)
+    assert error.code == "E-RANGE" and remedy in error.remedy
+
+
 def test_empty_orders_and_entries_that_are_no_tables(tmp_path):
     error = refused(replaced("orders = [105, 111]", "orders = []"), tmp_path)
     assert error.code == "E-RANGE" and "0 entries are too few" in str(error) and "Tuple" not in str(error)

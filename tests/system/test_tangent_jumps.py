@@ -42,6 +42,23 @@ def test_every_step_is_found(steps, wave):
     assert found == pytest.approx(sorted(steps), abs=2e-13)
 
 
+@pytest.mark.parametrize(
+    ("steps", "seen"),
+    [
+        ({0.3001: 0.5, 0.3004: -0.5}, []),
+        # of five equal steps in neighbouring intervals the outer ones
+        ({0.3 + k * WIDTH: 0.1 for k in range(5)}, [0.3, 0.3 + 4 * WIDTH]),
+        # a tenth of the smooth change: 0.1 * 2 pi * 0.4 / 512 = 5e-4
+        ({0.123: 3e-4}, []),
+        ({0.123: 1e-3}, [0.123]),
+        ({0.2: 1.0, 0.5: 1e-9}, [0.2]),
+    ],
+)
+def test_steps_that_the_search_cannot_see_are_those_that_its_docstring_names(steps, seen):
+    (found,) = tangent_jumps(staircase(steps, wave=0.4), np.array([0]))
+    assert found == pytest.approx(seen, abs=2e-13)
+
+
 @pytest.mark.parametrize("place", [0.0, 5e-14, 1.0 - 5e-14])
 def test_a_step_at_the_ends_of_the_period_is_left_out(place):
     (found,) = tangent_jumps(staircase({place: 0.5, 0.4: -0.5}), np.array([0]))

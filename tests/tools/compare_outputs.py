@@ -98,6 +98,7 @@ MASKS = {
     "version, journal": Mask(r'"femgear": "[\w.+]+"', r"[\w.+]+(?=\"$)", ""),
     # of files that are compared themselves, and that hold run times
     "checksums, manifest": Mask(r'"files": \{[^}]*\}', r"\b[0-9a-f]{64}\b", ""),
+    "checksum of the manifest": Mask(r'(?m)^ "checksum": "[0-9a-f]{64}"$', r"[0-9a-f]{64}", ""),
     "checksums, report": Mask(r"(?s)<h3>Files</h3>.*?</table>", r"\b[0-9a-f]{64}\b", ""),
     "pictures, report": Mask(r'src="data:[^"]*"', r"base64,[^\"]*", ""),
     "place of a warning in the code": Mask(r"\(\w*Warning, [^()]*:\d+\)", r", .*:\d+", ""),

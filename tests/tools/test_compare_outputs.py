@@ -34,6 +34,7 @@ MANIFEST = {
     "timings": {"static": 2.345310505999805},
     "convergence": {"residual": 6.5e-16},
     "versions": {"femgear": "0.1.0"},
+    "checksum": "0" * 64,
 }
 
 
@@ -126,6 +127,7 @@ def test_run_times_versions_and_checksums_are_masked(compared):
         "timings": {"static": 11},
         "files": {"static.nc": "f" * 64},
         "versions": {"femgear": "2"},
+        "checksum": "f" * 64,
     }
     table = TABLE.replace("2.35", "12.35").replace(" ─────────────────\n", " ──────────────────\n")
     assert compared(table=table, manifest=changed).different == []

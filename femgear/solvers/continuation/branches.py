@@ -47,7 +47,6 @@ class Branch:
 
     Parameters
     ----------
-    solutions : tuple of PeriodicSolution
     curve : Curve
         The unknowns, limit points and branch points.
     equations : ContinuationProblem

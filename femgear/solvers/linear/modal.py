@@ -53,7 +53,6 @@ class ComplexModes:
         Whether the conjugate pole belongs to it.
     speed : float
         That multiplies the gyroscopic matrix [rad/s].
-    dofs : tuple of str
     """
 
     eigenvalue: NDArray[np.complex128]

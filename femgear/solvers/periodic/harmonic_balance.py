@@ -108,7 +108,6 @@ def displacements(
 
     Parameters
     ----------
-    problem, solution : NonlinearSystem, PeriodicSolution
     outputs : (n_outputs, n) array, optional
         ``L``; all degrees of freedom when not given.
     reduction : Reduction, optional

@@ -7,7 +7,7 @@ fixed point or directly; meshes that repeat others later in time are solved once
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import linalg as sparse_linalg
@@ -315,7 +315,7 @@ def spectral_radius(problem: HarmonicProblem, *, exact_limit: int = 80) -> np.nd
 
     Eigenvalues of the full matrices of at most `exact_limit` rows; otherwise the largest Ritz value of 20
     Arnoldi steps from one random vector (Saad, Numerical Methods for Large Eigenvalue Problems, algorithm
-    6.1), all speeds together but none dependent on the others.
+    6.1), all speeds together; but for rounding none depends on the others.
     """
     n, speeds, size = problem.source.shape
     if 2 * n * size <= exact_limit:
@@ -356,13 +356,13 @@ def _response(frequency, found, method: str, tolerance: float, periods: int) -> 
         array[~converged] = np.nan
     tail = np.where(converged, tail, np.nan)
     lowest = sample(force, 4 * force.shape[-1]).min(axis=(1, 2))
-    return Response(
+    response = Response(
         mesh_frequency=frequency, deflection=deflection, force=force, modal=modal, converged=converged,
         residual=residual, iterations=iterations, spectral_radius=radius, tail=tail,
         method=tuple("direct" if flag else "fixed point" for flag in direct),
-        lowest_force=lowest, message=_message(frequency, converged, direct, radius, tail, lowest),
-        periods=periods,
+        lowest_force=lowest, message="", periods=periods,
     )  # fmt: skip
+    return replace(response, message=joint_message([response]))
 
 
 def _check_harmonics(excitation_harmonics: np.ndarray, response_harmonics: np.ndarray) -> None:
@@ -511,17 +511,12 @@ def _tail(deflection: np.ndarray) -> np.ndarray:
 
 
 def joint_message(responses: Sequence[Response]) -> str:
-    """Write the message of the responses at some speeds each as if all had been solved together."""
+    """Write what is to be said of responses, each at some speeds: the method, and everything doubtful."""
     names = ("mesh_frequency", "converged", "spectral_radius", "tail", "lowest_force")
     frequency, converged, radius, tail, lowest = (
         np.concatenate([getattr(one, name) for one in responses]) for name in names
     )
     direct = np.concatenate([np.array(one.method) == "direct" for one in responses])
-    return _message(frequency, converged, direct, radius, tail, lowest)
-
-
-def _message(frequency, converged, direct, radius, tail, lowest) -> str:
-    """One sentence on the method, and one for everything that deserves doubt."""
     parts = [
         f"{len(frequency)} speeds: fixed point at {int(np.sum(~direct & converged))}, direct solution at "
         f"{int(np.sum(direct))}; largest spectral radius {np.max(radius):.3g} "

@@ -156,7 +156,6 @@ def trajectory(
         Relative local error, and absolute of ``scale``, the size of the motion [m].
     events : bool
         Stop at every contact change and at every break of a step series.
-    max_steps : int
 
     Raises
     ------

@@ -20,7 +20,6 @@ from femgear.case.quantities import (
     ACCELERATION,
     FREQUENCY,
     LENGTH,
-    SPEED,
     TIME,
     TORQUE,
     Count,
@@ -30,7 +29,7 @@ from femgear.case.quantities import (
     Title,
     Values,
 )
-from femgear.case.sections import FORMAT
+from femgear.case.sections import FORMAT, DampingRatio, Speed
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError, Finding
 from femgear.trains.drivetrain.parts import (
@@ -99,7 +98,7 @@ class TorqueSection(Section):
 class OperationSection(Section):
     """Speed of the first body at the start, and the torques."""
 
-    speed: Annotated[float, Quantity(SPEED, 1e-3 * SPEED.scale, 1e6 * SPEED.scale)]
+    speed: Speed
     torque: Annotated[tuple[TorqueSection, ...], Field(max_length=_MOST_PARTS)] = ()
 
 
@@ -111,7 +110,7 @@ class SimulationSection(Section):
     record: Annotated[float, Quantity(FREQUENCY, 1.0, FASTEST_RATE)] | None = None
     start: Literal["static", "zero"] = "static"
     harmonics: Annotated[int, Count(1, 200)] = 15
-    damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)] = 0.0
+    damping_ratio: DampingRatio = 0.0
     turning: StrictBool = True
     torsional: StrictBool = False
     contact_loss: StrictBool = False

@@ -226,7 +226,6 @@ class MeshGeometry:
 
     Parameters
     ----------
-    names : tuple of str
     basic : (n, m) array
         ``U``, among all coordinates or the free ones.
     fixed : (m, n_meshes) array

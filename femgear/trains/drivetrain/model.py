@@ -459,7 +459,6 @@ def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duratio
     ----------
     train : Drivetrain
         Stages whose driver is given keep it.
-    torques : sequence of TorqueHistory
     duration : float
         Of the run [s].
 

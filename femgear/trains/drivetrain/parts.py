@@ -34,7 +34,7 @@ from femgear.case.quantities import (
     StiffnessOrRigid,
     Values,
 )
-from femgear.case.sections import Angle, PressureAngle
+from femgear.case.sections import Angle, PressureAngle, Teeth
 from femgear.case.text import described
 from femgear.errors import CaseError
 from femgear.fe import shaft as shafts
@@ -90,7 +90,6 @@ Radius = Annotated[float, Quantity(LENGTH, 1e-4, 100.0)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 1e3)]
 Offset = Annotated[float, Quantity(LENGTH, -100.0, 100.0)]
 Module = Annotated[float, Quantity(LENGTH, 5e-5, 0.5)]
-Teeth = Annotated[int, Count(4, 5000)]
 Joint = Annotated[float, StiffnessOrRigid(TORSION, 1e-3, 1e15)]
 BOTH = BeforeValidator(_two)
 """Of entries of the first and the second body, in `Annotated`."""
@@ -331,10 +330,6 @@ class Drivetrain:
 
     Parameters
     ----------
-    bodies : tuple of BodySection
-    shafts : tuple of ShaftSection
-    parallel : tuple of ParallelSection
-    planetary : tuple of PlanetarySection
     bearings : tuple of BearingSection
         Several of a body add.
     gravity : float

@@ -15,7 +15,7 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
-from femgear.report.tables import Block, describe_modes, tabulate
+from femgear.report.tables import Block, describe_modes, pull, tabulate
 from femgear.storage.results import coordinates, dataset, mode_entries
 from femgear.trains.drivetrain.case_file import DrivetrainCase, torque_histories
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
@@ -303,14 +303,8 @@ def transient_warnings(data: xr.Dataset) -> Iterator[Finding]:
     pulling, least = data["pulling"].values, data["least_force"].values
     for v, variant in enumerate(data["variant"].values):
         if pulling[v].any() and least[v].min() < -_NOTHING and not separating(data):
-            worst, lowest = int(np.argmax(pulling[v])), int(np.argmin(least[v]))
-            beside = "" if lowest == worst else f" {data['mesh'].values[lowest]}"
-            text = (
-                f"{variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the "
-                f"time,{beside} with up to "
-                f"{-1e-3 * least[v, lowest]:.4g} kN: real teeth would part (simulation.contact_loss)"
-            )
-            yield Finding("W-PULL", "", text)
+            remedy = "simulation.contact_loss = true lets them"
+            yield pull(str(variant), data["mesh"].values, least[v], pulling[v], remedy=remedy)
     for variant, lost in zip(data["variant"].values, data["lost"].values):
         if names := [str(mesh) for mesh, share in zip(data["mesh"].values, lost) if share >= 1.0]:
             text = f"{variant}: the teeth of {', '.join(names)} never touch and transmit nothing"

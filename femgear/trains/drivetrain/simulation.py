@@ -81,7 +81,6 @@ class DrivetrainRun:
     ----------
     time : (n,) array
         [s]
-    outputs : tuple of str
     motion, velocity : (n, n_outputs) arrays
         Deviations from the free spin [m, rad].
     approach, force : (n, n_meshes) arrays

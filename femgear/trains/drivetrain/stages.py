@@ -233,7 +233,6 @@ def line_amplitudes(signal, angle, speed, lines, *, record_rate: float) -> np.nd
         Records of equal distance in time.
     angle, speed : (n,) arrays
         Of the first body [rad], [rad/s].
-    lines : sequence of MeshLine
     record_rate : float
         [Hz]
     """

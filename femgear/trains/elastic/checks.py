@@ -7,7 +7,7 @@ afterwards a warning says what the housing would feel beyond the excitation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,9 +18,7 @@ from femgear.case.quantities import RPM
 from femgear.case.sections import Case, output_member
 from femgear.errors import CaseError, Finding
 from femgear.gears.kinematics import torques
-from femgear.report.response import harmonics_of, some_at_a_time
-from femgear.report.tables import first_speeds, response_warnings
-from femgear.system.fourier import sample
+from femgear.report.tables import response_warnings
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
 from femgear.trains.static.description import set_warnings
@@ -37,8 +35,6 @@ _CHECKED = 12
 """Speeds at which the level is computed again, at most."""
 NOTICEABLE = 1.0
 """Change of the level that is worth a warning [dB]."""
-_NOTHING = 1e-3
-"""Pull that is no more than the end of the harmonics, in mean mesh forces."""
 MOST_WINDING = 1.0
 """Angle between the ends of a coupling that is worth a warning [rad]."""
 
@@ -230,43 +226,7 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if "level_change" in data:
         change, limit = data["level_change"].values, data["excitation_limit"].values
         yield from missing_level(data["speed"].values, change, limit, float(data.attrs["compared_to"]))
-    pulls = [pulls_of(harmonics_of(one, "mesh_force")) for one in some_at_a_time(data)]
-    yield from pulling_meshes(data["speed"].values, data["mesh"].values, pulls)
     yield from response_warnings(data)
-
-
-def pulls_of(forces: np.ndarray) -> np.ndarray:
-    """Find the lowest force [N] and the share of the time with a pull, (2, n_speeds, n_meshes).
-
-    Of harmonics (n_speeds, n_meshes, H + 1) of mesh forces [N], whose springs know no contact loss.
-    """
-    found = np.empty((2, *forces.shape[:2]))
-    for s, harmonics in enumerate(forces):
-        record, nothing = sample(harmonics, 4 * harmonics.shape[-1]), _NOTHING * np.abs(harmonics[:, 0]).max()
-        found[:, s] = record.min(axis=-1), (record < -nothing).mean(axis=-1)
-    return found
-
-
-def pulling_meshes(rpm, names, pulls: Sequence[np.ndarray]) -> Iterator[Finding]:
-    """Warn where the force of a mesh turns into a pull.
-
-    Parameters
-    ----------
-    rpm, names : (n_speeds,) and (n_meshes,) arrays
-        Speeds of the input [rpm], of which the first ones are known, and names of the meshes.
-    pulls : sequence of arrays
-        From `pulls_of`, for some speeds after the other.
-    """
-    least, share = np.concatenate(pulls, axis=1)
-    pulling, rpm = share.any(axis=1), rpm[: len(share)]
-    if pulling.any():
-        s, mesh = np.unravel_index(least.argmin(), least.shape)
-        text = (
-            f"{names[mesh]} pulls for {share[s, mesh]:.2%} of the time at {rpm[s]:.6g} rpm, with up to "
-            f"{-1e-3 * least[s, mesh]:.4g} kN: real teeth would part; meshes pull at {pulling.sum()} of the "
-            f"{len(rpm)} speeds: {first_speeds(rpm[pulling])}"
-        )
-        yield Finding("W-PULL", "", text, remedy="in the section [planar] meshes lose contact")
 
 
 def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[Finding, ...]:

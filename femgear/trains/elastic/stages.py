@@ -46,7 +46,7 @@ from femgear.housing.sensor import (
     fixed_sensor_signal,
     heaviside_linear_lines,
 )
-from femgear.report.tables import describe_modes, describe_response
+from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
@@ -65,8 +65,6 @@ from femgear.trains.elastic.checks import (
     fastest_mesh_frequency,
     max_nodal_diameter,
     missing_level,
-    pulling_meshes,
-    pulls_of,
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
@@ -97,7 +95,7 @@ from femgear.trains.protocol import (
     response_verdict,
     silent,
 )
-from femgear.trains.rigid import at_speeds, member_speeds
+from femgear.trains.rigid import member_speeds, parts_of_speeds
 from femgear.trains.static.description import describe_set
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS, case_supports, mesh_backlash, ring_foundation
@@ -425,6 +423,8 @@ def dynamics_parts(
 ) -> Iterator[tuple[Case, DynamicsResult]]:
     """Solve as `solve_dynamics` for some speeds after the others, each with the case that has them alone.
 
+    The numbers are those of all speeds at once but for rounding.
+
     Parameters
     ----------
     memory : float
@@ -455,15 +455,13 @@ def dynamics_parts(
     names, pulls = mesh_names(len(basis.mesh_stiffness) // 2), list[np.ndarray]()
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     size = len(speeds) * _harmonic_size(case) * limit.response.max()
-    for own in np.array_split(np.arange(len(speeds)), min(max(math.ceil(size / memory), 1), len(speeds))):
-        whole = len(own) == len(speeds)
-        if not whole or len(own) > len(some):
+    for own, part in parts_of_speeds(case, min(max(math.ceil(size / memory), 1), len(speeds))):
+        if len(own) < len(speeds) or len(own) > len(some):
             response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
         pulls.append(pulls_of(response.force))
-        if not whole:
+        if part is not case:
             response = replace(response, message=joint_message(told))
-        part = case if whole else at_speeds(case, speeds[own])
         dte, field = mesh_and_ring_outputs(modes, response)
         yield (
             part,

@@ -22,7 +22,7 @@ from femgear.case.quantities import (
     Title,
     Values,
 )
-from femgear.case.sections import FORMAT, Angle, Inertia, Mass, Radius, Stiffness
+from femgear.case.sections import FORMAT, Angle, DampingRatio, Inertia, Mass, Radius, Stiffness, Teeth
 from femgear.case.text import ReadCase
 from femgear.errors import CaseError
 from femgear.trains.gear_pair.model import ImpactPair, PairBearings
@@ -35,14 +35,14 @@ _MOST_WAVES = 50
 class GearsSection(Section):
     """The driving and the driven gear: two entries of each."""
 
-    teeth: Annotated[tuple[Annotated[int, Count(4, 5000)], ...], PAIR]
+    teeth: Annotated[tuple[Teeth, ...], PAIR]
     inertia: Annotated[tuple[Inertia, ...], PAIR]
     base_radii: Annotated[tuple[Radius, ...], PAIR]
     eccentricity: Annotated[tuple[Annotated[float, Quantity(LENGTH, 0.0, 0.01)], ...], PAIR] = (0.0, 0.0)
     eccentricity_angles: Annotated[tuple[Angle, ...], PAIR] = (0.0, 0.0)
     mass: Annotated[tuple[Mass, ...], PAIR] | None = None
     bearing_stiffness: Annotated[tuple[Stiffness, ...], PAIR] | None = None
-    bearing_damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)] = 0.0
+    bearing_damping_ratio: DampingRatio = 0.0
 
 
 class MeshSection(Section):
@@ -54,7 +54,7 @@ class MeshSection(Section):
     ] = ()
     stiffness_angles: Annotated[tuple[Angle, ...], Values(max_length=_MOST_WAVES)] = ()
     backlash: Annotated[float, Quantity(LENGTH, 1e-7, 0.05)]
-    damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)]
+    damping_ratio: DampingRatio
     error: Annotated[
         tuple[Annotated[float, Quantity(LENGTH, -1e-3, 1e-3)], ...], Values(max_length=_MOST_WAVES)
     ] = ()

@@ -145,7 +145,6 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
 
     Parameters
     ----------
-    case : Case
     gears : PlanetarySet
         Of the transverse section.
     mesh_stiffness : (2N,) array, optional

@@ -52,11 +52,11 @@ from femgear.trains.protocol import (
     silent,
 )
 from femgear.trains.rigid import (
-    at_speeds,
     driving_torque,
     gear_set_modes,
     member_speeds,
     needed,
+    parts_of_speeds,
     rotation_sense,
 )
 from femgear.trains.static.description import describe_set, set_warnings
@@ -156,13 +156,17 @@ def solve_helical_dynamics(
 def helical_dynamics_parts(
     case: HelicalCase, modes: HelicalModesResult, *, progress: Progress = silent, most: int = _TOGETHER
 ) -> Iterator[tuple[HelicalCase, HelicalDynamicsResult]]:
-    """Solve as `solve_helical_dynamics` for ``most`` speeds after the others, with the case of each."""
+    """Solve as `solve_helical_dynamics`, but for rounding, for ``most`` speeds after the others.
+
+    Each result comes with the case that has these speeds alone.
+    """
     if modes.excitation is None:
         remedy = "leave it out: the static solution then gives a stiffness that varies"
         raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness", remedy=remedy)
-    speeds, told = np.array(case.operation.speeds), list[Response]()
-    for own in np.array_split(speeds, -(-len(speeds) // most)):
-        turning = tuple(member_speeds(case, modes.planetary_set, float(speed)) for speed in own)
+    count, told = len(case.operation.speeds), list[Response]()
+    for own, part in parts_of_speeds(case, -(-count // most)):
+        speeds = part.operation.speeds
+        turning = tuple(member_speeds(case, modes.planetary_set, speed) for speed in speeds)
         frequency = np.array([one.mesh_frequency for one in turning])
         response = solve_spectral(
             modes.modes,
@@ -178,9 +182,8 @@ def helical_dynamics_parts(
         told.append(response.without_lines())
         loads = _loads(modes, response)
         response = replace(response, message=joint_message(told))
-        part = case if len(own) == len(speeds) else at_speeds(case, own)
-        yield part, HelicalDynamicsResult(modes, own, turning, response, verdict, loads)
-        progress("dynamics", sum(len(one.method) for one in told), len(speeds))
+        yield part, HelicalDynamicsResult(modes, np.array(speeds), turning, response, verdict, loads)
+        progress("dynamics", float(own[-1] + 1), float(count))
 
 
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:

@@ -12,7 +12,6 @@ from pydantic import BeforeValidator, Field
 from femgear.case.quantities import (
     LENGTH,
     PAIR,
-    RPM,
     SPEED,
     STIFFNESS,
     TORQUE,
@@ -26,7 +25,19 @@ from femgear.case.quantities import (
     Title,
     Values,
 )
-from femgear.case.sections import FORMAT, Angle, Inertia, Mass, MeshStiffnessSection, PressureAngle, Radius
+from femgear.case.sections import (
+    FORMAT,
+    Angle,
+    FaceWidth,
+    Inertia,
+    Mass,
+    MeshStiffnessSection,
+    PressureAngle,
+    Radius,
+    Shift,
+    Speed,
+    Teeth,
+)
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import RoundSection, joint_springs
@@ -74,8 +85,6 @@ def _member(value: object) -> str:
 _STIFFEST_TORSION, _STIFFEST_LATERAL = 1e12, 1e15
 MemberName = Annotated[str, BeforeValidator(_member)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
-Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
-Teeth = Annotated[int, Count(4, 5000)]
 
 
 class BodySection(Section):
@@ -100,9 +109,9 @@ class GearsSection(Section):
 
     teeth: Annotated[tuple[Teeth, ...], TRIPLE]
     module: Annotated[float, Quantity(LENGTH, 5e-5, 0.5)]
-    face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
+    face_width: FaceWidth
     pressure_angle: PressureAngle = math.radians(20.0)
-    profile_shifts: Annotated[tuple[Annotated[float, Number(-5.0, 5.0)], ...], TRIPLE] = (0.0, 0.0, 0.0)
+    profile_shifts: Annotated[tuple[Shift, ...], TRIPLE] = (0.0, 0.0, 0.0)
     addendum: Annotated[tuple[Annotated[float, Number(0.1, 3.0)], ...], TRIPLE] = (1.0, 1.0, 1.0)
     mesh_stiffness: MeshStiffnessSection | None = None
 

@@ -152,7 +152,6 @@ class MultistageSet:
 
     Parameters
     ----------
-    stages : tuple of PlanetaryStage
     couplings : tuple of StageCoupling
         `in_series` makes those of a plain train. None: stages side by side.
     input, output : Member
@@ -190,7 +189,6 @@ def in_series(
 
     Parameters
     ----------
-    stages : sequence of PlanetaryStage
     torsional, lateral : float
         Of every coupling [N m/rad], [N/m], see `StageCoupling`.
     """

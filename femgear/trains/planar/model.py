@@ -22,7 +22,7 @@ from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import constant, line_tail
+from femgear.system.fourier import constant, fluctuation, line_tail
 from femgear.system.mesh_directions import free_motions, mesh_elements, pin_directions
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
 from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
@@ -430,11 +430,6 @@ def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[
         free = np.flatnonzero(back[:top] == 0.0)
         points += [(int(free[-1]), "before back flanks touch")] if len(free) and free[-1] else []
     return [*points, (top, words)]
-
-
-def fluctuation(lines: np.ndarray) -> np.ndarray:
-    """Compute the root mean square (...) about the mean of lines (..., L), mean first."""
-    return np.sqrt(0.5 * (np.abs(lines[..., 1:]) ** 2).sum(axis=-1))
 
 
 def merged_folds(frequency: np.ndarray, fold: np.ndarray) -> np.ndarray:

@@ -18,15 +18,16 @@ from femgear.case.quantities import RPM
 from femgear.case.sections import output_member
 from femgear.errors import Finding, remark
 from femgear.gears.kinematics import torques
+from femgear.report.response import harmonics_of
 from femgear.report.tables import Block, chosen, first_speeds, tabulate
 from femgear.storage.results import complex_entries, coordinates, dataset
+from femgear.system.fourier import fluctuation
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.planar.model import (
     MOTIONS,
     TAIL_LIMIT,
     MotionLines,
     flank_forces,
-    fluctuation,
     merged_folds,
     shown_points,
 )
@@ -427,8 +428,7 @@ def _verdicts(data: xr.Dataset) -> Iterator[str]:
 
 def describe_response(data: xr.Dataset) -> Block:
     """Tabulate displacements [um], mesh forces [kN] and contact of response.nc, a row a speed [rpm]."""
-    force = np.hypot(data["mesh_force_real"].values, data["mesh_force_imag"].values)
-    varying = fluctuation(force).max(axis=1)
+    varying = fluctuation(harmonics_of(data, "mesh_force")).max(axis=1)
     columns = {
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.4g}",
         "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.4f}",

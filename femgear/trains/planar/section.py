@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from femgear.case.quantities import (
     ACCELERATION,
@@ -17,14 +17,21 @@ from femgear.case.quantities import (
     STIFFNESS,
     TORSION,
     Count,
-    Number,
     Quantity,
     Section,
     Title,
     Values,
     printable_line,
 )
-from femgear.case.sections import Inertia, Mass, MeshStiffnessSection, RigidCase, Stiffness, output_member
+from femgear.case.sections import (
+    DampingRatio,
+    Inertia,
+    Mass,
+    MeshStiffnessSection,
+    RigidCase,
+    Stiffness,
+    output_member,
+)
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     Gravity,
@@ -41,7 +48,6 @@ _SMOOTHING = 0.3e-6
 Frequency = Annotated[float, Quantity(FREQUENCY, 0.01, 1e5)]
 Clearance = Annotated[float, Quantity(LENGTH, 0.0, 0.01)]
 Torsion = Annotated[float, Quantity(TORSION, 0.0, 1e15)]
-Ratio = Annotated[float, Number(0.0, 1.0, open_high=True)]
 Comparison = Annotated[str, BeforeValidator(partial(printable_line, name="comparison", most=600))]
 
 # figures of a planar case that may be compared with published ones
@@ -58,13 +64,6 @@ FigureName = Literal[
     "response_spectrum",
     "contact_over_speed",
 ]
-
-
-def _some(values: tuple) -> tuple:
-    # pydantic's own min_length counts valid entries alone, and would complain twice
-    if not values:
-        raise CaseError("there is no entry", code="E-RANGE", limit="1 or more")
-    return values
 
 
 class PlanarRingSection(Section):
@@ -148,7 +147,7 @@ class PlanarSection(Section):
     line_backlash: Clearance | None = None
     smoothing: Annotated[float, Quantity(LENGTH, 0.0, 1e-3)] = _SMOOTHING
     back_flanks: StrictBool = False
-    damping_ratios: Annotated[tuple[Ratio, ...], Values(max_length=1000), AfterValidator(_some)] | None = None
+    damping_ratios: Annotated[tuple[DampingRatio, ...], Values(min_length=1, max_length=1000)] | None = None
     gyroscopic: StrictBool = False
     reaction: Literal["supports", "output"] = "output"
     ring: PlanarRingSection

@@ -340,7 +340,6 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
 
     Parameters
     ----------
-    data : xarray.Dataset
     module : float
         Of the gears, of helical ones in their transverse section [m].
     """

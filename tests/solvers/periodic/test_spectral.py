@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -352,13 +353,15 @@ def test_bad_excitation_is_refused(geared_chain, chain_excitation):
 
 
 def test_too_few_harmonics_are_told_of_converged_speeds_only():
-    converged, force = np.array([False, True, True]), np.tile([5.0, 1.0, 0.5], (3, 2, 1))
-    frequency, radius, tail = (
-        np.array([10.0, 20.0, 30.0]),
-        np.array([1.2, 0.6, 0.4]),
-        np.array([0.9, 0.3, 0.2]),
+    response = SimpleNamespace(
+        mesh_frequency=np.array([10.0, 20.0, 30.0]),
+        converged=np.array([False, True, True]),
+        spectral_radius=np.array([1.2, 0.6, 0.4]),
+        tail=np.array([0.9, 0.3, 0.2]),
+        lowest_force=np.array([np.nan, 1.0, 0.5]),
+        method=("fixed point",) * 3,
     )
-    text = spectral._message(frequency, converged, np.zeros(3, bool), radius, tail, force)
+    text = spectral.joint_message([response])
     assert "fixed point at 2, direct solution at 0; largest spectral radius 1.2 at 10 Hz" in text
     assert "did not converge at 1 speeds, first at 10 Hz with spectral radius 1.2" in text
     assert "at 2 speeds: the upper half holds 0.09 of the energy at 20 Hz" in text

@@ -9,8 +9,9 @@ from femgear.case.dependencies import Steps
 from femgear.errors import CaseError
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_lines
+from femgear.report.tables import pulling_meshes, pulls_of
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.trains.elastic.checks import dynamics_warnings, missing_level, pulling_meshes, pulls_of
+from femgear.trains.elastic.checks import dynamics_warnings, missing_level
 from femgear.trains.elastic.stages import (
     HARMONICS,
     MEMORY,

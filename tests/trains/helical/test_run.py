@@ -18,7 +18,12 @@ from femgear.system.system import MeshExcitation
 from femgear.trains.helical.figures import transmission_errors
 from femgear.trains.helical.model import normal_record, section_stiffness, shared_load
 from femgear.trains.helical.results import describe_helical_static
-from femgear.trains.helical.stages import solve_helical_dynamics, solve_helical_modes, solve_helical_static
+from femgear.trains.helical.stages import (
+    HELICAL,
+    solve_helical_dynamics,
+    solve_helical_modes,
+    solve_helical_static,
+)
 from femgear.trains.planar.stages import solve_planar_modes
 from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
@@ -266,6 +271,22 @@ def test_what_holds_the_fixed_member_takes_up_its_moment(coarse, static, modes, 
     assert np.abs(moments[0][1:]).max() > 1e-2
     # a spring 3e4 times stiffer than that of the case holds the ring too
     np.testing.assert_allclose(moments[1][1:], moments[0][1:], atol=1e-3 * np.abs(moments[0][1:]).max())
+
+
+def test_meshes_that_pull_are_warned_of(coarse, static):
+    """At a resonance almost without damping; whole meshes, not the slices that they are made of."""
+    speeds = {"operation.speeds": {"from": "15000 rpm", "to": "15600 rpm", "count": 41}}
+    case = changed(coarse, speeds | {"dynamics.damping_ratio": 0.0005})
+    solved = solve_helical_dynamics(case, solve_helical_modes(case, static, cache=grid_cache()))
+    data = solved.dataset()
+    least = over_a_period(lines(data, "mesh_force"), 256).min(axis=-1)
+    speed, mesh = np.unravel_index(least.argmin(), least.shape)
+    count = int((least.min(axis=1) < 0).sum())
+    assert 0 < count < 41
+    (said,) = next(stage for stage in HELICAL.stages if stage.name == "dynamics").warnings(data)
+    where = f"at {data['speed'].values[speed]:.6g} rpm: {data['mesh'].values[mesh]} pulls for "
+    assert said.code == "W-PULL" and said.text.startswith(where)
+    assert f"meshes pull at {count} of the 41 speeds" in said.text
 
 
 def test_shared_load_is_a_static_state_on_the_same_tangents():
