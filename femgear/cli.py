@@ -266,8 +266,8 @@ def export(
     output
         Folder of the files. Default: exported, inside the other.
     """
-    from femgear.storage.files import own_files
-    from femgear.storage.results import EXPORTED, additions, folder_lock, write_csv_tables
+    from femgear.storage.files import list_own, own_files
+    from femgear.storage.results import EXPORTED, Results, additions, folder_lock, write_csv_tables
     from femgear.trains.reading import open_results
 
     if not csv:
@@ -275,18 +275,18 @@ def export(
             "no format is named", code="E-ARGUMENTS", limit="--csv", remedy="femgear export --help"
         )
 
-    def write(place: Path) -> list[str]:
-        results = open_results(folder)
+    def write(place: Path, results: Results) -> list[str]:
         return [name for stage in results.stages for name in write_csv_tables(results[stage], place, stage)]
 
     if output is None:
         with folder_lock(folder), additions(folder) as new:
-            (new / EXPORTED).mkdir()
-            names = write(new / EXPORTED)
+            list_own(new / EXPORTED)
+            names = write(new / EXPORTED, open_results(folder))
     else:
+        results = open_results(folder)  # refused before the other folder is touched
         own_files(output, ())
-        names = write(output)
-    print(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
+        names = write(output, results)
+    _say(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
     return 0
 
 
@@ -390,7 +390,9 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
         output.flush()
         # a reader that has seen enough is no failure
         if code == 0 and output.error and not isinstance(output.error, BrokenPipeError):
-            code = _fail(storage_error(output.error, "standard output"))
+            failure = storage_error(output.error, "standard output")
+            failure.remedy = "free some space where it goes, or send it elsewhere"
+            code = _fail(failure)
         errors.flush()
     if arguments is None:  # the process ends: nothing is left to interrupt but the interpreter
         signal.signal(signal.SIGINT, signal.SIG_IGN)

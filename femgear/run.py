@@ -20,10 +20,10 @@ from femgear.report.page import page, write_pictures
 from femgear.storage.files import (
     append_dataset,
     checksum,
+    own_files,
     read_dataset,
     read_result,
     replaced_file,
-    storage_errors,
     write_dataset,
     write_result,
     write_text,
@@ -161,8 +161,7 @@ def run_case(
         warnings.warn(f"{', '.join(results)}: as the run that was interrupted left them", stacklevel=2)
     write_text(case.source, folder / "case.toml")
     run.record("case.toml")
-    with storage_errors(folder):
-        (folder / KEPT).mkdir(exist_ok=True)
+    own_files(folder / KEPT, ["*"])
     with one_blas_thread():
         for stage in stages:
             if stage.name not in run.timings:

@@ -302,7 +302,7 @@ def ring_surface(planetary_set, radial, tangential, *, columns: int = 360):
 def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
     """The ring's deflection as VTU; the polar modulation as VTP and PNG."""
     from femgear.report.scene import write_vtu
-    from femgear.storage.files import replace_file
+    from femgear.storage.files import replaced_file
 
     shown = slice(0, max(EXPORTED, heard.harmonic) + 1)
     field = dynamics.ring_radial[0, shown], dynamics.ring_tangential[0, shown]
@@ -312,7 +312,8 @@ def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
     envelope = heard.bands["exact"].envelope
     # scaled by the largest value: no part of the curve reaches into the ring
     curve = polar_curve(envelope, radius=1.02 * radius, height=0.4 * radius)
-    replace_file(folder / "modulation.vtp", lambda path: curve.save(path, binary=True))
+    with replaced_file(folder / "modulation.vtp") as temporary:
+        curve.save(temporary, binary=True)
     _polar_picture(folder / "modulation.png", planetary_set, heard, curve)
 
 

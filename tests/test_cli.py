@@ -14,12 +14,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from edited_manifests import finish
 
 from femgear import cli
 from femgear import run as run_module
 from femgear.errors import ConvergenceError
 from femgear.storage.files import write_dataset, write_text
-from femgear.storage.results import finish
 from femgear.trains import registry
 from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value, with_values
 

@@ -87,6 +87,7 @@ def started(*arguments, shell: str = "") -> subprocess.CompletedProcess:
     (">&-", ["schema"], 0, ""),
     (">&- 2>&-", ["check", "absent.toml"], 2, ""),
     (">/dev/full", ["schema"], 4, "[E-DISK-FULL] standard output: "),
+    (">/dev/full", ["schema"], 4, "remedy:  free some space where it goes, or send it elsewhere\n"),
     (">/dev/full", ["check", "absent.toml"], 2, "E-FILE"),
     ("2>/dev/full", ["check", "absent.toml"], 2, ""),
     ("| true", ["schema"], 0, ""),

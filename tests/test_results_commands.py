@@ -1,6 +1,7 @@
 """`femgear report` and `femgear export`: they replace what is their own and unchanged, and nothing else."""
 
 import os
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +9,19 @@ import pandas as pd
 import pytest
 import synthetic_results
 import xarray as xr
+from edited_manifests import finish
 
 from femgear import cli
 from femgear.errors import StorageError
 from femgear.report import style
 from femgear.storage.files import checksum, write_dataset, write_text
-from femgear.storage.results import finish, prepare_output, read_manifest, run_folder, write_csv_tables
+from femgear.storage.results import (
+    prepare_output,
+    read_manifest,
+    record,
+    run_folder,
+    write_csv_tables,
+)
 from femgear.trains.reading import read_case
 from femgear.trains.static import figures
 
@@ -173,6 +181,31 @@ def test_tables_in_another_folder_replace_their_own_alone(out, tmp_path, refused
     assert "static_mesh_position.csv" in refused(other, "export", out, "--csv", "-o", other)
     results = out / "manifest.json"
     assert "results of a run" in refused(out, "export", out, "--csv", "-o", results.parent)
+
+
+def test_a_refused_export_leaves_nothing(out, tmp_path, refused):
+    other = tmp_path / "tables"
+    refused(tmp_path, "export", tmp_path / "absent", "--csv", "-o", other, code="E-RESULTS-MISSING")
+    assert not other.exists()
+    other.mkdir()
+    (other / "static.csv").write_text("mine")
+    refused(tmp_path, "export", out, "--csv", "-o", other)
+    assert contents(other) == {"static.csv": b"mine"}
+
+
+def test_an_export_names_its_folder_without_control_characters(out, tmp_path, capsys):
+    assert cli.main(["export", str(out), "--csv", "-o", str(tmp_path / "a\x1b[31mb")]) == 0
+    said = capsys.readouterr().out
+    assert "\x1b" not in said and r"a\x1b[31mb: " in said
+
+
+def test_the_command_that_is_suggested_can_be_given_to_a_shell(tmp_path, refused):
+    out = prepare_output(tmp_path / "my run; 'b'")
+    write_text(read_case(CASE).source, out / "case.toml")
+    record(out, ["case.toml"], timings={}, convergence={})
+    said = refused(tmp_path, "report", out, code="E-RESULTS-INCOMPLETE")
+    (command,) = (line.partition("run it again: ")[2] for line in said.splitlines() if "remedy" in line)
+    assert shlex.split(command) == ["femgear", "run", str(out / "case.toml"), "-o", str(out)]
 
 
 def test_tables_are_written_through_no_link(out, tmp_path, refused):

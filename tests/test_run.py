@@ -132,6 +132,20 @@ def test_stages_that_do_not_fit_are_computed_again(interrupted, damage):
     assert run(case, folder) == ["modes", "response"]
 
 
+def test_a_file_of_the_user_among_the_kept_stages_is_refused_and_stays(interrupted):
+    folder, case = interrupted
+    photo = folder / ".stages" / "photo.png"
+    photo.write_text("mine")
+    with pytest.raises(StorageError) as info, pytest.warns(UserWarning, match="modes: as the run"):
+        run(case, folder)
+    assert info.value.file == str(photo) and photo.read_text() == "mine"
+    assert not read_manifest(folder).complete
+    photo.rename(folder.parent / "photo.png")
+    with pytest.warns(UserWarning, match="modes: as the run"):
+        assert run(case, folder) == ["response"]
+    assert not photo.parent.exists()
+
+
 def fingerprint_of(path):
     with np.load(path) as file:
         return json.loads(file["arr_0"].tobytes())["fingerprint"]
@@ -139,8 +153,8 @@ def fingerprint_of(path):
 
 @pytest.mark.parametrize("module", ["builtins", "os", "subprocess", "femgear.run"])
 def test_a_result_names_classes_of_femgear_alone(tmp_path, module):
-    tree = {"kind": "own", "number": 0, "class": [module, "list" if module == "builtins" else "Popen"]}
-    text = json.dumps({"fingerprint": "", "result": tree | {"items": []}})
+    tree = ["own", 0, module, "list" if module == "builtins" else "Popen", ["dict", 1]]
+    text = json.dumps({"fingerprint": "", "result": tree})
     np.savez(tmp_path / "a.npz", np.frombuffer(text.encode(), np.uint8))
     with pytest.raises(StorageError, match="no result of this case"):
         read_result(tmp_path / "a.npz", fingerprint="")

@@ -151,7 +151,10 @@ def _curved_coordinates(element_nodes, points, b1, b2):
         if max(np.abs(step1).max(), np.abs(step2).max()) < 1e-13:
             break
     if np.minimum(np.minimum(b1, b2), 1.0 - b1 - b2).min() < -0.05:
-        raise GridError("an observation point falls between curved elements", code="E-GRID")
+        raise GridError(
+            "an observation point falls between curved elements", code="E-GRID",
+            remedy="try another static.flank_elements or static.depth",
+        )  # fmt: skip
     return b1, b2
 
 
@@ -229,7 +232,9 @@ def condense_sector(
 
 def _check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
     if np.any(loads[cut]):
-        raise GridError("a load acts on a cut of the sector", code="E-GRID")
+        raise GridError(
+            "a load acts on a cut of the sector", code="E-GRID", remedy="load nodes of the flanks alone"
+        )
 
 
 def _check_residual(residual: float) -> None:

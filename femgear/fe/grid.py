@@ -71,7 +71,10 @@ def boundary_edges(grid: Grid, name: str) -> np.ndarray:
     """Edges (k, 3) of a named boundary; GridError (E-GRID) when there is none of that name."""
     if name not in grid.boundaries:
         limit = "one of " + ", ".join(sorted(grid.boundaries))
-        raise GridError(f"the grid has no boundary {name!r}", code="E-GRID", key=name, limit=limit)
+        raise GridError(
+            f"the grid has no boundary {name!r}", code="E-GRID", key=name, limit=limit,
+            remedy="name one of these, or give the outline a curve of this name",
+        )  # fmt: skip
     return grid.boundaries[name]
 
 
@@ -255,7 +258,10 @@ def write_grid(path: Path, grid: Grid) -> None:
             temporary.unlink(missing_ok=True)
         if isinstance(error, FileNotFoundError) and path.is_file():
             return
-        raise StorageError(f"cannot write the grid {path}: {error}", code="E-GRID-FILE") from error
+        raise StorageError(
+            f"cannot write the grid {path}: {error}", code="E-GRID-FILE",
+            remedy="free some space, or name another folder of grids: FEMGEAR_MESHES",
+        ) from error  # fmt: skip
 
 
 def read_grid(path: Path) -> Grid:

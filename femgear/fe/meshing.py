@@ -102,12 +102,16 @@ def check_outline(outline) -> Plan:
     every = np.vstack([points for _, points in curves])
     size = np.ptp(every, axis=0).max()
     if not size > 0:
-        raise GridError("all points of the outline coincide", code="E-GRID")
+        raise GridError(
+            "all points of the outline coincide", code="E-GRID", remedy="give points that enclose an area"
+        )
     points, segments, mids, names = _join(curves, inner, size)
     n_boundary = sum(len(p) // 2 for _, p in curves)
     if len(segments) > MAX_SEGMENTS:
-        limit = f"at most {MAX_SEGMENTS}"
-        raise GridError(f"the outline has {len(segments)} segments", code="E-GRID", limit=limit)
+        raise GridError(
+            f"the outline has {len(segments)} segments", code="E-GRID", limit=f"at most {MAX_SEGMENTS}",
+            remedy="use fewer points along the outline",
+        )  # fmt: skip
     _check_distinct(points, size)
     _check_crossing(points, segments, names, size)
     _check_area(points[segments[:n_boundary, 0]], size)
@@ -123,7 +127,8 @@ def _curve(name, points):
     if len(bad):
         x, y = points[bad[0]]
         message = f"point {bad[0]} of the curve {name!r} is ({x}, {y})"
-        raise GridError(message, code="E-GRID", key=name, limit="finite coordinates")
+        remedy = "give every point two plain numbers"
+        raise GridError(message, code="E-GRID", key=name, limit="finite coordinates", remedy=remedy)
     return points
 
 
@@ -158,6 +163,7 @@ def _check_distinct(points, size):
             f"{len(pairs)} pairs of corners coincide, the first at ({a[0]:.9g}, {a[1]:.9g}) m, "
             f"{np.hypot(*(a - b)):.3e} m apart",
             code="E-GRID",
+            remedy="give every corner once",
         )
 
 
@@ -187,6 +193,7 @@ def _check_crossing(points, segments, names, size):
                 f"the outline crosses or touches itself: {names[p]!r} and {names[q]!r} near "
                 f"({x:.9g}, {y:.9g}) m",
                 code="E-GRID",
+                remedy="give the points in their order along the outline; curves meet at their ends alone",
             )
 
 
@@ -203,10 +210,12 @@ def _check_area(polygon, size):
     area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
     if abs(area) < 1e-6 * size**2:
         message = f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit"
-        raise GridError(message, code="E-GRID")
+        raise GridError(message, code="E-GRID", remedy="give an outline with a body inside")
     if area < 0:
-        limit = "counter-clockwise, the body on the left"
-        raise GridError("the outline runs clockwise", code="E-GRID", limit=limit)
+        raise GridError(
+            "the outline runs clockwise", code="E-GRID", limit="counter-clockwise, the body on the left",
+            remedy="reverse the order of curves and points",
+        )  # fmt: skip
 
 
 def _faces(segments, n_boundary, inner):
@@ -228,7 +237,8 @@ def _faces(segments, n_boundary, inner):
             break
         else:
             message = f"the interface {name!r} does not end at two corners of one part of the body"
-            raise GridError(message, code="E-GRID", key=name)
+            remedy = "end it at two corners of the boundary, or of an interface before it"
+            raise GridError(message, code="E-GRID", key=name, remedy=remedy)
     return tuple(loops)
 
 
@@ -242,7 +252,8 @@ def _name_faces(points, segments, loops, regions):
         names = [name for name, point in regions if _contains(points, own, np.array([point]))[0]]
         if len(names) != 1:
             message = f"a part of the outline holds the points of the regions {names}"
-            raise GridError(message, code="E-GRID", limit="one region for each part")
+            remedy = "give each part a region with a point inside it"
+            raise GridError(message, code="E-GRID", limit="one region for each part", remedy=remedy)
         faces += names
     return tuple(faces)
 
@@ -361,17 +372,20 @@ def _grid_of_plan(plan: Plan, found: Grid, path: Path) -> Grid:
             face[found.regions[name]] = k
         points = np.vstack([plan.points, found.points[n : len(used)]])
         if used[0] != 0 or used[-1] != len(used) - 1 or len(used) < n or not np.isfinite(points).all():
-            raise GridError("it has other nodes", code="E-GRID")
+            raise ValueError("it has other nodes")
         grid = _second_order(plan, points, corners, face)
         check_grid(grid)
         same = [np.array_equal(grid.points, found.points), np.array_equal(grid.triangles, found.triangles)]
         for mine, other in ((grid.boundaries, found.boundaries), (grid.regions, found.regions)):
             same += [mine.keys() == other.keys(), *(np.array_equal(mine[key], other[key]) for key in mine)]
         if not all(same):
-            raise GridError("it has other points or boundaries", code="E-GRID")
+            raise ValueError("it has other points or boundaries")
         return grid
     except (GridError, KeyError, IndexError, ValueError) as error:
-        raise StorageError(f"{path} is not a grid of this outline: {error!r}", code="E-GRID-FILE") from error
+        raise StorageError(
+            f"{path} is not a grid of this outline: {error!r}", code="E-GRID-FILE",
+            remedy="delete the file; it is made again when needed",
+        ) from error  # fmt: skip
 
 
 def mesh_outlines(outlines, *, cache: Path | None = None) -> tuple[Grid, ...]:

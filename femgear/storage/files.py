@@ -34,22 +34,33 @@ import numpy as np
 from femgear import __version__
 from femgear.errors import StorageError
 
+try:
+    import fcntl
+except ImportError:  # Windows, where no open file can be removed
+    fcntl = None
+
 if TYPE_CHECKING:
     import xarray as xr
 
-_NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 _RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
 """Names that some file system gives a meaning of its own, or takes for others."""
-# what `replace_file` writes under; older versions had the number of the process
-_TEMPORARY = re.compile(r"\..+\.([0-9a-f]{16}|\d{1,10})\.tmp(\..{1,8})?")
+# what `replaced_file` writes under; nobody else has such names
+_TEMPORARY = re.compile(r"\.femgear-[0-9a-f]{16}\..+")
 # bytes of the disk that stay free
 _RESERVE = 1_000_000
 _FORMAT = 1
-_SEQUENCES: dict[str, Callable] = {one.__name__: one for one in (tuple, list, set, frozenset)}
-_OWN = "femgear."
-# what was written into a folder, as sha256sum lists it
-_WRITTEN = ".written"
+_CONTAINERS: dict[str, Callable[[list], Any]] = {
+    **{"tuple": tuple, "list": list, "set": set, "frozenset": frozenset, "dict": dict},
+    "mappingproxy": lambda items: MappingProxyType(dict(items)),
+    "slice": lambda parts: slice(*parts),
+    "complex": lambda parts: complex(*parts),
+}
+_PACKAGE = "femgear."
+# what was written into a folder, as sha256sum lists it; half a line of a killed process is one too
+WRITTEN, _LINE = ".written", re.compile(rb"[0-9a-f]{64}  .+|[0-9a-f]{0,64} ?")
+# folders whose lists this process keeps
+_LISTED: set[Path] = set()
 # bytes that a file may declare beyond four times its size
 _MARGIN = 1_000_000
 # bytes of a file from which its numbers are read when they are asked for
@@ -70,7 +81,8 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     StorageError
         ``E-FORMAT``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
     """
-    replace_file(path, lambda temporary: _to_netcdf(dataset, temporary), size=int(dataset.nbytes))
+    with replaced_file(path, size=dataset.nbytes) as temporary:
+        _to_netcdf(dataset, temporary)
 
 
 def _to_netcdf(dataset: xr.Dataset, path: Path, **options: Any) -> None:
@@ -129,9 +141,8 @@ def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object])
             # signals interrupt the main thread alone: raised within HDF5 they would be lost
             pool.submit(write, disk).result()
         except RuntimeError as error:  # of HDF5 itself
-            raise StorageError(
-                str(error), file=os.fspath(path), remedy="see that disk and memory suffice"
-            ) from error
+            remedy = "see that disk and memory suffice"
+            raise StorageError(str(error), file=os.fspath(path), remedy=remedy) from error
         finally:
             if disk.failure is not None:
                 raise disk.failure
@@ -177,11 +188,12 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     name = os.fspath(path)
     with storage_errors(path):
         if not os.path.isfile(path):
-            raise StorageError("no such file", code="E-STORAGE", file=name)
+            raise StorageError("no such file", code="E-STORAGE", file=name, remedy="run the case again")
     options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
     try:
         with storage_errors(path):
-            _refuse_hostile(path)
+            if hostile := _hostility(path):
+                raise StorageError(hostile, code="E-FORMAT", file=name, remedy="do not use this file")
         large = os.path.getsize(path) > _LARGE
         dataset = xr.open_dataset(path, cache=False, **options) if large else xr.load_dataset(path, **options)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
@@ -189,12 +201,9 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     version = dataset.attrs.get("femgear_format")
     if not isinstance(version, int | np.integer) or version > _FORMAT:
         raise StorageError(
-            "not written by this version of femgear",
-            code="E-FORMAT",
-            file=name,
-            value=version,
-            limit=f"femgear_format up to {_FORMAT}",
-        )
+            "not written by this version of femgear", code="E-FORMAT", file=name, value=version,
+            limit=f"femgear_format up to {_FORMAT}", remedy="run the case again",
+        )  # fmt: skip
     return dataset
 
 
@@ -217,8 +226,8 @@ def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -
     arrays: list[np.ndarray] = []
     tree = {"fingerprint": fingerprint, "result": _encoded(result, arrays, {})}
     text = np.frombuffer(json.dumps(tree).encode(), np.uint8)
-    size = sum(array.nbytes for array in arrays)
-    replace_file(path, lambda new: np.savez(new, text, *arrays), size=size)  # type: ignore[arg-type]
+    with replaced_file(path, size=sum(array.nbytes for array in arrays)) as temporary:
+        np.savez(temporary, text, *arrays)  # type: ignore[arg-type]
 
 
 def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
@@ -235,105 +244,88 @@ def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
         tree = json.loads(arrays[0].tobytes())
         if tree["fingerprint"] == fingerprint:
             return _decoded(tree["result"], arrays[1:], {})
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, ImportError, BadZipFile):
+    except (ValueError, LookupError, TypeError, RecursionError, AttributeError, ImportError, BadZipFile):
         pass
-    raise StorageError("no result of this case", code="E-FORMAT", file=os.fspath(path))
+    raise StorageError(
+        "no result of this case", code="E-FORMAT", file=os.fspath(path), remedy="run the case again"
+    )
 
 
 def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, Any]]) -> Any:
     """Turn a value into JSON that numbers its arrays; what was met before is named by its number."""
-
-    def inner(value: Any) -> Any:
-        return _encoded(value, arrays, known)
-
-    def pairs(table: Mapping) -> list:
-        return [[inner(key), inner(item)] for key, item in table.items()]
-
-    kind = type(value)
-    if value is None or kind in (bool, int, float, str):
+    if value is None or type(value) in (bool, int, float, str):
         return value
     if id(value) in known:
-        return {"kind": "known", "number": known[id(value)][0]}
+        return ["known", known[id(value)][0]]
     number = len(known)
     # the value itself is kept, so that no other one gets its id
     known[id(value)] = number, value
-    found: dict[str, Any] = {"number": number, "kind": kind.__name__}
-    if kind is np.ndarray and value.dtype != object:
+    if type(value) is np.ndarray and value.dtype != object:
         arrays.append(value)
-        return found | {"array": len(arrays) - 1, "fixed": not value.flags.writeable}
-    if isinstance(value, np.generic | complex):
+        return ["array", number, len(arrays) - 1, not value.flags.writeable]
+    if isinstance(value, np.generic):
         arrays.append(np.asarray(value))
-        return found | {"kind": "complex" if kind is complex else "generic", "array": len(arrays) - 1}
-    if kind in (tuple, list, set, frozenset):
-        return found | {"items": [inner(item) for item in value]}
-    if kind in (dict, MappingProxyType):
-        return found | {"items": pairs(value)}
+        return ["generic", number, len(arrays) - 1]
+    kind, parts = _parts(value)
+    return [kind, number, *(_encoded(part, arrays, known) for part in parts)]
+
+
+def _parts(value: Any) -> tuple[str, Sequence]:
+    """Kind of a value that is no array, and the values that it is made of; `_made` joins them."""
+    kind = type(value)
     if kind is slice:
-        return found | {"items": [inner(item) for item in (value.start, value.stop, value.step)]}
+        return kind.__name__, (value.start, value.stop, value.step)
+    if kind is complex:
+        return kind.__name__, (value.real, value.imag)
     if kind is MethodType:
-        return found | {"name": value.__name__, "of": inner(value.__self__)}
+        return "method", (value.__self__, value.__name__)
+    if kind.__module__ == "builtins" and kind.__name__ in _CONTAINERS:
+        return kind.__name__, tuple(value.items() if isinstance(value, Mapping) else value)
     if kind.__module__.startswith("scipy.sparse") and value.format in ("csc", "csr"):
-        parts = value.data, value.indices, value.indptr, value.shape
-        return found | {"items": [inner(item) for item in parts]}
-    if not (is_dataclass(value) or kind.__module__.startswith(_OWN)):
+        return kind.__name__, (value.data, value.indices, value.indptr, value.shape)
+    if is_dataclass(value):  # its fields alone, without what it has computed from them
+        state = {one.name: getattr(value, one.name) for one in fields(value)}
+    elif kind.__module__.startswith(_PACKAGE):
+        state = value.__getstate__()
+    else:
         raise TypeError(f"a {kind.__qualname__} cannot be written")
-    # a dataclass keeps its fields alone, without what it has computed from them
-    names = [one.name for one in fields(value)] if is_dataclass(value) else None
-    own: Any = value
-    state = own.__getstate__() if names is None else {name: getattr(own, name) for name in names}
-    return found | {"kind": "own", "class": [kind.__module__, kind.__qualname__], "items": pairs(state)}
+    return "own", (kind.__module__, kind.__qualname__, state)
 
 
 def _decoded(node: Any, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
     """Turn JSON of `_encoded` into the value again."""
-    if not isinstance(node, dict):
+    if not isinstance(node, list | dict):
         return node
-    if node["kind"] == "known":
-        return known[node["number"]]
-    value = known[node["number"]] = _made(node, arrays, known)
-    return value
+    kind, number, *parts = node
+    if kind != "known":
+        known[number] = _made(kind, [_decoded(part, arrays, known) for part in parts], arrays)
+    return known[number]
 
 
-def _made(node: dict, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
-    """Make the value of a node that was not met before."""
-
-    def items() -> list:
-        return [_decoded(item, arrays, known) for item in node["items"]]
-
-    def table() -> dict:
-        return {_decoded(key, arrays, known): _decoded(item, arrays, known) for key, item in node["items"]}
-
-    match node["kind"]:
-        case "ndarray":
-            array = arrays[node["array"]]
-            array.setflags(write=not node["fixed"])
+def _made(kind: str, parts: list, arrays: list[np.ndarray]) -> Any:
+    """Make a value of its parts."""
+    match kind:
+        case "array":
+            array = arrays[parts[0]]
+            array.setflags(write=not parts[1])
             return array
-        case "generic" | "complex" as kind:
-            number = arrays[node["array"]][()]
-            return number if kind == "generic" else complex(number)
-        case "dict":
-            return table()
-        case "mappingproxy":
-            return MappingProxyType(table())
-        case "slice":
-            return slice(*items())
+        case "generic":
+            return arrays[parts[0]][()]
         case "method":
-            return getattr(_decoded(node["of"], arrays, known), node["name"])
-        case "csc_array" | "csr_array" | "csc_matrix" | "csr_matrix" as kind:
-            *parts, shape = items()
-            return getattr(importlib.import_module("scipy.sparse"), kind)(tuple(parts), shape=shape)
+            return getattr(*parts)
+        case "csc_array" | "csr_array" | "csc_matrix" | "csr_matrix":
+            *stored, shape = parts
+            return getattr(importlib.import_module("scipy.sparse"), kind)(tuple(stored), shape=shape)
         case "own":
-            module, name = node["class"]
-            return _own_object(module, name, table())
-        case kind:
-            return _SEQUENCES[kind](items())
+            return _own_object(*parts)
+    return _CONTAINERS[kind](parts)
 
 
 def _own_object(module: str, name: str, state: dict) -> Any:
     """Make an object of a dataclass or of femgear as it was; its checks have been passed before."""
-    place = importlib.import_module(module) if module.startswith(_OWN) else sys.modules[module]
+    place = importlib.import_module(module) if module.startswith(_PACKAGE) else sys.modules[module]
     found = getattr(place, name)
-    if not isinstance(found, type) or not (is_dataclass(found) or module.startswith(_OWN)):
+    if not isinstance(found, type) or not (is_dataclass(found) or module.startswith(_PACKAGE)):
         raise TypeError(f"{module} has no such class {name}")
     made = object.__new__(found)
     if is_dataclass(found):
@@ -341,12 +333,6 @@ def _own_object(module: str, name: str, state: dict) -> Any:
     else:
         made.__setstate__(state)  # type: ignore[attr-defined]
     return made
-
-
-def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
-    """Write a file by ``write(path)`` into an empty one of another name; see `replaced_file`."""
-    with replaced_file(path, size=size) as temporary:
-        write(temporary)
 
 
 @contextlib.contextmanager
@@ -357,7 +343,7 @@ def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Pat
 
     Parameters
     ----------
-    size : int
+    size : float
         What the disk must have room for [bytes].
 
     Raises
@@ -366,46 +352,61 @@ def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Pat
         ``E-DISK-FULL``, ``E-STORAGE``; the old file is untouched and no temporary one stays behind.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.tmp{path.suffix}")
+    temporary = path.with_name(f".femgear-{secrets.token_hex(8)}.{path.name}")
     with storage_errors(path):
         free = shutil.disk_usage(path.parent).free
         if free < size + _RESERVE:
             raise StorageError(
                 f"{size / 1e6:.1f} MB to write, {free / 1e6:.1f} MB left on the disk, of which "
                 f"{_RESERVE / 1e6:.0f} MB are kept in reserve",
-                code="E-DISK-FULL",
-                file=str(path),
-                limit=f"{(size + _RESERVE) / 1e6:.1f} MB free",
+                code="E-DISK-FULL", file=str(path), limit=f"{(size + _RESERVE) / 1e6:.1f} MB free",
                 remedy="free some space or name another folder",
-            )
+            )  # fmt: skip
         try:
-            open(temporary, "xb").close()
-            yield temporary
-            with open(temporary, "rb+") as stream:
-                os.fsync(stream.fileno())
-            if _is_regular(path.with_name(_WRITTEN)):
-                _list_own(path, checksum(temporary))
-            os.replace(temporary, path)
+            with open(temporary, "xb") as held:
+                _lock(held, alone=False)
+                yield temporary
+                os.fsync(held.fileno())
+                if path.parent.absolute() in _LISTED or _is_regular(path.with_name(WRITTEN)):
+                    _list_own(path, checksum(temporary))
+                if os.name == "nt":  # no open file gets another name there
+                    held.close()
+                os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
 
 
 def remove_temporaries(folder: str | os.PathLike) -> None:
-    """Remove what dead processes left half written in a folder; nobody else may write into it meanwhile."""
+    """Remove what dead processes left half written in a folder; that of a living one stays."""
     with storage_errors(folder):
-        for path in Path(folder).iterdir():
-            if is_temporary(path):
-                path.unlink()
+        for path in filter(is_temporary, Path(folder).iterdir()):
+            # it may have its name meanwhile, or belong to somebody else
+            with contextlib.suppress(OSError):
+                with open(path, "rb") as stream:
+                    dead = _lock(stream, alone=True)
+                if dead:
+                    path.unlink()
+
+
+def _lock(stream: io.BufferedIOBase, *, alone: bool) -> bool:
+    """Lock a file as long as it is open, shared or alone; tell whether nobody else's lock is in the way."""
+    try:
+        if fcntl is not None:
+            fcntl.flock(stream, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def is_temporary(path: Path) -> bool:
-    """Tell whether a regular file has a name that `replace_file` writes under."""
+    """Tell whether a regular file has a name that `replaced_file` writes under."""
     return bool(_TEMPORARY.fullmatch(path.name)) and _is_regular(path)
 
 
 def write_bytes(data: bytes, path: str | os.PathLike) -> None:
     """Write bytes so that the file is either the old or the new one, whole."""
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+    with replaced_file(path, size=len(data)) as temporary:
+        temporary.write_bytes(data)
 
 
 def write_text(text: str, path: str | os.PathLike) -> None:
@@ -442,59 +443,93 @@ def checksum(path: str | os.PathLike) -> str:
 def own_files(folder: Path, names: Iterable[str]) -> None:
     """Make a folder ready for files of these names or patterns, and replace none that was not written so.
 
-    From now on the folder keeps a list, ``.written``, of the SHA-256 of all that `replace_file` writes there.
+    Raises
+    ------
+    StorageError
+        ``E-OUTPUT``: a file of such a name is not on the list of the folder, see `list_own`, or was changed
+        since; results of a run.
+    """
+    with storage_errors(folder):
+        if os.path.lexists(folder / "manifest.json"):
+            message, remedy = "the folder holds the results of a run", "name another folder"
+            raise StorageError(message, code="E-OUTPUT", file=str(folder), remedy=remedy)
+        for name in names:
+            for path in folder.glob(name) if "*" in name else [folder / name]:
+                _refuse_foreign(path)
+    list_own(folder)
+
+
+def list_own(folder: Path) -> None:
+    """Make a folder whose list, ``.written``, has the SHA-256 of all that `replaced_file` writes there.
+
+    What dead processes left half written there is removed.
+    """
+    with storage_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        _refuse_foreign(folder / WRITTEN)
+    remove_temporaries(folder)
+    _LISTED.add(folder.absolute())
+
+
+def remove_own(folder: Path) -> None:
+    """Remove a folder that was made by `list_own`, with all that was written there.
 
     Raises
     ------
     StorageError
-        ``E-OUTPUT``: a file of such a name is not on the list, or was changed since; results of a run.
+        ``E-OUTPUT``: it holds anything else, or a file was changed; nothing is removed then.
     """
     with storage_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.path.lexists(folder / "manifest.json"):
-            raise StorageError(
-                "the folder holds the results of a run",
-                code="E-OUTPUT",
-                file=str(folder),
-                remedy="name another folder",
-            )
-        for name in names:
-            for path in folder.glob(name) if "*" in name else [folder / name]:
-                _refuse_foreign(path)
-        with contextlib.suppress(FileExistsError):
-            open(folder / _WRITTEN, "x").close()
-        if not _is_regular(folder / _WRITTEN):
-            _refuse_foreign(folder / _WRITTEN)
+        paths = [folder, *sorted(folder.rglob("*"))] if os.path.lexists(folder) else []
+        folders = [path for path in paths if path.is_dir() and not path.is_symlink()]
+        files = [path for path in paths if path not in folders]
+        for path in files:
+            _refuse_foreign(path)
+        # the lists last, so that what a killed process leaves of it can be told
+        for path in sorted(files, key=lambda path: path.name == WRITTEN):
+            path.unlink()
+        for path in reversed(folders):
+            path.rmdir()
 
 
 def _list_own(path: Path, digest: str) -> None:
     """Put the checksum of a file on the list of its folder before the file has its name."""
-    entry = _entry(path, digest)
-    listed = _refuse_foreign(path)
+    written, entry = path.with_name(WRITTEN), _entry(path, digest)
+    for one in (path, written):
+        _refuse_foreign(one)
+    listed = written.read_bytes() if written.exists() else b""
     if entry not in listed.splitlines():
-        with open(path.with_name(_WRITTEN), "ab") as stream:
+        with open(written, "ab") as stream:
             # half a line of a killed process spoils no other
             stream.write((b"" if listed[-1:] in (b"", b"\n") else b"\n") + entry + b"\n")
             stream.flush()
             os.fsync(stream.fileno())
 
 
-def _refuse_foreign(path: Path) -> bytes:
-    """Refuse to replace what the list of the folder has not; the list otherwise."""
-    there = os.path.lexists(path)
-    found = _entry(path, checksum(path)) if _is_regular(path) else b"a link or folder"
+def _refuse_foreign(path: Path) -> None:
+    """Refuse to replace or remove a file that the list of its folder has not, or a list that is none."""
+    if os.path.lexists(path) and not _is_own(path):
+        raise foreign(path)
+
+
+def _is_own(path: Path) -> bool:
+    """Tell whether a file is on the list of its folder, and as it was written; or is such a list."""
+    if is_temporary(path) or not _is_regular(path):
+        return is_temporary(path)
+    if path.name == WRITTEN:
+        return all(map(_LINE.fullmatch, path.read_bytes().splitlines()))
+    entry, written = _entry(path, checksum(path)), path.with_name(WRITTEN)
     # read after the file: another process that replaces it lists it first
-    written = path.with_name(_WRITTEN)
-    listed = written.read_bytes() if _is_regular(written) else b""
-    if there and found not in listed.splitlines():
-        raise StorageError(
-            "would be replaced, but was not written here by femgear, or was changed since",
-            code="E-OUTPUT",
-            file=str(path),
-            limit=f"files whose SHA-256 {_WRITTEN} lists",
-            remedy="move it away, or name another folder",
-        )
-    return listed
+    return _is_regular(written) and entry in written.read_bytes().splitlines()
+
+
+def foreign(path: Path) -> StorageError:
+    """Make the refusal to replace or remove what femgear has not written, or somebody has changed."""
+    return StorageError(
+        "femgear has not written this here, or it was changed since", code="E-OUTPUT", file=str(path),
+        limit=f"files whose SHA-256 {WRITTEN} or the manifest lists",
+        remedy="move it away and repeat the command, or name another folder",
+    )  # fmt: skip
 
 
 def _entry(path: Path, digest: str) -> bytes:
@@ -512,24 +547,11 @@ def checked_name(name: str) -> str:
     plain = name.isprintable() and unicodedata.is_normalized("NFC", name) and not _RESERVED.fullmatch(name)
     if not plain or len(name) > 100 or len(name.encode()) > 240:
         raise StorageError(
-            "not a safe file name",
-            code="E-CHOICE",
-            value=name,
+            "not a safe file name", code="E-CHOICE", value=name, remedy="name another folder",
             limit='1 to 100 characters (240 bytes), composed (NFC), without / \\ : * ? " < > | and control '
             "characters, no dot or blank at the ends, none that Windows reserves (con, nul, com1, ...)",
-            remedy="name another folder",
-        )
+        )  # fmt: skip
     return name
-
-
-def is_safe_path(name: str) -> bool:
-    """Tell whether a relative path stays in its folder and has plain names only."""
-    path = Path(name)
-    return (
-        bool(path.parts)
-        and not path.is_absolute()
-        and all(_NAME.fullmatch(p) and p != ".." for p in path.parts)
-    )
 
 
 @contextlib.contextmanager
@@ -553,11 +575,9 @@ def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
             lock.acquire()
         except Timeout:
             raise StorageError(
-                "another run is writing into this folder",
-                code="E-LOCKED",
-                file=str(path.parent),
+                "another run is writing into this folder", code="E-LOCKED", file=str(path.parent),
                 remedy="wait until it has ended, or name another folder",
-            ) from None
+            ) from None  # fmt: skip
     try:
         yield
     finally:
@@ -582,7 +602,16 @@ def resumable(folder: Path, complete: Callable[[], bool] = lambda: False) -> Ite
 
 @contextlib.contextmanager
 def storage_errors(path: str | os.PathLike) -> Iterator[None]:
-    """Turn an `OSError` of the block into a `StorageError` that names ``path``."""
+    """Turn an `OSError` of the block into a `StorageError` that names ``path``; refuse what is no name."""
+    try:
+        possible = b"\0" not in os.fsencode(path)
+    except UnicodeEncodeError:
+        possible = False
+    if not possible:
+        raise StorageError(
+            "no file can have this name", value=os.fsdecode(path), limit="no NUL, no lone surrogate",
+            remedy="name another folder",
+        )  # fmt: skip
     try:
         yield
     except OSError as error:
@@ -593,8 +622,6 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
     """Say what an `OSError` says in a `StorageError`, ``E-DISK-FULL`` or ``E-STORAGE``."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
     remedies = {
-        errno.ENOSPC: "free some space or name another folder",
-        errno.EDQUOT: "free some space or name another folder",
         errno.EFBIG: "raise the limit of the size of files (ulimit -f), or name another folder",
         errno.ELOOP: "move the link away",
     }
@@ -602,7 +629,9 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
         error.strerror or str(error),
         code="E-DISK-FULL" if full else "E-STORAGE",
         file=None if path is None else os.fsdecode(path),
-        remedy=remedies.get(error.errno or 0, "check name and permissions"),
+        remedy="free some space or name another folder"
+        if full
+        else remedies.get(error.errno or 0, "check name and permissions"),
     )
 
 
@@ -610,37 +639,38 @@ def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path:
     """Refuse a variable of a type that no file holds, or without unit or text."""
     if variable.dtype.kind not in "fiubOUS":
         raise StorageError(
-            f"{name} has the type {variable.dtype}",
-            code="E-FORMAT",
-            file=os.fspath(path),
+            f"{name} has the type {variable.dtype}", code="E-FORMAT", file=os.fspath(path),
             remedy="store complex numbers as real and imaginary part",
-        )
+        )  # fmt: skip
     labels = coordinate and variable.dtype.kind in "OUS"
     missing = [key for key in ("units", "long_name") if key not in variable.attrs]
     if missing and not labels:
-        raise StorageError(f"{name} lacks {' and '.join(missing)}", code="E-FORMAT", file=os.fspath(path))
+        raise StorageError(
+            f"{name} lacks {' and '.join(missing)}", code="E-FORMAT", file=os.fspath(path),
+            remedy="give every variable attributes units and long_name",
+        )  # fmt: skip
 
 
-def _refuse_hostile(path: str | os.PathLike) -> None:
-    """Refuse an HDF5 file that points out of itself or holds what no result has (groups among it)."""
+def _hostility(path: str | os.PathLike) -> str:
+    """Tell why an HDF5 file is no result: it points out of itself, or holds what none has, as groups."""
     import h5py
 
     if _heap_without_end(path):
-        raise _hostile(path, None, "holds a heap without end")
+        return "holds a heap without end"
     size, declared = os.path.getsize(path), 0
     with h5py.File(path, "r") as file:
         for name in file:
             plain = isinstance(file.get(name, getlink=True), h5py.HardLink)
             item = file.get(name) if plain else None
             if not isinstance(item, h5py.Dataset):
-                raise _hostile(path, name, "is a link, a group or a named type")
+                return f"{name!a} is a link, a group or a named type"
             if item.external or item.is_virtual:
-                raise _hostile(path, name, "keeps its data in other files")
-            if not _is_plain(item.dtype):
-                raise _hostile(path, name, f"has the type {item.dtype}")
+                return f"{name!a} keeps its data in other files"
+            kind = "S" if h5py.check_string_dtype(item.dtype) is not None else item.dtype.kind
+            if kind not in "fiubS":
+                return f"{name!a} has the type {item.dtype}"
             declared += item.size * item.dtype.itemsize
-    if declared > 4 * size + _MARGIN:
-        raise _hostile(path, None, f"declares {declared:.3g} bytes in a file of {size}")
+    return f"declares {declared:.3g} bytes in a file of {size}" if declared > 4 * size + _MARGIN else ""
 
 
 def _heap_without_end(path: str | os.PathLike) -> bool:
@@ -662,16 +692,3 @@ def _heap_without_end(path: str | os.PathLike) -> bool:
                 place += step
             start = data.find(b"GCOL\x01", start + 1)
     return False
-
-
-def _is_plain(dtype: np.dtype) -> bool:
-    """Tell whether a type is a number, a truth value or a text."""
-    import h5py
-
-    return dtype.kind in "fiubS" or (dtype.kind == "O" and h5py.check_string_dtype(dtype) is not None)
-
-
-def _hostile(path: str | os.PathLike, name: str | None, what: str) -> StorageError:
-    """Make the refusal of a file, or of a name in it."""
-    message = f"{name!a} {what}" if name else f"the file {what}"
-    return StorageError(message, code="E-FORMAT", file=os.fspath(path), remedy="do not use this file")

@@ -11,12 +11,12 @@ import math
 import os
 import platform
 import re
-import shutil
+import shlex
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -28,13 +28,16 @@ import numpy as np
 from femgear import __version__
 from femgear.errors import StorageError
 from femgear.storage.files import (
+    WRITTEN,
     checked_name,
     checksum,
     csv_cell,
     exclusive_lock,
-    is_safe_path,
+    foreign,
     is_temporary,
+    list_own,
     read_dataset,
+    remove_own,
     remove_temporaries,
     storage_errors,
     write_text,
@@ -49,9 +52,8 @@ MANIFEST = "manifest.json"
 KEPT = ".stages"
 """Folder of results that a run goes on from when it was interrupted."""
 _CASE, _LOCK = "case.toml", ".lock"
-_RUNNING, _FINISHED, _ADDED, EXPORTED = ".running", ".finished", ".added", "exported"
-_WRITTEN = re.compile(r"manifest\.json|case\.toml|[\w.-]+\.(nc|npz|png|gif|vtu|html|csv)")
-"""Names of the files that femgear writes; a folder of its own that holds others is not removed."""
+_RUNNING, _ADDED, EXPORTED = ".running", ".added", "exported"
+_NAME = re.compile(r"(?!\.\.?$)[A-Za-z0-9._-]{1,100}")
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
 _COORDINATES = {
     "axis": ("1", "axis of the frame of the carrier"),
@@ -132,22 +134,21 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
     """
     import pandas as pd
 
-    flat, tables = data.reset_coords(), {}
+    flat, names = data.reset_coords(), []
     single = [
         *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
         *(_attribute(str(name), value) for name, value in data.attrs.items()),
     ]
-    if single:
-        tables[()] = pd.DataFrame(single, columns=["name", "value", "unit"])
-    for dims in dict.fromkeys(one.dims for one in flat.values() if one.dims):
-        chosen = [name for name, one in flat.items() if one.dims == dims]
-        frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
-        tables[dims] = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
-    names = []
-    for dims, frame in tables.items():
+    for dims in dict.fromkeys([(), *(one.dims for one in flat.values())]):
+        if dims:
+            chosen = [name for name, one in flat.items() if one.dims == dims]
+            frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
+            frame = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
+        else:
+            frame = pd.DataFrame(single, columns=["name", "value", "unit"])
         if frame.empty:
             continue
-        names.append(checked_name("_".join((stage, *dims)) + ".csv"))
+        names.append(checked_name("_".join((stage, *map(str, dims))) + ".csv"))
         text = frame.select_dtypes(["object", "str"]).map(csv_cell)
         frame[text.columns] = text
         write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])
@@ -297,18 +298,14 @@ class Results:
         if name not in self.manifest.files:
             _refuse_incomplete(self)
             raise StorageError(
-                "the run did not write this file",
-                code="E-RESULTS-MISSING",
-                file=str(path),
+                "the run did not write this file", code="E-RESULTS-MISSING", file=str(path),
                 limit=", ".join(self.manifest.files) or "nothing was written",
-            )
+            )  # fmt: skip
         if checksum(path) != self.manifest.files[name]:
             raise StorageError(
                 "the file is not the one that the run wrote (SHA-256 differs from the manifest)",
-                code="E-RESULTS-CHANGED",
-                file=str(path),
-                remedy="run the case again",
-            )
+                code="E-RESULTS-CHANGED", file=str(path), remedy="run the case again",
+            )  # fmt: skip
         return path
 
 
@@ -338,43 +335,38 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
     folder : path-like
         Created where it does not exist (its last name must be safe, see `checked_name`).
     case : str, optional
-        Text of the case, as for `prepare_output`.
+        Text of the case: what an interrupted run of it left stays, for this one to go on from.
     force : bool
-        Replace the results of an earlier run.
-
-    Yields
-    ------
-    Path
-        Made ready as by `prepare_output`.
+        Replace the results of an earlier run, or what an interrupted one of another case left.
 
     Raises
     ------
     StorageError
-        As `prepare_output`; ``E-LOCKED`` while another run writes into the folder.
+        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, files of an
+        interrupted run of another case, or files that were changed. ``E-LOCKED``: another run writes there.
     """
     folder = Path(folder)
     _make(folder)
     with folder_lock(folder):
         running = folder / _RUNNING
-        if not (force and (folder / MANIFEST).is_file() and read_manifest(folder).complete):
-            _remove_tree(running)
+        if not (force and _is_complete(folder)):
+            remove_own(running)
             yield prepare_output(folder, case=case, force=force)
             _remove_kept(folder)
             return
         _refuse_changed(folder, read_manifest(folder))
         try:
-            _publish_running(folder)
             if case is None or not (running / MANIFEST).is_file():
-                _remove_tree(running)
-            with storage_errors(folder):
-                running.mkdir(exist_ok=True)
+                remove_own(running)
+            list_own(running)
             yield prepare_output(running, case=case, force=True)
-            _publish_running(folder)
         except BaseException as error:
             # what a user interrupts goes on with the next run
-            if case is None or isinstance(error, Exception) or not read_manifest(running).files:
-                _remove_tree(running)
+            interrupted = case is not None and not isinstance(error, Exception)
+            if not (interrupted and (running / MANIFEST).is_file() and read_manifest(running).files):
+                remove_own(running)
             raise
+        _publish(folder)
 
 
 def completed_since_now(folder: str | os.PathLike) -> Callable[[], bool]:
@@ -402,79 +394,49 @@ def folder_lock(folder: str | os.PathLike) -> Iterator[None]:
     with exclusive_lock(folder / _LOCK):
         remove_temporaries(folder)
         _publish(folder)
-        _remove_tree(folder / _ADDED)
+        remove_own(folder / _ADDED)
         _remove_kept(folder)
         yield
 
 
-def _publish_running(folder: Path) -> None:
-    """Give the files of a run that replaces results their places, where it has come to its end."""
-    running = folder / _RUNNING
-    if not running.is_symlink() and (running / MANIFEST).is_file() and read_manifest(running).complete:
-        with storage_errors(folder):
-            os.replace(running, folder / _FINISHED)
-        _publish(folder)
+def _is_complete(folder: Path) -> bool:
+    """Tell whether a folder holds the results of a run that came to its end."""
+    return (folder / MANIFEST).is_file() and read_manifest(folder).complete
 
 
 def _remove_kept(folder: Path) -> None:
     """Remove what only an interrupted run goes on from, where the run has come to its end."""
-    if (folder / MANIFEST).is_file() and read_manifest(folder).complete:
-        _remove_tree(folder / KEPT)
+    if _is_complete(folder):
+        remove_own(folder / KEPT)
 
 
 @contextmanager
 def additions(folder: Path) -> Iterator[Path]:
     """Add files to results, whose folder is locked; the manifest lists them.
 
-    Yields
-    ------
-    Path
-        Folder inside. At the end its files take the places that they have in it.
-
-    Raises
-    ------
-    StorageError
-        ``E-OUTPUT``: a file of the manifest was changed, or one that it does not list is in the way.
+    At the end the files of the folder that is given take the places that they have in it. Refused (E-OUTPUT)
+    where a file of the manifest was changed, or one that it does not list is in the way.
     """
     manifest = read_manifest(folder)
     _refuse_changed(folder, manifest)
     added = folder / _ADDED
     try:
-        with storage_errors(added):
-            added.mkdir()
+        list_own(added)
         yield added
-        paths = sorted(path for path in added.rglob("*") if path.is_file())
+        paths = sorted(path for path in added.rglob("*") if path.is_file() and path.name != WRITTEN)
         files = {path.relative_to(added).as_posix(): checksum(path) for path in paths}
         _movable(added, folder, files, manifest.files)  # refused before it counts as finished
         _write_manifest(added, replace(manifest, files={**manifest.files, **files}))
-        with storage_errors(folder):
-            os.replace(added, folder / _FINISHED)
-        _publish(folder)
-    finally:
-        _remove_tree(added)
+    except BaseException:
+        remove_own(added)
+        raise
+    _publish(folder)
 
 
 def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force: bool = False) -> Path:
-    """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
+    """Make a folder ready for a run as `run_folder`; its manifest says that the run is not complete.
 
-    Parameters
-    ----------
-    folder : path-like
-    case : str, optional
-        Text of the case to run: what an interrupted run of it left stays, for this one to go on from.
-    force : bool
-        Replace what an interrupted run of another case left.
-
-    Returns
-    -------
-    Path
-        The folder, created where there is none, with a manifest that says that the run is not complete.
-
-    Raises
-    ------
-    StorageError
-        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, files of an
-        interrupted run of another case, or files of one that were changed.
+    Only unchanged files of an interrupted run are ever removed, those of another case with ``force`` alone.
     """
     folder = Path(folder)
     _make(folder)
@@ -482,22 +444,17 @@ def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force:
         manifest = read_manifest(folder)
         if manifest.complete:
             raise StorageError(
-                "the folder holds results already",
-                code="E-OUTPUT",
-                file=str(folder),
+                "the folder holds results already", code="E-OUTPUT", file=str(folder),
                 remedy="name a new folder, or replace them with --force",
-            )
+            )  # fmt: skip
         _refuse_changed(folder, manifest)
-        own = case is not None and manifest.files.get(_CASE) == hashlib.sha256(case.encode()).hexdigest()
-        if own:
+        if case is not None and manifest.files.get(_CASE) == hashlib.sha256(case.encode()).hexdigest():
             return folder
         if case is not None and _CASE in manifest.files and not force:
             raise StorageError(
-                "the folder holds an interrupted run of another case",
-                code="E-OUTPUT",
-                file=str(folder),
+                "the folder holds an interrupted run of another case", code="E-OUTPUT", file=str(folder),
                 remedy="name a new folder, or replace it with --force",
-            )
+            )  # fmt: skip
         discard(folder, manifest.files)
     _write_manifest(folder, Manifest(complete=False))
     return folder
@@ -506,7 +463,11 @@ def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force:
 def discard(folder: Path, files: Mapping[str, str]) -> None:
     """Remove files of a run that are unchanged, names with checksums, and folders that are empty then."""
     with storage_errors(folder):
-        _remove_unchanged(folder, files)
+        for path in [folder / name for name, digest in files.items() if _is_unchanged(folder, name, digest)]:
+            path.unlink()
+            if path.parent != folder:
+                with suppress(OSError):
+                    path.parent.rmdir()
 
 
 def record(
@@ -518,7 +479,7 @@ def record(
     known: Mapping[str, str] = MappingProxyType({}),
     complete: bool = False,
 ) -> Manifest:
-    """Write the manifest of what a run has written so far.
+    """Write the manifest of what a run has written so far; see `Manifest`.
 
     Parameters
     ----------
@@ -526,21 +487,13 @@ def record(
         Files that the run wrote, as paths inside the folder.
     known : mapping of str to str
         Checksums of those that are as they were, which saves reading them.
-    timings : mapping of str to float
-        Seconds a stage.
     convergence : mapping
         Numbers, texts, arrays and tables of these; numbers that are not finite are stored as null.
-    complete : bool
-        Whether the run came to its end.
     """
     files = {name: known.get(name) or checksum(Path(folder) / name) for name in names}
     manifest = Manifest(complete, files, timings, convergence, versions())
     _write_manifest(folder, manifest)
     return manifest
-
-
-finish = partial(record, complete=True)
-"""`record` of a run that came to its end."""
 
 
 def versions() -> dict[str, str]:
@@ -566,31 +519,26 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
         written = data.pop("femgear_format")
         if type(written) is not int or written != _FORMAT:
             raise StorageError(
-                "written by another version of femgear",
-                code="E-FORMAT",
-                file=str(path),
-                value=written,
-                limit=str(_FORMAT),
-                remedy="run the case again",
-            )
+                "written by another version of femgear", code="E-FORMAT", file=str(path), value=written,
+                limit=str(_FORMAT), remedy="run the case again",
+            )  # fmt: skip
         if seal != right:
             raise StorageError(
-                "changed since femgear wrote it (its checksum does not fit)",
-                code="E-FORMAT",
-                file=str(path),
-                remedy="run the case again in a new folder",
-            )
+                "changed since femgear wrote it (its checksum does not fit)", code="E-FORMAT",
+                file=str(path), remedy="run the case again in a new folder",
+            )  # fmt: skip
         manifest = Manifest(**data)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
         raise StorageError(
-            "no femgear manifest of reasonable size",
-            code="E-FORMAT",
-            file=str(path),
+            "no femgear manifest of reasonable size", code="E-FORMAT", file=str(path),
             remedy="name a folder that femgear run wrote",
-        ) from None
+        ) from None  # fmt: skip
     for name in manifest.files:
-        if not is_safe_path(name):
-            raise StorageError("names a file outside the folder", code="E-FORMAT", file=str(path), value=name)
+        if not all(_NAME.fullmatch(part) for part in name.split("/")):
+            raise StorageError(
+                "names a file outside the folder", code="E-FORMAT", file=str(path), value=name,
+                remedy="run the case again in a new folder",
+            )  # fmt: skip
     return manifest
 
 
@@ -620,10 +568,10 @@ def _plain(value: Any) -> Any:
 def _refuse_missing(folder: Path) -> None:
     """Refuse a folder that is not there."""
     if not folder.is_dir():
-        remedy = "name a folder that femgear run wrote"
         raise StorageError(
-            "no such results folder", code="E-RESULTS-MISSING", file=str(folder), remedy=remedy
-        )
+            "no such results folder", code="E-RESULTS-MISSING", file=str(folder),
+            remedy="name a folder that femgear run wrote",
+        )  # fmt: skip
 
 
 def _refuse_incomplete(results: Results) -> None:
@@ -633,11 +581,9 @@ def _refuse_incomplete(results: Results) -> None:
     folder = results.folder
     case = folder / _CASE if _CASE in results.manifest.files else "CASE"
     raise StorageError(
-        _interrupted(results),
-        code="E-RESULTS-INCOMPLETE",
-        file=str(folder),
-        remedy=f"run it again: femgear run {case} -o {folder}",
-    )
+        _interrupted(results), code="E-RESULTS-INCOMPLETE", file=str(folder),
+        remedy=f"run it again: femgear run {shlex.quote(str(case))} -o {shlex.quote(str(folder))}",
+    )  # fmt: skip
 
 
 def _refuse_changed(folder: Path, manifest: Manifest) -> None:
@@ -647,10 +593,8 @@ def _refuse_changed(folder: Path, manifest: Manifest) -> None:
     if changed:
         raise StorageError(
             f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
-            code="E-OUTPUT",
-            file=str(folder),
-            remedy="move the changed files away, or name a new folder",
-        )
+            code="E-OUTPUT", file=str(folder), remedy="move the changed files away, or name a new folder",
+        )  # fmt: skip
 
 
 def _interrupted(results: Results) -> str:
@@ -668,31 +612,29 @@ def _make(folder: Path) -> None:
             message, remedy = "exists and is not a folder", "name another folder"
             raise StorageError(message, code="E-OUTPUT", file=str(folder), remedy=remedy)
         folder.mkdir(parents=True, exist_ok=True)
-        foreign = any(path.name != _LOCK and not is_temporary(path) for path in folder.iterdir())
-    if foreign and not (folder / MANIFEST).is_file():
+        others = [path for path in folder.iterdir() if path.name != _LOCK and not is_temporary(path)]
+    if others and not (folder / MANIFEST).is_file():
         raise StorageError(
-            "the folder holds files but no femgear results",
-            code="E-OUTPUT",
-            file=str(folder),
+            "the folder holds files but no femgear results", code="E-OUTPUT", file=str(folder),
             remedy="name a new folder",
-        )
+        )  # fmt: skip
 
 
 def _publish(folder: Path) -> None:
-    """Give the files of a finished run their places, the manifest last; repeated after an interruption."""
-    source = folder / _FINISHED
-    if not source.is_symlink() and (source / MANIFEST).is_file():
+    """Give new files their places, the manifest last, if it is there; repeated after an interruption."""
+    for source in (folder / _RUNNING, folder / _ADDED):
+        if source.is_symlink() or not (source / MANIFEST).is_file():
+            continue
         new, old = read_manifest(source), read_manifest(folder)
         if old.complete and not new.complete:
-            raise _foreign(source)
-        moved = _movable(source, folder, new.files, old.files)
+            continue
         with storage_errors(folder):
-            for name in moved:
+            for name in _movable(source, folder, new.files, old.files):
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 os.replace(source / name, folder / name)
-            _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
+            discard(folder, {name: digest for name, digest in old.files.items() if name not in new.files})
             os.replace(source / MANIFEST, folder / MANIFEST)
-    _remove_tree(source)
+        remove_own(source)
 
 
 def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mapping[str, str]) -> list[str]:
@@ -700,44 +642,12 @@ def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mappin
     moved = [name for name in files if os.path.lexists(source / name)]
     for name in moved:
         if not _is_unchanged(source, name, files[name]):
-            raise _foreign(source / name)
+            raise foreign(source / name)
         place, known = folder / name, owned.get(name, files[name])
         led_away = place.parent.resolve() != folder.resolve() / Path(name).parent
         if led_away or (os.path.lexists(place) and not _is_unchanged(folder, name, known)):
-            raise _foreign(place)
+            raise foreign(place)
     return moved
-
-
-def _remove_tree(path: Path) -> None:
-    """Remove a folder that a run left, where there is one; refuses one that holds what no run has written."""
-    with storage_errors(path):
-        if not os.path.lexists(path):
-            return
-        for one in (path, *path.rglob("*")):
-            own = one.is_dir() or (one != path and one.is_file() and _WRITTEN.fullmatch(one.name))
-            if one.is_symlink() or not (own or is_temporary(one)):
-                raise _foreign(one)
-        shutil.rmtree(path)
-
-
-def _foreign(path: Path) -> StorageError:
-    """Make the refusal to replace or remove what no run has written, or somebody has changed."""
-    return StorageError(
-        "no run has written this, or it was changed since",
-        code="E-OUTPUT",
-        file=str(path),
-        remedy="move it away and repeat the command",
-    )
-
-
-def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
-    """Remove those of some files that are as the run wrote them, and folders that are empty then."""
-    for name, digest in files.items():
-        if _is_unchanged(folder, name, digest):
-            (folder / name).unlink()
-            if (folder / name).parent != folder:
-                with suppress(OSError):
-                    (folder / name).parent.rmdir()
 
 
 def _is_unchanged(folder: Path, name: str, digest: str) -> bool:

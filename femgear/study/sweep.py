@@ -251,11 +251,8 @@ def sweep_into(
     with resumable(folder):
         found = sweep(case, values, quantities, **options)
         write_csv(folder / _TABLE, found.header, found.records())
-        names = [_TABLE, _JOURNAL]
-        if np.isfinite(found.values).any():
-            _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
-            names.append(_FIGURE)
-    return found, names
+        _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
+    return found, [_TABLE, _JOURNAL, _FIGURE]
 
 
 def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:
@@ -275,6 +272,8 @@ def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:
             name = ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point[:-1], strict=False))
             legend = {"label": name} if name else {}
             axes[q].plot(x, curve[:, q], marker="o", markersize=4, **line_style(k), **legend)
+        if not np.isfinite(curves[..., q]).any():
+            axes[q].text(0.5, 0.5, "no case can be computed", transform=axes[q].transAxes, ha="center")
         title = f"{quantity.name} [{quantity.dimension.shown}]".replace("[um]", "[µm]")
         label(axes[q], f"{found.keys[-1]} [{unit}]" if unit else found.keys[-1], fill(title, 36))
     for ax in axes[count:]:

@@ -38,14 +38,23 @@ def test_codes_on_the_other_pages_exist():
         assert codes <= set(errors.CODES), path.name
 
 
-@pytest.mark.parametrize("folder", ["case", "gears", "trains", "study"])
-def test_what_a_user_meets_says_what_is_allowed_or_what_to_do(error_page, folder):
-    """Refusals of cases, trains and studies; what `checked_numbers` and the like refuse has both."""
-    bare = []
+def refusals(error_page, folder):
+    """File, code, words and message of the refusals of a folder."""
     for path in (PATH.parents[2] / "femgear" / folder).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("Error"):
                 words = {word.arg: word.value for word in node.keywords}
-                if error_page._codes(words.get("code")) and not words.keys() & {"limit", "remedy"}:
-                    bare.append(f"{path.name}:{node.lineno}: {error_page._text(node.args[0])}")
-    assert bare == []
+                for code in error_page._codes(words.get("code")):
+                    yield code, words.keys(), f"{path.name}:{node.lineno}: {error_page._text(node.args[0])}"
+
+
+@pytest.mark.parametrize("folder", ["case", "gears", "trains", "study", "storage"])
+def test_what_a_user_meets_says_what_is_allowed_or_what_to_do(error_page, folder):
+    """Refusals of cases, trains and studies; what `checked_numbers` and the like refuse has both."""
+    found = list(refusals(error_page, folder))
+    assert found and not [place for _, words, place in found if not words & {"limit", "remedy"}]
+
+
+def test_refusals_of_grids_say_what_to_do(error_page):
+    found = [one for one in refusals(error_page, "fe") if one[0] in ("E-GRID", "E-GRID-FILE")]
+    assert len(found) > 15 and not [place for _, words, place in found if "remedy" not in words]

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from edited_manifests import finish
 
 from femgear.errors import StorageError
 from femgear.report import style
 from femgear.report.page import page as html
 from femgear.storage.files import write_dataset, write_text
-from femgear.storage.results import finish, prepare_output
+from femgear.storage.results import prepare_output
 from femgear.trains.elastic.stages import ELASTIC
 from femgear.trains.reading import open_results, parse_case, read_case, with_value
 from femgear.trains.static import figures as static_figures

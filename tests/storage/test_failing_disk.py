@@ -3,7 +3,6 @@
 import errno
 import io
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -12,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from edited_manifests import finish
 
 from femgear.errors import StorageError
 from femgear.storage import files
 from femgear.storage.files import read_dataset, write_dataset, write_text
-from femgear.storage.results import MANIFEST, finish, folder_lock, read_manifest, run_folder
+from femgear.storage.results import MANIFEST, folder_lock, read_manifest, record, run_folder
 
 NAMED = {"units": "1", "long_name": "something"}
 LIMITED = """
@@ -161,12 +161,14 @@ def run_and_die(where, folder, force):
         if where == "picture":
             write_text("png", working / "picture.png")
             kill()
-        finish(working, ["case.toml", "static.nc"], timings={}, convergence={})
+        record(working, ["case.toml", "static.nc"], timings={}, convergence={}, complete=True)
         last = {"publish": "static.nc", "manifest": MANIFEST}.get(where)
-        replace = os.replace
+        replace, remove = os.replace, os.unlink
         os.replace = lambda a, b: kill() if Path(b).name == last else replace(a, b)
         if where == "clear":
-            shutil.rmtree = kill
+            os.unlink = lambda a: kill() if Path(a).name == ".written" else remove(a)
+        if where == "clear folder":
+            os.rmdir = kill
 
 
 def killed(work, *arguments):
@@ -183,7 +185,7 @@ def killed(work, *arguments):
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 @pytest.mark.parametrize(
     ("where", "force"),
-    [(where, "force") for where in ("write", "picture", "publish", "manifest", "clear")]
+    [(where, "force") for where in ("write", "picture", "publish", "manifest", "clear", "clear folder")]
     + [("write", "new"), ("picture", "new")],
 )
 def test_a_killed_run_leaves_nothing_that_the_next_does_not_remove(tmp_path, where, force):
@@ -194,7 +196,7 @@ def test_a_killed_run_leaves_nothing_that_the_next_does_not_remove(tmp_path, whe
             finish(working, ["case.toml"], timings={}, convergence={})
     assert killed(run_and_die, where, folder, force) == -signal.SIGKILL
     assert read_manifest(folder).complete == (force == "force")
-    published = where in ("publish", "manifest", "clear")
+    published = where in ("publish", "manifest", "clear", "clear folder")
     with folder_lock(folder):
         if published:
             assert (folder / "case.toml").read_text() == "new" and read_manifest(folder).complete

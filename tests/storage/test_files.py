@@ -11,13 +11,13 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from edited_manifests import finish
 
 from femgear.errors import StorageError
 from femgear.storage import files
-from femgear.storage.files import checksum, read_dataset, write_csv, write_dataset, write_text
+from femgear.storage.files import checksum, list_own, read_dataset, write_csv, write_dataset, write_text
 from femgear.storage.results import (
     MANIFEST,
-    finish,
     folder_lock,
     prepare_output,
     read_manifest,
@@ -404,10 +404,10 @@ def test_results_are_replaced_as_a_whole_even_if_the_process_is_killed_in_betwee
 def test_what_a_killed_run_left_is_cleared_by_the_next(tmp_path):
     folder = tmp_path / "out"
     finished(folder)
-    (folder / ".running").mkdir()
-    (folder / ".running" / "static.nc").write_bytes(b"half")
+    list_own(folder / ".running")
+    write_text("half", folder / ".running" / "static.nc")
     with run_folder(folder, force=True) as working:
-        assert names(working) == [MANIFEST]
+        assert names(working) == [".written", MANIFEST]
         write_case(working)
     assert names(folder) == ["case.toml", MANIFEST]
 

@@ -5,15 +5,14 @@ import stat
 import threading
 
 import pytest
-from edited_manifests import edit_manifest
+from edited_manifests import edit_manifest, finish
 
 from femgear.errors import StorageError
 from femgear.storage import files
-from femgear.storage.files import checksum, exclusive_lock, replace_file, write_text
+from femgear.storage.files import checksum, exclusive_lock, list_own, own_files, replaced_file, write_text
 from femgear.storage.results import (
     MANIFEST,
     additions,
-    finish,
     folder_lock,
     prepare_output,
     read_manifest,
@@ -80,10 +79,11 @@ def test_temporary_names_cannot_be_foretold_and_what_is_there_is_not_written_int
 ):
     seen = []
     for _ in range(2):
-        replace_file(tmp_path / "a.txt", lambda path: seen.append((path.name, path.stat().st_size)))
+        with replaced_file(tmp_path / "a.txt") as path:
+            seen.append((path.name, path.stat().st_size))
     assert seen[0] != seen[1] and all(size == 0 for _, size in seen)
     monkeypatch.setattr(files.secrets, "token_hex", lambda n: "0" * 2 * n)
-    trap = tmp_path / f".a.{'0' * 16}.tmp.txt"
+    trap = tmp_path / f".femgear-{'0' * 16}.a.txt"
     trap.symlink_to(elsewhere / "thesis.txt")
     with pytest.raises(StorageError, match="File exists"):
         write_text("mine", tmp_path / "a.txt")
@@ -100,29 +100,31 @@ def test_a_link_where_a_result_belongs_is_not_followed(tmp_path, elsewhere):
 
 
 def test_temporary_files_of_dead_runs_are_removed_and_nothing_like_them(results, elsewhere):
-    dead = [".static.4711.tmp.nc", ".manifest.0123456789abcdef.tmp.json", ".x.0123456789abcdef.tmp"]
+    dead = [f".femgear-0123456789abcdef.{name}" for name in ("static.nc", "manifest.json", "x")]
     alive = [
-        ".static.tmp.nc",
-        "static.4711.tmp.nc",
+        ".ANYNAME.1.tmp.2",
+        ".static.4711.tmp.nc",
+        ".static.0123456789abcdef.tmp.nc",
         ".notes",
-        ".a.xyz.tmp.txt",
-        ".static.012345678901.tmp.nc",
+        ".femgear-0123.static.nc",
+        "femgear-0123456789abcdef.static.nc",
     ]
     for name in dead + alive:
         (results / name).write_text("half")
-    (results / ".link.4711.tmp.nc").symlink_to(elsewhere / "thesis.txt")
-    (results / ".folder.4711.tmp.nc").mkdir()
+    link, folder = (f".femgear-0123456789abcde{digit}.static.nc" for digit in "01")
+    (results / link).symlink_to(elsewhere / "thesis.txt")
+    (results / folder).mkdir()
     with folder_lock(results):
         pass
     there = contents(results).keys()
     assert not there & set(dead)
-    assert {*alive, ".link.4711.tmp.nc", ".folder.4711.tmp.nc"} <= there
+    assert {*alive, link, folder} <= there
 
 
 def test_a_run_killed_while_it_wrote_its_first_manifest_may_be_repeated(tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
-    (folder / ".manifest.0123456789abcdef.tmp.json").write_text("{")
+    (folder / ".femgear-0123456789abcdef.manifest.json").write_text("{")
     with run_folder(folder) as working:
         complete(working)
     assert contents(folder).keys() == {"case.toml", "static.nc", MANIFEST}
@@ -169,10 +171,39 @@ def _link_to_exported(path, elsewhere):
     (path / "exported").symlink_to(elsewhere, target_is_directory=True)
 
 
+def _files_like_ours(path, elsewhere):
+    path.mkdir()
+    for name in ("photo.png", "notes.csv", "modes.nc", "case.toml", "static.npz"):
+        (path / name).write_text("mine")
+
+
+def _temporary_name(path, elsewhere):
+    path.mkdir()
+    (path / ".ANYNAME.1.tmp.2").write_text("mine")
+
+
+def _list(path, elsewhere):
+    path.mkdir()
+    (path / ".written").write_text(PRECIOUS)
+
+
+def _picture_in_ours(path, elsewhere):
+    list_own(path)
+    write_text("half", path / "static.nc")
+    (path / "photo.png").write_text("mine")
+
+
+def _ours_changed(path, elsewhere):
+    list_own(path)
+    write_text("half", path / "notes.csv")
+    (path / "notes.csv").write_text("mine")
+
+
 PLANTED = [_link, _file, _pipe, _notes, _notes_below, _link_below, _pipe_below, _link_to_exported]
+PLANTED += [_files_like_ours, _temporary_name, _list, _picture_in_ours, _ours_changed]
 
 
-@pytest.mark.parametrize("name", [".running", ".finished", ".added"])
+@pytest.mark.parametrize("name", [".running", ".added", ".stages"])
 @pytest.mark.parametrize("plant", PLANTED)
 def test_what_no_run_left_is_refused_and_kept(results, elsewhere, name, plant):
     plant(results / name, elsewhere)
@@ -184,24 +215,60 @@ def test_what_no_run_left_is_refused_and_kept(results, elsewhere, name, plant):
         assert contents(results) == before
 
 
-def test_what_somebody_puts_into_the_folder_of_a_running_run_is_kept(results):
+@pytest.mark.parametrize("name", ["notes.txt", "photo.png", "notes.csv"])
+def test_what_somebody_puts_into_the_folder_of_a_running_run_is_kept(results, name):
     def run():
         with run_folder(results, force=True) as working:
-            (working / "notes.txt").write_text("mine")
+            (working / name).write_text("mine")
             complete(working, "new")
 
-    assert refused(run).file == str(results / ".finished" / "notes.txt")
+    assert refused(run).file == str(results / ".running" / name)
     assert (results / "case.toml").read_text() == "new case.toml"
-    assert (results / ".finished" / "notes.txt").read_text() == "mine"
+    assert contents(results / ".running").keys() == {".written", name}
+    assert (results / ".running" / name).read_text() == "mine"
 
 
-# --- planted .finished -----------------------------------------------------------------------------
+def test_what_a_run_has_written_is_removed_with_its_folder(results):
+    """And with the folders below, whatever the names."""
+    for folder in (results / ".added", results / ".added" / "exported"):
+        list_own(folder)
+        for name in ("static.nc", "photo.jpeg", "a"):
+            write_text("half", folder / name)
+        (folder / ".femgear-0123456789abcdef.a.csv").write_text("ha")
+    before = contents(results / ".added")
+    assert len(before) == 11 and ".written" in before
+    with folder_lock(results):
+        pass
+    assert not (results / ".added").exists()
+
+
+def test_a_folder_of_stages_that_somebody_made_is_refused_before_a_run(tmp_path):
+    folder = prepare_output(tmp_path / "out")
+    (folder / ".stages").mkdir()
+    (folder / ".stages" / "static.npz").write_text("mine")
+    error = refused(lambda: own_files(folder / ".stages", ["*"]))
+    assert error.file == str(folder / ".stages" / "static.npz")
+    assert contents(folder / ".stages") == {"static.npz": "mine"}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no open file can be removed there")
+def test_what_a_living_process_writes_is_not_removed(results):
+    with replaced_file(results / "modes.nc") as new:
+        new.write_text("whole")
+        with folder_lock(results):
+            pass
+        list_own(results.parent)
+        assert new.read_text() == "whole"
+    assert (results / "modes.nc").read_text() == "whole"
+
+
+# --- planted results that have not yet their places --------------------------------------------------
 
 
 def finished(results, names=("case.toml", "static.nc", "modes.nc"), text="new"):
     """What a run leaves that is killed before its results have their places."""
-    (results / ".finished").mkdir()
-    return complete(results / ".finished", text, names)
+    (results / ".running").mkdir()
+    return complete(results / ".running", text, names)
 
 
 def test_a_finished_run_is_brought_to_its_end_by_whoever_locks_the_folder(results):
@@ -209,7 +276,7 @@ def test_a_finished_run_is_brought_to_its_end_by_whoever_locks_the_folder(result
     with folder_lock(results):
         assert contents(results).keys() >= {"case.toml", "static.nc", "modes.nc", MANIFEST}
         assert (results / "modes.nc").read_text() == "new modes.nc"
-    assert not (results / ".finished").exists() and "modes.nc" in read_manifest(results).files
+    assert not (results / ".running").exists() and "modes.nc" in read_manifest(results).files
 
 
 @pytest.mark.parametrize("name", ["modes.nc", "static.nc", "report.html"])
@@ -224,16 +291,6 @@ def test_a_file_of_the_user_is_not_overwritten_by_a_finished_run(results, name):
     with folder_lock(results):
         assert (results / name).read_text() == f"new {name}"
     assert (results.parent / "moved").read_text() == "mine"
-
-
-def test_results_elsewhere_are_not_taken_through_a_link(results, tmp_path):
-    theirs = tmp_path / "theirs"
-    theirs.mkdir()
-    complete(theirs, "theirs")
-    (results / ".finished").symlink_to(theirs, target_is_directory=True)
-    before = contents(tmp_path)
-    refused(lambda: replaced(results))
-    assert contents(tmp_path) == before
 
 
 def test_a_publication_that_was_interrupted_goes_on(results):
@@ -263,8 +320,9 @@ def test_a_finished_run_without_a_valid_manifest_is_refused(results, text):
     assert contents(results) == before
 
 
-def test_a_run_that_is_not_complete_is_not_published(results):
-    source = results / ".finished"
+@pytest.mark.parametrize("name", [".running", ".added"])
+def test_a_run_that_is_not_complete_is_not_published(results, name):
+    source = results / name
     source.mkdir()
     write_text("new", source / "case.toml")
     record(source, ["case.toml"], timings={}, convergence={})
@@ -304,7 +362,7 @@ def test_a_link_in_place_of_a_result_counts_as_changed(results, tmp_path):
 def add(folder, **given):
     with folder_lock(folder), additions(folder) as new:
         for name, text in given.items():
-            (new / f"{name}.html").write_text(text)
+            write_text(text, new / f"{name}.html")
 
 
 def test_additions_are_listed_and_replaced_while_they_are_unchanged(results):
@@ -335,13 +393,13 @@ def test_an_addition_replaces_nothing_foreign(results, elsewhere):
     assert "report.html" in read_manifest(results).files
 
 
-@pytest.mark.parametrize("last", ["report.html", MANIFEST, ".finished"])
+@pytest.mark.parametrize("last", ["report.html", MANIFEST, f".added/{MANIFEST}"])
 def test_an_addition_that_is_killed_goes_on_with_the_next(results, monkeypatch, last):
     add(results, report="one")
     replace = os.replace
 
     def killed(source, target):
-        if os.path.dirname(target) == str(results) and os.path.basename(target) == last:
+        if os.path.relpath(target, results) == last:
             raise KeyboardInterrupt
         replace(source, target)
 
@@ -352,7 +410,7 @@ def test_an_addition_that_is_killed_goes_on_with_the_next(results, monkeypatch, 
     with folder_lock(results):
         pass
     there = contents(results)
-    assert there["report.html"] == ("one" if last == ".finished" else "two")
+    assert there["report.html"] == ("one" if last.startswith(".") else "two")
     assert read_manifest(results).files["report.html"] == checksum(results / "report.html")
     assert not any(name.startswith(".") for name in there)
 
@@ -426,6 +484,50 @@ def test_many_threads_hold_a_lock_one_after_the_other(tmp_path):
     for thread in threads:
         thread.join()
     assert max(most) == 1 and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", [".running", ".added"])
+def test_results_elsewhere_are_not_published_through_a_link(results, tmp_path, name):
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    complete(theirs, "theirs")
+    (results / name).symlink_to(theirs, target_is_directory=True)
+    before = contents(tmp_path)
+    refused(lambda: replaced(results))
+    assert contents(tmp_path) == before
+
+
+def test_results_are_replaced_in_a_folder_that_a_link_leads_to(results, tmp_path):
+    (tmp_path / "link").symlink_to(results, target_is_directory=True)
+    replaced(tmp_path / "link")
+    assert contents(results)["case.toml"] == "new case.toml"
+
+
+def test_a_complete_run_that_was_killed_takes_its_place_whoever_locks_the_folder(results):
+    list_own(results / ".running")
+    complete(results / ".running", "new")
+    with folder_lock(results):
+        pass
+    assert contents(results)["case.toml"] == "new case.toml" and not (results / ".running").exists()
+
+
+def test_a_folder_of_another_name_is_left_alone(results):
+    for path in (results / ".finished", results / ".mine"):
+        _files_like_ours(path, None)
+    before = contents(results)
+    replaced(results)
+    add(results, report="one")
+    assert all(contents(results)[name] == before[name] for name in before if name.startswith("."))
+
+
+def test_an_interrupt_before_the_first_manifest_is_told_as_such(results, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("femgear.storage.results.list_own", interrupt)
+    with pytest.raises(KeyboardInterrupt), run_folder(results, case="new", force=True):
+        pass
+    assert contents(results).keys() == {"case.toml", "static.nc", MANIFEST}
 
 
 def test_no_folder_is_left_behind(results):

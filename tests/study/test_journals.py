@@ -17,6 +17,7 @@ import pytest
 from script_runs import wait_for_lines
 from soak import programs
 
+from femgear import cli
 from femgear.errors import ContactError, StorageError
 from femgear.storage import files
 from femgear.study import search
@@ -465,6 +466,54 @@ def test_the_list_of_what_was_written_may_be_damaged_and_half_written(free, tmp_
     with pytest.raises(StorageError, match=r"(?s)\.written: .*move it away"):
         sweep_into(free, tmp_path, over=OVER, of=OF)
     assert CASE.read_bytes() == before
+
+
+def test_a_refused_sweep_leaves_no_list(free, tmp_path):
+    (tmp_path / "sweep.jsonl").write_text("theirs")
+    with pytest.raises(StorageError, match="E-JOURNAL"):
+        sweep_into(free, tmp_path, over=OVER, of=OF)
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.jsonl"]
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a\0b/c", "a\ud800b"])
+def test_a_folder_with_an_impossible_name_is_refused(free, tmp_path, name, capsys):
+    with pytest.raises(StorageError, match="no file can have this name") as info:
+        sweep_into(free, tmp_path / name, over=OVER, of=OF)
+    assert info.value.limit and info.value.remedy
+    words = ["sweep", str(CASE), "-o", str(tmp_path / name), "--over", "operation.torque=50 N m"]
+    assert cli.main(words) == 4 and "no file can have this name" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_sweep_without_a_value_replaces_the_figure_of_one_with_values(free, tmp_path):
+    sweep_into(free, tmp_path, over=OVER, of=OF)
+    before = (tmp_path / "sweep.png").read_bytes()
+    (tmp_path / "sweep.jsonl").unlink()
+    found, names = sweep_into(free, tmp_path, over=["sun.profile_shift=2.5,3.5"], of=OF)
+    assert np.isnan(found.values).all() and "sweep.png" in names
+    after = (tmp_path / "sweep.png").read_bytes()
+    assert after.startswith(b"\x89PNG") and after != before
+
+
+HALF_WRITTEN = """
+import os, signal, sys
+from pathlib import Path
+from femgear.storage.files import own_files, replaced_file
+own_files(Path(sys.argv[1]), ["sweep.csv"])
+with replaced_file(Path(sys.argv[1]) / "sweep.csv") as new:
+    new.write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_process_left_half_written_is_removed_by_the_next_sweep(free, tmp_path):
+    killed = subprocess.run([sys.executable, "-c", HALF_WRITTEN, str(tmp_path)], check=False)
+    assert killed.returncode == -9 and len(list(tmp_path.iterdir())) == 1
+    with files.replaced_file(tmp_path / "of another process") as living:
+        sweep_into(free, tmp_path, over=OVER, of=OF)
+        assert living.exists()
+    expected = {"sweep.csv", "sweep.png", "sweep.jsonl", ".written", "of another process"}
+    assert {path.name for path in tmp_path.iterdir()} == expected
 
 
 # --- kills -----------------------------------------------------------------------------------------
