@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import atexit
 import contextlib
 import os
 import signal
@@ -394,8 +395,8 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
             failure.remedy = "free some space where it goes, or send it elsewhere"
             code = _fail(failure)
         errors.flush()
-    if arguments is None:  # the process ends: nothing is left to interrupt but the interpreter
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if arguments is None:  # when the process ends, nothing is left to interrupt but the interpreter
+        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     return code
 
 
