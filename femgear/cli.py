@@ -116,8 +116,8 @@ def _say(text: str) -> None:
 
 
 def _fail(error: FemgearError) -> int:
-    if error.key == "only":
-        error.key = "--only"
+    if error.key in ("only", "speeds"):
+        error.key = f"--{error.key}"
     print(error, file=sys.stderr)
     return error.exit_code
 
@@ -396,7 +396,8 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
             code = _fail(failure)
         errors.flush()
     if arguments is None:  # when the process ends, nothing is left to interrupt but the interpreter
-        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            atexit.register(signal.signal, number, signal.SIG_IGN)
     return code
 
 

@@ -113,6 +113,7 @@ def main(
         Folder of the results.
     """
     from femgear.storage.files import resumable
+    from femgear.study.front import check_second
     from femgear.study.objectives import named_quantity
     from femgear.trains.reading import read_case, with_value
 
@@ -121,6 +122,8 @@ def main(
     _check_request(data, extent)
     data, problem = _problem(data, task, extent)
     another = None if task.second is None else named_quantity(task.second, speeds=task.speeds)
+    if another is not None:
+        check_second(problem, another)
     names = [*FILES, *(FRONT if another else ()), *(CHECK if extent.check else ())]
     folder = ready_folder(output, names)
     _refuse_foreign(data, problem, folder, RUNS if extent.check else ())

@@ -417,10 +417,11 @@ def test_a_process_that_may_use_too_little_memory_does_not_begin(limit):
     assert "ulimit" in done.stderr and "Traceback" not in done.stderr
 
 
-def test_ctrl_c_when_the_command_has_ended_changes_nothing():
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_when_the_command_has_ended_change_nothing(number):
     program = (
-        "import atexit, os, sys; from femgear.cli import main; atexit.register(os.kill, os.getpid(), 2);"
-        "sys.exit(main())"
+        "import atexit, os, sys; from femgear.cli import main;"
+        f"atexit.register(os.kill, os.getpid(), {int(number)}); sys.exit(main())"
     )
     done = _started(program, "--version")
     assert done.returncode == 0 and not done.stderr

@@ -624,6 +624,8 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
     remedies = {
         errno.EFBIG: "raise the limit of the size of files (ulimit -f), or name another folder",
         errno.ELOOP: "move the link away",
+        errno.EMFILE: "raise the limit of open files (ulimit -n)",
+        errno.ENAMETOOLONG: "take a shorter name",
     }
     return StorageError(
         error.strerror or str(error),

@@ -80,8 +80,9 @@ class Journal(dict[str, dict]):
                 self._number, self[found["key"]] = found["number"], found["record"]
             else:
                 bad.append(str(place))
-        if bad:
-            shown = f"line{'s' * (len(bad) > 1)} {', '.join(bad[:9])}"
+        missing = self._number - len(lines[1:])
+        if bad or missing > 0:
+            shown = f"line{'s' * (len(bad) > 1)} {', '.join(bad[:9])}" if bad else f"{missing} missing"
             shown += f" and {len(bad) - 9} more" if len(bad) > 9 else ""
             finding = Finding(
                 "W-JOURNAL", "", f"{path}: changed or damaged since it was written: {shown}",

@@ -68,6 +68,19 @@ class ParetoFront:
 
 
 @one_blas_thread()
+def check_second(problem: Problem, second: Quantity) -> None:
+    """Refuse (E-OBJECTIVE) the objective of a problem as the second one of its front."""
+    if second.name == problem.objective.name:
+        raise CaseError(
+            "a front has two objectives",
+            code="E-OBJECTIVE",
+            key="second",
+            value=second.name,
+            limit=f"another objective than {problem.objective.name}",
+            remedy="name another second objective, or search without one",
+        )
+
+
 def pareto_front(
     problem: Problem,
     second: Quantity,
@@ -102,14 +115,7 @@ def pareto_front(
     ConvergenceError
         E-INFEASIBLE: no design within the limits was found.
     """
-    if second.name == problem.objective.name:
-        raise CaseError(
-            "a front has two objectives",
-            code="E-OBJECTIVE",
-            key="second",
-            value=second.name,
-            limit=f"another objective than {problem.objective.name}",
-        )
+    check_second(problem, second)
     check_count("points", points, 2)
     options = options or SearchOptions()
     most = options.max_designs

@@ -328,7 +328,11 @@ def _chosen(value, table: dict, key: str):
 
 def _range(first: str, last: str, count: int) -> Range:
     """Range of speeds from texts with units, refused (E-OBJECTIVE) where it is none."""
-    low, high = to_si(first, SPEED), to_si(last, SPEED)
+    try:
+        low, high = to_si(first, SPEED), to_si(last, SPEED)
+    except CaseError as error:
+        error.key = "speeds"
+        raise
     if not (0 < low < high and 2 <= count <= 10000):
         raise CaseError(
             "not a range of speeds",
@@ -336,6 +340,7 @@ def _range(first: str, last: str, count: int) -> Range:
             key="speeds",
             value=f"{count} from {first} to {last}",
             limit="2 to 10000 speeds, from over 0 upwards",
+            remedy='give the lower speed first, as in "1000 rpm" and "3500 rpm"',
         )
     return low, high, int(count)
 

@@ -73,12 +73,11 @@ class Variable:
         low, high = self.bounds
         if not low < high:
             raise CaseError(
+                "the bounds of a design variable are equal" if low == high else
                 "the bounds of a design variable are in the wrong order",
-                code="E-VARIABLE",
-                key=self.name,
-                value=f"{self.low} to {self.high}",
-                limit="low < high",
-            )
+                code="E-VARIABLE", key=self.name, value=f"{self.low}..{self.high}", limit="low < high",
+                remedy=f'write "{self.high}..{self.low}"' if low > high else "give two different bounds",
+            )  # fmt: skip
         if self.integer and (self.unit or low != round(low) or high != round(high)):
             raise CaseError(
                 "bounds of whole numbers are whole numbers",

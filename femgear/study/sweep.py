@@ -136,6 +136,11 @@ def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: S
             )  # fmt: skip
         for value in values:
             with_value(case, key, value)
+        if len(set(values)) < len(values):
+            raise CaseError(
+                "a value is given twice", code="E-DUPLICATE", key="--over",
+                value=f"{key}={', '.join(map(str, values))}", remedy="give every value once",
+            )  # fmt: skip
     _check_stages(case, quantities, over)
     return count
 

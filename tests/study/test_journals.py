@@ -201,6 +201,14 @@ def test_lines_of_another_case_are_not_taken(problem, whole, tmp_path):
     assert f"lines {', '.join(str(n) for n in range(6, 15))} and 1 more;" in words
 
 
+def test_lines_that_are_missing_are_computed_again_and_said(problem, whole, tmp_path):
+    right, text = whole
+    lines = lines_of(text)
+    (tmp_path / "j").write_bytes(b"".join([*lines[:3], *lines[5:]]))
+    found, computed, (words,) = work(problem, tmp_path / "j")
+    assert found == right and computed and "changed or damaged since it was written: 2 missing;" in words
+
+
 def test_many_damaged_lines_are_one_warning(problem, whole, tmp_path):
     right, text = whole
     (tmp_path / "j").write_bytes(lines_of(text)[0] + b"\n" * 20)

@@ -16,8 +16,15 @@ from femgear import cli
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, ConvergenceError, StorageError
 from femgear.study.designs import Designs, Failure, Journal, evaluations, open_designs
-from femgear.study.front import non_dominated, pareto_front
-from femgear.study.objectives import NUMBER, Quantity, contact_ratio, tip_thickness, transmission_error
+from femgear.study.front import check_second, non_dominated, pareto_front
+from femgear.study.objectives import (
+    NUMBER,
+    Quantity,
+    contact_ratio,
+    named_quantity,
+    tip_thickness,
+    transmission_error,
+)
 from femgear.study.problem import Limit, Problem, Variable
 from femgear.study.search import SearchOptions, _linear_program, has_derivatives, minimise, signals
 from femgear.study.sweep import parse_over, sweep, sweep_into
@@ -381,6 +388,12 @@ def test_results_that_are_no_numbers_are_failures(case):
     ("make", "code", "words"),
     [
         (lambda c: Variable("sun.profile_shift", 1.0, 0.5), "E-VARIABLE", "sun.profile_shift"),
+        (lambda c: Variable("sun.profile_shift", 1.0, 0.5), "E-VARIABLE", 'write "0.5..1.0"'),
+        (lambda c: Variable("sun.profile_shift", 0.5, 0.5), "E-VARIABLE", "equal"),
+        (lambda c: sweep(c, {"sun.mass": ["1 kg", "1 kg"]}, [ROSENBROCK]), "E-DUPLICATE", "given twice"),
+        (lambda c: named_quantity("housing", speeds=("100", "200 rpm")), "E-UNIT", "speeds: "),
+        (lambda c: named_quantity("housing", speeds=("2 rpm", "1 rpm")), "E-OBJECTIVE", "lower speed first"),
+        (lambda c: check_second(Problem(c, [X], ROSENBROCK), ROSENBROCK), "E-OBJECTIVE", "two objectives"),
         (lambda c: Variable("sun.mass", "1 kg", "2 mm"), "E-UNIT", "sun.mass"),
         (lambda c: Variable("sun.mass", "1 kg", 2.0), "E-UNIT", "sun.mass"),
         (lambda c: Variable("sun.mass", "heavy", "2 kg"), "E-VARIABLE", "sun.mass"),
