@@ -162,3 +162,10 @@ def test_unusable_requests_are_refused():
         with pytest.raises(CaseError) as caught:
             call()
         assert caught.value.code == code
+
+
+def test_lobes_of_a_tenth_of_the_largest_count():
+    """Six dips of a share of the largest value: that is how far the six maxima stand out."""
+    for share, count in ((0.11, 6), (0.19, 6), (0.09, 0)):
+        lobes = count_lobes(1.0 - share * np.sin(3 * THETA) ** 2)
+        assert (len(lobes.position), lobes.threshold) == (count, 0.1)

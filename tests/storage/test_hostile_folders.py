@@ -533,3 +533,21 @@ def test_an_interrupt_before_the_first_manifest_is_told_as_such(results, monkeyp
 def test_no_folder_is_left_behind(results):
     replaced(results)
     assert contents(results).keys() == {"case.toml", "static.nc", MANIFEST}
+
+
+GOOD = b"0" * 64 + b"  modes.nc\n"
+
+
+@pytest.mark.parametrize("foreign", [b"years of work\n", b"0" * 63 + b"  a.csv\n", b"0" * 64 + b" a.csv\n"])
+@pytest.mark.parametrize("text", [b"%s", GOOD + b"%s", b"%s" + GOOD, GOOD + b"%s" + GOOD])
+def test_one_line_that_is_no_entry_makes_a_list_foreign(tmp_path, text, foreign):
+    """Of whatever place; an empty list and one that ends in half an entry are our own."""
+    path = tmp_path / ".written"
+    path.write_bytes(text % foreign)
+    with pytest.raises(StorageError, match="femgear has not written this here"):
+        list_own(tmp_path)
+    assert path.read_bytes() == text % foreign
+    path.write_bytes(text % b"")
+    list_own(tmp_path)
+    path.write_bytes(text % b"" + GOOD[:30])
+    list_own(tmp_path)

@@ -12,6 +12,7 @@ from femgear.system.system import (
     HarmonicForce,
     MechanicalSystem,
     NonlinearSystem,
+    drift_note,
     element_forces,
     external_force,
 )
@@ -128,3 +129,20 @@ def test_systems_that_cannot_be_are_refused(name, value, code):
     parts = {"M": np.eye(2), "C": np.zeros((2, 2)), "K": np.eye(2), "W": np.ones((2, 1)), "load": np.zeros(2)}
     with pytest.raises(CaseError, match=code):
         NonlinearSystem(MechanicalSystem(**parts | {name: np.array(value)}, dofs=("a", "b")), ())
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e9])
+@pytest.mark.parametrize("count", [2, 100])
+def test_a_support_of_a_ten_millionth_of_the_others_takes_the_load_up(count, size):
+    """In a model of many coordinates as of two; one of 1e-15 is none."""
+    load = np.zeros(count)
+    load[1] = 3.0
+    for share, drifts in ((1e-7, False), (1e-15, True)):
+        stiffness = np.full(count, size)
+        stiffness[1] *= share
+        system = MechanicalSystem(
+            np.eye(count), np.zeros((count, count)), np.diag(stiffness), np.zeros((count, 1)), load, ()
+        )
+        note = drift_note(NonlinearSystem(system, ()))
+        assert ("it drives degree of freedom 1 away" in note) is drifts
+        assert bool(note) is drifts

@@ -182,3 +182,16 @@ def test_weak_strain_of_a_rigid_mode_is_still_refused():
     system = replace(pair(), W=np.array([[1.0, 1e-6], [1.0, 0.0]]))
     with pytest.raises(ConvergenceError, match="strains column 2 of W"):
         solve_modes(system, [30.0, 0.0], damping_ratio=0.05)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("apart, kept", [(0.0, 3), (1e-7, 3), (1e-5, 2)])
+def test_no_multiple_frequency_is_cut(size, apart, kept):
+    """Squares 1, 2, 2 (1 + apart) and 5 times a size: two modes are asked for."""
+    stiffness = size * np.diag([5.0, 2.0, 1.0, 2.0 * (1.0 + apart)])
+    system = MechanicalSystem(
+        np.eye(4), np.zeros((4, 4)), stiffness, np.eye(4, 1), np.zeros(4), ("a", "b", "c", "d")
+    )
+    modes = solve_modes(system, [0.0], damping_ratio=0.0, count=2)
+    wanted = size * np.array([1.0, 2.0, 2.0])[:kept]
+    np.testing.assert_allclose((2.0 * np.pi * modes.frequency) ** 2, wanted, rtol=2e-6)

@@ -19,7 +19,14 @@ from validation.reference.mode_energy import (
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes
-from femgear.solvers.linear.tracking import campbell_data, oscillating, track_modes
+from femgear.solvers.linear.tracking import (
+    TrackedModes,
+    _groups,
+    _matched,
+    campbell_data,
+    oscillating,
+    track_modes,
+)
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.system import MechanicalSystem
@@ -305,3 +312,37 @@ def test_of_modes_of_one_shape_each_goes_on_at_its_own_rate():
     tracked = track_modes(family, np.linspace(0.0, 0.9, 8), np.eye(2))
     assert tracked.eigenvalue[:, 0] == pytest.approx(1j * (1.0 + tracked.value))
     assert tracked.eigenvalue[:, 1] == pytest.approx(1j * (2.0 - tracked.value))
+
+
+def test_damping_ratio_is_the_cosine_of_the_eigenvalue():
+    value = np.array([[-0.6 + 0.8j, 3.0 + 4.0j], [-5.0, 0.0], [10.0j, -0.03 + 0.04j]])
+    tracked = TrackedModes(np.arange(3.0), np.ones(3, bool), value, np.ones((3, 2, 2)), np.ones((2, 2)), ())
+    assert tracked.damping_ratio == pytest.approx(np.array([[0.6, -0.6], [1.0, 0.0], [0.0, 0.6]]))
+    assert tracked.frequency == pytest.approx(
+        np.array([[1.0, 5.0], [5.0, 0.0], [10.0, 0.05]]) / (2.0 * np.pi)
+    )
+
+
+def test_members_of_a_multiple_eigenvalue_are_found_whatever_their_rounding():
+    """Damped alike: real parts differ by rounding only, and tell nothing of what belongs together."""
+    value = np.array([1.0j, 2.0j, 1.0j, 3.0j, 2.0j, 1.0j]) - 0.01
+    value += 1e-12 * np.array([0.0, 1.0, 2.0, 3.0, -1.0, 4.0])
+    for order in (np.arange(6), np.arange(6)[::-1], np.array([3, 0, 5, 1, 4, 2])):
+        found = [sorted(order[group].tolist()) for group in _groups(value[order])]
+        assert sorted(found) == [[0, 2, 5], [1, 4]]
+    assert _groups(np.array([1.0j, 1.0j * (1.0 + 1e-5), 2.0j])) == []
+
+
+@pytest.mark.parametrize("size", [0.5, 2.0])
+@pytest.mark.parametrize("value", [[1j, 2j], [1j, 1j]], ids=["single", "double"])
+def test_vectors_take_the_phase_of_the_old_ones(value, size):
+    old = np.linalg.qr(np.array([[1.0, 2.0j], [0.5, 1.0], [1j, 0.3]]))[0]
+    new = size * old * np.exp([0.7j, -2.1j])
+    # the members of a multiple one come back as a basis of unit vectors
+    wanted = old if value[0] == value[1] else size * old
+    np.testing.assert_allclose(_matched(old, new, np.array(value)), wanted, atol=1e-14)
+
+
+def test_a_vector_without_anything_of_the_old_one_keeps_its_phase():
+    new = 0.8j * np.eye(2)
+    np.testing.assert_array_equal(_matched(np.eye(2)[::-1], new, np.array([1j, 2j])), new)

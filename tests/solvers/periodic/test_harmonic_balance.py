@@ -11,8 +11,10 @@ from validation.reference.adapted_harmonics import adapt_harmonics
 from validation.reference.cornered_springs import PiecewiseSprings
 
 from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.periodic import harmonic_balance as newton
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.periodic.phase_grid import sample_counts
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, harmonic_lines, harmonics_of, side_bands
@@ -371,3 +373,35 @@ def test_unknowns_do_not_grow_with_the_model(planet_set, planet_excitation):
     problem = NonlinearSystem(grown, (meshes,))
     large = harmonic_balance(problem, harmonics=6)
     assert large.size == small.size == 6 * 13
+
+
+def test_newton_takes_five_steps_that_lower_nothing(monkeypatch):
+    """Away from the solution of a linear system every step raises the residual: the sixth is not taken."""
+    right = newton._newton_step
+    monkeypatch.setattr(newton, "_newton_step", lambda *problem: -right(*problem))
+    found = solve_harmonic_balance(duffing(cubic=0.0), 1.2, harmonics=3, start=first_line(0.4, 0.0, 3))
+    assert not found.converged and "no step along Newton's direction" in found.message
+    assert len(found.history) == found.iterations == 6
+
+
+def test_embedding_starts_from_a_linear_system_at_rest():
+    """Nothing but the errors of the flanks moves it, and only where the mesh is there."""
+    error = FourierSeries([[0.0, 0.4]])
+    mesh = GearMeshes([0], FourierSeries([[1.0, 0.3]]), deflection=error, separates=False)
+    problem = oscillator(mesh, damping=0.2, stiffness=0.5)
+    balance = harmonic_balance(problem, harmonics=6)
+    whole = solve_harmonic_balance(problem, 0.9, harmonics=6)
+    frequency = np.array([0.9])
+    found = newton._embed(balance, frequency, whole, 1e-10, 20)
+    assert found.converged and "embedding" in found.message
+    np.testing.assert_allclose(found.deflection, whole.deflection, atol=1e-9)
+
+
+def test_samples_of_a_contact_along_one_two_and_three_bases():
+    for bases, least in ((1, 2048), (2, 64), (3, 64)):
+        lines = np.concatenate([np.zeros((1, bases), int), np.eye(bases, dtype=int)])
+        for order, times in ((2, (256, 16, 16)[bases - 1]), (20, (2560, 160, 160)[bases - 1])):
+            counts = sample_counts(parting_pair(), order * lines)
+            # the stiffness has two harmonics along the first base
+            wanted = np.maximum(times, least) + np.array([4, 0, 0])[:bases]
+            assert all(one <= count <= 1.1 * one for one, count in zip(wanted, counts, strict=True))

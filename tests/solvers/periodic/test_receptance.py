@@ -181,3 +181,18 @@ def test_amplitudes_of_the_loads_on_the_lines():
     with pytest.raises(CaseError) as error:
         source_columns(problem, np.array([[0], [1]]))
     assert error.value.code == "E-HARMONICS"
+
+
+@pytest.mark.parametrize("share, real", [(0.0, True), (1e-13, True), (1e-6, False), (-1e-6, False)])
+def test_real_modes_are_kept_where_they_make_the_damping_diagonal(share, real):
+    """Two equal masses between springs, with dampers like the springs and one that is not."""
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    C = 0.1 * K + share * np.diag([1.0, 0.0])
+    system = MechanicalSystem(np.eye(2), C, K, np.eye(2, 1), np.zeros(2), ("a", "b"))
+    reduction = reduce_problem(NonlinearSystem(system, ()))
+    if real:
+        assert reduction.square == 1.0 and reduction.shape.shape == (2, 2)
+        np.testing.assert_allclose(reduction.linear, [0.1, 0.3], atol=1e-11)
+        np.testing.assert_allclose(reduction.constant, [1.0, 3.0], rtol=1e-12)
+    else:
+        assert reduction.square == 0.0 and reduction.shape.shape == (2, 4)

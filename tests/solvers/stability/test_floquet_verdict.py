@@ -216,3 +216,16 @@ def test_kinds_of_loss():
     verdict = floquet_verdict(*pair(constant_spring, 0.7, 2))
     root = -0.05 + 1j * np.sqrt(1 - 0.05**2)
     np.testing.assert_allclose(abs(verdict.multipliers[0]), abs(np.exp(root * 2 * np.pi / 0.7)), rtol=1e-12)
+
+
+def test_exact_exponentials_have_no_error():
+    """Of a mass on a spring: multipliers ``exp(lambda T)``; only a splitting has an error to tell."""
+    linear = GearMeshes([0], constant([4.0]), separates=False)
+    verdict = floquet_verdict(*pair(oscillator(0.2, (linear,), amplitude=0.1), 1.3, harmonics=2))
+    assert (verdict.method, verdict.error, verdict.stable) == ("exact exponentials", 0.0, True)
+    root = -0.1 + 1j * np.sqrt(4.0 - 0.01)
+    wanted = np.exp(2.0 * np.pi / 1.3 * np.array([root, np.conj(root)]))
+    np.testing.assert_allclose(np.sort_complex(verdict.multipliers), np.sort_complex(wanted), rtol=1e-12)
+    moving = GearMeshes([0], FourierSeries([[4.0, 0.5]]), separates=False)
+    verdict = floquet_verdict(*pair(oscillator(0.2, (moving,), amplitude=0.1), 1.3, harmonics=4))
+    assert verdict.method == "splitting" and 0.0 < verdict.error < 1e-6

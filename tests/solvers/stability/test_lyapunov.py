@@ -1,5 +1,8 @@
 """Lyapunov exponents: closed forms, Floquet multipliers, a published attractor, neighbouring motions."""
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from small_trains import example_pair, lightly_loaded_pair
@@ -7,7 +10,7 @@ from validation.reference.adaptive_lyapunov import adaptive_exponents
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.stability.lyapunov import lyapunov_exponents
+from femgear.solvers.stability.lyapunov import _check_sum, _Stepped, lyapunov_exponents
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
@@ -171,3 +174,27 @@ def test_the_error_of_the_steps_is_that_beside_the_exact_exponents():
         errors.append(found.step_error.max())
         np.testing.assert_allclose(found.section.time, found.period * (12 + np.arange(12)))
     assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("count, off, refused", [(2, 0.019, False), (2, 0.021, True), (1, 0.5, False)])
+def test_the_sum_of_all_exponents_is_the_divergence_to_two_per_cent_of_the_largest(sign, count, off, refused):
+    run = SimpleNamespace(size=2, divergence=-2.0, period=1.0)
+    exponents = np.array([1.0, -3.0 + sign * 3.0 * off])[:count]
+    exponents[-1] *= 3.0 / np.abs(exponents[-1]) if count == 1 else 1.0
+    outcome = pytest.raises(ConvergenceError, match="the exponents add up") if refused else nullcontext()
+    with outcome:
+        _check_sum(exponents, np.zeros(count), run)
+    # a scatter of the same size excuses it
+    _check_sum(exponents, np.full(count, 0.022), run)
+
+
+def test_an_undamped_oscillation_turns_and_does_not_stretch():
+    """In the coordinates of the small motions: a step turns by ``2 atan(h omega / 2)``."""
+    problem = oscillator(GearMeshes([0], constant([9.0]), separates=False), 0.0, 0.1)
+    stepped = _Stepped(problem, [1.3], 40, 1)
+    (_, parts) = next(stepped.passages(([0.2], [0.1])))
+    angle = 40.0 * 2.0 * np.arctan(0.5 * 3.0 * stepped.period / 40.0)
+    whole = np.linalg.multi_dot(parts[::-1])
+    turned = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    np.testing.assert_allclose(whole, turned, atol=1e-12)

@@ -6,7 +6,7 @@ import pytest
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.solution import CIRCLE
-from femgear.solvers.stability.floquet import frame_of
+from femgear.solvers.stability.floquet import Frame, frame_of
 from femgear.solvers.stability.parametric import Stability, StabilityChart, stability, stability_chart
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, constant
@@ -69,3 +69,12 @@ def test_a_chart_names_no_loss_on_the_circle():
     chart = stability_chart(system, FourierSeries([[1.0, -0.6]]), [0.7, 5.0], [0.0, 0.2])
     assert np.abs(chart.multiplier) == pytest.approx(1.0, abs=1e-8)
     assert np.all(chart.stable) and np.all(chart.loss == "")
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, -1.0, 1e9])
+def test_damping_couples_modes_from_a_rounding_of_its_largest_entry_on(size):
+    for share, diagonal in ((0.0, True), (5e-13, True), (2e-12, False), (-2e-12, False)):
+        damping = size * np.array([[1.0, share], [share, 0.5]])
+        frame = Frame(np.ones(2), damping, np.ones((1, 2)), np.ones(1), np.zeros((1, 1)))
+        assert frame.diagonal is diagonal
+    assert Frame(np.ones(2), np.zeros((2, 2)), np.ones((1, 2)), np.ones(1), np.zeros((1, 1))).diagonal

@@ -6,8 +6,9 @@ from scipy.special import mathieu_a, mathieu_b
 from validation.parametric import NATURAL, RATIO, SOFT, rectangular_monodromy
 from validation.reference.stability_boundary import stability_boundary
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.stability import parametric
 from femgear.solvers.stability.parametric import stability, stability_chart
 from femgear.system.fourier import FourierSeries, StepSeries
 from femgear.system.system import MechanicalSystem, NonlinearSystem
@@ -112,3 +113,19 @@ def test_refusals():
         stability_boundary(mass(), wave, (1.0, 2.0))
     with pytest.raises(CaseError, match="one end stable"):
         stability_boundary(mass(0.1), wave, (5.0, 6.0), depth=0.1)
+
+
+@pytest.mark.parametrize("bad", [0, 3])
+def test_one_cell_of_a_chart_that_is_wrong_refuses_all(bad, monkeypatch):
+    right = parametric.passage
+
+    def passage(*given, **options):
+        matrix, error = right(*given, **options)
+        error[bad] = 2e3 * options["tolerance"]
+        return matrix, error
+
+    wave = FourierSeries([[1.0, -0.6]])
+    stability_chart(mass(0.1), wave, [1.0, 3.0], [0.5, 1.0])
+    monkeypatch.setattr(parametric, "passage", passage)
+    with pytest.raises(ConvergenceError, match="the monodromy matrix has an error of"):
+        stability_chart(mass(0.1), wave, [1.0, 3.0], [0.5, 1.0])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from femgear.errors import ConvergenceError
-from femgear.solvers.time.adaptive import flow, motion_scale, sampled, trajectory
+from femgear.solvers.time.adaptive import _contacts, flow, motion_scale, sampled, trajectory
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import constant
+from femgear.system.fourier import FourierSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 ONE = np.eye(1)
@@ -62,3 +62,32 @@ def test_too_many_steps_are_refused():
     assert len(list(trajectory(moving, start, 0.0, 20.0, max_steps=taken))) == taken
     with pytest.raises(ConvergenceError, match=f"more than {taken - 1} steps"):
         list(trajectory(moving, start, 0.0, 20.0, max_steps=taken - 1))
+
+
+@pytest.mark.parametrize("pace", [1e-12, 1.0, 1e12])
+@pytest.mark.parametrize("size", [0.0, 1e-6, 5.0])
+def test_a_switch_at_zero_is_where_its_rate_takes_it(size, pace):
+    """Two meshes with backlash touch a flank each, of a motion of any size and pace: they close, or part."""
+    system = MechanicalSystem(np.eye(3), np.eye(3), np.eye(3), np.eye(3), np.zeros(3), tuple("abc"))
+    mesh = GearMeshes([0, 1], constant([4.0, 4.0]), backlash=[size + 1.0, 0.3 * size])
+    problem = NonlinearSystem(system, (mesh,))
+    x = np.array([0.0, -0.3 * size, size])
+    for rate in np.array([[2.0, -3.0, 0.0], [-2.0, 3.0, 0.0], [-2.0, -3.0, 0.0]]):
+        (closed,) = _contacts(problem, x, np.zeros(1), pace * rate, events=True).closed
+        now, later = (
+            mesh.switches((x + t * (size or 1.0) * rate)[mesh.columns], np.zeros(1)) for t in (0.0, 0.01)
+        )
+        touching = np.abs(now) < 1e-15
+        assert touching.sum() >= 2
+        assert closed.tolist() == np.where(touching, later > 0.0, now > 0.0).tolist()
+
+
+@pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
+def test_force_is_that_of_the_phases_at_the_instants(method):
+    system = MechanicalSystem(ONE, 0.2 * ONE, ONE, ONE, np.ones(1), ("x",))
+    mesh = GearMeshes([0], FourierSeries([[3.0, 1.0 - 0.5j]]), separates=False)
+    times = np.array([0.0, 0.3, 1.1, 1.6])
+    found = solve_transient(NonlinearSystem(system, (mesh,)), 2.5, times, start=([0.4], [0.0]), method=method)
+    stiffness = 3.0 + np.cos(2.5 * times) + 0.5 * np.sin(2.5 * times)
+    assert found.deflection[:, 0] == pytest.approx(found.displacement[:, 0], abs=1e-15)
+    assert found.force[:, 0] == pytest.approx(stiffness * found.displacement[:, 0], abs=1e-12)

@@ -5,6 +5,7 @@ import pytest
 from validation.reference.sections import bifurcation_diagram, stroboscopic_section
 
 from femgear.errors import CaseError
+from femgear.solvers.time.stroboscopic import stroboscopic_map
 from femgear.system.force_laws import PolynomialSprings
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
@@ -62,3 +63,15 @@ def test_bad_input_is_refused():
             stroboscopic_section(problem, 1.0, **options)
     with pytest.raises(CaseError, match="E-RANGE"):
         stroboscopic_section(problem, 1.0, steps=2)
+
+
+@pytest.mark.parametrize(
+    "options, frequency, period", [({}, [2.0], np.pi), ({"periods": 2}, [2.0, 3.0], 2.0 * np.pi)]
+)
+def test_a_map_takes_one_period_in_equal_steps_and_ends_where_it_begins(options, frequency, period):
+    once = stroboscopic_map(oscillator(0.4, 2.0, force=1.0), frequency, steps=8, **options)
+    assert once.period == pytest.approx(period, rel=1e-15)
+    turns = np.arange(9.0)[:, None] / 8.0 * period * np.array(frequency)
+    assert np.exp(1j * once.theta) == pytest.approx(np.exp(1j * turns), abs=1e-14)
+    # to the last bit, so that a second period has the forces of the first
+    assert once.theta[-1].tolist() == once.theta[0].tolist()
