@@ -71,8 +71,13 @@ class Mutant:
 
 
 def replacements(node: Any, place: str = "") -> Iterator[tuple[str, ast.AST]]:
-    """Kinds and replacements of one node; `place` is "index" within brackets, "axis" for that argument."""
+    """Kinds and replacements of one node.
+
+    `place` is "index" within brackets, "axis" for that argument, "size" for those of ``reshape``.
+    """
     match node:
+        case ast.UnaryOp(ast.USub(), ast.Constant(1)) if place == "size":
+            return  # any negative length of an array is inferred
         case ast.BinOp(left, op, right) if type(op) in OPPOSITE and not (_is_text(left) or _is_text(right)):
             sign = isinstance(op, ast.Add | ast.Sub)
             yield "sign" if sign else "factor", ast.BinOp(left, OPPOSITE[type(op)](), right)
@@ -195,6 +200,8 @@ def _place(parent: ast.AST, field: str, place: str) -> str:
         return "index"
     if isinstance(parent, ast.keyword) and parent.arg == "axis":
         return "axis"
+    if isinstance(parent, ast.Call) and field == "args" and getattr(parent.func, "attr", "") == "reshape":
+        return "size"
     return place if isinstance(parent, ast.Tuple | ast.Slice) else ""
 
 

@@ -22,7 +22,7 @@ def law(x: float = 1e-9, *, n: int = -1) -> "list[3]":
         raise ValueError(f"{n + 1} is " + "below" + str(2 * n))
     total = -x * 3 + abs(x[-1] - x[2, 0])
     total -= np.where(x > 0.5, min(x, 7), np.sum(x, axis=0).conj())
-    return total if n else not total
+    return total.reshape(-1, 5) if n else not total
 '''
 WHERE = "np.where(x > 0.5, min(x, 7), np.sum(x, axis=0).conj())"
 CHANGES = {
@@ -47,7 +47,8 @@ CHANGES = {
     ("extreme", "min(x, 7)", "max(x, 7)"),
     ("axis", "0", "1"),
     ("dropped", "np.sum(x, axis=0).conj()", "np.sum(x, axis=0)"),
-    ("branch", "total if n else not total", "not total if n else total"),
+    ("size", "5", "6"),
+    ("branch", "total.reshape(-1, 5) if n else not total", "not total if n else total.reshape(-1, 5)"),
     ("logic", "not total", "total"),
 }  # fmt: skip
 

@@ -216,3 +216,12 @@ def test_a_step_that_never_helps_is_taken_whole(duffing, monkeypatch):
     found = shooting._improved(moving, np.zeros(2), np.array([0.5, 0.25]), 0.9, 5.0, {})
     assert found.tolist() == [0.5, 0.25]
     assert tried == [0.5**k for k in range(1, 9)]
+
+
+def test_a_start_beyond_the_motion_in_all_it_has_takes_one_step(monkeypatch):
+    """A linear motion that decays: after a period displacement and velocity are smaller than they were."""
+    shot, shoot = [], shooting.shoot
+    monkeypatch.setattr(shooting, "shoot", lambda *given: shot.append(given) or shoot(*given))
+    problem = oscillator(0.2, PolynomialSprings([0], [[1.0]]), force=1e-3)
+    found = solve_shooting(problem, 1.0, start=([5.0], [5.0]))
+    assert found.solution.iterations == 1 and len(shot) == 3

@@ -299,6 +299,14 @@ def test_refusals_name_what_is_missing():
     assert "bearing 1" in caught.value.message and "mesh" not in caught.value.message
 
 
+@pytest.mark.parametrize("soft", [0.0, 1e-9])
+def test_a_spring_of_next_to_no_stiffness_is_named_as_one_of_none(soft):
+    bodies = MechanicalSystem(np.eye(2), np.eye(2), np.zeros((2, 2)), np.eye(2), np.zeros(2), ("x", "y"))
+    springs = tuple(PolynomialSprings([i], [[k, 0.0, 1.0]]) for i, k in enumerate((1e6, soft)))
+    with pytest.raises(ConvergenceError, match="spring 2 has no linear stiffness"):
+        solve_harmonic_balance(NonlinearSystem(bodies, springs), 1.0, harmonics=3)
+
+
 def test_cubic_spring_alone_is_solved_with_the_reference_that_the_refusal_names():
     """``x'' + x^3 = f cos``: Newton's method with a reference of one, shooting without any."""
     problem = oscillator(PolynomialSprings([0], [[0.0, 0.0, 1.0]]), forces=[(0.2, (1,))])
