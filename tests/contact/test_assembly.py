@@ -1,13 +1,14 @@
 """What a contact problem takes from that of another position."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from femgear.contact.assembly import ContactProblem
 
 
-def cells(*places) -> SimpleNamespace:
+def cells(*places) -> Any:
     """A contact problem of which only mesh, pair and cell of the candidates are known."""
     mesh, pair, cell = np.array(places).T
     return SimpleNamespace(mesh=mesh, pair=pair, cell=cell)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -172,7 +173,7 @@ def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
 
 
 def test_first_cells_and_springs_are_those_that_equal_forces_would_press():
-    """2 kN on each of two planets, 20 mm: pairs within 10 um of the nearest share; a half presses 0.281 um."""
+    """2 kN on each of two planets: pairs within 10 um of the nearest share; a half presses 0.281 um."""
     # two windows in each of the meshes with the sun and the ring, and on the back flanks
     smallest = np.array([0.0, 9.0, 0.0, 9.0, 1.0, 12.0, 1.0, 12.0, *np.zeros(8)])[None, :, None]
     gap = 1e-6 * (smallest + np.array([0.6, 0.27, 0.0, 0.29, 0.5]))
@@ -183,7 +184,9 @@ def test_first_cells_and_springs_are_those_that_equal_forces_would_press():
     # equal forces on all drive flanks push along both motions alike, over their arms
     found.approach = np.array([[-4.0, 0.0], [1.0, 0.0], [1.0, -1.0], [0.0, 0.5], *np.full((4, 2), 5.0)])
     arms = np.array([[1.0, 0.0], [0.7, 0.7], [0.9, 0.4], [0.0, 1.0], [-1.0, 0.0]])
-    sets = SimpleNamespace(found=found, given=np.array([0.0, 4000.0]), arms=arms, arm=np.array([4.0, 1.0]))
+    sets: Any = SimpleNamespace(
+        found=found, given=np.array([0.0, 4000.0]), arms=arms, arm=np.array([4.0, 1.0])
+    )
     active, springs = batch._ActiveSets._first(sets)
     assert springs.tolist() == [[False, True, True, False, False]]
     # where a pair is too far away the other one carries alone; back flanks carry nothing

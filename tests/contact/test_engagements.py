@@ -1,6 +1,7 @@
 """Largest loads of engagements and their classes by hand, and numbers of a contact problem that are none."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from femgear.errors import ContactError
 def test_a_tooth_is_in_the_next_slot_a_period_later():
     """Three periods of one position: what enters first carries 1 N, then 20 N, and so on."""
     load = np.array([[[1.0, 2.0, 3.0], [10.0, 20.0, 30.0]]])
-    teeth = SimpleNamespace(load=load, turn=np.arange(3), periods=3, each=1)
+    teeth: Any = SimpleNamespace(load=load, turn=np.arange(3), periods=3, each=1)
     assert _engagement_peaks(teeth, closes=True).tolist() == [[20.0, 30.0, 10.0]]
     # of a record that does not close the first and the last one are not whole
     assert _engagement_peaks(teeth, closes=False).tolist() == [[20.0, 30.0]]
@@ -23,7 +24,8 @@ def test_a_tooth_is_in_the_next_slot_a_period_later():
 def test_loads_are_counted_in_twenty_classes_up_to_the_largest_one(largest):
     """Three engagements, of which one or two carry: small and large loads are the same spectrum."""
     load = largest * np.array([[[0.0, 0.0, 0.5]], [[0.92, 0.0, 1.0]]])
-    found = load_spectrum(SimpleNamespace(load=load, turn=np.arange(3), periods=3, each=1))
+    teeth: Any = SimpleNamespace(load=load, turn=np.arange(3), periods=3, each=1)
+    found = load_spectrum(teeth)
     assert found.edges == pytest.approx(largest * np.arange(21) / 20, rel=1e-14)
     for shares in (found.time, found.engagements):
         assert [np.flatnonzero(row).tolist() for row in shares] == [[10], [18, 19]]

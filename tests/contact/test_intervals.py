@@ -1,12 +1,14 @@
 """Which intervals between positions of a loaded period need another one: parabolas and jumps by hand."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from femgear.contact.loaded_period import MISSED, SHORTEST, SMOOTHEST, _unresolved
 
 
-def record(position, stiffness, loaded=0):
+def record(position, stiffness, loaded: Any = 0):
     """One mesh with a constant deflection."""
     teeth = np.empty(len(position), object)
     teeth[:] = [frozenset([int(one)]) for one in np.broadcast_to(loaded, len(position))]
