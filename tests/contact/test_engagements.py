@@ -20,18 +20,22 @@ def test_a_tooth_is_in_the_next_slot_a_period_later():
     assert _engagement_peaks(teeth, closes=False).tolist() == [[20.0, 30.0]]
 
 
-@pytest.mark.parametrize("largest", [0.16, 1600.0])
-def test_loads_are_counted_in_twenty_classes_up_to_the_largest_one(largest):
+def test_loads_are_counted_in_twenty_classes_up_to_the_largest_one():
     """Three engagements, of which one or two carry: small and large loads are the same spectrum."""
-    load = largest * np.array([[[0.0, 0.0, 0.5]], [[0.92, 0.0, 1.0]]])
-    teeth: Any = SimpleNamespace(load=load, turn=np.arange(3), periods=3, each=1)
-    found = load_spectrum(teeth)
-    assert found.edges == pytest.approx(largest * np.arange(21) / 20, rel=1e-14)
-    for shares in (found.time, found.engagements):
-        assert [np.flatnonzero(row).tolist() for row in shares] == [[10], [18, 19]]
-        assert shares.max(axis=1).tolist() == [1.0, 0.5]
-    assert found.cycles == pytest.approx(np.array([[1.0, 1.0], [2.0, 2.0]]) / 3)
-    assert found.duration == pytest.approx([1 / 3, 2 / 3])
+    for largest in (0.16, 1600.0):
+        load = largest * np.array([[[0.0, 0.0, 0.5]], [[0.92, 0.0, 1.0]]])
+        teeth: Any = SimpleNamespace(load=load, turn=np.arange(3), periods=3, each=1)
+        found = load_spectrum(teeth)
+        assert found.edges == pytest.approx(largest * np.arange(21) / 20, rel=1e-14)
+        for shares in (found.time, found.engagements):
+            assert [np.flatnonzero(row).tolist() for row in shares] == [[10], [18, 19]]
+            assert shares.max(axis=1).tolist() == [1.0, 0.5]
+        assert found.cycles == pytest.approx(np.array([[1.0, 1.0], [2.0, 2.0]]) / 3)
+        assert found.duration == pytest.approx([1 / 3, 2 / 3])
+    teeth.load = 0.0 * teeth.load
+    unloaded = load_spectrum(teeth)
+    for shares in (unloaded.time, unloaded.engagements):
+        assert shares.shape == (2, 20) and not shares.any()
 
 
 @pytest.mark.parametrize("bad", [1, 2])

@@ -54,12 +54,12 @@ def test_a_jump_is_enclosed_in_2_13th_and_a_curve_followed_to_2_10th_of_a_period
     assert halvings(lambda gap: parabola(1.05, gap)) == 6
 
 
-@pytest.mark.parametrize("share", [0.95, 1.05, 1.2])
-def test_lines_may_miss_3e_4_of_a_stiffness_and_of_what_a_deflection_moves(share):
+def test_lines_may_miss_3e_4_of_a_stiffness_and_of_what_a_deflection_moves():
     """A deflection that moves by 1.5e-3 of its mean counts as moving."""
-    found = [] if share < 1.0 else list(range(8))
-    assert _unresolved(parabola(share * 3e-4 / MISSED)).tolist() == found
-    x = np.arange(-4.0, 5.0)
-    moves = 1.5e-3 * (x / 8.0 - share * MISSED * 4.0 * x**2)
-    straight = record(0.125 * x, np.ones(9)) | {"deflection": 1e-5 * (1.0 + moves)[None]}
-    assert _unresolved(straight).tolist() == found
+    for share in (0.95, 1.05, 1.2):
+        found = [] if share < 1.0 else list(range(8))
+        assert _unresolved(parabola(share * 3e-4 / MISSED)).tolist() == found
+        x = np.arange(-4.0, 5.0)
+        moves = 1.5e-3 * (x / 8.0 - share * MISSED * 4.0 * x**2)
+        straight = record(0.125 * x, np.ones(9)) | {"deflection": 1e-5 * (1.0 + moves)[None]}
+        assert _unresolved(straight).tolist() == found
