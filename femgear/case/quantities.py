@@ -84,6 +84,8 @@ class Dimension:
 LENGTH = Dimension("a length", "m", "mm", 1e-3)
 ANGLE = Dimension("an angle", "rad", "deg", math.pi / 180)
 SPEED = Dimension("a speed of rotation", "rad/s", "rpm", math.pi / 30)
+SMALLEST = 1e-100
+"""Least size of a number that is not zero, in SI units: products of three are numbers as well."""
 RPM = SPEED.scale
 """One revolution a minute [rad/s]."""
 TORQUE = Dimension("a torque", "N m", "N m", 1.0)
@@ -149,6 +151,8 @@ def to_si(
     number = number / inverse if abs(inverse * factor - 1) < 1e-12 else number * factor
     if not math.isfinite(number):
         raise CaseError("the number is not finite", code="E-FINITE", value=value, limit="finite numbers")
+    if 0.0 < abs(number) < SMALLEST:
+        raise _too_small(value)
     if not low <= number <= high:
         raise CaseError(
             f"{dimension.name} of {dimension.show(number)} is not plausible",
@@ -158,6 +162,14 @@ def to_si(
             remedy=_factor_hint(number, low, high, dimension, value) or remedy,
         )
     return number
+
+
+def _too_small(value: object) -> CaseError:
+    """Make the refusal of a number that is next to none."""
+    return CaseError(
+        "the number is next to none", code="E-RANGE", value=value,
+        limit=f"0, or {SMALLEST:g} or more of either sign in SI units", remedy="write 0 where it has no effect",
+    )  # fmt: skip
 
 
 def _no_text(value: object, dimension: Dimension, low: float, high: float) -> CaseError:
@@ -305,6 +317,8 @@ def Number(
             raise CaseError(message, code="E-TYPE", value=value, limit=limit, remedy=remedy)
         above = low < value if open_low else low <= value
         below = value < high if open_high else value <= high
+        if 0.0 < abs(value) < SMALLEST:
+            raise _too_small(value)
         if not (above and below):
             raise CaseError(
                 f"the number is out of range{': ' + note if note else ''}",

@@ -125,7 +125,7 @@ def tip_corner(gear: Gear, material: Material) -> TipCorner:
     angle = 0.5 * math.pi + math.acos(min(gear.base_radius / gear.tip_radius, 1.0))
     nu, mu = material.poisson_ratio, material.shear_modulus
     logarithm = (1 - nu) / (math.pi * mu) * apex_excess(angle)
-    equal = float(_excess(angle, np.ones(1), np.zeros(1), nu)[0]) / mu
+    equal = float(_excess(angle, 1.0, 0.0, nu)) / mu
     arc = gear.tip_roll**2 / (2 * gear.base_radius)
     return TipCorner(arc, angle, mu, nu, logarithm, equal + logarithm * math.log(2.0))
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from femgear.contact.active_set import Problem, _residual, solve_step
+from femgear.contact.active_set import Problem, _residual, settle, solve_step
 from femgear.contact.solve import solve_contact
+from femgear.errors import ContactError
 
 
 def two_springs(gap=(1.0, 1.0), load=4.0):
@@ -67,3 +68,40 @@ def test_single_pivots_solve_where_blocks_cycle():
     assert state.method == "active set, single pivots"
     np.testing.assert_allclose(state.loads, [0.5, 0.0, 0.0], rtol=1e-13)
     np.testing.assert_allclose(state.gaps, [0.0, 1.0, 2.0], rtol=1e-12)
+
+
+def test_candidates_that_part_balance_no_load_by_rounding():
+    """The load parts the first candidate and closes the second one by something, or by rounding."""
+    load, none = np.array([1.0, 0.0]), np.zeros(2, bool)
+
+    def forced(approach):
+        G = np.array([[-1.0, 0.0], [approach, 1.0]])
+        return settle(G, load, np.ones(2), np.eye(2), np.ones(2), none)[2].tolist()
+
+    assert forced(1e-3) == [1]
+    with pytest.raises(ContactError, match="no candidate can balance the load"):
+        forced(1e-12)
+
+
+def test_small_loads_count_beside_the_largest_one_however_light_that_is():
+    """Rigid bodies far apart: 1e7 on one spring and 5 on the other, both of them times the scale."""
+    for scale in (1.0, 1e-10):
+        gap = scale * np.array([1e15, 1e15 + 1e7 - 5.0])
+        state = solve_contact(np.eye(2), gap, np.ones((2, 1)), scale * np.array([1e7 + 5.0]))
+        assert state.active.tolist() == [True, True]
+        assert state.loads == pytest.approx(scale * np.array([1e7, 5.0]), abs=scale)
+
+
+def test_the_first_candidate_in_the_way_of_a_load_must_touch():
+    """Separations of 3, 2 and 0.1 close at speeds of 2, 1 and -1: after 1.5, after 2, never."""
+    for scale in (1.0, 1e-10):
+        given = np.array([[2.0], [1.0], [-1.0]]), np.array([scale]), np.ones(1), np.eye(1)
+        shift, blocked, forced = settle(*given, np.array([3.0, 2.0, 0.1]), np.zeros(3, bool))
+        assert shift.tolist() == [0.0] and forced.tolist() == [0] and blocked.tolist() == [0, 1, 2]
+
+
+def test_a_motion_with_a_load_of_rounding_ends_penetration_by_the_least_shift():
+    """The second motion, 1e-12 of the load on it: the first candidate is 0.5 deep, the other one 3 apart."""
+    given = np.array([[1.0, 1.0], [0.0, -1.0]]), np.array([-1.0, 1e-12]), np.ones(2), np.eye(2)[:, 1:]
+    shift, *none = settle(*given, np.array([-0.5, 3.0]), np.zeros(2, bool))
+    assert shift == pytest.approx([-0.5]) and [one.tolist() for one in none] == [[], []]

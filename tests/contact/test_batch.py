@@ -1,6 +1,8 @@
 """All positions at once against one position at a time: loads, motions and stiffness of random sets."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -129,7 +131,9 @@ def test_planet_with_clearance_that_loses_all_load(monkeypatch):
     # its motions are restrained by nothing: most positions need no other route all the same
     alone = []
     one = batch.solve_contact
-    monkeypatch.setattr(batch, "solve_contact", lambda *arrays: alone.append(1) or one(*arrays))
+    monkeypatch.setattr(
+        batch, "solve_contact", lambda *arrays, **start: alone.append(1) or one(*arrays, **start)
+    )
     gears = reference_set()
     bodies = make_bodies(make_sectors(gears, STEEL, flank_elements=8), STEEL)
     results = list(both_ways(gears, bodies, 1.0, supports=LOOSE, pins=60.0))
@@ -166,3 +170,29 @@ def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
     # the others: two steps and one that takes out the rounding
     rest = [3] * (len(steps) - len(counted))
     assert len(counted) > 0 and sorted(steps.tolist()) == sorted([2 + count for count in counted] + rest)
+
+
+def test_first_cells_and_springs_are_those_that_equal_forces_would_press():
+    """2 kN on each of two planets: pairs within 10 um of the nearest share; a half presses 0.281 um."""
+    # two windows in each of the meshes with the sun and the ring, and on the back flanks
+    smallest = np.array([0.0, 9.0, 0.0, 9.0, 1.0, 12.0, 1.0, 12.0, *np.zeros(8)])[None, :, None]
+    gap = 1e-6 * (smallest + np.array([0.6, 0.27, 0.0, 0.29, 0.5]))
+    candidate = np.ones(gap.shape, bool)
+    candidate[0, 0, 1] = False
+    bodies = SimpleNamespace(face_width=0.02, material=STEEL)
+    found = SimpleNamespace(setup=SimpleNamespace(n_planets=2), bodies=bodies, gap=gap, candidate=candidate)
+    # equal forces on all drive flanks push along both motions alike, over their arms
+    found.approach = np.array([[-4.0, 0.0], [1.0, 0.0], [1.0, -1.0], [0.0, 0.5], *np.full((4, 2), 5.0)])
+    arms = np.array([[1.0, 0.0], [0.7, 0.7], [0.9, 0.4], [0.0, 1.0], [-1.0, 0.0]])
+    sets: Any = SimpleNamespace(
+        found=found, given=np.array([0.0, 4000.0]), arms=arms, arm=np.array([4.0, 1.0])
+    )
+    active, springs = batch._ActiveSets._first(sets)
+    assert springs.tolist() == [[False, True, True, False, False]]
+    # where a pair is too far away the other one carries alone; back flanks carry nothing
+    alone, expected = [1, 2, 3, 4], [[2], [1, 2], [1, 2], [1, 2]]
+    expected += [alone, [], alone, [], *([[]] * 8)]
+    assert [np.flatnonzero(row).tolist() for row in active[0]] == expected
+    # without load what touches
+    sets.given = np.zeros(2)
+    assert np.array_equal(batch._ActiveSets._first(sets)[0], gap == 0.0)

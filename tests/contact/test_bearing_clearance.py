@@ -115,7 +115,10 @@ def test_ripple_is_below_its_stated_limit():
     for ratio, limit in ((1.05, 4e-3), (1.1, 1e-3), (1.2, 1e-3), (1.5, 1e-3), (3.0, 1e-3), (100.0, 1e-3)):
         directions = np.cos(angle - np.linspace(0.0, 2 * np.pi / n, 41)[:, None])
         forces = 4 * K / n * (np.maximum(ratio * directions - 1.0, 0.0) * directions).sum(axis=1)
-        assert np.abs(forces / bearing_law(ratio, K, 1.0) - 1).max() < 1.01 * limit
+        ripple = np.abs(forces / bearing_law(ratio, K, 1.0) - 1).max()
+        assert ripple < 1.01 * limit
+        # where the limit is the ripple itself, not above it
+        assert ripple > 0.99 * limit or ratio > 1.05
 
 
 @pytest.mark.parametrize("torque", [1e-3, 1.0])

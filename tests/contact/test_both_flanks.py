@@ -12,6 +12,7 @@ from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.flank_pairs import BACK_SIDE, DRIVE_SIDE, flank_side, mesh_pairs, side_teeth
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
+from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import orientations
 
@@ -133,14 +134,13 @@ def test_backlash_keeps_the_back_flanks_out(gears, bodies):
     one = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8)
     two = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, options=BOTH)
     assert not two.back_force.any() and not two.wedged.any()
+    assert one.message == two.message == "all positions by the active set"
     assert two.deflection == pytest.approx(one.deflection, rel=1e-9)
     assert two.stiffness == pytest.approx(one.stiffness, rel=1e-9)
 
 
 def test_a_floating_sun_pushed_into_the_teeth_is_wedged(gears, bodies):
     """A light torque, planets moved towards the sun by more than the backlash: both flanks carry."""
-    from femgear.gears.deviations import no_deviations
-
     pushed = no_deviations(gears)
     pushed = replace(pushed, pin_errors=np.array([[-105e-6, 0.0], [-105e-6, 0.0], [-105e-6, 0.0]]))
     cycle = walk_mesh_cycle(gears, bodies, sun_torque=5.0, positions=4, options=BOTH, deviations=pushed)
@@ -150,6 +150,14 @@ def test_a_floating_sun_pushed_into_the_teeth_is_wedged(gears, bodies):
     assert net[:3].sum(axis=0) == pytest.approx(5.0 / gears.sun.base_radius, rel=1e-9)
     assert net[:3] == pytest.approx(net[3:], rel=1e-6)
     assert cycle.residual.max() < 1e-9
+
+
+def test_a_planet_further_ahead_than_the_backlash_works_against_the_others(gears, bodies):
+    pins = replace(no_deviations(gears), pin_errors=np.array([[0.0, -100e-6], [0.0, 0.0], [0.0, 0.0]]))
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=2, options=BOTH, deviations=pins)
+    assert (cycle.force[0] > 0).all() and not cycle.force[1:3].any() and not cycle.wedged.any()
+    assert not cycle.back_force[0].any() and (cycle.back_force[1:3] > 0).all()
+    assert cycle.message.endswith("; some meshes carry on their back flanks alone")
 
 
 def test_floating_sun_rests_on_both_flanks_where_it_must(gears, bodies):

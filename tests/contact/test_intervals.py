@@ -1,12 +1,14 @@
 """Which intervals between positions of a loaded period need another one: parabolas and jumps by hand."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from femgear.contact.loaded_period import MISSED, SHORTEST, SMOOTHEST, _unresolved
 
 
-def record(position, stiffness, loaded=0):
+def record(position, stiffness, loaded: Any = 0):
     """One mesh with a constant deflection."""
     teeth = np.empty(len(position), object)
     teeth[:] = [frozenset([int(one)]) for one in np.broadcast_to(loaded, len(position))]
@@ -39,3 +41,25 @@ def test_jumps_are_halved_down_to_the_shortest_interval(gap):
     x, found = gap * np.arange(6.0), [2] if gap > SHORTEST else []
     assert _unresolved(record(x, np.ones(6), loaded=[1, 1, 1, 2, 2, 2])).tolist() == found
     assert _unresolved(record(x, [1.0, 1.0, 1.0, 0.5, 0.5, 0.5])).tolist() == found
+
+
+def test_a_jump_is_enclosed_in_2_13th_and_a_curve_followed_to_2_10th_of_a_period():
+    """Halvings of a sixteenth of the period."""
+
+    def halvings(made):
+        gaps = 2.0 ** -np.arange(4, 40)
+        return next(n for n, gap in enumerate(gaps) if not len(_unresolved(made(gap))))
+
+    assert halvings(lambda gap: record(gap * np.arange(4.0), np.ones(4), loaded=[1, 1, 2, 2])) == 9
+    assert halvings(lambda gap: parabola(1.05, gap)) == 6
+
+
+def test_lines_may_miss_3e_4_of_a_stiffness_and_of_what_a_deflection_moves():
+    """A deflection that moves by 1.5e-3 of its mean counts as moving."""
+    for share in (0.95, 1.05, 1.2):
+        found = [] if share < 1.0 else list(range(8))
+        assert _unresolved(parabola(share * 3e-4 / MISSED)).tolist() == found
+        x = np.arange(-4.0, 5.0)
+        moves = 1.5e-3 * (x / 8.0 - share * MISSED * 4.0 * x**2)
+        straight = record(0.125 * x, np.ones(9)) | {"deflection": 1e-5 * (1.0 + moves)[None]}
+        assert _unresolved(straight).tolist() == found

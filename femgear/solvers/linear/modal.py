@@ -491,7 +491,13 @@ def _held(mass, stiffness, rigid):
     own = np.diag(stiffness) / np.diag(mass)
     weight = own[own > 0.0].min(initial=np.inf)
     weight = weight if np.isfinite(weight) else 1.0
-    return linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
+    try:
+        return linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
+    except linalg.LinAlgError:
+        raise ConvergenceError(
+            "rounding of the largest stiffness hides the smallest", code="E-STIFFNESS",
+            remedy="bring the stiffnesses closer together",
+        ) from None  # fmt: skip
 
 
 def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:

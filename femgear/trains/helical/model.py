@@ -491,14 +491,14 @@ def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
     try:
         balanced = _balanced(case, data)
     except ConvergenceError as error:
-        if error.code != "E-RIGID-MODE":
+        if error.code not in ("E-RIGID-MODE", "E-STIFFNESS"):
             raise
         raise CaseError(
             "the stiffest supports are too stiff beside the softest: rounding hides the soft ones",
             code="E-RANGE",
             key="helical",
             limit="tilt and torsional stiffnesses over the radius squared within 1e17 N/m",
-            remedy="lower the largest axial_stiffness, tilt_stiffness or torsional_stiffness",
+            remedy="lower the largest axial_stiffness, tilt_stiffness or torsional_stiffness, or raise the least",
             file=case.location("helical"),
         ) from None
     if not balanced:
