@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 _INTERRUPTED = 130
 _MEMORY = 600_000_000
@@ -34,6 +34,7 @@ try:
     from pathlib import Path
     from typing import Annotated, Any
 
+    import numpy as np
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
     from femgear import __version__
@@ -388,13 +389,14 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
     output, errors = _Stream(sys.stdout), _Stream(sys.stderr)
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
         code = _called(program_app, sys.argv[1:] if arguments is None else list(arguments), program)
-        output.flush()
-        # a reader that has seen enough is no failure
-        if code == 0 and output.error and not isinstance(output.error, BrokenPipeError):
-            failure = storage_error(output.error, "standard output")
-            failure.remedy = "free some space where it goes, or send it elsewhere"
-            code = _fail(failure)
-        errors.flush()
+        with _handlers({signal.SIGINT: signal.SIG_IGN}):  # all is done but to show it
+            output.flush()
+            # a reader that has seen enough is no failure
+            if code == 0 and output.error and not isinstance(output.error, BrokenPipeError):
+                failure = storage_error(output.error, "standard output")
+                failure.remedy = "free some space where it goes, or send it elsewhere"
+                code = _fail(failure)
+            errors.flush()
     if arguments is None:  # when the process ends, nothing is left to interrupt but the interpreter
         for number in (signal.SIGINT, signal.SIGTERM):
             atexit.register(signal.signal, number, signal.SIG_IGN)
@@ -452,6 +454,9 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
                 remedy="ask for fewer speeds, positions, harmonics or elements",
             )
         )
+    except np.linalg.LinAlgError as error:
+        remedy = "look for masses, stiffnesses or dimensions of very different size"
+        return _fail(FemgearError(f"equations cannot be solved: {error}", code="E-SOLVE", remedy=remedy))
     except ImportError as error:
         message = f"a library cannot be loaded: {' '.join(str(error).split())}"
         return _fail(FemgearError(message, code="E-LIBRARY", remedy=_LOADING))
@@ -462,10 +467,7 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
 @contextlib.contextmanager
 def _termination_interrupts() -> Iterator[None]:
     """End the block by SIGTERM as by Ctrl-C, so that files stay whole and locks are released."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before, hook = signal.signal(signal.SIGTERM, signal.default_int_handler), sys.unraisablehook
+    hook = sys.unraisablehook
 
     def again(lost: Any) -> None:
         # Python drops what is raised while it clears an object up: the interrupt comes once more
@@ -474,12 +476,24 @@ def _termination_interrupts() -> Iterator[None]:
         else:
             hook(lost)
 
-    sys.unraisablehook = again
+    with _handlers({signal.SIGTERM: signal.default_int_handler}):
+        sys.unraisablehook = again
+        try:
+            yield
+        finally:
+            sys.unraisablehook = hook
+
+
+@contextlib.contextmanager
+def _handlers(handlers: Mapping[signal.Signals, Any]) -> Iterator[None]:
+    """Handle signals so in the block; in the main thread alone, where they arrive."""
+    main = threading.current_thread() is threading.main_thread()
+    before = {number: signal.signal(number, one) for number, one in handlers.items()} if main else {}
     try:
         yield
     finally:
-        sys.unraisablehook = hook
-        signal.signal(signal.SIGTERM, before)
+        for number, one in before.items():
+            signal.signal(number, one)
 
 
 if __name__ == "__main__":

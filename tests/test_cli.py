@@ -427,6 +427,13 @@ def test_signals_when_the_command_has_ended_change_nothing(number):
     assert done.returncode == 0 and not done.stderr
 
 
+def test_an_interrupt_while_the_last_words_are_shown_changes_nothing(monkeypatch, capsys):
+    flush = cli._Stream.flush
+    monkeypatch.setattr(cli._Stream, "flush", lambda self: os.kill(os.getpid(), signal.SIGINT) or flush(self))
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() and signal.getsignal(signal.SIGINT) == signal.default_int_handler
+
+
 def test_an_interrupt_behind_the_results_says_that_they_are_complete(tmp_path, capsys, pipeline, monkeypatch):
     out = tmp_path / "out"
     monkeypatch.setattr(cli, "_print", _interrupt)
@@ -459,6 +466,10 @@ def _crowd(*_, **__):
     raise RuntimeError("can't start new thread")
 
 
+def _differ(*_, **__):
+    np.linalg.cholesky(-np.eye(2))
+
+
 def _lack(*_, **__):
     raise ImportError("No module named 'h5py'")
 
@@ -473,6 +484,7 @@ def _fill(*_, **__):
         (_diverge, 3, "no solution"),
         (_exhaust, 3, "E-MEMORY"),
         (_crowd, 3, "E-MEMORY"),
+        (_differ, 3, "E-SOLVE"),
         (_lack, 3, "E-LIBRARY"),
         (_interrupt, 130, "interrupted"),
         (_terminate, 130, "interrupted"),

@@ -168,7 +168,8 @@ def _too_small(value: object) -> CaseError:
     """Make the refusal of a number that is next to none."""
     return CaseError(
         "the number is next to none", code="E-RANGE", value=value,
-        limit=f"0, or {SMALLEST:g} or more of either sign in SI units", remedy="write 0 where it has no effect",
+        limit=f"0, or {SMALLEST:g} or more of either sign in SI units",
+        remedy="write 0 where it has no effect",
     )  # fmt: skip
 
 

@@ -1,8 +1,12 @@
 """Units of case files."""
 
+from functools import partial
+from types import FunctionType
+
 import pytest
 
 from femgear.case import quantities
+from femgear.case.quantities import MASS, Number, to_si
 from femgear.errors import CaseError
 
 
@@ -20,6 +24,18 @@ def test_common_units_are_those_of_pint():
         assert several is None or several == quantities._root(f"{unit}s", "all"), unit
     for unit in ("N m/rad", "kg mm^2", "kN/um", "rad/s", "kg m^2"):
         assert quantities._root(unit, "common") == quantities._root(unit, "all")
+
+
+@pytest.mark.parametrize("read", [partial(to_si, dimension=MASS), Number(0.0, 1.0).read])
+def test_numbers_next_to_none_are_refused_and_zero_is_not(read):
+    def given(number):
+        return number if isinstance(read, FunctionType) else f"{number!r} kg"
+
+    assert read(given(0.0)) == 0.0 and read(given(1e-99)) == 1e-99
+    for small in (5e-324, 1e-310, 9e-101):
+        with pytest.raises(CaseError, match="next to none") as caught:
+            read(given(small))
+        assert caught.value.code == "E-RANGE" and "1e-100" in caught.value.limit
 
 
 def test_units_of_messages_are_what_they_say():

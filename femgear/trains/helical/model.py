@@ -498,7 +498,7 @@ def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
             code="E-RANGE",
             key="helical",
             limit="tilt and torsional stiffnesses over the radius squared within 1e17 N/m",
-            remedy="lower the largest axial_stiffness, tilt_stiffness or torsional_stiffness, or raise the least",
+            remedy="bring axial_stiffness, tilt_stiffness and torsional_stiffness closer together",
             file=case.location("helical"),
         ) from None
     if not balanced:

@@ -204,6 +204,14 @@ def test_stiffest_supports_that_are_allowed_pass_the_check(given):
     assert "too stiff" in info.value.message
 
 
+@pytest.mark.parametrize("soft", ["1e-99 N m/rad", "1e-30 N m/rad", "1e-15 N m/rad"])
+def test_a_support_that_rounding_hides_is_refused(given, soft):
+    loose = with_value(given, "helical.planet.tilt_stiffness", soft)
+    with pytest.raises(CaseError, match="E-RANGE") as info:
+        check_helical_case(loose, planetary_set(loose))
+    assert "rounding hides the soft ones" in info.value.message and "closer together" in info.value.remedy
+
+
 def test_a_torque_that_no_teeth_carry_is_refused(case):
     large = with_value(case, "operation.torque", "1e9 N m")
     with pytest.raises(CaseError, match="E-RANGE") as info:
