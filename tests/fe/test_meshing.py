@@ -86,24 +86,23 @@ def test_cache_is_used_and_damaged_files_are_made_again(tmp_path, monkeypatch):
     first = mesh_outline(outline, cache=tmp_path / "meshes")
     (file,) = (tmp_path / "meshes").iterdir()
     whole = file.read_bytes()
-    file.write_bytes(whole[: len(whole) // 2])
-    with pytest.warns(UserWarning, match=f"the grid is made again: {file} is not a readable grid"):
-        second = mesh_outline(outline, cache=tmp_path / "meshes")
-    assert np.array_equal(first.points, second.points) and file.read_bytes() == whole
+
+    def made_again(damaged):
+        file.write_bytes(damaged)
+        with pytest.warns(UserWarning, match=f"the grid is made again: {file} is not a readable grid"):
+            found = mesh_outline(outline, cache=tmp_path / "meshes")
+        assert np.array_equal(found.points, first.points) and file.read_bytes() == whole
+
+    made_again(whole[: len(whole) // 2])
     # a coordinate of the boundary that was changed in the file
     place = whole.index(np.float64(0.25).tobytes())
-    file.write_bytes(whole[:place] + np.float64(0.26).tobytes() + whole[place + 8 :])
-    assert np.array_equal(mesh_outline(outline, cache=tmp_path / "meshes").points, first.points)
+    made_again(whole[:place] + np.float64(0.26).tobytes() + whole[place + 8 :])
     # a node inside that was moved by little: no check of the geometry can tell
     inside = next(p for p in first.points if 0 < p.min() and p.max() < 1 and p[0] not in (0.25, 0.5, 0.75))
     place = whole.index(inside[0].tobytes())
-    file.write_bytes(whole[:place] + np.float64(inside[0] + 1e-3).tobytes() + whole[place + 8 :])
-    assert np.array_equal(mesh_outline(outline, cache=tmp_path / "meshes").points, first.points)
-    assert file.read_bytes() == whole
+    made_again(whole[:place] + np.float64(inside[0] + 1e-3).tobytes() + whole[place + 8 :])
     # a file without checksum
-    file.write_bytes(whole[: whole.rindex(b"$Comments")])
-    mesh_outline(outline, cache=tmp_path / "meshes")
-    assert file.read_bytes() == whole
+    made_again(whole[: whole.rindex(b"$Comments")])
     monkeypatch.setattr(meshing, "_run_gmsh", None)
     third = mesh_outline(outline, cache=tmp_path / "meshes")
     assert np.array_equal(first.points, third.points) and np.array_equal(first.triangles, third.triangles)
