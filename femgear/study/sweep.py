@@ -136,7 +136,7 @@ def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: S
             )  # fmt: skip
         for value in values:
             with_value(case, key, value)
-        if len(set(values)) < len(values):
+        if len(set(map(repr, values))) < len(values):  # some are lists
             raise CaseError(
                 "a value is given twice", code="E-DUPLICATE", key="--over",
                 value=f"{key}={', '.join(map(str, values))}", remedy="give every value once",

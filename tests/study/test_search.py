@@ -340,6 +340,15 @@ def test_a_sweep_writes_a_table_and_a_figure(case, tmp_path):
     assert not (tmp_path / "two").exists()
 
 
+def test_values_of_a_sweep_may_be_lists(case, tmp_path):
+    even, uneven = ([f"{a} deg" for a in angles] for angles in ((0, 120, 240), (0, 120, 230)))
+    quantity = named_quantity("tip thickness sun")
+    found = sweep(case, {"set.planet_angles": [even, uneven]}, [quantity])
+    assert found.points == ((even,), (uneven,)) and not found.errors[0]
+    with pytest.raises(CaseError, match="given twice"):
+        sweep(case, {"set.planet_angles": [even, list(even)]}, [quantity])
+
+
 def test_sweeps_on_the_command_line():
     assert parse_over("operation.torque=50 N m, 100 N m") == ("operation.torque", ["50 N m", "100 N m"])
     assert parse_over("sun.modifications[0].amount=0 um..12 um/4")[1] == ["0 um", "4 um", "8 um", "12 um"]
