@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from soak.trials import metered
 
-from femgear.case.text import read_text
+from femgear.case.text import parse, read_text
 from femgear.errors import MOST_SHOWN, CaseError
 from femgear.trains.reading import parse_case, read_case
 
@@ -65,6 +65,24 @@ def letters(i: int) -> str:
 )
 def test_what_takes_long_to_refuse(text, code):
     assert refused(text).code == code
+
+
+def test_limits_of_a_text_are_those_that_its_refusal_names():
+    """What is allowed is read; one more is refused."""
+    for most, text, limit in (
+        (1_000, lambda n: many(n, "[[a]]"), "1000 of a table"),
+        (1_000, lambda n: "[a]\n" + many(n, "k{i} = 1"), "1000 of a table"),
+        (120_000, lambda n: f"a = [{'1,' * (n - 1)}]", "120000 of all together"),
+        (100, lambda n: many(n, "a.b.c.d.e.f.g.k{i} = 1"), "32 levels"),
+        (
+            30_000,
+            lambda n: "".join(many(1_000, f"[[a{j}]]") for j in range(n // 1000)) + many(n % 1000, "[b{i}]"),
+            "30000 keys",
+        ),
+    ):
+        parse(text(most), "case.toml")
+        with pytest.raises(CaseError, match=limit):
+            parse(text(most + 1), "case.toml")
 
 
 def test_the_first_of_many_mistakes_are_shown_with_their_number():

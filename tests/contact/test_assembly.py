@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from femgear.contact.assembly import ContactProblem
+from femgear.contact.assembly import Candidates, ContactProblem
 
 
 def cells(*places) -> Any:
@@ -23,3 +23,23 @@ def test_a_start_is_taken_from_the_same_cells_and_from_all_springs():
         start = ContactProblem.warm_start(now, before, np.append(active, springs))
         came = [{0: 3, 1: 1, 2: 4, 3: 0, 4: 5}[cell] for cell in touching]
         assert start.tolist() == [*np.isin(np.arange(8), came).tolist(), *springs]
+
+
+def test_contact_reaches_the_end_of_a_flank_where_its_first_or_last_cell_does():
+    """Four windows of five cells, of which the last two windows hold three: both ends, one, none."""
+    candidate = np.ones((1, 4, 5), bool)
+    candidate[0, 2:, 3:] = False
+    touching = np.zeros((1, 4, 5), bool)
+    at_edge = np.zeros((2, 1, 4), bool)
+    found: Any = SimpleNamespace(candidate=candidate, at_edge=at_edge)
+    # the low end, then the high one: a contact in one cell alone, wherever it is
+    for end, reached in ((0, (0, 0, 0, 0)), (1, (4, 4, 2, 2))):
+        for window in range(4):
+            for cell in range(5 if window < 2 else 3):
+                touching[:], at_edge[:] = False, False
+                touching[0, window, cell] = True
+                assert not Candidates.at_flank_end(found, touching).any()
+                at_edge[end] = True
+                expected = np.zeros((1, 4), bool)
+                expected[0, window] = cell == reached[window]
+                assert np.array_equal(Candidates.at_flank_end(found, touching), expected)

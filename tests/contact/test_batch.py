@@ -150,6 +150,29 @@ def test_teeth_wedged_between_both_flanks():
     compare(results)
 
 
+def test_a_position_solved_alone_begins_with_what_touches_at_the_one_before(monkeypatch):
+    gears, bodies, torque = random_bodies(SEEDS[0])
+    together, alone, starts, solved = batch.solve_batch, batch.solve_contact, [], []
+
+    def noting(*arrays, start, **options):
+        starts.append(start)
+        return alone(*arrays, start=start, **options)
+
+    def keeping(found, load, springs):
+        solved.append((found.candidate, together(found, load, springs)))
+        return solved[-1][1]
+
+    # no position is solved together with others
+    monkeypatch.setattr(batch, "_MOST_STEPS", 0)
+    monkeypatch.setattr(batch, "solve_contact", noting)
+    monkeypatch.setitem(globals(), "solve_batch", keeping)
+    compare(both_ways(gears, bodies, torque, supports=Supports()))
+    ((candidate, state),) = solved
+    assert len(starts) == 5
+    for at in range(1, 5):
+        assert np.array_equal(starts[at], state.active[at - 1][candidate[at]])
+
+
 def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
     gears, bodies, torque = random_bodies(SEEDS[0])
     together, alone, states = batch.solve_batch, batch.solve_contact, []

@@ -239,3 +239,29 @@ def test_progress_tells_the_positions_done(gears, bodies, monkeypatch):
     options = CycleOptions(progress=lambda *done: told.append(done))
     walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, options=options)
     assert told[-3:] == [(3, 8), (6, 8), (8, 8)]
+
+
+def test_unknowns_are_those_of_the_position_with_the_most(gears, bodies, monkeypatch):
+    """However many positions are solved together."""
+    found = []
+    for together in (1, 3, 8):
+        monkeypatch.setattr("femgear.contact.cycle._TOGETHER", together)
+        cycle = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8)
+        found.append(cycle.unknowns)
+        # a window of 36 cells for each pair in contact
+        assert cycle.unknowns >= (cycle.tooth_load > 0).sum(axis=(0, 1)).max()
+    assert found[0] == found[1] == found[2]
+
+
+def test_meshes_are_coupled_under_the_lightest_load(gears, bodies):
+    """A thousandth of a newton on every mesh: the torsion of the sun between them is the same."""
+    light, usual = (
+        walk_mesh_cycle(
+            gears, bodies, sun_torque=torque, positions=[0.4], options=CycleOptions(held_bodies=bodies)
+        ).held_compliance[..., 0]
+        for torque in (1e-4, TORQUE)
+    )
+    own = np.diag(usual)
+    apart = ~np.eye(6, dtype=bool)
+    assert (np.diag(light) > own).all()
+    assert np.abs(light - usual)[apart].max() < 0.1 * np.abs(usual[apart]).max() > 0.0

@@ -7,7 +7,7 @@ import pytest
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.loaded_period import SHORTEST, loaded_period, planet_symmetry
+from femgear.contact.loaded_period import SHORTEST, LoadedPeriod, loaded_period, planet_symmetry
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
@@ -150,3 +150,22 @@ def test_positions_meet_equal_planets_alike():
         assert gears.equal_positions(wanted) == expected
     # pairs: 21 x 18 of 80 pitches apart, fortieths of a period
     assert small_set(PAIRS).equal_positions(64) == 80
+
+
+def test_cubics_between_the_positions_keep_enclosed_jumps():
+    """A smooth function with and without a jump: far better than straight lines, the jump as high."""
+    for jump in (0.0, 1.0):
+        tau = np.sort(np.append(np.arange(48) / 48, 0.375 + 2.0**-13))
+
+        def exact(x, jump=jump):
+            return np.cos(2 * np.pi * x) + 0.3 * np.sin(4 * np.pi * x) + jump * (x > 0.375) * (1.0 - x)
+
+        values = exact(tau)[None]
+        period = LoadedPeriod(tau, values, values, values, values, np.zeros((2, 2)))
+        found, at = period.resampled("force", 400)[0], np.arange(400) / 400
+        # at the ends of a piece the slopes are of one side alone
+        inner = np.abs(at - 0.375) > 2 / 48 if jump else np.ones(400, bool)
+        inner &= (at > 2 / 48) & (at < 1 - 2 / 48)
+        straight = np.interp(at, tau, values[0], period=1.0)
+        assert np.abs(found - exact(at))[inner].max() < 0.4 * np.abs(straight - exact(at))[inner].max()
+        assert np.abs(found - exact(at))[at != 0.375].max() < 5e-3

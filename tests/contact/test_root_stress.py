@@ -16,10 +16,11 @@ from femgear.contact.root_stress import (
     BACK,
     LOADED,
     observed_root_stress,
+    root_ranges,
     root_stress,
     root_stress_cycle,
 )
-from femgear.contact.tooth_loads import deformed_set
+from femgear.contact.tooth_loads import deformed_set, loaded_teeth
 from femgear.fe.compliance import symmetric_factor
 from femgear.fe.elasticity import Material, foundation, stiffness, tangential_stress
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
@@ -335,6 +336,32 @@ def test_equal_planets_give_equal_stresses(loaded):
             assert np.sort(stresses[other].tension.ravel()) == pytest.approx(
                 np.sort(stresses[first].tension.ravel()), rel=1e-3, abs=1e4
             )
+
+
+def test_ranges_are_those_of_the_point_with_the_widest_one(loaded):
+    """Planets, bent by the sun one way and by the ring the other way: no point of either root has more."""
+    gears, _, _, cycle, roots, stresses = loaded
+    ranges = root_ranges(gears, roots, loaded_teeth(cycle, reverse=False))
+    for n in range(3):
+        sun_side, ring_side = stresses[2 * n + 1], stresses[2 * (3 + n)]
+        for number, pulled, other in (
+            (2 * n + 1, sun_side, ring_side),
+            (2 * (3 + n), ring_side, sun_side),
+        ):
+            both = np.concatenate(
+                [pulled.stress[:, :, LOADED].reshape(-1, len(pulled.arc)),
+                 other.stress[:, :, BACK].reshape(-1, len(pulled.arc))]
+            )  # fmt: skip
+            found = ranges[number]
+            assert found.point == np.ptp(both, axis=0).argmax()
+            assert found.maximum - found.minimum == pytest.approx(np.ptp(both, axis=0).max(), rel=1e-9)
+
+
+def test_fields_without_a_position_are_those_of_the_first(loaded):
+    gears, sectors, _, cycle, _, _ = loaded
+    default, first = (deformed_set(gears, sectors, cycle, **given) for given in ({}, {"position": 0}))
+    for one, other in zip(default, first, strict=True):
+        assert one.name == other.name and np.array_equal(one.displacement, other.displacement)
 
 
 def test_history_of_a_tooth(loaded):

@@ -57,6 +57,14 @@ def test_wedge_is_reciprocal_and_logarithmic_at_the_apex(degrees):
     np.testing.assert_allclose(one + logarithm * t, other, atol=1e-9)
 
 
+def test_wedge_turns_about_its_apex():
+    """Near the apex, at rest, nothing is left but a rotation: a displacement that grows with the distance."""
+    t = np.array([9.0, 12.0, 15.0, 18.0])
+    for degrees in (95, 120, 150):
+        found = _excess(math.radians(degrees), np.exp(-t), 0.0 * t, 0.3) * np.exp(t)
+        assert found == pytest.approx(found[1], rel=0.1)
+
+
 @pytest.mark.parametrize("gear", [SET.sun, SET.planet, SET.ring])
 def test_surface_of_the_wedge_in_closed_form(gear):
     corner = tip_corner(gear, STEEL)

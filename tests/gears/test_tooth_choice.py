@@ -79,9 +79,8 @@ def test_chosen_by_phasing():
     assert tuple(chosen.teeth[0]) == (31, 21, 73) and tuple(chosen.teeth[1]) == (29, 19, 67)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
+def test_numbers_out_of_range_are_refused():
+    for change in (
         dict(distance=-1),
         dict(distance=31),
         dict(closure=11),
@@ -92,12 +91,19 @@ def test_chosen_by_phasing():
         dict(sun_teeth=30.0),
         dict(ring_teeth=20),
         dict(planets=0),
-    ],
-)
-def test_numbers_out_of_range_are_refused(change):
-    arguments = dict(sun_teeth=30, planet_teeth=20, ring_teeth=70, planets=4) | change
-    with pytest.raises(GeometryError, match=r"E-CHOICE|E-RANGE"):
-        neighbouring_teeth(**arguments)
+    ):
+        arguments = dict(sun_teeth=30, planet_teeth=20, ring_teeth=70, planets=4) | change
+        with pytest.raises(GeometryError, match=r"E-CHOICE|E-RANGE"):
+            neighbouring_teeth(**arguments)
+
+
+def test_closure_is_what_profile_shifts_must_take_up():
+    """At standard centre distances the meshes of 30/20/71 are half a module apart: z_r - z_s - 2 z_p = 1."""
+    found = neighbouring_teeth(30, 20, 70, 4, distance=2, closure=3, ratio_tolerance=1)
+    sun, planet, ring = found.teeth.T
+    apart = (ring - planet) / 2 - (sun + planet) / 2
+    assert np.array_equal(found.closure, 2 * apart)
+    assert {-3, 0, 3} <= set(found.closure.tolist())
 
 
 def test_nothing_near_is_an_empty_list():

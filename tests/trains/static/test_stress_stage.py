@@ -11,7 +11,7 @@ from validation.reference.root_stress import set_root_stress
 
 from femgear.contact.flank_pairs import LEFT, RIGHT
 from femgear.contact.root_stress import LOADED, body_stress, root_stress_cycle
-from femgear.contact.tooth_loads import LOAD_BINS, LoadedTeeth, load_spectrum, loaded_teeth
+from femgear.contact.tooth_loads import loaded_teeth
 from femgear.gears.gear import half_thickness_angle
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static import stages as static_stages
@@ -189,34 +189,6 @@ def test_load_spectrum_carries_the_mesh_force(reference):
     assert (spectrum.engagements.argmax(axis=1) == peak).all()
     assert spectrum.cycles.tolist() == [[3, 1]] * N + [[1, 3]] * N
     assert spectrum.duration[0] > static.planetary_set.contact_ratio_sun_planet
-
-
-def invented(periods, slots=3, each=4):
-    """Teeth of two meshes; tooth number e, which enters in period e, has the peak e + 1."""
-    load = np.zeros((2, slots, periods * each))
-    for entered in range(-slots, periods):
-        for slot in range(slots):
-            period = entered + slot
-            if 0 <= period < periods:
-                load[:, slot, period * each : (period + 1) * each] = (entered % periods + 1) * (slot == 1)
-    zero = np.zeros((2, 1, periods * each))
-    turn = np.arange(periods * each) // each
-    tooth = np.zeros((2, 2, slots), int)
-    return LoadedTeeth(load, load, tooth, zero, zero, tooth[:, :, :1], turn, periods, False)
-
-
-def test_peaks_are_counted_once_an_engagement():
-    whole = load_spectrum(invented(10), closes=True)
-    assert whole.edges[-1] == 10 and len(whole.edges) == LOAD_BINS + 1
-    # classes are half a unit wide and begin with their lower limit, the last one holds its upper limit too
-    expected = np.zeros(LOAD_BINS)
-    expected[[*range(2, 20, 2), 19]] = 0.1
-    assert whole.engagements[0] == pytest.approx(expected)
-    # a record that does not repeat shows eight teeth from entry to exit: those with peaks 1 .. 8
-    part = load_spectrum(invented(10), closes=False)
-    expected = np.zeros(LOAD_BINS)
-    expected[2:18:2] = 1 / 8
-    assert part.engagements[0] == pytest.approx(expected)
 
 
 def with_pitch_error(amount, monkeypatch, **changes):
