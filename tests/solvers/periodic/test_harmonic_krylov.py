@@ -7,7 +7,7 @@ from femgear.solvers.periodic import equations
 from femgear.solvers.periodic import harmonic_balance as solvers_periodic_harmonic_balance
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.system.force_laws import GearMeshes, RadialBearings
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, side_bands
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
@@ -68,3 +68,19 @@ def test_the_matrix_helps_where_products_do_not_suffice(balance, monkeypatch):
     assert tangent.solve(error) is None
     step = solvers_periodic_harmonic_balance._newton_step(balance, receptance, y, error, tangent)
     np.testing.assert_allclose(balance.evaluate(y, [0.21, 1.3])[1] @ step, error, atol=1e-12)
+
+
+def test_a_matrix_is_made_of_six_hundred_unknowns_at_most(monkeypatch):
+    one = np.eye(1)
+    system = MechanicalSystem(one, 0.1 * one, one, one, np.zeros(1), ("x",))
+    element = PolynomialSprings([0], [[0.0, 0.0, 0.2]])
+    problem = NonlinearSystem(system, (element,), (HarmonicForce([0.4]),))
+    made, jacobian = [], equations.HarmonicBalance.jacobian
+    monkeypatch.setattr(
+        equations.HarmonicBalance, "jacobian", lambda self, *rest: made.append(1) or jacobian(self, *rest)
+    )
+    # one mean, a real and an imaginary part of every harmonic
+    for harmonics, by_matrix in ((299, True), (300, False)):
+        made.clear()
+        assert solve_harmonic_balance(problem, 2.0, harmonics=harmonics, stability=False).converged
+        assert bool(made) is by_matrix

@@ -381,3 +381,43 @@ def test_arnoldi_is_exact_once_it_has_the_whole_space(geared_chain, chain_excita
     )
     exact = spectral.spectral_radius(few, exact_limit=np.inf)
     np.testing.assert_allclose(spectral.spectral_radius(few, exact_limit=0.0), exact, rtol=1e-6)
+
+
+def test_a_mesh_later_in_time_repeats_the_first_one_whatever_its_phase():
+    """``x(t - 0.37 T)`` of a signal with any phases, and of one whose first harmonic is missing."""
+    h = np.arange(5)
+    for signal in ([3.0, 1j, 0.4 - 0.3j, 0.0, 0.1], [2.0, 0.0, -0.7 + 0.2j, 0.0, 0.3j]):
+        later = np.exp(-2j * np.pi * 0.37 * h) * signal
+        twins = spectral.find_twins((np.array([signal, later]),))
+        assert twins.leaders.tolist() == [0] and twins.group.tolist() == [0, 0]
+        np.testing.assert_allclose(twins.shift[1] * signal, later, atol=1e-14)
+
+
+def test_twins_differ_by_rounding_of_the_largest_receptance():
+    """Not of that at a third mesh which they hardly move: the reduced equations have the same solution."""
+    wave = np.array([0.1, 0.05, 0.02j])
+    signals = np.array([wave, wave, 0.5 * wave])
+    signals[2, 2] = 0.03
+    twins = spectral.find_twins((signals,))
+    for off, same in ((1e-10, True), (1e-7, False)):
+        receptance = np.array([[1.0 + off, 0.3, 1e-4], [0.3, 1.0, 1e-4], [1e-4, 1e-4, 2.0]])
+        receptance = np.tile(receptance[:, :, None, None] + 0j, (1, 1, 1, 3))
+        source = np.tile(np.array([1.0, 1.0, 0.4])[:, None, None] + 0j, (1, 1, 3))
+        problem = spectral.HarmonicProblem(receptance, Product(signals), source)
+        reduced = spectral.reduce_twins(problem, twins)
+        assert (reduced is not None) is same
+        if reduced is not None:
+            found = spectral.solve_direct(reduced)[twins.group]
+            np.testing.assert_allclose(found, spectral.solve_direct(problem), rtol=1e-9, atol=1e-9)
+
+
+def test_radius_of_many_unknowns_costs_twenty_products(monkeypatch):
+    rng = np.random.default_rng(5)
+    wave = np.pad(rng.standard_normal((2, 4)), ((0, 0), (0, 36)))
+    gain = 1.0 / (1.0 + np.arange(40.0)) * np.array([[1.0, 0.2], [0.2, 0.7]])[:, :, None, None]
+    problem = spectral.HarmonicProblem(gain + 0j, Product(wave), np.zeros((2, 1, 40), complex))
+    made, product = [], spectral._apply
+    monkeypatch.setattr(spectral, "_apply", lambda *parts: made.append(1) or product(*parts))
+    found = spectral.spectral_radius(problem)
+    assert len(made) == 20
+    np.testing.assert_allclose(found, spectral.spectral_radius(problem, exact_limit=200), rtol=0.02)

@@ -229,3 +229,19 @@ def test_exact_exponentials_have_no_error():
     moving = GearMeshes([0], FourierSeries([[4.0, 0.5]]), separates=False)
     verdict = floquet_verdict(*pair(oscillator(0.2, (moving,), amplitude=0.1), 1.3, harmonics=4))
     assert verdict.method == "splitting" and 0.0 < verdict.error < 1e-6
+
+
+def test_a_hundred_modes_are_followed():
+    """Uncoupled masses have multipliers of size ``exp(-c T / 2)``, each with its own c: the slowest count."""
+    count = 103
+    damping = np.linspace(0.02, 0.3, count)
+    system = MechanicalSystem(
+        np.eye(count), np.diag(damping), np.diag(np.linspace(1.0, 3.0, count)), np.eye(count, 1),
+        np.zeros(count), tuple(f"x{i}" for i in range(count)),
+    )  # fmt: skip
+    mesh = GearMeshes([0], constant([0.001]), separates=False)
+    problem = NonlinearSystem(system, (mesh,), (HarmonicForce(np.ones(count)),))
+    solution = solve_harmonic_balance(problem, 1.3, harmonics=1, stability=False)
+    verdict = floquet_verdict(problem, solution)
+    wanted = np.repeat(np.exp(-0.5 * damping[:100] * 2.0 * np.pi / 1.3), 2)
+    np.testing.assert_allclose(np.sort(np.abs(verdict.multipliers))[::-1], wanted, rtol=1e-9)

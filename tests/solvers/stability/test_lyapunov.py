@@ -1,6 +1,7 @@
 """Lyapunov exponents: closed forms, Floquet multipliers, a published attractor, neighbouring motions."""
 
 from contextlib import nullcontext
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ from validation.reference.adaptive_lyapunov import adaptive_exponents
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.stability.lyapunov import _check_sum, _Stepped, lyapunov_exponents
+from femgear.solvers.stability.lyapunov import _check_sum, _Stepped, lyapunov_exponents, pieces
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
@@ -176,17 +177,17 @@ def test_the_error_of_the_steps_is_that_beside_the_exact_exponents():
     assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
 
 
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-@pytest.mark.parametrize("count, off, refused", [(2, 0.019, False), (2, 0.021, True), (1, 0.5, False)])
-def test_the_sum_of_all_exponents_is_the_divergence_to_two_per_cent_of_the_largest(sign, count, off, refused):
+def test_the_sum_of_all_exponents_is_the_divergence_to_two_per_cent_of_the_largest():
     run = SimpleNamespace(size=2, divergence=-2.0, period=1.0)
-    exponents = np.array([1.0, -3.0 + sign * 3.0 * off])[:count]
-    exponents[-1] *= 3.0 / np.abs(exponents[-1]) if count == 1 else 1.0
-    outcome = pytest.raises(ConvergenceError, match="the exponents add up") if refused else nullcontext()
-    with outcome:
-        _check_sum(exponents, np.zeros(count), run)
-    # a scatter of the same size excuses it
-    _check_sum(exponents, np.full(count, 0.022), run)
+    cases = ((2, 0.019, False), (2, 0.021, True), (1, 0.5, False))
+    for sign, (count, off, refused) in product((-1.0, 1.0), cases):
+        exponents = np.array([1.0, -3.0 + sign * 3.0 * off])[:count]
+        exponents[-1] *= 3.0 / np.abs(exponents[-1]) if count == 1 else 1.0
+        outcome = pytest.raises(ConvergenceError, match="the exponents add up") if refused else nullcontext()
+        with outcome:
+            _check_sum(exponents, np.zeros(count), run)
+        # a scatter of the same size excuses it
+        _check_sum(exponents, np.full(count, 0.022), run)
 
 
 def test_an_undamped_oscillation_turns_and_does_not_stretch():
@@ -198,3 +199,16 @@ def test_an_undamped_oscillation_turns_and_does_not_stretch():
     whole = np.linalg.multi_dot(parts[::-1])
     turned = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     np.testing.assert_allclose(whole, turned, atol=1e-12)
+
+
+def test_small_motions_are_made_orthogonal_before_they_fade():
+    """By ``exp(-3)`` at most between two times; four times a period, and not more than a thousand times."""
+    assert pieces(np.zeros((0, 0)), 2.0) == pieces(np.zeros((2, 2)), 2.0) == 4
+    for rate, period in ((5.9, 2.0), (6.1, 2.0), (30.0, 2.0), (1.0, 500.0)):
+        # the strongest damping counts, here along (3, 4)
+        along = np.array([0.6, 0.8])
+        damping = rate * np.outer(along, along)
+        count = pieces(damping, period)
+        assert np.exp(-rate * period / count) >= np.exp(-3.0) * (1.0 - 1e-12)
+        assert count == 4 or np.exp(-rate * period / (count - 1)) < np.exp(-3.0)
+    assert pieces(np.diag([1e6, 0.0]), 2.0) == 1000

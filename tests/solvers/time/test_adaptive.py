@@ -6,8 +6,8 @@ import pytest
 from femgear.errors import ConvergenceError
 from femgear.solvers.time.adaptive import _contacts, flow, motion_scale, sampled, trajectory
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import FourierSeries, constant
+from femgear.system.force_laws import GearMeshes, PolynomialSprings
+from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 ONE = np.eye(1)
@@ -91,3 +91,76 @@ def test_force_is_that_of_the_phases_at_the_instants(method):
     stiffness = 3.0 + np.cos(2.5 * times) + 0.5 * np.sin(2.5 * times)
     assert found.deflection[:, 0] == pytest.approx(found.displacement[:, 0], abs=1e-15)
     assert found.force[:, 0] == pytest.approx(stiffness * found.displacement[:, 0], abs=1e-12)
+
+
+def flights():
+    """Two masses that fly with speed one into springs of stiffness 4, one element each; and their start."""
+    two, none = np.eye(2), np.zeros((2, 2))
+    system = MechanicalSystem(two, none, none, two, np.zeros(2), ("x", "y"))
+    meshes = tuple(GearMeshes([i], constant([4.0])) for i in range(2))
+    return flow(NonlinearSystem(system, meshes), np.array([1.0])), np.array([-1.0, -1.5, 1.0, 1.0])
+
+
+def flown(times, at):
+    """Free up to x = 0, half a period of sin 2 t, and free again."""
+    t = times - at
+    return np.where(t < 0.0, t, np.where(t < 0.5 * np.pi, 0.5 * np.sin(2.0 * t), 0.5 * np.pi - t))
+
+
+def test_contacts_of_several_elements_change_one_by_one():
+    times = np.linspace(0.0, 4.0, 17)
+    moving, start = flights()
+    pieces = trajectory(moving, moving.state(start[:2], start[2:]), 0.0, 4.0, events=True)
+    found, _ = sampled(pieces, times, start)
+    assert found[:, 0] == pytest.approx(flown(times, 1.0), abs=1e-9)
+    assert found[:, 1] == pytest.approx(flown(times, 1.5), abs=1e-9)
+
+
+def test_a_motion_before_time_zero_is_the_same_motion_earlier():
+    """Nothing depends on time: begun at -6, the contacts close at -5 and -4.5."""
+    times = np.linspace(-6.0, -2.0, 17)
+    moving, start = flights()
+    pieces = trajectory(moving, moving.state(start[:2], start[2:]), -6.0, -2.0, events=True)
+    found, steps = sampled(pieces, times, start)
+    assert steps > 4
+    assert found[:, 0] == pytest.approx(flown(times, -5.0), abs=1e-9)
+    assert found[:, 1] == pytest.approx(flown(times, -4.5), abs=1e-9)
+
+
+def test_a_motion_without_end_stops_where_it_runs_away():
+    """``x'' = x^3`` has ``x = sqrt 2 / (1 - t)``."""
+    system = MechanicalSystem(ONE, 0.0 * ONE, 0.0 * ONE, ONE, np.zeros(1), ("x",))
+    problem = NonlinearSystem(system, (PolynomialSprings([0], [[0.0, 0.0, -1.0]]),))
+    moving = flow(problem, np.array([1.0]))
+    start = moving.state([2.0**0.5], [2.0**0.5])
+    with pytest.raises(ConvergenceError, match="DOP853 stopped at") as caught:
+        list(trajectory(moving, start, 0.0, 2.0, tolerance=1e-7, max_steps=2000))
+    assert caught.value.code == "E-INTEGRATION"
+    assert float(caught.value.message.split()[3]) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_steps_of_a_stiffness_are_borders_in_every_period():
+    """Stiffness 9 for 0.3 of every second, 1 after that: products of exact motions, begun late or not."""
+    system = MechanicalSystem(ONE, 0.0 * ONE, 0.0 * ONE, ONE, np.zeros(1), ("x",))
+    mesh = GearMeshes([0], StepSeries([[9.0, 1.0]], [0.0, 0.3]), separates=False)
+    moving = flow(NonlinearSystem(system, (mesh,)), np.array([2.0 * np.pi]))
+
+    def free(omega, t):
+        turn = omega * t
+        return np.array([[np.cos(turn), np.sin(turn) / omega], [-omega * np.sin(turn), np.cos(turn)]])
+
+    for begin, parts in (
+        (0.0, [(3, 0.3), (1, 0.7), (3, 0.3), (1, 0.7), (3, 0.25)]),
+        (3.1, [(3, 0.2), (1, 0.7), (3, 0.3), (1, 0.45)]),
+    ):
+        borders = begin + np.cumsum([duration for _, duration in parts])
+        pieces = list(
+            trajectory(moving, moving.state([0.4], [0.1]), begin, borders[-1], events=True, max_steps=400)
+        )
+        ends = np.array([end for _, end, _ in pieces])
+        assert np.abs(ends[:, None] - borders).min(axis=0).max() < 1e-12
+        exact = np.array([0.4, 0.1])
+        for omega, duration in parts:
+            exact = free(omega, duration) @ exact
+        q, v, _ = moving.split(pieces[-1][2](borders[-1]))
+        assert [q[0], v[0]] == pytest.approx(exact, abs=1e-9)

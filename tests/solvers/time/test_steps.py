@@ -116,3 +116,57 @@ def test_stiffest_phase_of_a_column_is_looked_for_all_around():
     meshes = GearMeshes(np.arange(5), series)
     problem = NonlinearSystem(system, (meshes, meshes))
     assert transient._column_stiffness(problem, [7.0]) == pytest.approx(6.0, rel=1e-12)
+
+
+def test_named_rules_lose_nothing_up_to_their_limits_and_grow_beyond():
+    """Eigenvalues of one step of ``q'' + q = 0``; Hughes (2000), table 9.1.1: 2 sqrt 3, sqrt 6 and 2 rad."""
+    one = np.eye(1)
+    problem = NonlinearSystem(MechanicalSystem(one, 0.0 * one, one, one, np.zeros(1), ("x",)), ())
+
+    def radius(rule, step):
+        scheme = steps.RuleScheme(problem, rule, step)
+        starts = (np.array([[1.0], [0.0], [-1.0]]), np.array([[0.0], [1.0], [0.0]]))
+        ends = [scheme.free(start, np.zeros(1), 0.0)[:2, 0] for start in starts]
+        return np.abs(np.linalg.eigvals(np.column_stack(ends))).max()
+
+    limits = {"linear acceleration": 12.0**0.5, "Fox-Goodwin": 6.0**0.5, "central difference": 2.0}
+    for name, limit in limits.items():
+        rule = steps.RULES[name]
+        assert 2.0 * np.pi * stability_limit(rule) == pytest.approx(limit, rel=1e-12)
+        for share in (0.1, 0.5, 0.99):
+            assert radius(rule, share * limit) == pytest.approx(1.0, rel=1e-12)
+        assert radius(rule, 1.01 * limit) > 1.1
+    assert stability_limit(steps.RULES["average acceleration"]) == np.inf
+    for step in (0.1, 3.0, 100.0):
+        assert radius(steps.AVERAGE_ACCELERATION, step) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_steady_vibration_goes_on_with_the_phase_of_its_force():
+    """Of ``q'' + 0.3 q' + 4 q = Re (1 - 2i) exp 1.3 i t``, begun on its steady state."""
+    one = np.eye(1)
+    system = MechanicalSystem(one, 0.3 * one, 4.0 * one, one, np.zeros(1), ("x",))
+    problem = NonlinearSystem(system, (), (HarmonicForce([1.0 - 2.0j]),))
+    line = (1.0 - 2.0j) / (4.0 - 1.3**2 + 0.39j)
+    times = np.linspace(0.0, 5.0, 11)
+    wave = line * np.exp(1.3j * times)
+    start = ([line.real], [(1.3j * line).real])
+    for method in ("average acceleration", "generalised alpha"):
+        found = solve_transient(problem, 1.3, times, start=start, step=0.02, method=method)
+        assert found.displacement[:, 0] == pytest.approx(wave.real, abs=5e-4)
+        assert found.velocity[:, 0] == pytest.approx((1.3j * wave).real, abs=5e-4)
+
+
+def test_error_of_a_step_is_bounded_where_the_acceleration_bends():
+    """Of ``q = t^4 / 12``, by the rule from exact accelerations: at most half too large."""
+    step, t = 0.1, 0.1 * np.arange(9.0)
+    q, v, a = t**4 / 12.0, t**3 / 3.0, t**2
+    system = MechanicalSystem(4.0 * np.eye(1), np.eye(1), np.eye(1), np.eye(1), np.zeros(1), ("x",))
+    for name in ("average acceleration", "central difference"):
+        rule = steps.RULES[name]
+        scheme = steps.RuleScheme(NonlinearSystem(system, ()), rule, step)
+        states = np.stack([q, v, a], axis=1)[:, :, None]
+        stepped = q[:-1] + step * v[:-1] + step**2 * ((0.5 - rule.beta) * a[:-1] + rule.beta * a[1:])
+        # the size of an error is the root of e M e
+        exact = 2.0 * np.abs(stepped - q[1:])
+        found = scheme.local_error(states, np.zeros((9, 1)))
+        assert np.all(found[1:] > exact[1:]) and np.all(found[1:] < 1.6 * exact[1:])

@@ -1,0 +1,20 @@
+"""Matrices of a set from its members: what the supports hold."""
+
+from dataclasses import replace
+
+import numpy as np
+from published.planetary_sets import lin_parker_set
+
+from femgear.system.mesh_directions import gear_set_system, support_diagonal
+
+
+def test_supports_that_hold_a_motion_are_no_stiffness():
+    """A torsional spring acts on ``u = r theta``; of three motions of a body the held ones give nothing."""
+    data = lin_parker_set(3)
+    free = replace(data.sun, support=2e7, torsional_support=5e5)
+    stiff = support_diagonal(replace(data, sun=free))[2]
+    np.testing.assert_allclose(stiff, [2e7, 2e7, 5e5 / data.sun_radius**2], rtol=1e-14)
+    held = replace(data, sun=replace(free, torsional_support=np.inf), ring=replace(data.ring, support=np.inf))
+    assert support_diagonal(held)[2].tolist() == [2e7, 2e7, 0.0]
+    assert support_diagonal(held)[1, :2].tolist() == [0.0, 0.0]
+    assert len(gear_set_system(held).M) == len(gear_set_system(replace(data, sun=free)).M) - 3
