@@ -480,6 +480,11 @@ def _termination_interrupts() -> Iterator[None]:
         sys.unraisablehook = again
         try:
             yield
+        except SystemError as error:
+            # compiled code may make one of the interrupt that it was sent
+            if isinstance(error.__cause__, KeyboardInterrupt):
+                raise error.__cause__ from None
+            raise
         finally:
             sys.unraisablehook = hook
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -435,6 +436,20 @@ def test_an_interrupt_while_the_last_words_are_shown_changes_nothing(monkeypatch
     assert (
         capsys.readouterr().out == "said\n" and signal.getsignal(signal.SIGINT) == signal.default_int_handler
     )
+
+
+def test_an_interrupt_that_compiled_code_changed_is_one(monkeypatch, capsys):
+    """The interpreter's own words for a function that returns though it was interrupted."""
+
+    def changed(*_, cause=KeyboardInterrupt, **__):
+        raise SystemError("returned a result with an exception set") from cause()
+
+    monkeypatch.setattr("femgear.trains.reading.read_case", changed)
+    assert cli.main(["check", str(CASE)]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
+    monkeypatch.setattr("femgear.trains.reading.read_case", partial(changed, cause=ValueError))
+    with pytest.raises(SystemError, match="exception set"):
+        cli.main(["check", str(CASE)])
 
 
 def test_an_interrupt_behind_the_results_says_that_they_are_complete(tmp_path, capsys, pipeline, monkeypatch):

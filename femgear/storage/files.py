@@ -183,21 +183,17 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     StorageError
         ``E-STORAGE`` (missing, truncated, checksum), ``E-FORMAT`` (see above; of another femgear).
     """
-    import xarray as xr
-
     name = os.fspath(path)
     with storage_errors(path):
         if not os.path.isfile(path):
             raise StorageError("no such file", code="E-STORAGE", file=name, remedy="run the case again")
-    options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
-    try:
-        with storage_errors(path):
-            if hostile := _hostility(path):
-                raise StorageError(hostile, code="E-FORMAT", file=name, remedy="do not use this file")
-        large = os.path.getsize(path) > _LARGE
-        dataset = xr.open_dataset(path, cache=False, **options) if large else xr.load_dataset(path, **options)
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
-        raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
+    with ThreadPoolExecutor(1) as pool:
+        # signals interrupt the main thread alone: h5py would make a SystemError of what is raised within it
+        reading = pool.submit(_loaded, path)
+        try:
+            dataset = reading.result()
+        except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
+            raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
     version = dataset.attrs.get("femgear_format")
     if not isinstance(version, int | np.integer) or version > _FORMAT:
         raise StorageError(
@@ -205,6 +201,19 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
             limit=f"femgear_format up to {_FORMAT}", remedy="run the case again",
         )  # fmt: skip
     return dataset
+
+
+def _loaded(path: str | os.PathLike) -> xr.Dataset:
+    """The dataset in an unsuspicious file, its numbers in memory unless it is large."""
+    import xarray as xr
+
+    with storage_errors(path):
+        if hostile := _hostility(path):
+            raise StorageError(hostile, code="E-FORMAT", file=os.fspath(path), remedy="do not use this file")
+    options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
+    if os.path.getsize(path) > _LARGE:
+        return xr.open_dataset(path, cache=False, **options)
+    return xr.load_dataset(path, **options)
 
 
 def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -> None:

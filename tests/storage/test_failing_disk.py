@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -139,6 +140,23 @@ def test_an_interrupt_at_any_call_of_hdf5_is_not_lost(tmp_path, monkeypatch, cal
         write_dataset(large(), tmp_path / "static.nc")
     assert len(count) > call
     assert (tmp_path / "static.nc").read_bytes() == before and len(list(tmp_path.iterdir())) == 1
+
+
+def test_an_interrupt_while_a_file_is_read_reaches_no_library(tmp_path, monkeypatch):
+    """Only the main thread is interrupted, and it waits for what reads."""
+    write_dataset(large(3), tmp_path / "static.nc")
+    walk, ended = files._hostility, []
+
+    def interrupted(path):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.05)
+        ended.append(walk(path))
+        return ended[-1]
+
+    monkeypatch.setattr(files, "_hostility", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        read_dataset(tmp_path / "static.nc")
+    assert len(ended) == 1 and not ended[0]
 
 
 def kill(*_):
