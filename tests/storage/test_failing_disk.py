@@ -148,6 +148,7 @@ def test_an_interrupt_while_a_file_is_read_reaches_no_library(tmp_path, monkeypa
     walk, ended = files._hostility, []
 
     def interrupted(path):
+        time.sleep(0.05)  # until the main thread waits
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(0.05)
         ended.append(walk(path))
