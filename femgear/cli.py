@@ -39,7 +39,7 @@ try:
 
     from femgear import __version__
     from femgear.errors import CaseError, FemgearError, printable
-    from femgear.storage.files import storage_error
+    from femgear.storage.files import noted_interrupts, storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
     raise SystemExit(_INTERRUPTED) from None
@@ -476,17 +476,16 @@ def _termination_interrupts() -> Iterator[None]:
         else:
             hook(lost)
 
-    with _handlers({signal.SIGTERM: signal.default_int_handler}):
-        sys.unraisablehook = again
-        try:
-            yield
-        except SystemError as error:
-            # compiled code may make one of the interrupt that it was sent
-            if isinstance(error.__cause__, KeyboardInterrupt):
-                raise error.__cause__ from None
-            raise
-        finally:
-            sys.unraisablehook = hook
+    with noted_interrupts() as interrupt:
+        caught = [signal.SIGTERM]
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored on purpose
+            caught.append(signal.SIGINT)
+        with _handlers(dict.fromkeys(caught, interrupt)):
+            sys.unraisablehook = again
+            try:
+                yield
+            finally:
+                sys.unraisablehook = hook
 
 
 @contextlib.contextmanager

@@ -1,5 +1,6 @@
 """The command line: exit codes, messages, and that it never shows a traceback."""
 
+import contextlib
 import errno
 import importlib.util
 import json
@@ -438,18 +439,26 @@ def test_an_interrupt_while_the_last_words_are_shown_changes_nothing(monkeypatch
     )
 
 
-def test_an_interrupt_that_compiled_code_changed_is_one(monkeypatch, capsys):
-    """The interpreter's own words for a function that returns though it was interrupted."""
+def test_an_interrupt_of_which_compiled_code_makes_an_error_is_one(tmp_path, capsys, pipeline):
+    """Extensions clear what was raised beneath them, and raise what they know."""
+    out = tmp_path / "out"
 
-    def changed(*_, cause=KeyboardInterrupt, **__):
-        raise SystemError("returned a result with an exception set") from cause()
+    def changed(*_, number=signal.SIGINT, **__):
+        with contextlib.suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), number)
+            time.sleep(1.0)
+        raise ValueError("Invalid bounding box")
 
-    monkeypatch.setattr("femgear.trains.reading.read_case", changed)
-    assert cli.main(["check", str(CASE)]) == 130
-    assert capsys.readouterr().err == "interrupted\n"
-    monkeypatch.setattr("femgear.trains.reading.read_case", partial(changed, cause=ValueError))
-    with pytest.raises(SystemError, match="exception set"):
-        cli.main(["check", str(CASE)])
+    for number in (signal.SIGINT, signal.SIGTERM):
+        pipeline(partial(changed, number=number))
+        assert cli.main(["run", str(CASE), "-o", str(out)]) == 130
+        said = f"interrupted; the same command goes on from what {out} holds"
+        assert capsys.readouterr().err.splitlines()[-1] == said
+    # without an interrupt it is a defect
+    pipeline(partial(changed, number=0))
+    with pytest.raises(ValueError, match="bounding box"):
+        cli.main(["run", str(CASE), "-o", str(out)])
+    assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
 
 
 def test_an_interrupt_behind_the_results_says_that_they_are_complete(tmp_path, capsys, pipeline, monkeypatch):

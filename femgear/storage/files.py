@@ -598,14 +598,47 @@ def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
         lock.release()
 
 
+_signals: list[int] = []
+
+
+@contextlib.contextmanager
+def noted_interrupts() -> Iterator[Callable[[int, object], None]]:
+    """Give a handler of signals that raises `KeyboardInterrupt`, which stays one in this block.
+
+    Compiled code may make another error of it: that of h5py and of Matplotlib does.
+    """
+
+    def interrupt(number: int, _: object) -> None:
+        _signals.append(number)
+        raise KeyboardInterrupt
+
+    try:
+        yield interrupt
+    except Exception as error:
+        if not is_interrupt(error):
+            raise
+        found = KeyboardInterrupt()
+        for note in getattr(error, "__notes__", []):
+            found.add_note(note)
+        raise found from error
+    finally:
+        _signals.clear()
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Tell whether an error is an interrupt, or comes after one."""
+    return bool(_signals) or not isinstance(error, Exception)
+
+
 @contextlib.contextmanager
 def resumable(folder: Path, complete: Callable[[], bool] = lambda: False) -> Iterator[None]:
     """Say with an interruption of the block how the command goes on, or that its results are complete."""
     try:
         yield
-    except KeyboardInterrupt as interrupt:
-        goes_on = f"the same command goes on from what {folder} holds"
-        interrupt.add_note(f"the results in {folder} are complete" if complete() else goes_on)
+    except BaseException as error:
+        if is_interrupt(error):
+            goes_on = f"the same command goes on from what {folder} holds"
+            error.add_note(f"the results in {folder} are complete" if complete() else goes_on)
         raise
 
 

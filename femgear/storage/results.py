@@ -34,6 +34,7 @@ from femgear.storage.files import (
     csv_cell,
     exclusive_lock,
     foreign,
+    is_interrupt,
     is_temporary,
     list_own,
     read_dataset,
@@ -362,8 +363,8 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
             yield prepare_output(running, case=case, force=True)
         except BaseException as error:
             # what a user interrupts goes on with the next run
-            interrupted = case is not None and not isinstance(error, Exception)
-            if not (interrupted and (running / MANIFEST).is_file() and read_manifest(running).files):
+            resumed = case is not None and is_interrupt(error)
+            if not (resumed and (running / MANIFEST).is_file() and read_manifest(running).files):
                 remove_own(running)
             raise
         _publish(folder)
