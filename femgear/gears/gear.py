@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import operator
 import re
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Integral
@@ -438,12 +439,8 @@ def _check_cutter(gear: Gear) -> None:
 
 def _largest_rounding(gear: Gear) -> float:
     """Largest tool tip rounding [modules] that fits with the same root circle, rounded down to 1e-4."""
-    low, high = 0.0, 3.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        fits = _generating_tool(gear, middle).room >= 0.0
-        low, high = (middle, high) if fits else (low, middle)
-    return math.floor(1e4 * low) / 1e4
+    first = bisect_left(range(30_001), True, key=lambda n: not _generating_tool(gear, n / 1e4).room >= 0.0)
+    return max(first - 1, 0) / 1e4
 
 
 def _check_flank(gear: Gear) -> None:

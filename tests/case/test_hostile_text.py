@@ -8,8 +8,9 @@ import pytest
 from soak.trials import metered
 
 from femgear.case.text import parse, read_text
-from femgear.errors import MOST_SHOWN, CaseError
+from femgear.errors import MOST_SHOWN, CaseError, GeometryError
 from femgear.trains.reading import parse_case, read_case
+from femgear.trains.registry import train_of
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 SET = (CASES / "planetary_27_40_108.toml").read_text(encoding="utf-8")
@@ -60,11 +61,22 @@ def letters(i: int) -> str:
         ("[set]\nplanet_angles = [" + ", ".join(f'"1 z{letters(i)}"' for i in range(40_000)) + "]", "E-CASE"),
         ("[sun]\n" + "k" * 900_000 + " = 1", "E-CASE"),
         ('# """\nx = """\n' + many(20_000, "a = 1") + '"""\na = 1\na = 1', "E-TOML"),
+        ("\n" * 990_000 + "k = 1", "E-CASE"),
+        ("#\n" * 490_000 + "k = 1", "E-CASE"),
     ],
-    ids=range(21),
+    ids=range(23),
 )
 def test_what_takes_long_to_refuse(text, code):
     assert refused(text).code == code
+
+
+def test_a_limit_that_is_searched_for_is_told_soon():
+    """The largest rounding of a tool that fits three gears, one of them cut far too deep."""
+    text = (CASES / "nrel_pgb.toml").read_text(encoding="utf-8")
+    case = parse_case(text.replace("profile_shift = 0.0", "profile_shift = -1", 1))
+    with metered(5.0) as meter, pytest.raises(GeometryError, match="E-ROOT-RADIUS"):
+        train_of(case).describe_case(case)
+    assert meter.seconds < SECONDS
 
 
 def test_limits_of_a_text_are_those_that_its_refusal_names():
