@@ -41,9 +41,9 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
         help_format="plaintext",
         suppress_keyboard_interrupt=False,
     )
-    app.default(command)
-    with one_blas_thread():
-        return call(app, arguments, program=program)
+    # within the call, which says what ends it
+    app.default(one_blas_thread()(command))
+    return call(app, arguments, program=program)
 
 
 def ready_folder(folder: Path, names: Sequence[str]) -> Path:

@@ -1,5 +1,6 @@
 """What the command line prints: any encoding, closed and full streams, names with control characters."""
 
+import contextlib
 import importlib
 import io
 import subprocess
@@ -194,3 +195,19 @@ def test_a_run_into_a_folder_with_umlaut_and_blank(tmp_path, capsys):
     case = Path(__file__).parents[1] / "cases" / "four_stage_reducer.toml"
     assert cli.main(["run", str(case), "-o", str(out), "--only", "modes", "--no-pictures"]) == 0
     assert f"results: {out}\n" in capsys.readouterr().out and open_results(out).stages == ("modes",)
+
+
+def test_an_interrupt_while_a_script_loads_its_libraries_is_told_as_such(monkeypatch, capsys):
+    """The limit of BLAS threads is what a script loads first."""
+
+    @contextlib.contextmanager
+    def interrupted():
+        raise KeyboardInterrupt
+        yield
+
+    def script(*, wide: bool = False) -> None:
+        """Compute nothing."""
+
+    monkeypatch.setattr("femgear.trains.protocol.one_blas_thread", interrupted)
+    assert script_tools.run_script(script, arguments=["--wide"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
