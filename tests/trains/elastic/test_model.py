@@ -576,7 +576,11 @@ def test_turning_set_with_a_rigid_ring_is_the_planar_set():
         carrier_speed=speed,
     )
     reference = complex_modes(planar, SPRING, speed=speed)
-    assert ours.eigenvalue[:-1] == pytest.approx(reference.eigenvalue, rel=1e-9, abs=1e-5)
+    # a motion that grows and one that fades as fast have no order
+    ours, expected = (
+        found[np.lexsort((found.real, found.imag))] for found in (ours.eigenvalue[:-1], reference.eigenvalue)
+    )
+    assert ours == pytest.approx(expected, rel=1e-9, abs=1e-5)
     still = complex_modes(replace(planar, gyroscopic=None), SPRING)
     assert not np.allclose(still.frequency[-10:], reference.frequency[-10:], rtol=1e-3)
 

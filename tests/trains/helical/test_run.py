@@ -280,12 +280,16 @@ def test_meshes_that_pull_are_warned_of(coarse, static):
     solved = solve_helical_dynamics(case, solve_helical_modes(case, static, cache=grid_cache()))
     data = solved.dataset()
     least = over_a_period(lines(data, "mesh_force"), 256).min(axis=-1)
-    speed, mesh = np.unravel_index(least.argmin(), least.shape)
+    speed = least.min(axis=1).argmin()
+    # planets opposite one another pull alike
+    worst = data["mesh"].values[least[speed] < (1.0 - 1e-9) * least.min()]
     count = int((least.min(axis=1) < 0).sum())
     assert 0 < count < 41
     (said,) = next(stage for stage in HELICAL.stages if stage.name == "dynamics").warnings(data)
-    where = f"at {data['speed'].values[speed]:.6g} rpm: {data['mesh'].values[mesh]} pulls for "
-    assert said.code == "W-PULL" and said.text.startswith(where)
+    where = f"at {data['speed'].values[speed]:.6g} rpm: "
+    assert said.code == "W-PULL" and said.text.startswith(
+        tuple(f"{where}{mesh} pulls for " for mesh in worst)
+    )
     assert f"meshes pull at {count} of the 41 speeds" in said.text
 
 
