@@ -387,12 +387,15 @@ def left_over(place: Path) -> list[str]:
 
 
 def commit() -> str:
-    """Name the commit, with a plus where the package has changes that it lacks; "unknown" outside of git."""
+    """Name the last commit that changed what is tested, with a plus where there are changes that it lacks.
+
+    "unknown" outside of git.
+    """
 
     def git(*words: str) -> str:
         done = subprocess.run(("git", *words), cwd=ROOT, capture_output=True, text=True, check=False)
         return done.stdout.strip()
 
-    return (git("rev-parse", "--short", "HEAD") or "unknown") + "+" * bool(
-        git("status", "--short", "femgear")
-    )
+    tested = ("--", "femgear", "scripts")
+    last = git("log", "-1", "--format=%h", *tested) or "unknown"
+    return last + "+" * bool(git("status", "--short", *tested))
