@@ -115,8 +115,8 @@ def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]
     day = time.strftime("%Y-%m-%d", time.gmtime(max(record["ended"] for record in records)))
     before = [record for record in state.records if record["commit"] != last]
     lines = [
-        f"Commit {last}, the last one that changed femgear/ or scripts/, until {day}: {60 * hours:.0f} minutes of "
-        f"processes on {records[-1]['machine']}.",
+        f"Commit {last}, the last one that changed femgear/ or scripts/, until {day}:",
+        f"{60 * hours:.0f} minutes of processes on {records[-1]['machine']}.",
         "",
         "| | pieces | trials | failures | most CPU time [s] | most memory [MB] | minutes |",
         "|---|---:|---:|---:|---:|---:|---:|",
