@@ -174,3 +174,12 @@ def test_default_cutter_is_named_in_the_gear():
     ring = INTERNAL["ring"]
     assert replace(ring, cutter=None).form_radius == ring.form_radius
     assert cutter_of(replace(ring, teeth=40, rim_radius=0.06, cutter=None)).teeth == 28
+
+
+def test_fillets_begin_where_their_flanks_end():
+    """Thinned teeth too: the tool's tip ends on the same point of the involute, at the form radius."""
+    for gear in (*EXTERNAL.values(), *INTERNAL.values()):
+        radius, angle = gear.tool.fillet_point(gear.fillet_end)
+        x, y = flank_points(gear, np.array([gear.form_roll]))[0]
+        apart = complex(x, y) - float(radius) * np.exp(1j * float(angle))
+        assert abs(apart) < 1e-9 * gear.module
