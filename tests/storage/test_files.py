@@ -195,6 +195,15 @@ def _group_loop(file, folder):
     file.create_group("x")["again"] = file["/"]
 
 
+def test_a_file_that_ends_within_the_header_of_a_heap_is_damaged(tmp_path):
+    """At every byte of the header: nothing is read beyond the end."""
+    path = tmp_path / "cut.nc"
+    for size in range(5, 17):
+        path.write_bytes(b"\x89HDF" + (b"GCOL\x01" + bytes(11))[:size])
+        with pytest.raises(StorageError, match="damaged|HDF5|h5|file"):
+            read_dataset(path)
+
+
 def test_a_heap_that_hdf5_would_never_leave_is_refused(tmp_path):
     path = tmp_path / "static.nc"
     write_dataset(dataset(), path)
