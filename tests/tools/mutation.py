@@ -274,16 +274,13 @@ class LineMap:
             }
 
     def covering(self, module: str, lines: tuple[int, int]) -> list[str]:
-        """Tests that run a line of a module: in their own call, or in a fixture that their file may share."""
+        """Tests that run a line of a module: in their own call, or in their file, by a fixture or its import."""
         if module not in self._lines:
             self._lines[module] = self._read(ROOT / "femgear" / module)
         table = self._lines[module]
         names = {name for line in range(lines[0], lines[1] + 1) for name in table.get(line, ())}
-        if names <= {""}:
-            # run by the import, or by nothing
-            names = {name for found in table.values() for name in found} if names else set()
         tests = {name.removesuffix("|call") for name in names if name.endswith("|call")}
-        shared = {name.split("::")[0] for name in names if name.endswith("|setup")}
+        shared = {name.split("::")[0] for name in names if not name.endswith("|call")}
         tests |= {name for name in self.seconds if name.split("::")[0] in shared}
         return sorted(tests & self.seconds.keys())
 
@@ -295,7 +292,7 @@ class LineMap:
             data = coverage.CoverageData(str(self.path(name)))
             data.read()
             for line, contexts in data.contexts_by_lineno(str(path)).items():
-                table[line] += contexts
+                table[line] += [context or f"{name}::" for context in contexts]
         return table
 
     def planned(
