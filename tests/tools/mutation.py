@@ -274,7 +274,7 @@ class LineMap:
             }
 
     def covering(self, module: str, lines: tuple[int, int]) -> list[str]:
-        """Tests that run a line of a module: in their own call, or in their file, by a fixture or its import."""
+        """Tests that run a line of a module: in their call, in a fixture of their file or in its import."""
         if module not in self._lines:
             self._lines[module] = self._read(ROOT / "femgear" / module)
         table = self._lines[module]
