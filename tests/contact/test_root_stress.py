@@ -357,6 +357,16 @@ def test_ranges_are_those_of_the_point_with_the_widest_one(loaded):
             assert found.maximum - found.minimum == pytest.approx(np.ptp(both, axis=0).max(), rel=1e-9)
 
 
+def test_ranges_of_a_part_of_a_turn_are_those_of_the_tooth_with_the_widest_one(loaded):
+    """A period of which every tooth of the sun sees another part: some are pulled all the time."""
+    gears, _, _, cycle, roots, stresses = loaded
+    ranges = root_ranges(gears, roots, loaded_teeth(cycle, reverse=False), closes=False)
+    of_teeth = [np.ptp(stresses[2 * mesh].stress[:, :, LOADED], axis=1).max(axis=-1) for mesh in range(3)]
+    for mesh in range(3):
+        found = ranges[2 * mesh]
+        assert found.maximum - found.minimum == pytest.approx(np.max(of_teeth), rel=1e-9)
+
+
 def test_fields_without_a_position_are_those_of_the_first(loaded):
     gears, sectors, _, cycle, _, _ = loaded
     default, first = (deformed_set(gears, sectors, cycle, **given) for given in ({}, {"position": 0}))
