@@ -17,6 +17,7 @@ with ``S`` the Schur complements of the half sector on its cut and ``P`` what lo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
@@ -167,27 +168,6 @@ def directional(weights, directions: np.ndarray) -> np.ndarray:
     return columns
 
 
-def split_sector(grid: Grid, held: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free interior, right-cut and left-cut degrees of freedom of a sector, cuts ordered by radius.
-
-    ``held`` is the boundary that cannot move, if any.
-    """
-    fixed = boundary_nodes(grid, held) if held else np.zeros(0, int)
-    cuts = []
-    for name in ("cut_right", "cut_left"):
-        nodes = np.setdiff1d(boundary_nodes(grid, name), fixed)
-        cuts.append(nodes[np.argsort(np.hypot(*grid.points[nodes].T))])
-    interior = np.setdiff1d(np.arange(len(grid.points)), np.concatenate([fixed, *cuts]))
-    return dof_pairs(interior), dof_pairs(cuts[0]), dof_pairs(cuts[1])
-
-
-def cut_rotation(count: int, size: int) -> np.ndarray:
-    """Block rotation (size, size) by the sector angle 2 pi / count."""
-    angle = 2 * np.pi / count
-    c, s = np.cos(angle), np.sin(angle)
-    return np.kron(np.eye(size // 2), np.array([[c, -s], [s, c]]))
-
-
 def condense_sector(
     grid: Grid, stiffness, *, count: int, held: str | None, loads: np.ndarray, observations: np.ndarray
 ) -> SectorSchur:
@@ -218,7 +198,7 @@ def condense_sector(
         A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
     cut = np.concatenate([boundary_nodes(grid, name) for name in ("cut_right", "cut_left")])
-    _check_loads(loads, dof_pairs(cut))
+    check_loads(loads, dof_pairs(cut))
     columns = csc_array(np.hstack([loads, observations]))
     f, d = np.split(np.arange(loads.shape[1] + observations.shape[1]), [loads.shape[1]])
     parts = []
@@ -230,7 +210,7 @@ def condense_sector(
     return SectorSchur(count, *(np.stack(part) for part in zip(*parts, strict=True)))
 
 
-def _check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
+def check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
     if np.any(loads[cut]):
         raise GridError(
             "a load acts on a cut of the sector", code="E-GRID", remedy="load nodes of the flanks alone"
@@ -314,55 +294,68 @@ def _schur_complement(matrix, columns, inner: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class _InteriorSolution:
-    """Interior of a sector with its cuts held: ``K_ii^-1`` applied to unit cut displacements and loads."""
-
-    factor: SuperLU  # of K_ii
-    coupling: csc_array  # K_ib (ni, 2 nb), right cut first [N/m]
-    cut: np.ndarray  # (ni, 2 nb)
-    loads: np.ndarray  # (ni, m)
-    schur: np.ndarray  # K_bb - K_ib^T K_ii^-1 K_ib (2 nb, 2 nb) [N/m]
-
-
-def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> _InteriorSolution:
-    """Factor the interior of a mirror-symmetric sector; the right cut is the mirror image of the left.
+class HalfSector:
+    """Symmetric or antisymmetric fields ``fields @ (interior, cut)`` of a sector, factored with the cut held.
 
     Parameters
     ----------
-    grid : Grid
-    stiffness : (2n, 2n) sparse matrix
+    fields : (2n, m) sparse matrix
+        Displacement of the sector per unknown of its left half; those of the cut come last, radial and
+        tangential node by node.
+    stiffness : (m, m) sparse matrix
         [N/m].
-    parts : tuple of three arrays
-        Interior, right and left degrees of freedom, see `split_sector`.
-    loads : (2n, m) array
-        Nodal forces [N], none on the cuts.
-
-    Raises
-    ------
-    GridError
-        A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
+    inner : int
+        Number of unknowns before those of the cut.
     """
-    interior, right, left = parts
-    cut = np.concatenate([right, left])
-    _check_loads(loads, cut)
-    stiffness = stiffness.tocsc()
-    rows = stiffness[interior]
-    K_ii, K_ib = rows[:, interior], rows[:, cut]
-    nl = len(left)
-    rhs = np.hstack([K_ib[:, nl:].toarray(), loads[interior]])
-    factor = symmetric_factor(K_ii)
-    solution = factor.solve(rhs)
-    # column by column: stiffnesses are many powers of ten larger than unit loads
-    largest = np.abs(rhs).max(axis=0)
-    residual = np.abs(K_ii @ solution - rhs).max(axis=0) / np.where(largest == 0.0, 1.0, largest)
-    _check_residual(residual.max())
-    full = np.zeros((stiffness.shape[0], nl))
-    full[interior] = solution[:, :nl]
-    # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
-    reflected = mirrored_columns(full, mirror_nodes(grid))[interior] * np.tile([1.0, -1.0], nl // 2)
-    X_b = np.hstack([reflected, solution[:, :nl]])
-    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
-    return _InteriorSolution(factor, K_ib, X_b, solution[:, nl:], 0.5 * (S + S.T))
+
+    fields: csc_array
+    stiffness: csc_array
+    inner: int
+
+    @cached_property
+    def factor(self) -> SuperLU:
+        """Factor of the interior."""
+        return symmetric_factor(self.stiffness[: self.inner, : self.inner], ordering="NATURAL")
+
+    def held(self, forces: np.ndarray) -> np.ndarray:
+        """Displacement (inner, k) [m] of the interior under forces (inner, k) [N] on it, the cut held.
+
+        Raises
+        ------
+        GridError
+            E-RESIDUAL: the solution is not finite or misses equilibrium.
+        """
+        solution = self.factor.solve(forces)
+        # column by column: stiffnesses are many powers of ten larger than unit loads
+        missed = self.stiffness[: self.inner, : self.inner] @ solution - forces
+        largest = np.abs(forces).max(axis=0)
+        _check_residual((np.abs(missed).max(axis=0) / np.where(largest == 0.0, 1.0, largest)).max())
+        return solution
+
+    def on_cut(self) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement (inner, nb) of the interior per unit one of the cut, and the Schur complement [N/m]."""
+        coupling = self.stiffness[: self.inner, self.inner :].toarray()
+        interior = -self.held(coupling)
+        schur = self.stiffness[self.inner :, self.inner :].toarray() + coupling.T @ interior
+        return interior, 0.5 * (schur + schur.T)
+
+
+def half_sectors(grid: Grid, stiffness, held: str | None) -> list[HalfSector]:
+    """Split a mirror-symmetric sector into its symmetric and its antisymmetric fields.
+
+    ``held`` is the boundary that cannot move, if any.
+    """
+    return [
+        HalfSector(fields, csc_array(fields.T @ stiffness @ fields), inner)
+        for fields, inner in _half_sector_fields(grid, held)
+    ]
+
+
+def cut_ties(nodal_diameter: float, count: int, size: int) -> np.ndarray:
+    """Displacements (2, size) of a cut per unit of ``w``: symmetric ones, then antisymmetric ones over ``i``."""
+    turn = np.pi * nodal_diameter / count
+    ties = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    return np.tile(ties, size // 2)
 
 
 def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
@@ -383,9 +376,7 @@ def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     # the image of an observation or a load takes antisymmetric fields the other way
     seen, acting = np.array([1.0, -1.0])[:, None, None, None], np.array([1.0, -1.0])[:, None]
     for row, n in enumerate(harmonics):  # one at a time: all the matrices of a deep body would take gigabytes
-        turn = np.pi * n / schur.count
-        ties = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-        ties = np.tile(ties, schur.stiffness.shape[1] // 2)[..., None]
+        ties = cut_ties(n, schur.count, schur.stiffness.shape[1])[..., None]
         A = (ties * schur.stiffness * ties.transpose(0, 2, 1)).sum(axis=0)
         if n % schur.count in (0, 1, schur.count - 1):  # rotation is the harmonic 0, translation the first
             values = np.linalg.eigvalsh(A)
@@ -432,21 +423,23 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
     (count, n, 2) array
         [m].
     """
-    count, size = loads.shape
-    inner, right, left = parts = split_sector(grid, held)
+    count = len(loads)
     forces = np.fft.rfft(loads, axis=0).T
-    n_h, nb = forces.shape[1], len(right)
-    solution = solve_interior(grid, stiffness, parts, np.hstack([forces.real, forces.imag]))
-    X_f = solution.loads[:, :n_h] + 1j * solution.loads[:, n_h:]
-    on_cut = -(solution.coupling.T @ X_f).T
-    tie = np.empty((n_h, 2 * nb, nb), complex)
-    tie[:, :nb] = np.eye(nb)
-    phase = np.exp(2j * np.pi * np.arange(n_h) / count)
-    tie[:, nb:] = phase[:, None, None] * cut_rotation(count, nb)
-    adjoint = tie.conj().transpose(0, 2, 1)
-    u_right = np.linalg.solve(adjoint @ solution.schur @ tie, adjoint @ on_cut[:, :, None])
-    u_cut = (tie @ u_right)[:, :, 0]
-    field = np.zeros((n_h, size), complex)
-    field[:, inner] = (X_f - solution.cut @ u_cut.T).T
-    field[:, np.concatenate([right, left])] = u_cut
-    return np.fft.irfft(field, n=count, axis=0).reshape(count, -1, 2)
+    sectors, n_h = half_sectors(grid, stiffness, held), forces.shape[1]
+    solved, pulls, schurs = [], [], []
+    for sector in sectors:
+        on_sector = sector.fields.T @ forces
+        parts = on_sector[: sector.inner]
+        found = sector.held(np.hstack([parts.real, parts.imag]))
+        interior, schur = sector.on_cut()
+        solved.append((interior, found[:, :n_h] + 1j * found[:, n_h:]))
+        pulls.append(on_sector[sector.inner :] + interior.T @ parts)
+        schurs.append(schur)
+    field = np.zeros((loads.shape[1], n_h), complex)
+    for n in range(n_h):
+        ties = cut_ties(n, count, len(schurs[0]))
+        tied = sum(tie[:, None] * schur * tie for tie, schur in zip(ties, schurs, strict=True))
+        w = np.linalg.solve(tied, ties[0] * pulls[0][:, n] - 1j * ties[1] * pulls[1][:, n])
+        for sector, (interior, own), cut in zip(sectors, solved, (ties[0] * w, 1j * ties[1] * w), strict=True):
+            field[:, n] += sector.fields @ np.concatenate([own[:, n] + interior @ cut, cut])
+    return np.fft.irfft(field, n=count, axis=1).T.reshape(count, -1, 2)

@@ -1,8 +1,9 @@
 """Modes of a cyclic body from one sector: Craig-Bampton on the sector, one small problem a nodal diameter.
 
-The sector is condensed on its two cuts (Craig and Bampton, AIAA J. 6, 1968) with fixed-interface modes and
-the static shape of the loads; the cyclic tie ``u_L = e^{i n a} Q u_R`` then gives a Hermitian eigenproblem
-for each number ``n`` of nodal diameters (Thomas 1979), whose nodal diameter is known by construction.
+The symmetric and the antisymmetric fields of the sector are condensed on its cut (Craig and Bampton, AIAA J.
+6, 1968) with fixed-interface modes and the static shape of the loads. The cyclic tie of `n` nodal diameters
+(Thomas 1979) leaves one real vector for both, see `femgear.fe.compliance`, and so a real symmetric
+eigenproblem for each `n`, whose nodal diameter is known by construction.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import cho_factor, cho_solve, eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from femgear.fe.compliance import cut_rotation, solve_interior, split_sector
+from femgear.fe.compliance import HalfSector, boundary_nodes, check_loads, cut_ties, dof_pairs, half_sectors
 from femgear.fe.grid import Grid
 
 
@@ -67,57 +68,76 @@ class CyclicModes:
 
 @dataclass(frozen=True)
 class _SectorBasis:
-    """Craig-Bampton basis ``u = vectors @ (u_cut, eta)`` of one of ``count`` sectors, and its matrices."""
+    """Craig-Bampton basis of one of ``count`` sectors: unknowns of the cut, then symmetric fields, then others.
+
+    Each of the pairs is of symmetric and of antisymmetric fields, reduced to ``(u_cut, eta)``.
+    """
 
     count: int
-    stiffness_cut: np.ndarray  # (2 nb, 2 nb) [N/m], right cut first
-    stiffness_interior: np.ndarray  # (nv, nv)
-    mass: np.ndarray  # (2 nb + nv, 2 nb + nv)
-    vectors: np.ndarray  # (2n, 2 nb + nv)
+    cut: int  # unknowns of the cut, nb
+    stiffness: tuple[np.ndarray, np.ndarray]  # (nb + nv, nb + nv) [N/m]
+    mass: tuple[np.ndarray, np.ndarray]  # [kg]
+    vectors: tuple[np.ndarray, np.ndarray]  # (2n, nb + nv)
+
+    def tied(self, n: int) -> list[tuple[slice, np.ndarray]]:
+        """For both kinds: where ``eta`` stands behind ``w``, and the factors of ``(w, eta)`` in the basis."""
+        ties, places, first = cut_ties(n, self.count, self.cut), [], self.cut
+        for tie, own in zip(ties, self.stiffness, strict=True):
+            more = len(own) - self.cut
+            places.append((slice(first, first + more), np.append(tie, np.ones(more))))
+            first += more
+        return places
 
 
 def sector_basis(
     grid: Grid, stiffness, mass, *, count: int, loads: np.ndarray, interior_modes: int = 16
 ) -> _SectorBasis:
-    """Reduce one sector to its cuts, `interior_modes` fixed-interface modes and the static load shapes.
+    """Reduce one sector to its cut, `interior_modes` fixed-interface modes and the static load shapes.
 
     Parameters
     ----------
     grid : Grid
-        Sector with boundaries ``cut_left`` and ``cut_right``.
+        Mirror-symmetric sector with boundaries ``cut_left`` and ``cut_right``.
     stiffness, mass : (2n, 2n) sparse matrices
         [N/m], [kg]; a foundation, if any, is part of `stiffness`.
     count : int
         Number of sectors.
     loads : (2n, m) array
         Load functionals; they must not act on the cuts.
+    interior_modes : int
+        Half of them symmetric.
     """
-    inner, right, left = parts = split_sector(grid, None)
-    cut = np.concatenate([right, left])
-    stiffness, mass = stiffness.tocsc(), mass.tocsc()
-    K_ii, M_ii = stiffness[inner][:, inner], mass[inner][:, inner]
-    solution = solve_interior(grid, stiffness, parts, loads)
-    constraint, static = -solution.cut, solution.loads
+    check_loads(loads, np.concatenate([boundary_nodes(grid, f"cut_{side}") for side in ("right", "left")]))
+    parts = [
+        _reduced(sector, mass, sector.fields.T @ loads, interior_modes // 2)
+        for sector in half_sectors(grid, stiffness, None)
+    ]
+    K, M, vectors, cut = zip(*parts, strict=True)
+    return _SectorBasis(count=count, cut=cut[0], stiffness=K, mass=M, vectors=vectors)
+
+
+def _reduced(sector: HalfSector, mass, loads: np.ndarray, count: int):
+    """Reduced stiffness and mass of the fields of one kind, their basis, and the unknowns of the cut."""
+    inner, size = sector.inner, sector.stiffness.shape[0]
+    M = (sector.fields.T @ mass @ sector.fields).tocsc()
+    K_ii, M_ii = sector.stiffness[:inner, :inner], M[:inner, :inner]
+    constraint, schur = sector.on_cut()
+    static = sector.held(loads[:inner])
     # the types that scipy's constructor shows are those of a subclass
-    inverse = LinearOperator(K_ii.shape, matvec=solution.factor.solve, dtype=float)  # type: ignore[call-arg]
-    start = np.cos(np.arange(len(inner)) + 1.0)
-    _, modes = eigsh(K_ii, k=interior_modes, M=M_ii, sigma=0.0, OPinv=inverse, v0=start)
+    inverse = LinearOperator(K_ii.shape, matvec=sector.factor.solve, dtype=float)  # type: ignore[call-arg]
+    start = np.cos(np.arange(inner) + 1.0)
+    _, modes = eigsh(K_ii, k=count, M=M_ii, sigma=0.0, OPinv=inverse, v0=start)
     static = static - modes @ (modes.T @ (M_ii @ static))
     static /= np.sqrt(np.einsum("ij,ij->j", static, M_ii @ static))
     interior = np.hstack([modes, static])
-    full_c = np.zeros((stiffness.shape[0], len(cut)))
-    full_c[inner], full_c[cut] = constraint, np.eye(len(cut))
-    full_i = np.zeros((stiffness.shape[0], interior.shape[1]))
-    full_i[inner] = interior
-    vectors = np.hstack([full_c, full_i])
-    reduced_mass = vectors.T @ (mass @ vectors)
-    return _SectorBasis(
-        count=count,
-        stiffness_cut=solution.schur,
-        stiffness_interior=interior.T @ (K_ii @ interior),
-        mass=0.5 * (reduced_mass + reduced_mass.T),
-        vectors=vectors,
-    )
+    nb, nv = size - inner, interior.shape[1]
+    basis = np.zeros((size, nb + nv))
+    basis[:inner] = np.hstack([constraint, interior])
+    basis[inner:, :nb] = np.eye(nb)
+    K = np.zeros((nb + nv, nb + nv))
+    K[:nb, :nb], K[nb:, nb:] = schur, interior.T @ (K_ii @ interior)
+    reduced = basis.T @ (M @ basis)
+    return K, 0.5 * (reduced + reduced.T), sector.fields @ basis, nb
 
 
 def cyclic_modes(
@@ -136,46 +156,53 @@ def cyclic_modes(
     static_correction : bool
         Append the part of the static response to the loads that the kept modes miss.
     """
-    on_basis = basis.vectors.T @ loads
+    on_basis = [vectors.T @ loads for vectors in basis.vectors]
     found = [
         _one_diameter(basis, int(n), on_basis, max_frequency, static_correction) for n in nodal_diameters
     ]
-    reduced = np.hstack([vectors for _, vectors in found])
+    reduced, recovery = np.hstack([vectors for _, vectors in found]), np.hstack(basis.vectors)
     return CyclicModes(
         count=basis.count,
         nodal_diameter=np.concatenate([np.full(len(f), n) for (f, _), n in zip(found, nodal_diameters)]),
         frequency=np.concatenate([f for f, _ in found]),
-        load=reduced.T @ on_basis,
-        output=reduced.T @ (basis.vectors.T @ outputs),
+        load=reduced.T @ np.concatenate(on_basis),
+        output=reduced.T @ (recovery.T @ outputs),
         reduced=reduced,
-        recovery=basis.vectors,
+        recovery=recovery,
     )
 
 
 def _one_diameter(basis: _SectorBasis, n, loads, max_frequency, static_correction):
     """Frequencies (m,) [Hz] and shapes (k, m) in the basis of all modes with n nodal diameters."""
-    count, nb, nv = basis.count, len(basis.stiffness_cut) // 2, len(basis.stiffness_interior)
-    phase = np.exp(2j * np.pi * n / count)
-    tie = np.vstack([np.eye(nb), phase * cut_rotation(count, nb)])
-    K = np.zeros((nb + nv, nb + nv), complex)
-    K[:nb, :nb] = tie.conj().T @ basis.stiffness_cut @ tie
-    K[nb:, nb:] = basis.stiffness_interior
-    T = np.zeros((2 * nb + nv, nb + nv), complex)
-    T[: 2 * nb, :nb], T[2 * nb :, nb:] = tie, np.eye(nv)
-    M = T.conj().T @ basis.mass @ T
-    if n == 0 or 2 * n == count:
-        K, M, T = np.real(K), np.real(M), np.real(T)
-    values, vectors = eigh(K, M)
-    kept = max(int(np.searchsorted(values, (2 * np.pi * max_frequency) ** 2)), 1)
-    chosen = vectors[:, :kept]
-    omega2 = np.maximum(values[:kept], 0.0)
-    if static_correction and kept < len(values):
+    nb, places = basis.cut, basis.tied(n)
+    size = places[-1][0].stop
+    K, M = np.zeros((2, size, size))
+    # antisymmetric fields lag by a quarter of a turn; where no turn is seen both are real
+    lags = (1.0, 1.0 if n == 0 or 2 * n == basis.count else 1j)
+    force = np.zeros((size, loads[0].shape[1]), complex)
+    for (own, tie), stiffness, mass, load, lag in zip(
+        places, basis.stiffness, basis.mass, loads, lags, strict=True
+    ):
+        at = np.r_[:nb, own]
+        K[np.ix_(at, at)] += tie[:, None] * stiffness * tie
+        M[np.ix_(at, at)] += tie[:, None] * mass * tie
+        force[at] += np.conj(lag) * tie[:, None] * load
+    # the largest 1 / (omega^2 + shift): the lowest omega^2 keep their digits, and a free body is no exception
+    top, shift = (2 * np.pi * max_frequency) ** 2, basis.stiffness[0][nb, nb]
+    values, chosen = eigh(M, K + shift * M, subset_by_value=(1.0 / (top + shift), np.inf))
+    if not len(values):
+        values, chosen = eigh(M, K + shift * M, subset_by_index=(size - 1, size - 1))
+    chosen = (chosen / np.sqrt(values))[:, ::-1]
+    omega2 = np.maximum(1.0 / values[::-1] - shift, 0.0)
+    if static_correction and len(values) < size:
         # static response of the modes left out, made orthogonal and of unit mass like a mode
-        force = T.conj().T @ loads
-        rest = vectors[:, kept:] @ ((vectors[:, kept:].conj().T @ force) / values[kept:, None])
-        small_M = rest.conj().T @ M @ rest
-        small_K = rest.conj().T @ K @ rest
-        extra_values, extra = eigh(small_K, small_M)
+        kept = M @ chosen
+        rest = cho_solve(cho_factor(K + shift * kept @ kept.T), force)
+        rest = rest - chosen @ (kept.T @ rest)
+        extra_values, extra = eigh(rest.conj().T @ force, rest.conj().T @ M @ rest)
         chosen = np.hstack([chosen, rest @ extra])
         omega2 = np.concatenate([omega2, extra_values])
-    return np.sqrt(omega2) / (2 * np.pi), T @ chosen
+    shapes = np.concatenate(
+        [lag * tie[:, None] * chosen[np.r_[:nb, own]] for (own, tie), lag in zip(places, lags, strict=True)]
+    )
+    return np.sqrt(omega2) / (2 * np.pi), shapes
