@@ -361,7 +361,11 @@ class _Walk:
         s, width = self.planetary_set, self.bodies.face_width
         # without torque what one micrometre of wedging may carry
         share = self.sun_torque / (s.sun.base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
-        return share, 3.0 * share / (ROUGH_STIFFNESS * width)
+        rough = share / (ROUGH_STIFFNESS * width)
+        # a ring on a soft foundation lets flanks come nearer than teeth alone do
+        bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
+        yields = max(body.regular[0].diagonal().max() for body in bodies)
+        return share, max(3.0 * rough, rough + share * yields)
 
     def attempt(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
         """Solve all positions in windows of one size, or up to one that needs more, see `in_windows`."""

@@ -440,6 +440,8 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
         ties = cut_ties(n, count, len(schurs[0]))
         tied = sum(tie[:, None] * schur * tie for tie, schur in zip(ties, schurs, strict=True))
         w = np.linalg.solve(tied, ties[0] * pulls[0][:, n] - 1j * ties[1] * pulls[1][:, n])
-        for sector, (interior, own), cut in zip(sectors, solved, (ties[0] * w, 1j * ties[1] * w), strict=True):
+        for sector, (interior, own), cut in zip(
+            sectors, solved, (ties[0] * w, 1j * ties[1] * w), strict=True
+        ):
             field[:, n] += sector.fields @ np.concatenate([own[:, n] + interior @ cut, cut])
     return np.fft.irfft(field, n=count, axis=1).T.reshape(count, -1, 2)
