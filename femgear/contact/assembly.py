@@ -45,6 +45,9 @@ HELD = 2.56
 ROUGH_STIFFNESS = 10e9
 """Stiffness of a mesh per face width, to size windows [N/m^2]."""
 
+_ALIKE = 1e-11
+"""Share of the largest value by which planets in the same state may differ."""
+
 Found = TypeVar("Found")
 
 
@@ -260,6 +263,45 @@ class Candidates:
         last = self.candidate.shape[-1] - 1 - self.candidate[..., ::-1].argmax(axis=-1)
         at_last = np.take_along_axis(active, last[..., None], axis=-1)[..., 0]
         return (active[..., 0] & self.at_edge[0]) | (at_last & self.at_edge[1])
+
+    def of_one_planet(self) -> Candidates | None:
+        """Candidates of planet 1 under equal loads on all planets; None where the planets are not alike.
+
+        Alike are planets with the same separations, whose windows feel the same of equal loads on all
+        planets. The motions left are those of planet 1 and of the sun; free members stay where they are.
+        """
+        N, meshes, (P, W, C) = self.setup.n_planets, len(self.approach), self.gap.shape
+        if N == 1 or meshes > 2 * N:
+            return None
+        every = (P, 2, N, W // meshes)
+        smooth = self.smooth.reshape(*every, 3, *every[1:], 3).sum(axis=6)
+        supports = self.supports.reshape(2, N, 2, N).sum(axis=3)
+        cells = self.candidate.reshape(*every, C)
+        # but for what planets owe to rounding
+        for values, planets in ((self.gap.reshape(*every, C), 2), (smooth, 2), (supports, 1)):
+            apart = np.abs(values - values.take([0], axis=planets)).max()
+            if apart > _ALIKE * np.abs(values).max():
+                return None
+        pushed = np.abs(self.approach[:, N + 1 :].reshape(2, N, -1).sum(axis=1)).max(initial=0.0)
+        if pushed > _ALIKE or (cells != cells[:, :, :1]).any():
+            return None
+        own = np.arange(W).reshape(every[1:])[:, 0].ravel()
+        setup = replace(self.setup, n_planets=1, **{
+            name: getattr(self.setup, name)[::N] for name in ("near", "gap", "layout", "cell", "cell_area")
+        })  # fmt: skip
+        return replace(
+            self,
+            setup=setup,
+            mesh=self.mesh[own] // N,
+            pair=self.pair[:, own],
+            gap=self.gap[:, own],
+            candidate=self.candidate[:, own],
+            polynomials=self.polynomials[:, own],
+            local=self.local[:, own],
+            smooth=smooth[:, :, 0].reshape(P, len(own), 3, len(own), 3),
+            approach=self.approach[::N, [0, N]],
+            supports=supports[:, 0],
+        )
 
     def problem(self, at: int) -> ContactProblem:
         """The contact problem at one of the positions."""

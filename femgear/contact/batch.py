@@ -14,7 +14,7 @@ there are none. Positions where that does not end, and loads that may be roundin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,7 +69,24 @@ def solve_batch(found: Candidates, load, springs: BearingSprings | None = None) 
     ContactError
         As `femgear.contact.solve.solve_contact`.
     """
-    batch = _ActiveSets(found, np.asarray(load, float), springs)
+    load, N = np.asarray(load, float), found.setup.n_planets
+    one = (
+        found.of_one_planet() if springs is None and np.all(load[np.arange(len(load)) != N] == 0.0) else None
+    )
+    if one is None:
+        return _solved(found, load, springs)
+    state = _solved(one, np.array([0.0, load[N] / N]), None)
+    kinds, cells = len(one.approach), {}
+    for name in ("loads", "gaps", "active"):
+        of_one = getattr(state, name).reshape(len(one.gap), kinds, 1, -1, one.gap.shape[-1])
+        cells[name] = np.repeat(of_one, N, axis=2).reshape(found.gap.shape)
+    motions = np.zeros((len(state.motions), len(load)))
+    motions[:, :N], motions[:, N] = state.motions[:, :1], state.motions[:, 1]
+    return replace(state, **cells, motions=motions)
+
+
+def _solved(found: Candidates, load: np.ndarray, springs: BearingSprings | None) -> BatchState:
+    batch = _ActiveSets(found, load, springs)
     batch.solve()
     state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
     return BatchState(*state)

@@ -333,7 +333,7 @@ class HalfSector:
         return solution
 
     def on_cut(self) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement (inner, nb) of the interior per unit one of the cut, and the Schur complement [N/m]."""
+        """Displacement (inner, nb) of the interior per unit one of the cut; Schur complement [N/m]."""
         coupling = self.stiffness[: self.inner, self.inner :].toarray()
         interior = -self.held(coupling)
         schur = self.stiffness[self.inner :, self.inner :].toarray() + coupling.T @ interior
@@ -352,7 +352,7 @@ def half_sectors(grid: Grid, stiffness, held: str | None) -> list[HalfSector]:
 
 
 def cut_ties(nodal_diameter: float, count: int, size: int) -> np.ndarray:
-    """Displacements (2, size) of a cut per unit of ``w``: symmetric ones, then antisymmetric ones over ``i``."""
+    """Displacements (2, size) of a cut per unit of ``w``: symmetric ones, antisymmetric ones over ``i``."""
     turn = np.pi * nodal_diameter / count
     ties = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     return np.tile(ties, size // 2)

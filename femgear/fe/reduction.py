@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from femgear.fe.compliance import HalfSector, boundary_nodes, check_loads, cut_ties, dof_pairs, half_sectors
+from femgear.fe.compliance import HalfSector, boundary_nodes, check_loads, cut_ties, half_sectors
 from femgear.fe.grid import Grid
 
 
@@ -68,7 +68,7 @@ class CyclicModes:
 
 @dataclass(frozen=True)
 class _SectorBasis:
-    """Craig-Bampton basis of one of ``count`` sectors: unknowns of the cut, then symmetric fields, then others.
+    """Craig-Bampton basis of one of ``count`` sectors.
 
     Each of the pairs is of symmetric and of antisymmetric fields, reduced to ``(u_cut, eta)``.
     """

@@ -151,7 +151,7 @@ def test_teeth_wedged_between_both_flanks():
 
 
 def test_a_position_solved_alone_begins_with_what_touches_at_the_one_before(monkeypatch):
-    gears, bodies, torque = random_bodies(SEEDS[0])
+    gears, bodies, torque = random_bodies(SEEDS[1])
     together, alone, starts, solved = batch.solve_batch, batch.solve_contact, [], []
 
     def noting(*arrays, start, **options):
@@ -193,6 +193,33 @@ def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
     # the others: two steps and one that takes out the rounding
     rest = [3] * (len(steps) - len(counted))
     assert len(counted) > 0 and sorted(steps.tolist()) == sorted([2 + count for count in counted] + rest)
+
+
+def test_planets_in_the_same_state_are_solved_as_one(monkeypatch):
+    """Three, four and five planets in phase, on springs or free: as all of them, to rounding."""
+    solutions, whole = [], batch.Candidates.of_one_planet
+
+    def noting(found):
+        solutions.append(whole(found))
+        return solutions[-1]
+
+    for seed, supports in ((3, SPRUNG), (6, Supports(sun=0.0)), (9, Supports())):
+        gears, bodies, torque = random_bodies(seed)
+        monkeypatch.setattr(batch.Candidates, "of_one_planet", noting)
+        one = list(both_ways(gears, bodies, torque, supports=supports))
+        assert solutions[-1] is not None and len(solutions[-1].approach) == 2
+        monkeypatch.setattr(batch.Candidates, "of_one_planet", lambda _: None)
+        every = list(both_ways(gears, bodies, torque, supports=supports))
+        # cells at a corner are a thousandth of a window wide: their loads show the rounding of separations
+        for tolerance, (found, _), (expected, _) in zip((1e-9, 1e-12, 1e-12, 1e-12), one, every, strict=True):
+            for a, b in zip(found, expected, strict=True):
+                assert np.abs(a - b).max() <= tolerance * np.abs(b).max()
+    # unequal places, an error of one pin: all are solved
+    for seed, pins in ((5, 0.0), (3, 0.3)):
+        monkeypatch.setattr(batch.Candidates, "of_one_planet", noting)
+        gears, bodies, torque = random_bodies(seed)
+        list(both_ways(gears, bodies, torque, supports=Supports(), pins=pins))
+        assert solutions[-1] is None
 
 
 def test_first_cells_and_springs_are_those_that_equal_forces_would_press():
