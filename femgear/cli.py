@@ -223,8 +223,8 @@ def run(
     place = run_folder(output, case=data.source, force=force)
     with resumable(output, completed_since_now(output)):
         with place as folder, Progress() as progress:
-            run_case(data, folder, only=only, pictures=pictures, progress=progress)
-        results = open_results(output)
+            written = run_case(data, folder, only=only, pictures=pictures, progress=progress)
+        results = open_results(output, known=written)
         _print(train.describe_results(results))
         _warn(train.result_warnings(results))
         _say(f"results: {output}")

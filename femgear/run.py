@@ -45,6 +45,8 @@ from femgear.trains.reading import open_results, read_case
 from femgear.trains.registry import check_case, stages_of, train_of
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from femgear.case.sections import Case
 
 
@@ -122,6 +124,7 @@ class _Run:
     files: dict[str, str] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
     convergence: dict[str, Any] = field(default_factory=dict)
+    data: dict[str, xr.Dataset] = field(default_factory=dict)
 
     def record(self, *names: str, complete: bool = False) -> Manifest:
         """Write the manifest with some more files."""
@@ -141,7 +144,7 @@ def run_case(
     only: str | None = None,
     pictures: bool = True,
     progress: Progress = silent,
-) -> None:
+) -> Mapping[str, xr.Dataset]:
     """Compute a case and write its results; goes on from the stages of an interrupted run of the same case.
 
     Parameters
@@ -154,6 +157,11 @@ def run_case(
         Draw figures, fields and report.
     progress : callable, optional
         Called with (stage, done, total).
+
+    Returns
+    -------
+    mapping of str to Dataset
+        Contents of those files that were written at once, by stage.
     """
     asked, stages = _asked(case, only)
     run, results = _resumed(folder, asked, stages)
@@ -168,18 +176,22 @@ def run_case(
                 _compute(run, asked, stage, stages, results, progress)
     if pictures:
         start = time.perf_counter()
-        data = {stage.name: read_dataset(folder / f"{stage.name}.nc") for stage in stages}
+        files = (stage.name for stage in stages if stage.name not in run.data)
+        run.data |= {name: read_dataset(folder / f"{name}.nc") for name in files}
         drawn = Drawn(
-            case, data, {name: one for name, one in results.items() if one is not None}, grid_cache()
+            case, run.data, {name: one for name, one in results.items() if one is not None}, grid_cache()
         )
         names = write_pictures(folder, train_of(case), drawn, progress=progress)
         run.timings["pictures"] = time.perf_counter() - start
         manifest = run.record(*names)
         shown = replace(manifest, complete=True, files=_without_kept(manifest.files))
-        write_text(page(train_of(case), Results(folder, shown, read_case)), folder / "report.html")
+        written = Results(folder, shown, read_case)
+        vars(written).update(run.data)
+        write_text(page(train_of(case), written), folder / "report.html")
         run.record("report.html")
     run.files = _without_kept(run.files)
     run.record(complete=True)
+    return run.data
 
 
 def _without_kept(files: Mapping[str, str]) -> dict[str, str]:
@@ -207,6 +219,7 @@ def _compute(
                 path, data = run.folder / f"{one.name}.nc", found.dataset()
                 if part is case:
                     write_dataset(data, path)
+                    run.data[one.name] = data
                 else:
                     if one.name not in files:
                         share = len(part.operation.speeds) / len(case.operation.speeds)

@@ -118,7 +118,7 @@ def sector_basis(
 
 def _reduced(sector: HalfSector, mass, loads: np.ndarray, count: int):
     """Reduced stiffness and mass of the fields of one kind, their basis, and the unknowns of the cut."""
-    inner, size = sector.inner, sector.stiffness.shape[0]
+    inner = sector.inner
     M = (sector.fields.T @ mass @ sector.fields).tocsc()
     K_ii, M_ii = sector.stiffness[:inner, :inner], M[:inner, :inner]
     constraint, schur = sector.on_cut()
@@ -130,8 +130,8 @@ def _reduced(sector: HalfSector, mass, loads: np.ndarray, count: int):
     static = static - modes @ (modes.T @ (M_ii @ static))
     static /= np.sqrt(np.einsum("ij,ij->j", static, M_ii @ static))
     interior = np.hstack([modes, static])
-    nb, nv = size - inner, interior.shape[1]
-    basis = np.zeros((size, nb + nv))
+    nb, nv = len(schur), interior.shape[1]
+    basis = np.zeros((inner + nb, nb + nv))
     basis[:inner] = np.hstack([constraint, interior])
     basis[inner:, :nb] = np.eye(nb)
     K = np.zeros((nb + nv, nb + nv))

@@ -12,7 +12,7 @@ import os
 import re
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError, create_model
 
@@ -27,6 +27,9 @@ from femgear.errors import CaseError, Finding
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
 from femgear.trains.protocol import OwnFile, Train
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _SET_FILE = OwnFile(embed=embed_profiles, points="measured profiles", remedy="measure at fewer points")
 """Case file of a planetary set, whatever its train."""
@@ -110,13 +113,17 @@ def _embedded_files(own_file: OwnFile, data: dict, name: str) -> tuple[dict[str,
             unread[error.key] = error
 
 
-def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
+def open_results(
+    folder: str | os.PathLike, *, partial: bool = True, known: Mapping[str, xr.Dataset] | None = None
+) -> Results:
     """Open the results of a run; of an interrupted one those stages that are complete, with a warning.
 
     Parameters
     ----------
     partial : bool
         Accept the results of an interrupted run.
+    known : mapping of str to Dataset, optional
+        Contents of files that need not be read, by stage.
 
     Returns
     -------
@@ -129,7 +136,9 @@ def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
         No folder, no manifest, a broken one or one of a newer femgear. ``E-RESULTS-INCOMPLETE``: an
         interrupted run and not ``partial``.
     """
-    return results_of(folder, read_case, partial=partial)
+    found = results_of(folder, read_case, partial=partial)
+    vars(found).update(known or {})
+    return found
 
 
 def with_value(case: Case, key: str, value: object) -> Case:
