@@ -17,9 +17,16 @@ import numpy as np
 from validation.reference.plane_elasticity import edge_load
 
 from femgear.errors import GridError
-from femgear.fe.compliance import boundary_nodes, cut_rotation, symmetric_factor
+from femgear.fe.compliance import boundary_nodes, symmetric_factor
 
 RIMS = ("held", "sliding")
+
+
+def cut_rotation(count: int, size: int) -> np.ndarray:
+    """Block rotation (size, size) by the sector angle 2 pi / count."""
+    angle = 2 * np.pi / count
+    c, s = np.cos(angle), np.sin(angle)
+    return np.kron(np.eye(size // 2), np.array([[c, -s], [s, c]]))
 
 
 @dataclass(frozen=True)
