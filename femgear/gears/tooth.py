@@ -14,14 +14,14 @@ from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 # point spacing in modules, before `refine`: about 1200 triangles in the half sector of the reference sun
 FILLET_SIZE = 0.05
 FINEST_SIZE = 0.02
-INNER_SIZE = 0.2
+INNER_SIZE = 0.1
 LARGEST_SIZE = 0.5
 RIM_SHARE = 0.35  # of the width of the half sector
 NEAR = 12.0  # modules from the root circle; elements beyond grow with the distance
 FAR_SHARE = 1.0  # of the same width, far from the teeth
 MOST_CUT_NODES = 400  # the dense matrices of a sector have twice as many rows
 SHORTEST_ROOT = 0.025
-GROWTH = 0.3  # increase of the spacing per unit length along a curve
+GROWTH = 0.11  # increase of the spacing per unit length along a curve
 
 
 @dataclass(frozen=True)
