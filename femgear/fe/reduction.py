@@ -127,9 +127,11 @@ def _reduced(sector: HalfSector, mass, loads: np.ndarray, count: int):
     inverse = LinearOperator(K_ii.shape, matvec=sector.factor.solve, dtype=float)  # type: ignore[call-arg]
     start = np.cos(np.arange(inner) + 1.0)
     _, modes = eigsh(K_ii, k=count, M=M_ii, sigma=0.0, OPinv=inverse, v0=start)
-    static = static - modes @ (modes.T @ (M_ii @ static))
-    static /= np.sqrt(np.einsum("ij,ij->j", static, M_ii @ static))
-    interior = np.hstack([modes, static])
+    rest = static - modes @ (modes.T @ (M_ii @ static))
+    whole, left = (np.sqrt(np.einsum("ij,ij->j", field, M_ii @ field)) for field in (static, rest))
+    # a load may have no part of this kind
+    new = left > 1e-9 * whole
+    interior = np.hstack([modes, rest[:, new] / left[new]])
     nb, nv = len(schur), interior.shape[1]
     basis = np.zeros((inner + nb, nb + nv))
     basis[:inner] = np.hstack([constraint, interior])
