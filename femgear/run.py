@@ -137,6 +137,7 @@ class _Run:
         return manifest
 
 
+@one_blas_thread()
 def run_case(
     case: Case,
     folder: Path,
@@ -170,10 +171,9 @@ def run_case(
     write_text(case.source, folder / "case.toml")
     run.record("case.toml")
     own_files(folder / KEPT, ["*"])
-    with one_blas_thread():
-        for stage in stages:
-            if stage.name not in run.timings:
-                _compute(run, asked, stage, stages, results, progress)
+    for stage in stages:
+        if stage.name not in run.timings:
+            _compute(run, asked, stage, stages, results, progress)
     if pictures:
         start = time.perf_counter()
         files = (stage.name for stage in stages if stage.name not in run.data)
@@ -283,6 +283,7 @@ def _source_checksum() -> str:
     return found.hexdigest()
 
 
+@one_blas_thread()
 def report_again(folder: Path) -> None:
     """Write report.html of a complete run anew, with figures where it drew none; update the manifest."""
     with folder_lock(folder):

@@ -90,7 +90,7 @@ class _SectorBasis:
 
 
 def sector_basis(
-    grid: Grid, stiffness, mass, *, count: int, loads: np.ndarray, interior_modes: int = 16
+    grid: Grid, stiffness, mass, *, count: int, loads: np.ndarray, interior_modes: int = 24
 ) -> _SectorBasis:
     """Reduce one sector to its cut, `interior_modes` fixed-interface modes and the static load shapes.
 
