@@ -167,7 +167,7 @@ def run_case(
     asked, stages = _asked(case, only)
     run, results = _resumed(folder, asked, stages)
     if results:
-        warnings.warn(f"{', '.join(results)}: as the run that was interrupted left them", stacklevel=2)
+        warnings.warn(f"{', '.join(results)}: as the run that was interrupted left them", stacklevel=3)
     write_text(case.source, folder / "case.toml")
     run.record("case.toml")
     own_files(folder / KEPT, ["*"])
