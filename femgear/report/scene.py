@@ -1,8 +1,8 @@
 """Grids of whole bodies with their displacements, as VTU and as pictures drawn by PyVista without a screen.
 
 `assemble_set` and `ring_modes_grid` make grids with displacement fields, `write_vtu` writes them,
-`deformed_picture` draws one, `animate_operating_deflection` the ring while the carrier turns past a fixed
-sensor. PyVista is loaded late, by `load_pyvista`, and only where it can draw.
+`deformed_picture` draws one, `animate_operating_deflection` (by Matplotlib) the ring while the carrier turns
+past a fixed sensor. PyVista is loaded late, by `load_pyvista`, and only where it can draw.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ _LARGEST_ANIMATED = 0.09
 """Largest displacement of an animation as a share of the outer radius."""
 # elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
 _FLANK, _COARSE = 10, 0.4
+_TINTS = 21
 _SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
 
 
@@ -406,7 +407,11 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
         image = np.asarray(plotter.screenshot(filename=None, return_img=True))
     finally:
         plotter.close()
-    _write_image(path, image, extension=".png")
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(image).save(stream, "PNG")
+    write_bytes(stream.getvalue(), path)
 
 
 def animate_operating_deflection(
@@ -450,8 +455,6 @@ def animate_operating_deflection(
 
     Raises
     ------
-    FemgearError
-        Without the OpenGL library.
     StorageError
         When the file cannot be written.
     """
@@ -485,55 +488,92 @@ class _Field:
     turn: float
     teeth: int
 
-    def at(self, angle: np.ndarray, carrier_angle: float) -> tuple[np.ndarray, np.ndarray]:
-        """Compute radial and tangential displacement [m] at housing angles for an angle of the carrier."""
+    def at(self, angle: np.ndarray, carrier: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Compute radial and tangential displacement (c, a) [m] at housing angles (a,) and carrier angles."""
         h, n_max = np.arange(self.radial.shape[0]), self.radial.shape[1] // 2
+        n = np.arange(-n_max, n_max + 1)
         # the mesh frequency is the ring's number of teeth times the carrier's, whichever way it turns
-        time = np.exp(1j * h * self.teeth * carrier_angle * self.turn) * (h > 0)
-        wave = np.exp(1j * np.outer(angle - carrier_angle, np.arange(-n_max, n_max + 1)))
-        return (wave @ (time @ self.radial)).real, (wave @ (time @ self.tangential)).real
+        time = np.exp(1j * np.outer(carrier, h * self.teeth * self.turn)) * (h > 0)
+        back, wave = np.exp(-1j * np.outer(carrier, n)), np.exp(1j * np.outer(n, angle))
+        radial, tangential = (((time @ of) * back @ wave).real for of in (self.radial, self.tangential))
+        return radial, tangential
 
 
 def _draw(planetary_set, field, carrier, sensor_angle, title, size):
     """Draw the frames, arrays (size, size, 3), one for every angle of the carrier [rad]."""
-    pv, plotter = load_pyvista(), new_plotter(size, size)
-    outer, text = planetary_set.ring.rim_radius, "radial displacement [µm]"
-    corners = _ring_corners(planetary_set)
-    ring_angle = np.angle(corners)
-    around = np.linspace(0.0, 2 * np.pi, 181)
-    on_surface = [field.at(around, c) for c in carrier]
-    largest = max(np.hypot(*one).max() for one in on_surface)
-    colour = max(np.abs(one[0]).max() for one in on_surface) * 1e6 or 1.0
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    outer, corners = planetary_set.ring.rim_radius, _ring_corners(planetary_set)
+    angle = np.angle(corners[:, 0])
+    displacement = field.at(angle, carrier)
+    largest = float(np.hypot(*displacement).max())
+    colour = 1e6 * float(np.abs(displacement[0]).max()) or 1.0
     scale = _LARGEST_ANIMATED * outer / largest if largest > 0 else 1.0
-    ring = pv.PolyData.from_regular_faces(_plane(corners.ravel()), _strip_faces(*corners.shape))
-    ring.point_data[text] = np.zeros(corners.size)
-    circle = _closed_line(pv, outer * np.exp(1j * around[:-1]))
-    plotter.add_mesh(circle, color="#808080", line_width=1.0, lighting=False)
-    add_coloured(plotter, ring, text, size, cmap="RdBu_r", limits=(-colour, colour), colours=21)
-    edges = [_closed_line(pv, corners[:, column]) for column in (0, -1)]
-    for edge in edges:
-        plotter.add_mesh(edge, color="#404040", line_width=1.0, lighting=False)
-    discs = _discs(pv, plotter, planetary_set)
-    _add_sensor(pv, plotter, sensor_angle, outer * 1.1, outer)
-    add_text(plotter, f"{title}\nring deflection × {rounded(scale)}, triangle: fixed sensor".strip(), size)
-    look_down(plotter, outer * 1.26)
+    words = f"{title}\nring deflection × {rounded(scale)}, triangle: fixed sensor".strip()
+    figure, ax, colours = _stage(size, 1.24 * outer, colour, words)
+    ring = PolyCollection([], antialiased=False)
+    edges, gears = LineCollection([], colors="#404040", linewidths=0.8), PolyCollection([], linewidths=0.0)
+    sensor = 1.1 * outer * np.exp(1j * sensor_angle) * np.array([1.0, 1.11 + 0.032j, 1.11 - 0.032j])
+    ax.fill(*_xy(sensor).T, color=_SENSOR)
+    ax.plot(*_xy(outer * np.exp(1j * np.linspace(0.0, 2 * np.pi, 361))).T, color="#808080", linewidth=0.8)
+    for collection in (ring, edges, gears):
+        ax.add_collection(collection, autolim=False)
+    outlines = _outlines(planetary_set)
+    gears.set_facecolor([tint for body in outlines for _, tint in body])
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    background, renderer = canvas.copy_from_bbox(figure.bbox), canvas.get_renderer()
     images = []
-    try:
-        for angle in carrier:
-            radial, tangential = (u.reshape(corners.shape) for u in field.at(ring_angle.ravel(), angle))
-            moved = corners + scale * (radial + 1j * tangential) * np.exp(1j * ring_angle)
-            ring.points = _plane(moved.ravel())
-            ring.point_data[text] = 1e6 * radial.ravel()
-            for edge, column in zip(edges, (0, -1)):
-                edge.points = _plane(moved[:, column])
-            for (centre, turn), pairs in zip(_places(planetary_set, angle), discs):
-                for mesh, outline in pairs:
-                    mesh.points = _plane(centre + outline * np.exp(1j * turn))
-            plotter.render()
-            images.append(np.asarray(plotter.screenshot(filename=None, return_img=True))[..., :3])
-    finally:
-        plotter.close()
+    for at, radial, tangential in zip(carrier, *displacement, strict=True):
+        moved = corners + (scale * (radial + 1j * tangential) * np.exp(1j * angle))[:, None]
+        bands = _bands(np.asarray(colours.norm(0.5e6 * (radial + np.roll(radial, -1)))))
+        ring.set_verts([_xy(np.append(moved[rows, 0], moved[rows[::-1], -1])) for rows, _ in bands])
+        tints = colours.cmap([tint for _, tint in bands])
+        ring.set(facecolor=tints, edgecolor=tints)
+        edges.set_segments([_xy(np.append(moved[:, k], moved[0, k])) for k in (0, -1)])
+        bodies = zip(_places(planetary_set, at), outlines, strict=True)
+        gears.set_verts(
+            [
+                _xy(centre + points * np.exp(1j * turn))
+                for (centre, turn), body in bodies
+                for points, _ in body
+            ]
+        )
+        canvas.restore_region(background)
+        for collection in (ring, edges, gears):
+            collection.draw(renderer)
+        images.append(np.array(canvas.buffer_rgba())[..., :3])
     return images
+
+
+def _bands(value: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    """Rows of the corners round bands of one colour, and its number, from values (n,) of 0 .. 1 between rows."""
+    tint = np.clip(value * _TINTS, 0, _TINTS - 1).astype(int)
+    first = np.flatnonzero(tint != np.roll(tint, 1))
+    first = first if len(first) else np.array([0])
+    last = np.append(first[1:], first[0] + len(tint))
+    return [(np.arange(a, b + 1) % len(tint), tint[a]) for a, b in zip(first, last, strict=True)]
+
+
+def _stage(size: int, reach: float, colour: float, words: str):
+    """Figure of `size` pixels, its square of half width `reach` [m], and colours up to +-`colour` [um]."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(size / 100, size / 100), dpi=100)
+    ax = figure.add_axes((0.0, 0.13, 1.0, 0.81))
+    ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+    ax.set_axis_off()
+    colours = ScalarMappable(Normalize(-colour, colour), colormaps["RdBu_r"].resampled(_TINTS))
+    text = size / 55.0
+    bar = figure.colorbar(colours, cax=figure.add_axes((0.2, 0.085, 0.6, 0.03)), orientation="horizontal")
+    bar.set_label("radial displacement [µm]", fontsize=text)
+    bar.ax.tick_params(labelsize=text)
+    figure.text(0.02, 0.985, words, fontsize=text, verticalalignment="top")
+    return figure, ax, colours
 
 
 def gear_outline(gear: Gear) -> np.ndarray:
@@ -575,58 +615,28 @@ def _places(planetary_set, carrier_angle):
     return [(0j, at.sun + carrier_angle), *zip(centres, turns)]
 
 
-def _discs(pv, plotter, planetary_set):
-    """Add sun and planets, a mark on each: of every body its meshes and their points in its own frame."""
-    discs = []
+def _outlines(planetary_set):
+    """Outlines with their colours, of sun and planets with a mark on each, in the frame of the body."""
     sun, planet = planetary_set.sun, planetary_set.planet
+    found = []
     for gear, colour in ((sun, _SUN), *((planet, _PLANET) for _ in planetary_set.planet_angles)):
-        edge = gear_outline(gear)
-        mark = gear.root_radius * 0.8 + 0.07 * gear.root_radius * np.exp(2j * np.pi * np.arange(12) / 12)
-        discs.append([])
-        for outline, tint in ((edge, colour), (mark, _MARK)):
-            points = np.append(outline, outline.mean())
-            n = len(outline)
-            fan = np.column_stack([np.arange(n), (np.arange(n) + 1) % n, np.full(n, n)])
-            mesh = pv.PolyData.from_regular_faces(_plane(points), fan)
-            plotter.add_mesh(mesh, color=tint, lighting=False)
-            discs[-1].append((mesh, points))
-    return discs
+        mark = gear.root_radius * (0.8 + 0.07 * np.exp(2j * np.pi * np.arange(12) / 12))
+        found.append(((gear_outline(gear), colour), (mark, _MARK)))
+    return found
 
 
-def _add_sensor(pv, plotter, angle, radius, size):
-    """Add a triangle that points at the ring from outside."""
-    direction = np.exp(1j * angle)
-    tip = radius * direction
-    points = tip + size * direction * np.array([0.0, 0.12 + 0.035j, 0.12 - 0.035j])
-    mesh = pv.PolyData.from_regular_faces(_plane(points), [[0, 1, 2]])
-    plotter.add_mesh(mesh, color=_SENSOR, lighting=False)
-
-
-def _closed_line(pv, points):
-    """Make a closed line through complex points."""
-    return pv.PolyData(_plane(points), lines=[len(points) + 1, *range(len(points)), 0])
-
-
-def _strip_faces(around: int, across: int) -> np.ndarray:
-    """Number the triangles of a closed strip of points numbered around first, across second."""
-    i, j = np.meshgrid(np.arange(around), np.arange(across - 1), indexing="ij")
-    a, b = i * across + j, ((i + 1) % around) * across + j
-    return np.concatenate([np.stack([a, b, a + 1], -1), np.stack([a + 1, b, b + 1], -1)]).reshape(-1, 3)
-
-
-def _plane(points) -> np.ndarray:
-    """Turn complex points into points in space, (n, 3)."""
-    return np.column_stack([points.real, points.imag, np.zeros(len(points))])
+def _xy(points) -> np.ndarray:
+    """Coordinates (..., 2) of complex points."""
+    return np.stack([points.real, points.imag], axis=-1)
 
 
 def _write_gif(path, images) -> None:
-    """Write the frames, whole or not at all."""
-    _write_image(path, images, extension=".gif", duration=1000.0 * _SECONDS / len(images), loop=0)
+    """Write the frames with the colours of the first one, whole or not at all."""
+    from PIL import Image
 
-
-def _write_image(path, image, **options) -> None:
-    import imageio.v3 as iio
-
-    stream = io.BytesIO()
-    iio.imwrite(stream, image, **options)
+    frames = [Image.fromarray(image) for image in images]
+    palette = frames[0].quantize(128, method=Image.Quantize.MEDIANCUT)
+    first, *others = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
+    stream, each = io.BytesIO(), 1000.0 * _SECONDS / len(frames)
+    first.save(stream, "GIF", save_all=True, append_images=others, duration=each, loop=0, optimize=False)
     write_bytes(stream.getvalue(), path)
