@@ -548,7 +548,7 @@ def _draw(planetary_set, field, carrier, sensor_angle, title, size):
 
 
 def _bands(value: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    """Rows of the corners round bands of one colour, and its number, from values (n,) of 0 .. 1 between rows."""
+    """Rows of corners round bands of one colour, and its number, by values (n,) of 0 .. 1 between them."""
     tint = np.clip(value * _TINTS, 0, _TINTS - 1).astype(int)
     first = np.flatnonzero(tint != np.roll(tint, 1))
     first = first if len(first) else np.array([0])
