@@ -185,8 +185,7 @@ def run_case(
         run.timings["pictures"] = time.perf_counter() - start
         manifest = run.record(*names)
         shown = replace(manifest, complete=True, files=_without_kept(manifest.files))
-        written = Results(folder, shown, read_case)
-        vars(written).update(run.data)
+        written = Results(folder, shown, read_case).with_known(run.data)
         write_text(page(train_of(case), written), folder / "report.html")
         run.record("report.html")
     run.files = _without_kept(run.files)

@@ -274,16 +274,19 @@ class Candidates:
         if N == 1 or meshes > 2 * N:
             return None
         every = (P, 2, N, W // meshes)
+
+        def apart(values: np.ndarray, planets: int) -> bool:
+            """Whether planets differ by more than they owe to rounding."""
+            differ = np.abs(values - values.take([0], axis=planets)).max()
+            return bool(differ > _ALIKE * np.abs(values).max())
+
+        cells, gap = (values.reshape(*every, C) for values in (self.candidate, self.gap))
+        pushed = np.abs(self.approach[:, N + 1 :].reshape(2, N, -1).sum(axis=1)).max(initial=0.0)
+        if pushed > _ALIKE or (cells != cells[:, :, :1]).any() or apart(gap, 2):
+            return None
         smooth = self.smooth.reshape(*every, 3, *every[1:], 3).sum(axis=6)
         supports = self.supports.reshape(2, N, 2, N).sum(axis=3)
-        cells = self.candidate.reshape(*every, C)
-        # but for what planets owe to rounding
-        for values, planets in ((self.gap.reshape(*every, C), 2), (smooth, 2), (supports, 1)):
-            apart = np.abs(values - values.take([0], axis=planets)).max()
-            if apart > _ALIKE * np.abs(values).max():
-                return None
-        pushed = np.abs(self.approach[:, N + 1 :].reshape(2, N, -1).sum(axis=1)).max(initial=0.0)
-        if pushed > _ALIKE or (cells != cells[:, :, :1]).any():
+        if apart(smooth, 2) or apart(supports, 1):
             return None
         own = np.arange(W).reshape(every[1:])[:, 0].ravel()
         setup = replace(self.setup, n_planets=1, **{

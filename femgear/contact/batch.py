@@ -70,9 +70,7 @@ def solve_batch(found: Candidates, load, springs: BearingSprings | None = None) 
         As `femgear.contact.solve.solve_contact`.
     """
     load, N = np.asarray(load, float), found.setup.n_planets
-    one = (
-        found.of_one_planet() if springs is None and np.all(load[np.arange(len(load)) != N] == 0.0) else None
-    )
+    one = None if springs is not None or np.delete(load, N).any() else found.of_one_planet()
     if one is None:
         return _solved(found, load, springs)
     state = _solved(one, np.array([0.0, load[N] / N]), None)

@@ -211,6 +211,7 @@ def condense_sector(
 
 
 def check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
+    """Refuse loads (2n, m) [N] that act on degrees of freedom (k,) of the cuts (`GridError`, E-GRID)."""
     if np.any(loads[cut]):
         raise GridError(
             "a load acts on a cut of the sector", code="E-GRID", remedy="load nodes of the flanks alone"
@@ -313,9 +314,14 @@ class HalfSector:
     inner: int
 
     @cached_property
+    def interior(self) -> csc_array:
+        """Stiffness of the interior, (inner, inner) [N/m]."""
+        return self.stiffness[: self.inner, : self.inner]
+
+    @cached_property
     def factor(self) -> SuperLU:
         """Factor of the interior."""
-        return symmetric_factor(self.stiffness[: self.inner, : self.inner], ordering="NATURAL")
+        return symmetric_factor(self.interior, ordering="NATURAL")
 
     def held(self, forces: np.ndarray) -> np.ndarray:
         """Displacement (inner, k) [m] of the interior under forces (inner, k) [N] on it, the cut held.
@@ -327,7 +333,7 @@ class HalfSector:
         """
         solution = self.factor.solve(forces)
         # column by column: stiffnesses are many powers of ten larger than unit loads
-        missed = self.stiffness[: self.inner, : self.inner] @ solution - forces
+        missed = self.interior @ solution - forces
         largest = np.abs(forces).max(axis=0)
         _check_residual((np.abs(missed).max(axis=0) / np.where(largest == 0.0, 1.0, largest)).max())
         return solution
@@ -435,13 +441,14 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
         solved.append((interior, found[:, :n_h] + 1j * found[:, n_h:]))
         pulls.append(on_sector[sector.inner :] + interior.T @ parts)
         schurs.append(schur)
-    field = np.zeros((loads.shape[1], n_h), complex)
+    on_cut = np.empty((2, len(schurs[0]), n_h), complex)
     for n in range(n_h):
         ties = cut_ties(n, count, len(schurs[0]))
         tied = sum(tie[:, None] * schur * tie for tie, schur in zip(ties, schurs, strict=True))
         w = np.linalg.solve(tied, ties[0] * pulls[0][:, n] - 1j * ties[1] * pulls[1][:, n])
-        for sector, (interior, own), cut in zip(
-            sectors, solved, (ties[0] * w, 1j * ties[1] * w), strict=True
-        ):
-            field[:, n] += sector.fields @ np.concatenate([own[:, n] + interior @ cut, cut])
+        on_cut[:, :, n] = ties[0] * w, 1j * ties[1] * w
+    field = sum(
+        sector.fields @ np.vstack([own + interior @ cut, cut])
+        for sector, (interior, own), cut in zip(sectors, solved, on_cut, strict=True)
+    )
     return np.fft.irfft(field, n=count, axis=1).T.reshape(count, -1, 2)

@@ -120,7 +120,7 @@ def _reduced(sector: HalfSector, mass, loads: np.ndarray, count: int):
     """Reduced stiffness and mass of the fields of one kind, their basis, and the unknowns of the cut."""
     inner = sector.inner
     M = (sector.fields.T @ mass @ sector.fields).tocsc()
-    K_ii, M_ii = sector.stiffness[:inner, :inner], M[:inner, :inner]
+    K_ii, M_ii = sector.interior, M[:inner, :inner]
     constraint, schur = sector.on_cut()
     static = sector.held(loads[:inner])
     # the types that scipy's constructor shows are those of a subclass

@@ -136,9 +136,7 @@ def open_results(
         No folder, no manifest, a broken one or one of a newer femgear. ``E-RESULTS-INCOMPLETE``: an
         interrupted run and not ``partial``.
     """
-    found = results_of(folder, read_case, partial=partial)
-    vars(found).update(known or {})
-    return found
+    return results_of(folder, read_case, partial=partial).with_known(known or {})
 
 
 def with_value(case: Case, key: str, value: object) -> Case:

@@ -115,7 +115,7 @@ def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]
     day = time.strftime("%Y-%m-%d", time.gmtime(max(record["ended"] for record in records)))
     before = [record for record in state.records if record["commit"] != last]
     lines = [
-        f"Commit {last}, the last one that changed femgear/ or scripts/, until {day}:",
+        f"Commit {last} (what later ones change in femgear/ or scripts/ is not part of it), until {day}:",
         f"{60 * hours:.0f} minutes of processes on {records[-1]['machine']}.",
         "",
         "| | pieces | trials | failures | most CPU time [s] | most memory [MB] | minutes |",
