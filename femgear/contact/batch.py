@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.contact.active_set import NULL, RIGID, ROUNDING, settle
+from femgear.contact.active_set import NULL, RIGID, ROUNDING, factor, settle
 from femgear.contact.assembly import ROUGH_STIFFNESS, Candidates
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import BearingSprings
@@ -81,6 +81,28 @@ def solve_batch(found: Candidates, load, springs: BearingSprings | None = None) 
     motions = np.zeros((len(state.motions), len(load)))
     motions[:, :N], motions[:, N] = state.motions[:, :1], state.motions[:, 1]
     return replace(state, **cells, motions=motions)
+
+
+def check_definite(found: Candidates) -> None:
+    """Refuse bodies whose compliance between all candidates at the first position is not positive definite.
+
+    That of ``L + Pi S Pi^T`` is where ``L`` and ``I + Q^(1/2) S Q^(1/2)`` are, ``Q = Pi^T L^-1 Pi``.
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-COMPLIANCE.
+    """
+    filled = np.flatnonzero(found.candidate[0].any(axis=-1))
+    local, some = found.local[0, filled], found.candidate[0, filled]
+    for matrix, cells in zip(local, some, strict=True):
+        factor(matrix[np.ix_(cells, cells)])
+    values = found.polynomials[0, filled] * some[..., None]
+    size, axes = np.linalg.eigh(values.swapaxes(1, 2) @ _local_solution(local, some, values))
+    root = axes * np.sqrt(np.maximum(size, 0.0))[:, None] @ axes.swapaxes(1, 2)
+    smooth, size = found.smooth[0, filled][:, :, filled], 3 * len(filled)
+    coupled = np.einsum("wab,wbvc,vcd->wavd", root, smooth, root, optimize=True).reshape(size, size)
+    factor(np.eye(size) + coupled)
 
 
 def _solved(found: Candidates, load: np.ndarray, springs: BearingSprings | None) -> BatchState:

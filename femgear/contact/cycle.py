@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from femgear.contact.active_set import factor
 from femgear.contact.assembly import (
     ROUGH_STIFFNESS,
     Candidates,
@@ -24,7 +23,7 @@ from femgear.contact.assembly import (
     in_windows,
     mesh_windows,
 )
-from femgear.contact.batch import BatchState, ContactTangents, solve_batch
+from femgear.contact.batch import BatchState, ContactTangents, check_definite, solve_batch
 from femgear.contact.bodies import Bodies
 from femgear.contact.supports import (
     RIGID,
@@ -391,7 +390,7 @@ class _Walk:
             candidates = contact_candidates(setup, self.bodies, some, self.members)
             if first == 0:
                 # bodies that are no elastic bodies are refused before anything rests on them
-                factor(candidates.problem(0).H)
+                check_definite(candidates)
             state = solve_batch(candidates, load, self.springs)
             found.append(self._at_positions(candidates, state))
             missed = setup.missed(some, found[-1]["deflection"])
