@@ -82,11 +82,9 @@ class SetDeviations:
         Separation of each tooth's loaded flank from its cumulative pitch deviation [m].
     planet_pitch, planet_ring_side_pitch : (N, z_p) array
         The same of the sun-side (left) and ring-side (right) flanks of every planet [m].
-    sun_runout, ring_runout, carrier_runout : Runout
     planet_runout : tuple of Runout, one a planet
     pin_errors : (N, 2) array
         Radial (outwards) and tangential (counter-clockwise) displacement of the planet axes [m].
-    ovality : Ovality
     sun_thickness, ring_thickness : float
         Reduction of the tooth thickness at the reference circle [m]; it only adds backlash.
     planet_thickness : (N,) array
@@ -206,7 +204,6 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
 
     Parameters
     ----------
-    deviations : SetDeviations
     mesh : int
         0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring.
     tooth_1, tooth_2 : integer arrays that broadcast

@@ -123,7 +123,6 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
 
     Parameters
     ----------
-    gear : Gear
     contact_ratio, tangential_force : float
         As for `nominal_contact_stress`, with its mate [1, N].
 
@@ -251,7 +250,6 @@ def theoretical_single_stiffness(
 
     Parameters
     ----------
-    teeth_1 : int
     teeth_2 : float
         ``math.inf`` for an internal gear.
     shift_1, shift_2 : float

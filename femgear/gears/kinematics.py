@@ -78,7 +78,6 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
 
     Parameters
     ----------
-    planetary : PlanetarySet
     input, fixed : {"sun", "carrier", "ring"}
         Driven and held member; they differ.
     speed : float
@@ -178,7 +177,6 @@ def unheld_members(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
     floating : sequence of str
         Members without a radial support: any of "sun", "carrier" and "ring".
     both_flanks : bool

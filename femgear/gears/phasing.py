@@ -42,7 +42,6 @@ class MeshPhasing:
 
     Parameters
     ----------
-    sun_teeth, ring_teeth : int
     positions : tuple of int
         m_n, assembly positions of the planets counted from the first.
     rotation : {1, -1}
@@ -295,7 +294,6 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
 
     Parameters
     ----------
-    phasing : MeshPhasing
     harmonics : (H,) sequence of int
 
     Raises
@@ -467,7 +465,6 @@ def neighbouring_teeth(
 
     Parameters
     ----------
-    sun_teeth, planet_teeth, ring_teeth, planets : int
     distance : int
         Largest change of each tooth number, up to 30.
     ratio_tolerance : float
@@ -507,7 +504,6 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     ----------
     phasing : MeshPhasing
         With the teeth of sun and ring and the positions of the planets.
-    planet_teeth : int
 
     Returns
     -------

@@ -145,7 +145,6 @@ class PinionCutter:
 
     Parameters
     ----------
-    teeth : int
     profile_shift : float
         Shift of the cutter in modules (0 when half worn).
     tip_radius : float, optional

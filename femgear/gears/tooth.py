@@ -61,7 +61,6 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
 
     Parameters
     ----------
-    gear : Gear
     flank_elements : int
         Element edges along the flank, 2 or more, uniform in roll angle, before `refine`.
     refine : float

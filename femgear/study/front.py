@@ -45,7 +45,6 @@ class ParetoFront:
         Of the case as it is [SI].
     dominated : (k, 2) array
         Objectives of the other designs within the limits.
-    designs, failures : int
     complete : bool
         Whether the search was not cut short by ``max_designs``.
     """

@@ -189,7 +189,6 @@ def mesh_elements(
 
     Parameters
     ----------
-    data : RigidSet
     stiffness : FourierSeries, StepSeries or MeshExcitation, optional
         Of the mesh columns [N/m], or their static record; the constant stiffnesses of the set when not given.
     harmonics, orders
@@ -253,7 +252,6 @@ def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
 
     Parameters
     ----------
-    data : RigidSet
     flank : {1, -1}
     """
     N, S = data.n_planets, len(data.contact_lines.heights)

@@ -161,10 +161,6 @@ def class_energies(motions: SetMotions) -> np.ndarray:
 def phase_shares(motions: SetMotions) -> np.ndarray:
     """Compute the shares of the cyclic harmonics in the planets' kinetic energy, 0 to 1.
 
-    Parameters
-    ----------
-    motions : SetMotions
-
     Returns
     -------
     (N // 2 + 1, m) array
@@ -287,7 +283,6 @@ def gear_set_motions(data: RigidSet, shape) -> SetMotions:
 
     Parameters
     ----------
-    data : RigidSet
     shape : (n, m) array
         In the coordinates of `gear_set_system`.
 
@@ -319,7 +314,6 @@ def gear_set_kinds(data: RigidSet, shape, *, frequency) -> tuple[str, ...]:
 
     Parameters
     ----------
-    data : RigidSet
     shape : (n, m) array
         In the coordinates of `gear_set_system`.
     frequency : (m,) array

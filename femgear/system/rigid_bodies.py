@@ -82,7 +82,6 @@ class RigidSet(ABC):
 
     Parameters
     ----------
-    sun, ring, carrier : PlanarBody or HelicalBody
     planet : PlanarBody or HelicalBody
         Each of the N equal planets; it has no supports but its bearing.
     sun_radius, ring_radius, planet_radius : float
@@ -337,7 +336,6 @@ def planar_from_set(planetary_set: PlanetarySet, **data: Any) -> PlanarSet:
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
     **data
         Bodies, mesh stiffnesses and planet bearing of `PlanarSet`.
     """
@@ -375,8 +373,6 @@ def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -
 
     Parameters
     ----------
-    data : RigidSet
-    torque : PlanarTorque, optional
     kept : (n,) bool array
         Coordinates that no infinite stiffness holds; as many a body, ``u`` being the last.
 

@@ -174,7 +174,6 @@ class Response:
         Lowest force of all meshes within the period [N]; teeth cannot pull.
     method : tuple of str
         ``"fixed point"`` or ``"direct"``, one a speed.
-    message : str
     periods : int
         Mesh periods in one period of the excitation record: harmonic ``h`` has the frequency
         ``h mesh_frequency / periods``.
@@ -241,7 +240,6 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
 
     Parameters
     ----------
-    excitation : MeshExcitation
     count : int
         Mesh harmonics kept; a record of several periods keeps all its lines up to that frequency.
 
@@ -390,7 +388,6 @@ def element_forces(problem: NonlinearSystem, x, theta) -> tuple[np.ndarray, np.n
 
     Parameters
     ----------
-    problem : NonlinearSystem
     x : (..., n_columns) array
         Deflections [m].
     theta : (..., n_bases) array
@@ -421,7 +418,6 @@ def tabulated_law(problem: NonlinearSystem, theta) -> Law:
 
     Parameters
     ----------
-    problem : NonlinearSystem
     theta : (n_times, n_bases) array
         Phases of the instants [rad].
 
@@ -501,7 +497,6 @@ def check_matrices(
 
     Parameters
     ----------
-    system : MechanicalSystem
     symmetric : tuple of str
         Matrices that must be; circulatory forces make K unsymmetric, which time integration takes.
     columns : int, optional

@@ -63,7 +63,6 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
 
     Parameters
     ----------
-    text : str
     name : str
         File name for messages.
     numbered : bool
@@ -144,7 +143,6 @@ def with_value(case: Case, key: str, value: object) -> Case:
 
     Parameters
     ----------
-    case : Case
     key : str
         Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
         ``"sun.modifications[0].amount"``.
@@ -161,7 +159,6 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
     Parameters
     ----------
-    case : Case
     values : mapping
         Keys and values as of `with_value`, as in
         ``{"operation.input": "carrier", "operation.fixed": "ring"}``.

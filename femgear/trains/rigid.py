@@ -80,7 +80,6 @@ def rigid_refusals(case: RigidCase, kind: str, *, without_torque: str) -> Iterat
 
     Parameters
     ----------
-    case : RigidCase
     kind : str
         "planar" or "helical".
     without_torque : str
@@ -121,8 +120,6 @@ def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
 
     Parameters
     ----------
-    case : Case
-    gears : PlanetarySet
     takes : str
         "the planar model takes", or whatever takes one period alone.
     """
@@ -307,7 +304,6 @@ def gear_set_modes(
 
     Parameters
     ----------
-    data : RigidSet
     system : MechanicalSystem, optional
         `gear_set_system` of the set, with the flanks that a torque loads; without torque when not given.
     mesh_stiffness : (n_columns,) array, optional
@@ -358,15 +354,11 @@ def gear_set_problem(
 
     Parameters
     ----------
-    data : RigidSet
     meshes : GearMeshes, optional
         From `mesh_elements`; constant stiffnesses without back side when not given.
     back_flanks : bool
         The back flanks act on their own lines of action, with the stiffness of the drive side, so that teeth
         can wedge; otherwise they act on the line of the drive flanks.
-    torque : PlanarTorque, optional
-    bearings : Bearings, optional
-    gravity : Gravity, optional
     pin_errors : (N, 2) array, optional
         Radial (outwards) and tangential (counter-clockwise) displacement of the pins [m], from which the
         coordinates of the planets then count. Not to be given again when the static record holds them.
@@ -454,7 +446,6 @@ def pin_deflections(data: RigidSet, pin_errors, *, flank: int = 1) -> np.ndarray
 
     Parameters
     ----------
-    data : RigidSet
     pin_errors : (N, 2) array
         See `gear_set_problem` [m].
     flank : {1, -1}
@@ -586,9 +577,6 @@ def modes_dataset(
 
     Parameters
     ----------
-    data : RigidSet
-    gears : PlanetarySet
-    modes : Modes
     attrs : dict
         Of the file; the number of unknowns is added behind its title.
     phasing : (m,) tuple of str, optional
@@ -619,7 +607,6 @@ def in_space(data: RigidSet, shape: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
     Parameters
     ----------
-    data : RigidSet
     shape : (n, m) array
         In the coordinates of `gear_set_system`.
 

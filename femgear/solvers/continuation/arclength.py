@@ -115,7 +115,6 @@ def continue_curve(
         Typical change of the parameter; by default the width of the range.
     direction : int
         +1 starts towards larger parameters, -1 towards smaller ones.
-    options : StepOptions, optional
     describe : callable
         The parameter as text with its name and unit, for messages.
 

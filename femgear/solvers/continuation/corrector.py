@@ -157,7 +157,6 @@ class CurvePoint:
         Scaled derivative of the equations.
     orientation : float
         Sign of the determinant of the derivative bordered by the tangent.
-    iterations : int
     contraction : float
         Second Newton step, with the derivative of the first one, over the first; zero when one was enough.
     error : float
@@ -186,7 +185,6 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
 
     Parameters
     ----------
-    curve : ScaledCurve
     guess, normal : (n + 1,) arrays
         In the scaled unknowns.
     along : (n + 1,) array, optional
@@ -254,7 +252,6 @@ def step_effort(
 
     Parameters
     ----------
-    options : StepOptions
     point, new : CurvePoint
         Both ends of the step.
     corner, sharp : bool

@@ -176,7 +176,6 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
 
     Parameters
     ----------
-    system : MechanicalSystem
     modes : Modes
         Of that system.
     outputs : (n_outputs, n) array

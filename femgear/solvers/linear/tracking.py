@@ -80,7 +80,6 @@ class CriticalSpeed:
         [rad/s]
     frequency : float
         [Hz]
-    branch : int
     order : float
         Of the line, in multiples of the speed.
     """

@@ -173,7 +173,6 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s] with a common period, see `stroboscopic_map`.
     start : pair of (n,) arrays, optional
@@ -210,13 +209,11 @@ def exponents_of(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     finer, coarser
         Integrators of the problem and its tangents from passage to passage, with ``size``, ``period`` [s],
         ``divergence`` [1/s] and ``passages(start)``.
     start : pair of (n,) arrays
         Displacement [m] and velocity [m/s] at the first passage.
-    chosen : LyapunovOptions
     beside : int
         Points that the coarser run covers.
     """

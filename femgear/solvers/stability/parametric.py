@@ -211,7 +211,6 @@ def stability_chart(
         Base frequencies [rad/s], positive.
     depth : (n_d,) array
         Factors of the fluctuation, 1 for the stiffness as given.
-    harmonics : int
     tolerance : float
         Relative error of the monodromy matrices.
 

@@ -38,7 +38,6 @@ class Flow:
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : (n_bases,) array
         [rad/s].
     rate : float

@@ -394,7 +394,6 @@ def march(
 
     Parameters
     ----------
-    scheme : Scheme
     law : callable
         Of the instants 0 .. count, from `tabulated_law`; instant 0 is the start.
     loads : (count, ...) array

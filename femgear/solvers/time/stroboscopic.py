@@ -80,7 +80,6 @@ def stroboscopic_map(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s]; all must repeat after ``periods`` periods of the first one.
     steps : int
@@ -222,7 +221,6 @@ def sweep_response(
         Periods of the map for settling.
     tolerance : float
         Change of the state from period to period, relative to its size, at which it has settled.
-    harmonics : int
     steps
         ``steps``, ``periods``, ``method`` of `stroboscopic_map`.
 

@@ -151,7 +151,6 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
 
     Parameters
     ----------
-    case : DrivetrainCase
     ratio : mapping of str to float
         Speeds of the bodies over that of the first one.
     """

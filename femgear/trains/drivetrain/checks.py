@@ -87,8 +87,6 @@ def speed_range(
 
     Parameters
     ----------
-    model : DrivetrainModel
-    torques : sequence of TorqueHistory
     duration, start : float
         End and begin of the range [s].
     speed : float
@@ -146,7 +144,6 @@ def mesh_mode(model: DrivetrainModel, limit: float) -> float:
 
     Parameters
     ----------
-    model : DrivetrainModel
     limit : float
         The highest line of the mesh stiffness [Hz]; modes above answer it as springs do, without resonance.
     """
@@ -405,7 +402,6 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
 
     Parameters
     ----------
-    train : Drivetrain
     turning : bool
         As of `drivetrain_model`, whose refusals apply.
 

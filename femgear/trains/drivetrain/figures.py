@@ -58,7 +58,6 @@ def over_time(
         With curves a sequence of (text, values (n,)).
     unit : str
         After the factor, with the quantity.
-    factor : float
     title : str
         Above all panels.
     zero : bool
@@ -100,7 +99,6 @@ def spectra(
         Marked above the first panel and drawn through all.
     unit : str
         After the factor, with the quantity.
-    factor : float
     x : str
         Label of the abscissa.
     title : str

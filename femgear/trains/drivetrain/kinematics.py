@@ -415,8 +415,6 @@ def flank_contacts(
 
     Parameters
     ----------
-    train : Drivetrain
-    place : Coordinates
     spin : (n_all,) array
         Of `rigid_rotation`.
     T : (n_all, n) array

@@ -143,7 +143,6 @@ def shaft_lines(
 
     Parameters
     ----------
-    model : DrivetrainModel
     layout : Layout
         Of ``model.train``.
     shape : (n_free,) array
@@ -220,14 +219,12 @@ def draw_motion(
 
     Parameters
     ----------
-    path : Path
     layout : Layout
         Discs, and the names of the places that are written beside them.
     move, turn : (n, 3) arrays
         Translation and rotation vector of every place, in the proportions of the motion [m], [rad].
     shafts : sequence of (rest (k, 3), displacement (k, 3))
         Centre lines [m].
-    title : str
     size : int
         Width in pixels.
 

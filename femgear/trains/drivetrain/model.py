@@ -57,7 +57,6 @@ class DrivetrainModel:
 
     Parameters
     ----------
-    train : Drivetrain
     system : MechanicalSystem
         ``W`` holds the mesh directions with the carriers at angle zero, ``load`` the weight, ``C`` the modal
         damping; ``gyroscopic`` multiplies the speed of the first body.
@@ -146,7 +145,6 @@ def drivetrain_model(
 
     Parameters
     ----------
-    train : Drivetrain
     harmonics : int
         Terms of the mesh stiffness series.
     turning : bool
@@ -204,7 +202,6 @@ def drivetrain_problem(
 
     Parameters
     ----------
-    model : DrivetrainModel
     torques : dict
         Constant torque on bodies [N m], by their names; they must balance over the spin.
     separates : bool
@@ -409,7 +406,6 @@ def static_flexibility(model: DrivetrainModel, W, k) -> np.ndarray:
 
     Parameters
     ----------
-    model : DrivetrainModel
     W : (n, n_meshes) array
         Directions of the drive flanks at one instant, all in touch.
     k : (n_meshes,) array

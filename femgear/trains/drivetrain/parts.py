@@ -380,7 +380,6 @@ class TorqueHistory:
 
     Parameters
     ----------
-    body : str
     times : (m,) array
         Ascending [s].
     values : (m,) array

@@ -46,7 +46,6 @@ def amplitude_and_mean(
     curves : sequence of (text, ratio (p,), amplitude (p,), mean (p,), stable (p,) bool)
     sweeps : sequence of (text, ratio (f,), amplitude (f,), mean (f,))
         Drawn as markers.
-    x, unit, title : str
     """
     figure, (top, bottom) = new_figure(rows=2, width=8.5, height=7.0, sharex=True)
     for number, (text, ratio, amplitude, mean, stable) in enumerate(curves):

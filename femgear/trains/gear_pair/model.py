@@ -165,7 +165,6 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
 
     Parameters
     ----------
-    pair : ImpactPair
     branch : Branch
         Over the frequency ratio, from ``parameter_curve(pair.problem, ..., 1.0)``.
     level : float

@@ -137,8 +137,6 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
 
     Parameters
     ----------
-    modes : xarray.Dataset
-    gears : PlanetarySet
     scale : float
         Largest displacement of each view as a share of the ring's radius.
 
@@ -243,7 +241,6 @@ def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 
 
     Parameters
     ----------
-    phasing : MeshPhasing
     harmonics : sequence of int
         A hand upwards has phase zero; phase grows counter-clockwise.
     """

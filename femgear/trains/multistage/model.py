@@ -70,7 +70,6 @@ class PlanetaryStage:
 
     Parameters
     ----------
-    data : PlanarSet
     teeth : (3,) tuple of int, optional
         Of sun, planet and ring (positive); speeds and mesh frequencies need them.
     fixed : {"carrier", "ring", "sun"}, optional
@@ -267,7 +266,6 @@ def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) ->
 
     Parameters
     ----------
-    data : MultistageSet
     torque : float
         On the input [N m].
     radii : bool
@@ -368,7 +366,6 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
 
     Parameters
     ----------
-    data : MultistageSet
     torque : float
         On the input [N m]; it reacts on the output and on the fixed members, and chooses the loaded flanks
         of every stage. Zero: flanks of suns that drive counter-clockwise.
@@ -438,7 +435,6 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
 
     Parameters
     ----------
-    data : MultistageSet
     speed : float
         Of the input [rad/s].
 

@@ -194,7 +194,6 @@ def multistage_problem(
 
     Parameters
     ----------
-    data : MultistageSet
     meshes : mapping of int to GearMeshes, optional
         By stage (from 1), from `mesh_elements` of its set with orders ``(1,)`` of the stage's own mesh
         frequency; a stage that is not named has constant stiffnesses and meshes that part.

@@ -53,7 +53,6 @@ def orbits(curves: Sequence[tuple], *, title: str = "") -> Figure:
     Parameters
     ----------
     curves : sequence of (text, path (2, n) [m])
-    title : str
     """
     figure, (ax,) = new_figure(width=6.2, height=6.2)
     for number, (text, path) in enumerate(curves):

@@ -67,11 +67,8 @@ class PlanarModel:
 
     Parameters
     ----------
-    data : PlanarSet
-    problem : NonlinearSystem
     back_flanks : bool
         The back flanks have columns of their own.
-    bearings : Bearings
     """
 
     data: PlanarSet
@@ -100,8 +97,6 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
 
     Parameters
     ----------
-    case : Case
-    gears : PlanetarySet
     static : StaticResult, optional
         Its mean stiffnesses are taken where the case gives none.
     """
@@ -133,8 +128,6 @@ def planar_model(
 
     Parameters
     ----------
-    case : Case
-    gears : PlanetarySet
     static : StaticResult, optional
         Needed where the case gives no mesh stiffness.
     mesh_frequency : bool
@@ -274,7 +267,6 @@ def weight_curve(
         As for `frequency_response_curve`.
     largest : float
         Longest step, see `StepOptions`.
-    max_points : int
     """
     return frequency_response_curve(
         problem,
@@ -297,7 +289,6 @@ def judged_branch(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     branch : Branch
         Followed without stability.
     progress : callable, optional
@@ -371,8 +362,6 @@ def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple
 
     Parameters
     ----------
-    model : PlanarModel
-    solution : PeriodicSolution
     theta : (n, n_bases) array
         Phases of the base frequencies [rad].
     """

@@ -187,7 +187,6 @@ class StressResult:
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
     cycle : MeshCycle
         The static solution that it belongs to.
     influences : RootStresses
@@ -200,8 +199,6 @@ class StressResult:
         Mesh period of the record with which each of `roots` begins.
     ranges : tuple of RootRange
         In the same order.
-    spectrum : LoadSpectrum
-    nominal : NominalStresses
     sun_torque : float
         [N m]
     closes : bool

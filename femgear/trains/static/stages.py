@@ -59,7 +59,6 @@ def solve_static(
 
     Parameters
     ----------
-    case : Case
     cache : path, optional
         Folder of generated grids.
     progress : callable, optional
@@ -140,7 +139,6 @@ def flank_compliances(
 
     Parameters
     ----------
-    case : Case
     gears : PlanetarySet
         Of that case.
     cache : path, optional
@@ -161,7 +159,6 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
 
     Parameters
     ----------
-    case : Case
     static : StaticResult
         Of that case.
     progress : callable, optional
@@ -204,7 +201,6 @@ def nominal_stresses(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
     sun_torque : float
         Of either sign [N m].
     youngs_modulus, poisson_ratio : float
