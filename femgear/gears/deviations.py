@@ -221,20 +221,12 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
 def body_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, position, *, back: bool = False
 ) -> np.ndarray:
-    """Compute the separation of every mesh by runouts, pin errors, ovality and planet thickness.
+    """Compute the separation (2N, P) [m] of every mesh by runouts, pin errors, ovality and planet thickness.
 
-    Parameters
-    ----------
-    position : (P,) array
-        tau, as a fraction of mesh periods; may exceed 1.
-    back : bool
-        Of the other flanks: what adds to the backlash of the set there, thickness of all gears included.
-
-    Returns
-    -------
-    (2N, P) array
-        ``n . (u_2 - u_1)`` [m] with the normals of `mesh_normals` and the displacements of both bodies, and
-        the part of the reduced tooth thickness on that side.
+    ``n . (u_2 - u_1)`` at positions tau (P,), in mesh periods and beyond 1 too, with the normals of
+    `mesh_normals` and the displacements of both bodies, and the part of the reduced tooth thickness on that
+    side. Of the other flanks, with ``back``, it is what adds to the backlash of the set, thickness of all
+    gears too.
     """
     d, s = deviations, planetary_set
     moved = _relative_displacements(d, s, np.atleast_1d(np.asarray(position, float)))

@@ -35,15 +35,7 @@ PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
 
 @dataclass(frozen=True)
 class GeometryWarning(Finding):
-    """A finding on gears, with what is usual.
-
-    Parameters
-    ----------
-    code, key, text : str
-        As of `femgear.errors.Finding`.
-    limit : str
-        What would not be warned about.
-    """
+    """A finding on gears, with the ``limit`` within which there would be no warning."""
 
     limit: str
 

@@ -89,12 +89,8 @@ def pad(amplitudes: np.ndarray, count: int) -> np.ndarray:
 class Product:
     """Multiplication of the harmonics of signals by periodic factors, without aliasing.
 
-    By a matrix, or in time where there are many harmonics.
-
-    Parameters
-    ----------
-    factor : (n, H + 1) complex array
-        One-sided harmonics of the factors.
+    ``factor`` (n, H + 1) complex are one-sided harmonics. By a matrix, or in time where there are many
+    harmonics.
     """
 
     factor: np.ndarray
@@ -278,12 +274,9 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SummedSeries:
-    """``sum_p parts[p]``, each with its own orders; elements take it where they take a `FourierSeries`.
+    """``sum_p parts[p]``, each with its own orders and all of the same number of coefficients.
 
-    Parameters
-    ----------
-    parts : tuple of FourierSeries
-        All of the same number of coefficients.
+    Elements take it where they take a `FourierSeries`.
     """
 
     parts: tuple[FourierSeries, ...]
@@ -368,16 +361,7 @@ def side_bands(carrier: int, mesh: int, bands: int) -> np.ndarray:
 
 
 def distinct_lines(orders) -> np.ndarray:
-    """Sort lines by their size, the mean first, without mirror images and repetitions.
-
-    Parameters
-    ----------
-    orders : (n, n_bases) int array
-
-    Returns
-    -------
-    (L, n_bases) int array
-    """
+    """Sort lines (n, n_bases) int by their size, the mean first, without mirror images and repetitions."""
     orders = np.atleast_2d(np.array(orders, int))
     orders = np.vstack([np.zeros_like(orders[:1]), orders])
     orders = np.unique(orders * _mirror_sign(orders)[:, None], axis=0)
@@ -439,11 +423,7 @@ def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _
 def coincidence_note(orders: np.ndarray, frequency) -> str:
     """Write what to know of a solution in which two lines have one frequency; empty where none have.
 
-    Parameters
-    ----------
-    orders : (L, n_bases) int array
-    frequency : (n_bases,) array
-        [rad/s]; with a single base frequency no two lines coincide.
+    Of lines (L, n_bases) at base frequencies (n_bases,) [rad/s]; with a single one no two lines coincide.
     """
     if orders.shape[1] < 2:
         return ""

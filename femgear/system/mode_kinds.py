@@ -234,12 +234,7 @@ def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> n
 def named_kinds(share, frequency) -> tuple[str, ...]:
     """Name modes ``rigid``, by the class with at least 99 % of the kinetic energy, or ``mixed``.
 
-    Parameters
-    ----------
-    share : (3, m) array
-        `class_energies` over the whole kinetic energy.
-    frequency : (m,) array
-        [Hz], zero for rigid-body modes.
+    From the `class_energies` over the whole kinetic energy (3, m), and frequencies (m,), zero if rigid [Hz].
     """
     best, most = share.argmax(axis=0), share.max(axis=0)
     return tuple(
@@ -278,18 +273,9 @@ def class_shares(data: RigidSet, shape) -> np.ndarray:
 def gear_set_motions(data: RigidSet, shape) -> SetMotions:
     """Collect the motions of all bodies in every mode, held ones and planets tied to pins included.
 
-    The central members of bodies that move in space stand twice: x, y and rotation, then tilt about x, tilt
-    about y and z, which turn with the frame as those do. Planets have all their motions.
-
-    Parameters
-    ----------
-    shape : (n, m) array
-        In the coordinates of `gear_set_system`.
-
-    Raises
-    ------
-    CaseError
-        Shapes of another system (E-SHAPE).
+    Shapes (n, m) are in the coordinates of `gear_set_system`, others are refused (CaseError, E-SHAPE). The
+    central members of bodies that move in space stand twice: x, y and rotation, then tilt about x, tilt about
+    y and z, which turn with the frame as those do. Planets have all their motions.
     """
     shape, T, axes = np.asarray(shape), free_motions(data), data.axes
     if shape.ndim != 2 or len(shape) != T.shape[1]:

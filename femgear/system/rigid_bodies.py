@@ -334,10 +334,7 @@ class HelicalBody:
 def planar_from_set(planetary_set: PlanetarySet, **data: Any) -> PlanarSet:
     """Make a planar set with the base radii, working pressure angles and planet angles of a geared one.
 
-    Parameters
-    ----------
-    **data
-        Bodies, mesh stiffnesses and planet bearing of `PlanarSet`.
+    ``data`` are the bodies, mesh stiffnesses and planet bearing of `PlanarSet`.
     """
     return PlanarSet(**data, **gear_geometry(planetary_set))
 
@@ -367,19 +364,10 @@ def torque_shares(data: RigidSet) -> dict[str, float]:
 
 
 def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -> np.ndarray:
-    """Compute the load (n,) [N] on ``u`` of the driven member and the output, in static balance.
+    """Compute the load (n,) [N] on ``u`` of the driven member and the output, balanced by `torque_shares`.
 
-    The balance is that of `torque_shares`.
-
-    Parameters
-    ----------
-    kept : (n,) bool array
-        Coordinates that no infinite stiffness holds; as many a body, ``u`` being the last.
-
-    Raises
-    ------
-    CaseError
-        A torque on a held member (E-MECHANISM).
+    ``kept`` (n,) are the coordinates that no infinite stiffness holds; as many a body, ``u`` being the last.
+    A torque on a held member is refused (CaseError, E-MECHANISM).
     """
     load, kept = np.zeros(kept.size), kept.reshape(data.n_planets + 3, -1)
     if torque is None:

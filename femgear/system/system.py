@@ -273,14 +273,9 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
 
 @dataclass(frozen=True)
 class HarmonicForce:
-    """``Re(force exp(i orders . theta))`` on the degrees of freedom.
+    """``Re(force exp(i orders . theta))`` on the degrees of freedom, ``force`` (n,) complex [N, N m].
 
-    Parameters
-    ----------
-    force : (n,) complex array
-        [N, N m].
-    orders : tuple of int
-        Multiples of the base frequencies.
+    ``orders`` are multiples of the base frequencies.
     """
 
     force: np.ndarray
@@ -386,12 +381,7 @@ def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
 def element_forces(problem: NonlinearSystem, x, theta) -> tuple[np.ndarray, np.ndarray]:
     """Compute forces (..., n_columns) [N] and tangents (..., n_columns, n_columns) [N/m] of all elements.
 
-    Parameters
-    ----------
-    x : (..., n_columns) array
-        Deflections [m].
-    theta : (..., n_bases) array
-        Phases of the base frequencies [rad].
+    At deflections x (..., n_columns) [m] and phases theta (..., n_bases) of the base frequencies [rad].
     """
     x = np.asarray(x, float)
     force = np.zeros(x.shape)

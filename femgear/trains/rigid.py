@@ -51,14 +51,9 @@ def listed(names: list[str]) -> str:
 
 
 def entries_without_effect(data: dict, others: Sequence[str] = ()) -> list[str]:
-    """List entries that no set of rigid bodies takes up: machines, housing, others, foundation of the ring.
+    """List entries that no set of rigid bodies takes up: machines, housing, foundation of the ring, others.
 
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file that was checked.
-    others : sequence of str
-        Further entries without effect.
+    ``data`` are the tables of a case file that was checked.
     """
     machines = [name for name in ("motor", "brake", "housing") if name in data]
     keys = ("foundation_radial", "foundation_tangential")
@@ -78,12 +73,7 @@ def flank_entries(data: dict) -> list[str]:
 def rigid_refusals(case: RigidCase, kind: str, *, without_torque: str) -> Iterator[CaseError]:
     """Refuse elastic supports of the static solution, and a torque of zero.
 
-    Parameters
-    ----------
-    kind : str
-        "planar" or "helical".
-    without_torque : str
-        What a torque of zero means.
+    ``kind`` is "planar" or "helical", ``without_torque`` tells what a torque of zero means.
     """
     if case.static.members == "elastic":
         yield CaseError(
@@ -118,10 +108,7 @@ def unheld_member(case: RigidCase, key: str, remedy: str) -> CaseError:
 def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
     """Refuse errors whose static record spans several mesh periods (E-PERIODS).
 
-    Parameters
-    ----------
-    takes : str
-        "the planar model takes", or whatever takes one period alone.
+    ``takes`` is "the planar model takes", or whatever takes one period alone.
     """
     # whatever the longest record: one period cut out of many is no period
     periods, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
@@ -396,7 +383,9 @@ def gear_set_problem(
         C = modal_damping(still, springs, mode_ratios(modes.frequency, damping))
     system = bearings.join(data, gear_set_system(data, carrier_speed=carrier_speed, **options))
     steady, forces = _weight(data, gravity)
-    load = system.load + steady + _pin_inertia(data, pins, carrier_speed)
+    # centrifugal force of the planets by the displacement of their pins
+    thrown = _of_planets(data, carrier_speed**2 * data.planet.mass * pins)
+    load = system.load + steady + free_motions(data).T @ thrown
     return NonlinearSystem(replace(system, load=load, C=C), elements, forces, speed=carrier_speed)
 
 
@@ -404,13 +393,7 @@ def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] =
     """Choose springs (n_columns,) [N/m] near which a set works: bearings closed, back flanks open.
 
     The elements' own reference counts back flanks on their own lines as closed, far from where the set works.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-        Of `gear_set_problem`.
-    members : sequence of MemberBearing
-        On the last columns; closed whatever their clearance.
+    Those of ``members`` stand on the last columns of a `gear_set_problem`; closed whatever their clearance.
     """
     springs = problem.reference
     for element in problem.elements[1:]:
@@ -444,16 +427,9 @@ def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float] | np.ndar
 def pin_deflections(data: RigidSet, pin_errors, *, flank: int = 1) -> np.ndarray:
     """Compute the approach of the flanks (n_columns,) [m] by displaced pins, all bodies at rest in bearings.
 
-    Parameters
-    ----------
-    pin_errors : (N, 2) array
-        See `gear_set_problem` [m].
-    flank : {1, -1}
-        See `mesh_directions`.
+    Pin errors (N, 2) [m] are those of `gear_set_problem`, ``flank`` (1 or -1) that of `mesh_directions`.
     """
-    shifted = np.zeros((data.n_planets + 3, len(data.axes)))
-    shifted[3:, :2] = _pins(data, pin_errors)
-    return mesh_directions(data, flank).T @ shifted.ravel()
+    return mesh_directions(data, flank).T @ _of_planets(data, _pins(data, pin_errors))
 
 
 def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, ...] = (1,)) -> FourierSeries:
@@ -557,11 +533,11 @@ def _pins(data: RigidSet, pin_errors) -> np.ndarray:
     return pins
 
 
-def _pin_inertia(data: RigidSet, pins: np.ndarray, carrier_speed: float) -> np.ndarray:
-    """Centrifugal force (n,) of the planets by the displacement of their pins."""
-    force = np.zeros((data.n_planets + 3, len(data.axes)))
-    force[3:, :2] = carrier_speed**2 * data.planet.mass * pins
-    return free_motions(data).T @ force.ravel()
+def _of_planets(data: RigidSet, values: np.ndarray) -> np.ndarray:
+    """Radial and tangential values (N, 2) of the planets in all coordinates (n_all,)."""
+    found = np.zeros((data.n_planets + 3, len(data.axes)))
+    found[3:, :2] = values
+    return found.ravel()
 
 
 def modes_dataset(
@@ -605,17 +581,8 @@ def modes_dataset(
 def in_space(data: RigidSet, shape: np.ndarray) -> tuple[np.ndarray, list[str]]:
     """Compute motions of all bodies along and about the axes of the set, held ones included.
 
-    Parameters
-    ----------
-    shape : (n, m) array
-        In the coordinates of `gear_set_system`.
-
-    Returns
-    -------
-    motions : (n_all, m) array
-        [m] and [rad] per unit of the shapes.
-    names : list of str
-        Body and motion, as in "planet 2: tilt x".
+    Of shapes (n, m) in the coordinates of `gear_set_system` the motions (n_all, m) [m] and [rad] per unit,
+    and their names: body and motion, as in "planet 2: tilt x".
     """
     N, axes = data.n_planets, len(data.axes)
     full = (free_motions(data) @ shape).reshape(N + 3, axes, -1)

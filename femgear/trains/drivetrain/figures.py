@@ -281,12 +281,7 @@ def _pass_band(data: xr.Dataset) -> str:
 def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:
     """Draw spectra [kN] over frequency, and side bands over orders, by file name; none without meshes.
 
-    Parameters
-    ----------
-    data : Dataset
-        spectrum.nc
-    transient : Dataset, optional
-        transient.nc, for the speeds between which the spectra were taken.
+    Of spectrum.nc; transient.nc has the speeds between which the spectra were taken.
     """
     meshes = chosen_meshes(data)
     if not meshes:

@@ -404,12 +404,8 @@ def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:
 def static_flexibility(model: DrivetrainModel, W, k) -> np.ndarray:
     """Compute the deviations (n, n) per unit of loads that do not drive the spin [m/N].
 
-    Parameters
-    ----------
-    W : (n, n_meshes) array
-        Directions of the drive flanks at one instant, all in touch.
-    k : (n_meshes,) array
-        Their stiffnesses [N/m].
+    At one instant: directions W (n, n_meshes) of the drive flanks, all in touch, and stiffnesses k
+    (n_meshes,) [N/m].
     """
     carried, total = model.system.M @ model.rigid, model.system.K + (W * k) @ W.T
     size = (np.abs(total).max() or 1.0) / np.abs(carried).max() ** 2

@@ -58,15 +58,10 @@ _BLOCK = 4096
 
 @dataclass(frozen=True)
 class Records:
-    """What a run keeps of its steps.
+    """What a run keeps of its steps: one record of ``every`` so many.
 
-    Parameters
-    ----------
-    every : int
-        Steps a record.
-    lowpass : bool
-        Records are low-passed (`Decimator`), so that nothing beyond half their rate appears as something
-        else; False takes the motion at these instants as it is.
+    With ``lowpass`` they are low-passed (`Decimator`), so that nothing beyond half their rate appears as
+    something else; otherwise they are the motion at these instants as it is.
     """
 
     every: int = 1

@@ -73,12 +73,8 @@ def amplitude_and_mean(
 def state_bands(rows: Sequence[tuple]) -> Figure:
     """Draw the contact state over the frequency ratio, one band a row.
 
-    A border is drawn halfway between two ratios; sparse rows show these as dots.
-
-    Parameters
-    ----------
-    rows : sequence of (text, ratio (p,), state (p,) int)
-        Sweeps, or pieces of a curve between limit points; numbers of states in `STATE_NAMES`.
+    A border is drawn halfway between two ratios; sparse rows show these as dots. Rows are (text, ratio (p,),
+    state (p,) int) of sweeps, or of pieces of a curve between limit points; states count as in `STATE_NAMES`.
     """
     figure, (ax,) = new_figure(width=8.5, height=1.6 + 0.5 * len(rows))
     marked = False

@@ -161,14 +161,9 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
     """Find the ratios (n,) along the branch at which the smallest deflection passes a level, to 1e-6.
 
     The harmonic balance equations are solved again between two points of the branch; at limit points, where
-    two points lie within 1e-3 of the ratio, the border is interpolated.
-
-    Parameters
-    ----------
-    branch : Branch
-        Over the frequency ratio, from ``parameter_curve(pair.problem, ..., 1.0)``.
-    level : float
-        In half backlashes: `DRIVE` for the first impacts, `BACK` for impacts on both flanks.
+    two points lie within 1e-3 of the ratio, the border is interpolated. The branch is one over the frequency
+    ratio, of ``parameter_curve(pair.problem, ..., 1.0)``; the level in half backlashes is `DRIVE` for the
+    first impacts, `BACK` for impacts on both flanks.
     """
     from scipy.optimize import brentq
 
@@ -207,12 +202,8 @@ STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
 def range_states(lowest, highest) -> np.ndarray:
     """Tell the contact states (...), indices into `STATE_NAMES`, from the range of the relative deflection.
 
-    `UNKNOWN` where an extreme is nan or infinite, as of a motion that did not settle.
-
-    Parameters
-    ----------
-    lowest, highest : (...) arrays
-        Extremes of the deflection, in half backlashes.
+    ``lowest`` and ``highest`` (...) are in half backlashes. `UNKNOWN` where one is nan or infinite, as of a
+    motion that did not settle.
     """
     lowest, highest = np.asarray(lowest, float), np.asarray(highest, float)
     both = (highest > DRIVE) & (lowest < BACK)
@@ -224,10 +215,7 @@ def range_states(lowest, highest) -> np.ndarray:
 def contact_shares(x) -> dict[str, np.ndarray]:
     """Compute the shares (...) of the instants with the drive flanks, none or the back flanks in contact.
 
-    Parameters
-    ----------
-    x : (..., T) array
-        Relative deflections over a period, in half backlashes.
+    Relative deflections x (..., T) over a period are in half backlashes.
     """
     drive, back = np.asarray(x) > DRIVE, np.asarray(x) < BACK
     touching = {"drive": drive, "free": ~drive & ~back, "back": back}

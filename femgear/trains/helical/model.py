@@ -143,12 +143,8 @@ class HelicalSet(RigidSet):
 def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
     """Make the helical set of a case: bodies and supports of its entries, radii and angles of its gears.
 
-    Parameters
-    ----------
-    gears : PlanetarySet
-        Of the transverse section.
-    mesh_stiffness : (2N,) array, optional
-        Mean stiffnesses along the tooth normals [N/m] where the case gives none.
+    The gears are those of the transverse section; mean stiffnesses (2N,) along the tooth normals [N/m] are
+    taken where the case gives none.
     """
     helical = case.helical
     bodies = {}
@@ -260,14 +256,9 @@ def helical_excitation(
 
 
 def slice_phases(phases, overlap_ratio, *, slices: int, hand: int = 1) -> np.ndarray:
-    """Compute phases (n_meshes S,) of the slices of meshes, as fractions of the mesh period.
+    """Compute phases (n_meshes S,) of the slices, in mesh periods, from those at mid-face (n_meshes,).
 
-    Parameters
-    ----------
-    phases : (n_meshes,) array
-        At mid-face.
-    overlap_ratio, slices, hand
-        See `helical_excitation`.
+    The overlap ratio, slices and hand are those of `helical_excitation`.
     """
     phases = np.asarray(phases, float)
     overlap = np.broadcast_to(np.asarray(overlap_ratio, float), len(phases))
@@ -401,16 +392,11 @@ def normal_record(
 
 
 def shared_load(record: MeshExcitation) -> MeshExcitation:
-    """Move tangent lines to the static state of a set with fixed centres.
+    """Move tangent lines of a record, 2N rows, to the static state of a set with fixed centres.
 
     Each planet passes the force on that it takes, ``F = k_s (d_s - e_s) = k_r (d_r - e_r)``, and one rotation
     of the sun closes the meshes of all planets, ``d_s + d_r = X``; the forces on the sun add up to those of
     the record.
-
-    Parameters
-    ----------
-    record : MeshExcitation
-        2N rows, one a mesh.
     """
     meshes = (2, len(record.stiffness) // 2, -1)
     k = record.stiffness.reshape(meshes)

@@ -186,10 +186,7 @@ def in_series(
 ) -> MultistageSet:
     """Join stages one after the other: each carrier turns the next sun.
 
-    Parameters
-    ----------
-    torsional, lateral : float
-        Of every coupling [N m/rad], [N/m], see `StageCoupling`.
+    All couplings have the same torsional [N m/rad] and lateral [N/m] stiffness, see `StageCoupling`.
     """
     couplings = tuple(
         StageCoupling(Member(n, "carrier"), Member(n + 1, "sun"), torsional, lateral)
@@ -218,12 +215,8 @@ class TrainSpeeds:
 class TrainTorques:
     """Torques without losses [N m], positive counter-clockwise.
 
-    Parameters
-    ----------
-    sun, ring, carrier : (S,) arrays
-        What couplings, housing, input and output give the members; they add up to zero in every stage.
-    output : float
-        On the output member.
+    What couplings, housing, input and output give sun, ring and carrier, (S,) arrays which add up to zero in
+    every stage; ``output`` is that on the output member.
     """
 
     sun: np.ndarray
@@ -233,19 +226,9 @@ class TrainTorques:
 
 
 def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
-    """Compute the speeds of all bodies from that of the input member.
+    """Compute the speeds of all bodies from that of the input member [rad/s], with the teeth of every stage.
 
-    Parameters
-    ----------
-    data : MultistageSet
-        With the teeth of every stage.
-    speed : float
-        Of the input [rad/s].
-
-    Returns
-    -------
-    TrainSpeeds
-        ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)`` in every stage (Willis).
+    ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)`` in every stage (Willis).
 
     Raises
     ------
@@ -262,15 +245,10 @@ def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
 
 
 def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) -> TrainTorques:
-    """Compute the torques on all members from that on the input, without losses.
+    """Compute the torques on all members from that on the input [N m], without losses.
 
-    Parameters
-    ----------
-    torque : float
-        On the input [N m].
-    radii : bool
-        Balance of the lumped sets, from base radii and pressure angles (see `torque_shares`), instead of
-        tooth numbers. Both agree where the radii close.
+    With ``radii`` the balance is that of the lumped sets, from base radii and pressure angles
+    (`torque_shares`), instead of tooth numbers. Both agree where the radii close.
     """
     weights = _radius_weights(data) if radii else _tooth_weights(data)
     # unknown: lambda of every row, and the torque of the output
@@ -431,17 +409,9 @@ def _stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
 
 
 def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
-    """Find the lateral couplings between frames that turn against one another.
+    """Find the lateral couplings between frames that turn against one another, at an input's speed [rad/s].
 
-    Parameters
-    ----------
-    speed : float
-        Of the input [rad/s].
-
-    Returns
-    -------
-    dict of int to float
-        Number of the coupling (from 0): speed of the second frame less that of the first [rad/s].
+    By the number of the coupling (from 0) the speed of the second frame less that of the first [rad/s].
 
     Raises
     ------

@@ -48,12 +48,7 @@ def pieces(stable, wanted: int) -> list[slice]:
 
 
 def orbits(curves: Sequence[tuple], *, title: str = "") -> Figure:
-    """Draw paths of a member's centre in the carrier frame.
-
-    Parameters
-    ----------
-    curves : sequence of (text, path (2, n) [m])
-    """
+    """Draw paths of a member's centre in the carrier frame: curves (text, path (2, n) [m])."""
     figure, (ax,) = new_figure(width=6.2, height=6.2)
     for number, (text, path) in enumerate(curves):
         closed = 1e6 * np.concatenate([path, path[:, :1]], axis=1)

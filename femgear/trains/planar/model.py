@@ -65,10 +65,7 @@ _STILL = 1e-6
 class PlanarModel:
     """A lumped set ready to be solved, and where its elements act.
 
-    Parameters
-    ----------
-    back_flanks : bool
-        The back flanks have columns of their own.
+    ``back_flanks`` tells whether these have columns of their own.
     """
 
     data: PlanarSet
@@ -95,10 +92,7 @@ class PlanarModel:
 def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None = None) -> PlanarSet:
     """Make the lumped set of a case: bodies and supports of its entries, radii and angles of its gears.
 
-    Parameters
-    ----------
-    static : StaticResult, optional
-        Its mean stiffnesses are taken where the case gives none.
+    Mean stiffnesses of the static solution are taken where the case gives none.
     """
     planar, bodies = case.planar, {}
     for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
@@ -287,12 +281,7 @@ def judged_branch(
 ) -> Branch:
     """Judge a branch by Floquet multipliers: coarse first, fine where open or near the unit circle.
 
-    Parameters
-    ----------
-    branch : Branch
-        Followed without stability.
-    progress : callable, optional
-        Called with (done, total).
+    The branch was followed without stability; ``progress`` is called with (done, total).
     """
     solutions = branch.solutions
     found = []
@@ -357,13 +346,8 @@ def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
 def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple[np.ndarray, np.ndarray]:
     """Compute the forces (n, 2N) [N] of drive flanks, and of back flanks on their own lines, by their laws.
 
-    The deflections are those of the solution. Its force lines, cut at the last one, would ring beside a short
-    contact; the law of a one-sided contact does not.
-
-    Parameters
-    ----------
-    theta : (n, n_bases) array
-        Phases of the base frequencies [rad].
+    At phases theta (n, n_bases) [rad], with the deflections of the solution. Its force lines, cut at the last
+    one, would ring beside a short contact; the law of a one-sided contact does not.
     """
     x = np.real(np.exp(1j * (theta @ solution.orders.T)) @ solution.deflection.T)
     force, groups = element_forces(model.problem, x, theta)[0], model.groups
@@ -424,11 +408,7 @@ def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[
 def merged_folds(frequency: np.ndarray, fold: np.ndarray) -> np.ndarray:
     """Find the limit points of a branch, neighbours at one frequency as one: the outermost of them.
 
-    Parameters
-    ----------
-    frequency : (p,) array
-        Along the branch.
-    fold : (p,) bool array
+    From the frequencies (p,) along the branch, and whether each point is a fold (p,).
     """
     groups: list[list[int]] = []
     for point in np.flatnonzero(fold):

@@ -75,14 +75,9 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
 
 
 def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Figure:
-    """Draw the tangent and secant stiffness of every mesh.
+    """Draw the tangent and secant stiffness of every mesh (static.nc).
 
-    Parameters
-    ----------
-    static : xarray.Dataset
-        Contents of static.nc.
-    face_width : float, optional
-        [m]; adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
+    The face width [m] adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
     """
     lines = distinct_lines(static["mesh"].values, static["mesh_stiffness"])
     # two families of curves that differ from planet to planet would cover one another

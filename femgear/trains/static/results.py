@@ -299,15 +299,8 @@ class StressResult:
 def root_values(roots: tuple[RootCycle, ...]) -> dict[str, np.ndarray]:
     """Follow the worst tooth of every gear through every mesh: stresses of both roots and loads.
 
-    Parameters
-    ----------
-    roots : tuple of RootCycle
-        As `femgear.contact.root_stress.root_stress_cycle` gives them.
-
-    Returns
-    -------
-    dict of str to array
-        Variables of `STRESS_VARIABLES`, which has shapes and units; points that a root does not have are NaN.
+    Roots are those of `femgear.contact.root_stress.root_stress_cycle`. The variables are some of
+    `STRESS_VARIABLES`, which has shapes and units; points that a root does not have are NaN.
     """
     histories = [root.history() for root in roots]
     return {
@@ -335,10 +328,7 @@ def _by_gear(rows) -> np.ndarray:
 def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
     """List what is wrong with the contents of static.nc in an engineer's eyes.
 
-    Parameters
-    ----------
-    module : float
-        Of the gears, of helical ones in their transverse section [m].
+    The module is that of the gears, of helical ones in their transverse section [m].
     """
     names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
     force, back, pressure, motion, approach = (data[name].values for name in names)

@@ -137,12 +137,7 @@ def flank_compliances(
 ) -> tuple[Sectors, Bodies]:
     """Make the sector grids of all gears and their flank compliances, the ring held or on its foundation.
 
-    Parameters
-    ----------
-    gears : PlanetarySet
-        Of that case.
-    cache : path, optional
-        Folder of generated grids.
+    The gears are those of the case; ``cache`` is the folder of generated grids.
     """
     material = material_of(case)
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
@@ -199,12 +194,7 @@ def nominal_stresses(
 ) -> NominalStresses:
     """Compute sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
 
-    Parameters
-    ----------
-    sun_torque : float
-        Of either sign [N m].
-    youngs_modulus, poisson_ratio : float
-        [Pa, 1]
+    The torque on the sun may have either sign [N m]; Young's modulus [Pa] and Poisson's ratio [1].
     """
     s = planetary_set
     # torque over reference radius: the same at all three gears
