@@ -443,15 +443,12 @@ def _worst(d: SetDeviations, s: PlanetarySet, *, back: bool) -> np.ndarray:
     first, second = d.planet_pitch.min(axis=1), d.planet_ring_side_pitch.min(axis=1)
     sun_side, ring_side = (second, first) if back else (first, second)
     pitch = np.concatenate([(side * d.sun_pitch).min() + sun_side, ring_side + (side * d.ring_pitch).min()])
-    profile = [_thickest(d, s, kind, back=back) for kind in (0, 1)]
+    sun, planet, ring = (np.linspace(g.form_roll, g.tip_roll, 101) for g in (s.sun, s.planet, s.ring))
+    profile = [
+        profile_separation(d, s, kind, one[:, None], two, back=back).min()
+        for kind, one, two in ((0, sun, planet), (1, planet, ring))
+    ]
     return pitch + np.repeat(profile, N)
-
-
-def _thickest(d: SetDeviations, s: PlanetarySet, kind: int, *, back: bool) -> float:
-    """Smallest separation [m] of any points of the flanks of one kind of mesh."""
-    gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
-    rolls = [np.linspace(gear.form_roll, gear.tip_roll, 101) for gear in gears]
-    return float(profile_separation(d, s, kind, rolls[0][:, None], rolls[1][None, :], back=back).min())
 
 
 def _wedging(d: SetDeviations, s: PlanetarySet):

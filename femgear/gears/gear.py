@@ -198,11 +198,6 @@ def tooth_thickness(gear: Gear, radius):
     return 2.0 * radius * half_thickness_angle(gear, radius)
 
 
-def roll_length(gear: Gear, radius):
-    """Compute the roll length ``sqrt(r^2 - r_b^2)`` [m] of flank points at a radius [m] (float or array)."""
-    return roll(radius, gear.base_radius)
-
-
 def working_half_angles(one: Gear, two: Gear, angle: float) -> tuple[float, float]:
     """Compute the half-thickness angles [rad] of two gears on their working pitch circles.
 

@@ -143,17 +143,11 @@ def mesh_phasing(
     return MeshPhasing(sun_teeth, ring_teeth, positions, rotation, flank, convention, lag)
 
 
-def phasing_of_set(
-    planetary_set: PlanetarySet, *, rotation: int = 1, flank: int = 1, convention: str = "rotation"
-) -> MeshPhasing:
-    """Find the phases of the meshes of a geared set, the lag of its planets from their tooth thickness.
-
-    ``rotation``, ``flank`` and ``convention`` are those of `MeshPhasing`.
-    """
+def phasing_of_set(planetary_set: PlanetarySet) -> MeshPhasing:
+    """Find the phases of the meshes of a geared set, the lag of its planets from their tooth thickness."""
     s, phases = planetary_set, planetary_set.mesh_phases
-    options = {"rotation": rotation, "flank": flank, "convention": convention}
     lag = float(np.mod(phases[0] - phases[s.n_planets], 1.0))
-    return mesh_phasing(s.sun.teeth, s.ring.teeth, s.planet_angles, lag=lag, **options)
+    return mesh_phasing(s.sun.teeth, s.ring.teeth, s.planet_angles, lag=lag)
 
 
 def standard_lag(planet_teeth: int) -> float:
@@ -261,11 +255,6 @@ class PhasingTable:
     planets: np.ndarray
     modes: np.ndarray
     separate: bool
-
-    @property
-    def cancelled(self) -> np.ndarray:
-        """Whether a resultant vanishes on sun, ring, carrier, (H, 3, 4) bool."""
-        return self.members < ZERO
 
     @property
     def excited(self) -> tuple[tuple[str, ...], ...]:

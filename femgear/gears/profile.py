@@ -110,10 +110,7 @@ def transverse_angle(normal_pressure_angle: float, helix_angle: float) -> float:
 
 
 def transverse_tool(module: float, pressure_angle: float, helix_angle: float) -> tuple[float, float]:
-    """Compute the transverse module [m] and pressure angle [rad] of normal ones under a helix angle [rad].
-
-    ``m_t = m_n / cos(beta)``, ``tan(alpha_t) = tan(alpha_n) / cos(beta)`` (ISO 21771, section 4.2).
-    """
+    """Compute ``m_t = m_n / cos(beta)`` [m] and `transverse_angle` [rad] (ISO 21771, section 4.2)."""
     return module / math.cos(helix_angle), transverse_angle(pressure_angle, helix_angle)
 
 

@@ -8,7 +8,7 @@ serves all models: they bring their shapes into `SetMotions`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +53,12 @@ class SetMotions:
     def weighted(self) -> np.ndarray:
         """Planet motions whose squares are twice the kinetic energy, (N, 3, m)."""
         return np.sqrt(self.planet_mass)[:, :, None] * self.planets
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Twice the kinetic energy (m,) of all bodies, without units of time."""
+        central = np.einsum("ba,bam->m", self.central_mass, np.abs(self.central) ** 2)
+        return central + (np.abs(self.weighted) ** 2).sum(axis=(0, 1))
 
 
 def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, planet_angles):
@@ -172,9 +178,8 @@ def phase_shares(motions: SetMotions) -> np.ndarray:
     """
     weighted, N = motions.weighted, len(motions.planet_angles)
     total = (np.abs(weighted) ** 2).sum(axis=(0, 1))
-    whole = total + np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
     energy = np.array([_inside(_harmonic(motions.planet_angles, j), weighted) for j in range(N // 2 + 1)])
-    moves = total > 1e-12 * whole
+    moves = total > 1e-12 * motions.energy
     return np.where(moves, energy / np.where(moves, total, 1.0), np.nan)
 
 
@@ -200,35 +205,40 @@ def phasing(motions: SetMotions) -> tuple[str, ...]:
     return tuple(found)
 
 
-def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> np.ndarray:
-    """Find the orthogonal matrix Q (m, m) that gives modes ``shape @ Q`` one phasing each, where it can.
+def mixture(frequency, energy: Callable[[np.ndarray], np.ndarray], *, tolerance: float = 1e-7) -> np.ndarray:
+    """Find the orthogonal matrix Q (m, m) that parts the modes ``shape @ Q`` of each frequency [Hz].
 
-    Modes of one frequency may be mixed at will; with six planets and more the planet modes of several
-    harmonics coincide on a rigid ring. Within each frequency Q diagonalises ``sum_j j E_j``, E_j the planets'
-    energy in harmonic j, so that harmonics come apart where they are independent, as at equal spacing.
-
-    Parameters
-    ----------
-    motions : SetMotions
-        Of real mass-normalised shapes.
-    frequency : (m,) array
-        [Hz], ascending.
-    tolerance : float
-        Relative distance of frequencies that count as one.
+    Modes of one frequency, to a relative tolerance, may be mixed at will: Q diagonalises the symmetric matrix
+    (k, k) that ``energy`` gives of the numbers (k,) of such modes.
     """
-    frequency, weighted = np.asarray(frequency, float), motions.weighted
+    frequency = np.asarray(frequency, float)
     Q = np.eye(len(frequency))
     starts = np.flatnonzero(np.diff(frequency) > tolerance * frequency[1:]) + 1
     for group in np.split(np.arange(len(frequency)), starts):
-        order = np.zeros((len(group),) * 2)
+        # a single mode stays as it is, sign included
+        if len(group) > 1:
+            Q[np.ix_(group, group)] = np.linalg.eigh(energy(group))[1]
+    return Q
+
+
+def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> np.ndarray:
+    """Find the orthogonal matrix Q (m, m) that gives modes ``shape @ Q`` one phasing each, where it can.
+
+    With six planets and more the planet modes of several harmonics coincide on a rigid ring. Within each
+    frequency [Hz] the `mixture` is that of ``sum_j j E_j``, E_j the planets' energy in harmonic j, of motions
+    of real mass-normalised shapes: harmonics come apart where they are independent, as at equal spacing.
+    """
+    weighted = motions.weighted
+
+    def energy(group: np.ndarray) -> np.ndarray:
+        total = np.zeros((len(group),) * 2)
         for j in range(1, len(motions.planet_angles) // 2 + 1):
             pattern = _harmonic(motions.planet_angles, j)
             part = np.einsum("nk,nam->kam", pattern, weighted[:, :, group]).reshape(-1, len(group))
-            order += j * part.T @ part
-        # a single mode stays as it is, sign included
-        if len(group) > 1:
-            Q[np.ix_(group, group)] = np.linalg.eigh(order)[1]
-    return Q
+            total += j * part.T @ part
+        return total
+
+    return mixture(frequency, energy, tolerance=tolerance)
 
 
 def named_kinds(share, frequency) -> tuple[str, ...]:
@@ -266,8 +276,7 @@ def class_shares(data: RigidSet, shape) -> np.ndarray:
     translational-tilting and planet motion; see `class_energies`, also for unequal spacing.
     """
     motions = gear_set_motions(data, shape)
-    central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
-    return class_energies(motions) / (central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1)))
+    return class_energies(motions) / motions.energy
 
 
 def gear_set_motions(data: RigidSet, shape) -> SetMotions:

@@ -373,8 +373,12 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     for number, coupling in enumerate(data.couplings):
         columns, stiffness = _springs(data, motions, coupling, lateral=number not in turning)
         K += (columns * stiffness) @ columns.T
-    meshes = [free_motions(one.data).T @ mesh_directions(one.data, sign)
-              for one, sign in zip(data.stages, _stage_flanks(data, torque))]  # fmt: skip
+    # torques that load the flanks of every stage; without any those of suns that drive counter-clockwise
+    on_sun = train_torques(data, torque, radii=True).sun if torque else np.ones(len(data.stages))
+    flanks = [flank_sign(one.data, PlanarTorque(float(t))) for one, t in zip(data.stages, on_sun)]
+    meshes = [
+        free_motions(one.data).T @ mesh_directions(one.data, flank) for one, flank in zip(data.stages, flanks)
+    ]
     turned = [member for n in turning for member in (data.couplings[n].first, data.couplings[n].second)]
     ends = [motions[member][:2].T for member in turned]
     load = np.concatenate([part.load for part in parts]) + _torque_load(data, motions, torque)
@@ -398,14 +402,6 @@ def mesh_columns(data: MultistageSet) -> tuple[np.ndarray, ...]:
 def mean_mesh_stiffness(data: MultistageSet) -> np.ndarray:
     """List the mean stiffness (n_meshes,) of all meshes [N/m], in the order of `mesh_columns`."""
     return np.concatenate([stage.data.mesh_stiffness for stage in data.stages])
-
-
-def _stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
-    """Loaded flanks of every stage: 1 where the sun drives counter-clockwise, else -1."""
-    if not torque:
-        return (1,) * len(data.stages)
-    on_sun = train_torques(data, torque, radii=True).sun
-    return tuple(flank_sign(one.data, PlanarTorque(float(t))) for one, t in zip(data.stages, on_sun))
 
 
 def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
