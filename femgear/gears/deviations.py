@@ -182,16 +182,11 @@ def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarr
 def profile_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, kind: int, roll_1, roll_2, *, back: bool = False
 ):
-    """Compute the separation [m] of two flanks by their modifications, of the shape of both roll lengths.
+    """Compute the separation [m] of two flanks by their modifications, of the shape of both roll lengths [m].
 
-    Parameters
-    ----------
-    kind : int
-        0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
-    roll_1, roll_2 : arrays that broadcast
-        Roll lengths of the facing points on gear 1 and gear 2 [m].
-    back : bool
-        The other flanks of the teeth; those of a planet are its ring side in the mesh with the sun.
+    The roll lengths of the facing points on gear 1 and gear 2 broadcast; ``kind`` is 0 for sun-planet (gear 1
+    is the sun), 1 for planet-ring (gear 1 is the planet). With ``back`` the other flanks of the teeth; those
+    of a planet are its ring side in the mesh with the sun.
     """
     s = planetary_set
     one, two = deviations.mesh_forms(kind, back)
@@ -202,14 +197,9 @@ def profile_separation(
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):
     """Compute the separation [m] of the loaded flanks of teeth by pitch deviations, of the teeth's shape.
 
-    Parameters
-    ----------
-    mesh : int
-        0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring.
-    tooth_1, tooth_2 : integer arrays that broadcast
-        Numbers of the teeth on gear 1 and gear 2, taken modulo the tooth numbers.
-    back : bool
-        The other flanks of the teeth: a tooth of sun or ring moves as a whole.
+    The numbers of the teeth on gear 1 and gear 2 broadcast, and are taken modulo the tooth numbers; the mesh
+    is 0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring. With ``back`` the other flanks of the teeth: a
+    tooth of sun or ring moves as a whole.
     """
     d, N = deviations, len(deviations.planet_pitch)
     planets = d.planet_pitch if (mesh < N) != back else d.planet_ring_side_pitch
@@ -336,14 +326,9 @@ def mirrored_deviations(
 
     The image is taken at the line through the first planet, with the sun where it was and the play of all
     meshes taken up the other way. The sun then drives the right flanks of the planets, here the ring side;
-    a tooth of sun or ring has the same form on both flanks and its pitch deviation moves it as a whole.
-
-    Parameters
-    ----------
-    mirrored : PlanetarySet
-        Planet angles ``2 psi_1 - psi``, ascending from the first planet.
-    order : (N,) integer array
-        Mirrored planet ``i`` is original planet ``order[i]``.
+    a tooth of sun or ring has the same form on both flanks and its pitch deviation moves it as a whole. The
+    mirrored set has the planet angles ``2 psi_1 - psi``, ascending from the first planet; its planet ``i`` is
+    original planet ``order[i]``, (N,) whole numbers.
     """
     d, s, order = deviations, planetary_set, [int(n) for n in order]
     axis = 2.0 * s.planet_angles[0]

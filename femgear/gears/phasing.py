@@ -121,14 +121,9 @@ def mesh_phasing(
     convention: str = "rotation",
     lag: float = 0.0,
 ) -> MeshPhasing:
-    """Find the phases of the meshes of planets at given angles [rad].
+    """Find the phases of the meshes of planets at given angles psi_n (N,) [rad], ascending within one turn.
 
-    Parameters
-    ----------
-    planet_angles : (N,) sequence of float
-        psi_n [rad], ascending within one turn.
-    sun_teeth, ring_teeth, rotation, flank, convention, lag
-        See `MeshPhasing`.
+    The other arguments are those of `MeshPhasing`.
 
     Raises
     ------
@@ -179,16 +174,8 @@ def planet_sums(turns, positions, teeth_sum, harmonics, orders) -> np.ndarray:
     their whirl), any q the motion ``exp(i q psi_n)`` of the planets. With equal spacing the mean is 1 where
     ``h turns + q`` is a multiple of N and 0 elsewhere (R. G. Parker, J. Sound Vib. 236, 2000, 561-573).
 
-    Parameters
-    ----------
-    turns, teeth_sum : (...) int arrays
-        Periods by which the phase grows over one turn, and Z; see `MeshPhasing`.
-    positions : (..., N) int array
-    harmonics, orders : (H,), (Q,) int arrays
-
-    Returns
-    -------
-    (..., H, Q) complex array
+    From whole numbers: turns and teeth_sum (...) and positions (..., N) of `MeshPhasing`, harmonics (H,) and
+    orders (Q,); (..., H, Q) complex.
     """
     turns, positions, teeth_sum = (np.asarray(a, np.int64) for a in (turns, positions, teeth_sum))
     rank = np.multiply.outer(turns, np.asarray(harmonics))[..., :, None] + np.asarray(orders)
@@ -489,15 +476,8 @@ def neighbouring_teeth(
 def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     """Check the tooth numbers of a set, and remark on those that profile shifts must help to one.
 
-    Parameters
-    ----------
-    phasing : MeshPhasing
-        With the teeth of sun and ring and the positions of the planets.
-
-    Returns
-    -------
-    tuple of str
-        Remarks in words: the shifts that are needed, tips of unshifted planets that overlap [modules].
+    The phasing has the teeth of sun and ring and the positions of the planets. The remarks are words: the
+    shifts that are needed, tips of unshifted planets that overlap [modules].
 
     Raises
     ------

@@ -140,12 +140,8 @@ ISO_53_C = BasicRack()
 class PinionCutter:
     """Pinion cutter that generates the gaps of an internal gear.
 
-    Parameters
-    ----------
-    profile_shift : float
-        Shift of the cutter in modules (0 when half worn).
-    tip_radius : float, optional
-        Rounding of the cutter's tips in modules; None takes the basic rack's ``root_radius``.
+    ``profile_shift`` in modules is 0 when it is half worn, ``tip_radius`` in modules rounds its tips; None
+    takes the basic rack's ``root_radius``.
     """
 
     teeth: int

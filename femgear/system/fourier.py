@@ -243,14 +243,9 @@ def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> Fourier
 
 
 def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
-    """Make the tooth errors (2N, H) [m] of one wave of each kind, shifted by the mesh phases.
+    """Make the tooth errors (2N, H) [m] of one wave of each kind, shifted by the mesh phases (2N,) [periods].
 
-    Parameters
-    ----------
-    sun_planet, planet_ring : (H,) complex arrays
-        Harmonics 1 to H at phase zero [m].
-    phases : (2N,) array
-        Fractions of the mesh period, see `femgear.trains.rigid.phased_series`.
+    The waves are harmonics 1 to H at phase zero [m]; phases as of `femgear.trains.rigid.phased_series`.
 
     Raises
     ------
@@ -314,20 +309,10 @@ Series = FourierSeries | StepSeries | SummedSeries
 
 
 def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
-    """List the mean and all lines with ``sum_b |orders_b| <= harmonics``, none of them twice.
+    """List the mean and all lines (L, bases) with ``sum_b |orders_b| <= harmonics``, none of them twice.
 
-    Parameters
-    ----------
-    harmonics : int
-        Highest harmonic; with several bases the highest sum of orders.
-    bases : int
-        Number of base frequencies.
-
-    Returns
-    -------
-    (L, bases) int array
-        Line 0 is the mean; of a line and its mirror image only the one whose last order that is not zero is
-        positive.
+    Line 0 is the mean; of a line and its mirror image only the one whose last order that is not zero is
+    positive.
     """
     if int(harmonics) != harmonics or harmonics < 0 or bases < 1:
         raise CaseError(
@@ -340,17 +325,13 @@ def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
 
 
 def side_bands(carrier: int, mesh: int, bands: int) -> np.ndarray:
-    """List the lines of the extended harmonic balance: carrier and mesh harmonics with side bands.
+    """List the lines (L, 2) of the extended harmonic balance: carrier and mesh harmonics with side bands.
 
     ``m omega_1`` (m <= carrier), ``n omega_2`` (n <= mesh) and ``n omega_2 +- q omega_1`` (q <= bands), with
     the carrier frequency first and the mesh frequency second (Guo, Keller and Parker, NREL/CP-5000-55355,
-    Eqs. 2-13; Eur. J. Mech. A/Solids 47, 2014, 45-57).
-
-    Returns
-    -------
-    (L, 2) int array
-        Line 0 is the mean. Lines whose frequencies coincide because the mesh frequency is a multiple of the
-        carrier frequency stay distinct: the phases are treated as independent.
+    Eqs. 2-13; Eur. J. Mech. A/Solids 47, 2014, 45-57). Line 0 is the mean. Lines whose frequencies coincide
+    because the mesh frequency is a multiple of the carrier frequency stay distinct: the phases are treated as
+    independent.
     """
     for name, value in (("carrier harmonics", carrier), ("mesh harmonics", mesh), ("side bands", bands)):
         if int(value) != value or value < 0:

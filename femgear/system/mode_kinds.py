@@ -106,18 +106,11 @@ def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, plane
 
 
 def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
-    """Collect the motions of the bodies by the names of their coordinates.
+    """Collect the motions of the bodies by the names of their coordinates, from shapes (n, m).
 
-    Parameters
-    ----------
-    shape : (n, m) array
-    mass : (n,) array
-        Diagonal mass matrix [kg, kg m^2].
-    dofs : sequence of str
-        ``"sun: x"``, ``"carrier: rotation"`` or ``"ring: u"``, ``"planet 1: x"`` or ``"planet 1: radial"``;
-        other names and names that are missing do not count.
-    planet_angles : (N,) array
-        [rad]
+    Masses (n,) are the diagonal [kg, kg m^2], planet angles (N,) [rad]. Names are ``"sun: x"``,
+    ``"carrier: rotation"`` or ``"ring: u"``, ``"planet 1: x"`` or ``"planet 1: radial"``; other names and
+    names that are missing do not count.
     """
     shape, place = np.asarray(shape), {name: i for i, name in enumerate(dofs)}
     planet_angles = np.asarray(planet_angles, float)

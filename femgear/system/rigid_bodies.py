@@ -198,15 +198,9 @@ class RigidSet(ABC):
 class PlanarSet(RigidSet):
     """Data of the lumped set; bodies, radii, angles and mesh stiffnesses as in `RigidSet`.
 
-    Parameters
-    ----------
-    planet_bearing : float or (N,) array
-        Isotropic stiffness between planet and carrier [N/m]; infinite fixes the planet's axis to its pin.
-
-    Notes
-    -----
-    Published data are often rounded, or mix reference and working angles: radii that do not close are
-    taken as they are, and `closure` tells by how much.
+    ``planet_bearing`` is the isotropic stiffness between planet and carrier, a number or one a planet [N/m];
+    infinite fixes the planet's axis to its pin. Published data are often rounded, or mix reference and
+    working angles: radii that do not close are taken as they are, and `closure` tells by how much.
     """
 
     axes: ClassVar[tuple[int, ...]] = (0, 1, 5)
@@ -259,16 +253,8 @@ class PlanarTorque:
 class HelicalSupport:
     """Isotropic support of a body in all six directions; infinite holds a motion, zero leaves it free.
 
-    Parameters
-    ----------
-    radial, axial : float
-        [N/m]
-    tilt, torsional : float
-        Against rotation about the two axes in the plane, and about the axis of the body [N m/rad].
-
-    Notes
-    -----
-    As `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
+    Radial and axial [N/m], against tilts about the two axes in the plane and against rotation about the axis
+    of the body [N m/rad]; as `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
 
     Raises
     ------

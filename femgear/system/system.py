@@ -238,15 +238,8 @@ def gear_meshes(
 def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the harmonics of stiffness, deflection and force of the meshes, ``count`` mesh harmonics each.
 
-    Parameters
-    ----------
-    count : int
-        Mesh harmonics kept; a record of several periods keeps all its lines up to that frequency.
-
-    Returns
-    -------
-    stiffness, deflection, force : (n_meshes, count periods + 1) complex arrays
-        [N/m], [m], [N].
+    [N/m], [m] and [N], (n_meshes, count periods + 1) complex each: a record of several periods keeps all its
+    lines up to that frequency.
 
     Raises
     ------
@@ -485,12 +478,8 @@ def check_matrices(
 ) -> None:
     """Refuse matrices of wrong shapes (E-SHAPE), not finite (E-FINITE) or of wrong symmetries (E-SYMMETRY).
 
-    Parameters
-    ----------
-    symmetric : tuple of str
-        Matrices that must be; circulatory forces make K unsymmetric, which time integration takes.
-    columns : int, optional
-        Of ``W``; one or more when not given.
+    Circulatory forces make K unsymmetric, which time integration takes: ``symmetric`` names those that must
+    be. ``W`` has so many ``columns``; one or more when that is not given.
     """
     n = len(system.M)
     shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "load": (n,), "gyroscopic": (n, n), "W": (n, columns)}

@@ -212,14 +212,8 @@ class Gravity:
 class MemberBearing:
     """A radial bearing between two central members, or between one and the housing.
 
-    Parameters
-    ----------
-    stiffness : float
-        [N/m]
-    clearance : float or None
-        Radial, from the centred position [m]; None leaves the columns without a bearing.
-    inner, outer : str
-        ``"carrier"``, ``"ring"`` or ``"sun"``; ``outer`` also ``"housing"``.
+    ``stiffness`` [N/m] and radial clearance from the centred position [m], None for columns without a
+    bearing; ``inner`` and ``outer`` are "carrier", "ring" or "sun", ``outer`` also "housing".
     """
 
     stiffness: float
@@ -405,15 +399,10 @@ def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] =
 
 
 def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float] | np.ndarray) -> np.ndarray:
-    """Assign a damping ratio (m,) to every mode from one a natural frequency.
+    """Assign damping ratios (m,) to modes of ascending frequency (m,) [Hz], from one of all modes or several.
 
-    Parameters
-    ----------
-    frequency : (m,) array
-        Of the modes, ascending [Hz].
-    ratios : float or sequence of float
-        Of all modes; a sequence gives one a natural frequency (a pair of modes has one), ascending, the last
-        one for the rest. Motions at frequency zero have none and do not count.
+    Several are one a natural frequency (a pair of modes has one), ascending, the last one for the rest.
+    Motions at frequency zero have none and do not count.
     """
     given = np.atleast_1d(np.asarray(ratios, float))
     moving = frequency > 0.0
@@ -551,14 +540,8 @@ def modes_dataset(
 ) -> xr.Dataset:
     """Collect modes.nc: frequencies, kinds and shapes of all bodies, mesh deflections, no elastic ring.
 
-    Parameters
-    ----------
-    attrs : dict
-        Of the file; the number of unknowns is added behind its title.
-    phasing : (m,) tuple of str, optional
-        Of every mode.
-    along : str
-        What is added to the descriptions of stiffness and deflection of the meshes.
+    The number of unknowns is added behind the title in the attributes of the file; ``phasing`` (m,) is that
+    of every mode, ``along`` what the descriptions of stiffness and deflection of the meshes end with.
     """
     shape, dofs = in_space(data, modes.shape)
     count, slices = 2 * data.n_planets, len(data.contact_lines.heights)

@@ -248,20 +248,9 @@ def step_effort(
     """Compare a step between two points with the angle [rad] and contraction aimed at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
-    a jump from curve to curve turns the chord but not the tangents.
-
-    Parameters
-    ----------
-    point, new : CurvePoint
-        Both ends of the step.
-    corner, sharp : bool
-        The step is so short that the curve may turn in a corner, or that any turn is one of a sharp corner,
-        between whose sides the chord lies.
-
-    Returns
-    -------
-    float
-        A ratio without unit: above one the next step has to be shorter.
+    a jump from curve to curve turns the chord but not the tangents. A ``corner`` says that the step is so
+    short that the curve may turn in one, ``sharp`` that any turn is one of a sharp corner, between whose
+    sides the chord lies. Above one the next step has to be shorter.
 
     Raises
     ------

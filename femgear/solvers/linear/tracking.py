@@ -72,17 +72,7 @@ class TrackedModes:
 
 @dataclass(frozen=True)
 class CriticalSpeed:
-    """A line of excitation at a natural frequency.
-
-    Parameters
-    ----------
-    speed : float
-        [rad/s]
-    frequency : float
-        [Hz]
-    order : float
-        Of the line, in multiples of the speed.
-    """
+    """A line of excitation, ``order`` times the speed [rad/s], at a natural frequency [Hz] of a branch."""
 
     speed: float
     frequency: float

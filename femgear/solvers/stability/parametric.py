@@ -136,19 +136,8 @@ def decisive_harmonics(modes: Modes, excitation: MeshExcitation, kept: int) -> i
 
     ``q'' + 2 zeta w q' + w^2 (1 + eps cos 2 w t) q = 0`` is stable below ``eps = 4 zeta`` (Nayfeh and Mook,
     Nonlinear Oscillations, 1979, section 5.3), and a mode whose strain is all in the mesh has
-    ``eps = |k_h|/k_0``; half of that is taken.
-
-    Parameters
-    ----------
-    modes, excitation
-        As given to `stability`.
-    kept : int
-        Mesh harmonics of the response.
-
-    Returns
-    -------
-    int
-        Six or more, as far as there are so many; at most 64: the amplitudes fall as one over the harmonic.
+    ``eps = |k_h|/k_0``; half of that is taken. Six or more of the harmonics ``kept`` by the response, as far
+    as there are so many; at most 64: the amplitudes fall as one over the harmonic.
     """
     most = min(kept, 64)
     stiffness = np.abs(mesh_harmonics(excitation, most)[0])

@@ -304,17 +304,9 @@ class ModalScheme:
 def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the exact step of ``y'' + 2 zeta w y' + w^2 y = p`` with p linear in it, state ``(y, v)``.
 
-    Parameters
-    ----------
-    natural, damping_ratio : (m,) arrays
-        ``w`` [rad/s], zero for rigid modes, and ``zeta``, above one too.
-    step : float
-        [s].
-
-    Returns
-    -------
-    transition (m, 2, 2), first (m, 2), last (m, 2) arrays
-        ``state_1 = transition state_0 + first p_0 + last p_1``.
+    Of natural frequencies w (m,) [rad/s], zero for rigid modes, damping ratios zeta (m,), above one too, and
+    a step [s]: transition (m, 2, 2), first (m, 2) and last (m, 2) of
+    ``state_1 = transition state_0 + first p_0 + last p_1``.
     """
     natural = np.asarray(natural, float)
     turn, scale = natural * step, np.array([1.0, 1.0 / step])

@@ -129,16 +129,9 @@ def common_period(frequency, periods: int) -> float:
 
 @dataclass(frozen=True)
 class PoincareSection:
-    """Points of a section.
+    """Points of a section: times (n_points,) [s], displacement [m] and velocity [m/s] (n_points, n).
 
-    Parameters
-    ----------
-    time : (n_points,) array
-        [s].
-    displacement, velocity : (n_points, n) arrays
-        [m, m/s]
-    deflection : (n_points, n_columns) array
-        ``W^T q`` [m].
+    ``deflection`` (n_points, n_columns) is ``W^T q`` [m].
     """
 
     time: np.ndarray

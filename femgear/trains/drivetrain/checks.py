@@ -79,18 +79,12 @@ def speed_range(
     speed: float,
     start: float = 0.0,
 ) -> SpeedRange:
-    """Compute the speeds of the first body as the rigid chain turns under its torques.
+    """Compute the speeds of the first body as the rigid chain turns under its torques, from start to end [s].
 
     Newton's law of the rigid chain, d omega / dt = sum(ratio_b T_b(t)) / I with its inertia I about the axis
-    of the first body. Torques are linear between their instants, so that the speed there is a sum of
-    trapezoids, and a parabola in between with its vertex where the sum is zero.
-
-    Parameters
-    ----------
-    duration, start : float
-        End and begin of the range [s].
-    speed : float
-        Of the first body at time zero [rad/s].
+    of the first body, whose ``speed`` is that at time zero [rad/s]. Torques are linear between their
+    instants, so that the speed there is a sum of trapezoids, and a parabola in between with its vertex where
+    the sum is zero.
     """
     instants = np.concatenate([[0.0, start, duration], *(one.times for one in torques)])
     times = np.unique(np.clip(instants, 0.0, duration))

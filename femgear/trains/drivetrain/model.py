@@ -143,12 +143,8 @@ def drivetrain_model(
 ) -> DrivetrainModel:
     """Assemble matrices, mesh directions and mesh stiffness of a drivetrain.
 
-    Parameters
-    ----------
-    harmonics : int
-        Terms of the mesh stiffness series.
-    turning : bool
-        Mesh directions of planetary stages turn with the carrier; False freezes them at angle zero.
+    The series of the mesh stiffness has so many ``harmonics``. Mesh directions of planetary stages turn with
+    the carrier, or are those at angle zero.
 
     Raises
     ------
@@ -441,24 +437,12 @@ def refusals_located(case: DrivetrainCase) -> Iterator[None]:
 
 
 def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
-    """Choose the driver of every stage by the torques.
+    """Choose the driver of every stage by the torques; stages whose driver is given keep it.
 
-    The torques, as means over the run, and the inertia forces of the acceleration of the free spin that they
-    give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so that
-    the load of parallel paths follows their stiffness. Weight does not count.
-
-    Parameters
-    ----------
-    train : Drivetrain
-        Stages whose driver is given keep it.
-    duration : float
-        Of the run [s].
-
-    Returns
-    -------
-    Drivetrain
-        A stage without load on its flanks, and one that its first body (the carrier) drives, stay as they
-        are.
+    The torques, as means over the run [s], and the inertia forces of the acceleration of the free spin that
+    they give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so
+    that the load of parallel paths follows their stiffness. Weight does not count. A stage without load on
+    its flanks, and one that its first body (the carrier) drives, stay as they are.
 
     Raises
     ------

@@ -41,11 +41,8 @@ def amplitude_and_mean(
 ) -> Figure:  # fmt: skip
     """Draw amplitude and mean of a deflection over frequency, dashed where it is not known to be stable.
 
-    Parameters
-    ----------
-    curves : sequence of (text, ratio (p,), amplitude (p,), mean (p,), stable (p,) bool)
-    sweeps : sequence of (text, ratio (f,), amplitude (f,), mean (f,))
-        Drawn as markers.
+    Curves are (text, ratio (p,), amplitude (p,), mean (p,), stable (p,) bool); sweeps, drawn as markers, are
+    (text, ratio (f,), amplitude (f,), mean (f,)).
     """
     figure, (top, bottom) = new_figure(rows=2, width=8.5, height=7.0, sharex=True)
     for number, (text, ratio, amplitude, mean, stable) in enumerate(curves):

@@ -46,16 +46,10 @@ _SHORT = 1e-3
 
 @dataclass(frozen=True)
 class PairBearings:
-    """Bearings of both gears along the line of action.
+    """Bearings of both gears along the line of action, two numbers each: gear 1 and gear 2.
 
-    Parameters
-    ----------
-    mass : (float, float)
-        Of gears 1 and 2 over the equivalent mass m_e.
-    stiffness : (float, float)
-        Of their bearings over the mean mesh stiffness.
-    damping_ratio : float
-        ``c_i = 2 xi sqrt(k_i m_i)``.
+    Masses over the equivalent mass m_e, stiffnesses over the mean mesh stiffness, and the damping ratio xi of
+    ``c_i = 2 xi sqrt(k_i m_i)``.
     """
 
     mass: tuple[float, ...]

@@ -177,16 +177,8 @@ def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_widt
     """Compute the transverse and overlap contact ratio (2, 2) of the sun-planet and the planet-ring mesh.
 
     ``eps_gamma = eps_alpha + eps_beta``, ``eps_beta = b sin|beta| / (pi m_n)`` (ISO 21771, sections 5.4.2.3
-    and 5.4.4); a row is one mesh.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-        Its gears in the transverse section.
-    helix_angle : float
-        [rad]
-    face_width : float
-        That both gears of a mesh have in common [m].
+    and 5.4.4); a row is one mesh. The gears are those of the transverse section; helix angle [rad] and the
+    face width that both gears of a mesh have in common [m].
     """
     s = planetary_set
     normal_module = s.sun.module * math.cos(helix_angle)
@@ -316,16 +308,8 @@ def section_stiffness(
 ) -> SectionStiffness:
     """Compute the stiffness of the teeth of both sections, from one planet each under equal load a length.
 
-    The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse.
-
-    Parameters
-    ----------
-    case : Case
-        With a section helical.
-    gears : PlanetarySet
-        Of its transverse section.
-    cache : path, optional
-        Folder of generated grids.
+    The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse. The
+    gears are those of the transverse section; ``cache`` is the folder of generated grids.
 
     Raises
     ------

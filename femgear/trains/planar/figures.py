@@ -65,13 +65,7 @@ def bearing_forces(
 ) -> Figure:
     """Draw sizes of bearing forces over one turn, of the weight against the carrier or of the carrier.
 
-    Parameters
-    ----------
-    angle : (n,) array
-        [rad]
-    curves : sequence of (text, force (2, n) [N])
-    title, over : str
-        Above the figure, and under its axis.
+    Over the angle (n,) [rad], whose name is ``over``: curves (text, force (2, n) [N]).
     """
     figure, (ax,) = new_figure()
     for number, (text, force) in enumerate(curves):

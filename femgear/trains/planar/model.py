@@ -385,14 +385,8 @@ def _phases(orders: np.ndarray) -> np.ndarray:
 def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[tuple[int, str]]:
     """Choose points of a branch to draw over the phase, in order, with what they are; the last is the top.
 
-    Parameters
-    ----------
-    rms : (p,) array
-        Amplitude along the branch.
-    back : (p,) array
-        Share of the cycle in which back flanks touch.
-    stable : (p,) int array
-        1 where known to be stable, 0 where known not to be, -1 where not known.
+    Along the branch, (p,) each: amplitude, share of the cycle in which back flanks touch, and stability: 1
+    where known to be stable, 0 where known not to be, -1 where not known.
     """
     sure = stable == 1
     top, words = int(np.argmax(rms)), "largest response"

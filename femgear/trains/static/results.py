@@ -166,14 +166,9 @@ class StaticResult:
 class NominalStresses:
     """Nominal stresses after ISO 6336 with equal load on all planets and no load factors.
 
-    Parameters
-    ----------
-    contact : (2,) array
-        sigma_H0 of sun-planet and planet-ring [Pa] (ISO 6336-2, method B).
-    root : (2, 2) array
-        sigma_F0 of gear 1 and gear 2 of both [Pa] (ISO 6336-3, method B).
-    message : str
-        Why a value is NaN: gears outside the range of the method; otherwise empty.
+    ``contact`` (2,) is sigma_H0 of sun-planet and planet-ring [Pa] (ISO 6336-2, method B), ``root`` (2, 2)
+    sigma_F0 of gear 1 and gear 2 of both [Pa] (ISO 6336-3, method B); ``message`` tells why a value is NaN,
+    of gears outside the range of the method.
     """
 
     contact: np.ndarray

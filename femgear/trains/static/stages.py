@@ -57,14 +57,8 @@ def solve_static(
 ) -> StaticResult:
     """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
 
-    Parameters
-    ----------
-    cache : path, optional
-        Folder of generated grids.
-    progress : callable, optional
-        Called with (stage, done, total).
-    steps : Steps, optional
-        Flank compliances of other cases, taken where they are those of this one.
+    ``cache`` is the folder of generated grids, ``progress`` is called with (stage, done, total), and flank
+    compliances of other cases are taken from ``steps`` where they are those of this one.
 
     Raises
     ------
@@ -149,15 +143,8 @@ def flank_compliances(
 def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silent) -> StressResult:
     """Find root stresses of every gear in every mesh, their ranges over a turn, load and nominal stresses.
 
-    The static solution need not have pressures (`StaticResult.cycle.pressure`); where it has, they are part
-    of the result.
-
-    Parameters
-    ----------
-    static : StaticResult
-        Of that case.
-    progress : callable, optional
-        Called with (stage, done, total).
+    The static solution of the case need not have pressures (`StaticResult.cycle.pressure`); where it has,
+    they are part of the result. ``progress`` is called with (stage, done, total).
 
     Raises
     ------
