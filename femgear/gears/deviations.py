@@ -369,6 +369,16 @@ def _reflected(runout: Runout, axis: float) -> Runout:
     return replace(runout, phase=axis - runout.phase)
 
 
+def loaded_flanks(d: SetDeviations, s: PlanetarySet) -> tuple[tuple[str, FlankForm, Gear], ...]:
+    """Name the four kinds of loaded flanks, with their forms and gears."""
+    return (
+        ("sun", d.sun, s.sun),
+        ("planet, sun side", d.planet_sun_side, s.planet),
+        ("planet, ring side", d.planet_ring_side, s.planet),
+        ("ring", d.ring, s.ring),
+    )
+
+
 def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[GeometryWarning, ...]:
     """Check the deviations of a planetary set, and list what deserves a warning.
 
@@ -383,16 +393,10 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
     GeometryError
         E-MODIFICATION: modifications of a flank that together exceed 0.2 modules.
     """
-    d, s = deviations, planetary_set
     found: list[GeometryWarning] = []
-    for flank, form, gear in (
-        ("sun", d.sun, s.sun),
-        ("planet, sun side", d.planet_sun_side, s.planet),
-        ("planet, ring side", d.planet_ring_side, s.planet),
-        ("ring", d.ring, s.ring),
-    ):
+    for flank, form, gear in loaded_flanks(deviations, planetary_set):
         found += check_flank(flank, form, gear)
-    return (*found, *_wedging(d, s))
+    return (*found, *_wedging(deviations, planetary_set))
 
 
 def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[float, float]:

@@ -232,6 +232,11 @@ def phase_of(theta, orders) -> np.ndarray:
     return theta[..., : len(used)] @ used
 
 
+def orders_of(base: int, bases: int, order: int = 1) -> tuple[int, ...]:
+    """Make the orders (n_bases,) that name one base frequency, counted from 0, alone."""
+    return tuple(order if place == base else 0 for place in range(bases))
+
+
 def constant(values) -> FourierSeries:
     """Make a series of coefficients (n,) that do not change."""
     return FourierSeries(np.atleast_1d(np.asarray(values, float))[:, None])

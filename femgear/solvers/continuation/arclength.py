@@ -32,8 +32,6 @@ from femgear.solvers.continuation.corrector import (
 
 # A loop is closed when it meets its start within this (scaled) distance.
 _CLOSED = 1e-6
-# One that starts in a branch point is closed by the same one within this part of the step.
-_CLOSED_BRANCH = 1e-2
 # Steps below this part of the largest one may turn in a corner of the curve; of a larger one than that of
 # a tenth of the scales they are no shorter than gaps between curves.
 _CORNER, _CORNER_LARGEST = 1e-3, 0.1
@@ -179,7 +177,7 @@ def _scaled_curve(
 
 
 def _collect(curve: ScaledCurve, first: CurvePoint) -> Curve:
-    """The whole curve from a corrected point, of orientation zero in a branch point, along its tangent."""
+    """The whole curve from a corrected point along its tangent."""
     points, closed, complete, message = _walk(curve, first)
     z = np.array([p.z for p in points])
     parameter = z[:, -1] * curve.unit
@@ -333,8 +331,6 @@ def _at_bound(segment: Segment, low, high, bound: float):
 
 def _closing(segment: Segment, first: CurvePoint, events, count: int):
     """Events up to the start of the curve, when the segment meets it again in the same sense."""
-    if first.orientation == 0.0:
-        return _closing_branch(segment, first, events, count)
     offset = first.z - segment.first.z
     h = float(segment.first.tangent @ offset)
     if count < 3 or not 0.0 < h <= segment.length or segment.first.tangent @ first.tangent < 0.5:
@@ -348,12 +344,3 @@ def _closing(segment: Segment, first: CurvePoint, events, count: int):
     if np.linalg.norm(met.z - first.z) > _CLOSED or met.tangent @ first.tangent < 0.9:
         return events, False
     return [e for e in events if e[0] < h - 1e-9] + [(h, replace(first, kind="regular"))], True
-
-
-def _closing_branch(segment: Segment, first: CurvePoint, events, count: int):
-    """The same for a curve that starts in a branch point, where Newton's method would not converge."""
-    for place, point in events if count >= 3 else ():
-        near = np.linalg.norm(point.z - first.z) <= _CLOSED_BRANCH * segment.length
-        if point.kind == "branch point" and near and point.tangent @ first.tangent > 0.9:
-            return [e for e in events if e[0] < place] + [(place, replace(first, kind="regular"))], True
-    return events, False

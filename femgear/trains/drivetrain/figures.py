@@ -231,7 +231,7 @@ def _campbell_figure(modes: xr.Dataset) -> Figure:
 def transient_figures(data: xr.Dataset) -> dict[str, Figure]:
     """Draw speeds [rpm], deviations [mrad] and mesh forces [kN] of transient.nc over time, by file name."""
     time, count, meshes = data["time"].values, data.sizes["body"], chosen_meshes(data)
-    passed = _pass_band(data)
+    passed = "" if data.attrs["filter"] == "none" else f"low-passed to {pass_band(data):.4g} Hz"
     shown = list(range(1, count))[-MOST_PANELS:] or [0]
     deviations = _curves(data, "deviation", shown)
     figures = {
@@ -271,11 +271,6 @@ def _curves(data: xr.Dataset, name: str, columns, kept=slice(None)) -> list[tupl
         (str(data[owner].values[i]), [(text, values[v, i]) for v, text in enumerate(variants)])
         for i in columns
     ]
-
-
-def _pass_band(data: xr.Dataset) -> str:
-    """What the low pass of the records of transient.nc leaves."""
-    return "" if data.attrs["filter"] == "none" else f"low-passed to {pass_band(data):.4g} Hz"
 
 
 def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:

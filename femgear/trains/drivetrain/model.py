@@ -26,7 +26,7 @@ from femgear.errors import CaseError
 from femgear.fe.shaft import beam_element, disc_matrices
 from femgear.solvers.linear.modal import modal_damping
 from femgear.system.force_laws import positive_part
-from femgear.system.fourier import FourierSeries, phase_of
+from femgear.system.fourier import FourierSeries, orders_of, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, torque_histories
 from femgear.trains.drivetrain.kinematics import (
@@ -274,8 +274,8 @@ def _flanks(
     if not model.turning:
         fixed, even, odd = fixed + even, empty, empty
     used = [contacts.columns[j] for j in own]
-    order = tuple(int(b == model.mesh_base[meshes[0]]) for b in range(n_bases))
-    turn = tuple(int(planetary and b == 2 * stage) for b in range(n_bases))
+    order = orders_of(int(model.mesh_base[meshes[0]]), n_bases)
+    turn = orders_of(2 * stage, n_bases, int(planetary))
     fixed, even, odd = (np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd))
     stiffness = FourierSeries(model.stiffness[meshes], order)
     return _TurningMeshes(np.array(used), fixed, even, odd, stiffness, turn, contacts.gap[own], separates)

@@ -33,7 +33,7 @@ import numpy as np
 from femgear.solvers.continuation.branches import Branch
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import FourierSeries, constant
+from femgear.system.fourier import FourierSeries, constant, orders_of
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 # deflections of drive and back contact in half backlashes
@@ -111,8 +111,7 @@ class ImpactPair:
 
     def mesh(self) -> GearMeshes:
         """Make the mesh with its play on the one column, see `ImpactPair.problem`."""
-        orders = _orders(0, 1, len(self.frequency))
-        k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders)
+        k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders_of(0, len(self.frequency)))
         return GearMeshes(np.array([0]), k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
 
     def _matrices(self):
@@ -130,11 +129,11 @@ class ImpactPair:
         count, base = len(self.frequency), 0
         for h, error in enumerate(self.tooth_error, 1):
             if error:
-                yield HarmonicForce((ratio * h) ** 2 * error * along, _orders(0, h, count))
+                yield HarmonicForce((ratio * h) ** 2 * error * along, orders_of(0, count, h))
         for error, z in zip(self.eccentricity, self.teeth):
             if error:
                 base += 1
-                yield HarmonicForce((ratio / z) ** 2 * error * along, _orders(base, 1, count))
+                yield HarmonicForce((ratio / z) ** 2 * error * along, orders_of(base, count))
 
 
 def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tuple[float, ...]:
@@ -182,10 +181,6 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
 def _lowest_deflection(solution) -> float:
     """Smallest deflection of a solution in scaled time, over 2048 phases."""
     return float(solution.at(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES).min())
-
-
-def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
-    return tuple(order if place == base else 0 for place in range(count))
 
 
 NORMAL, ONE_SIDED, TWO_SIDED, UNKNOWN = 0, 1, 2, 3

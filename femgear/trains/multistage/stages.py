@@ -16,7 +16,7 @@ from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import MeshErrorResponse, modal_error_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.force_laws import GearMeshes, TurningSprings, turning_wave
-from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample, tooth_lines
+from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, orders_of, sample, tooth_lines
 from femgear.system.mesh_directions import gear_set_system, mesh_elements
 from femgear.system.mode_kinds import class_energies, gear_set_motions, mixture, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
@@ -227,9 +227,7 @@ def _stage_elements(
     """The meshes of all stages on their columns, each with its own base frequency."""
     for number, (stage, columns) in enumerate(zip(data.stages, mesh_columns(data)), 1):
         made = meshes.get(number) or mesh_elements(stage.data)
-        orders = [0] * bases
-        orders[number - 1] = 1 if forward[number - 1] else -1
-        own = {}
+        orders, own = orders_of(number - 1, bases, 1 if forward[number - 1] else -1), {}
         for name in ("stiffness", "deflection", "force"):
             series = getattr(made, name)
             own[name] = replace(series, orders=tuple(series.orders[0] * one for one in orders))
@@ -240,11 +238,10 @@ def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int
     """Lateral springs between frames that turn apart, each with its own base frequency."""
     for place, (number, relative) in enumerate(turning.items()):
         one = data.couplings[number]
-        orders = [0] * bases
-        orders[len(data.stages) + place] = 1 if relative > 0.0 else -1
+        orders = orders_of(len(data.stages) + place, bases, 1 if relative > 0.0 else -1)
         phase = data.stages[one.second.stage - 1].angle - data.stages[one.first.stage - 1].angle
         first = data.n_meshes + 4 * place
-        wave = turning_wave(tuple(orders), phase=phase)
+        wave = turning_wave(orders, phase=phase)
         yield TurningSprings(np.arange(first, first + 4)[None], np.array([one.lateral]), wave)
 
 

@@ -19,6 +19,7 @@ from femgear.solvers.continuation.branches import Branch, frequency_response_cur
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.harmonic_balance import displacements
+from femgear.solvers.periodic.phase_grid import equidistant_phases
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.force_laws import GearMeshes
@@ -377,9 +378,7 @@ def column_contact(problem: NonlinearSystem, solution: PeriodicSolution) -> np.n
 def _phases(orders: np.ndarray) -> np.ndarray:
     """Instants (n, bases) [rad] that fill the phases evenly; one phase of a base that no line has."""
     used = np.any(orders != 0, axis=0)
-    counts = np.where(used, _GRID[: len(used)] if used.sum() > 1 else _SAMPLES, 1)
-    axes = [2.0 * np.pi * np.arange(count) / count for count in counts]
-    return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
+    return equidistant_phases(np.where(used, _GRID[: len(used)] if used.sum() > 1 else _SAMPLES, 1).tolist())
 
 
 def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[tuple[int, str]]:
