@@ -106,7 +106,7 @@ def continue_curve(
     parameter : float
         Where to start, within the limits.
     limits : (low, high)
-        The curve ends exactly there.
+        Two different numbers; the curve ends exactly there.
     scale : float or (n,) array
         Typical size of ``u``.
     unit : float, optional
@@ -123,18 +123,13 @@ def continue_curve(
     Raises
     ------
     CaseError
-        A start or limits that cannot be used.
+        Scales that are not positive (E-RANGE).
     ConvergenceError
         No solution near the start.
     """
     curve = _scaled_curve(
         evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, describe=describe
     )
-    if not limits[0] <= parameter <= limits[1]:
-        raise CaseError(
-            f"the start at {describe(parameter)} lies outside the range", code="E-RANGE",
-            limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
-        )  # fmt: skip
     axis = np.zeros(len(curve.scale) + 1)
     axis[-1] = 1.0
     try:
@@ -162,7 +157,7 @@ def _scaled_curve(
 
     Arguments as for :func:`continue_curve`.
     """
-    low, high = _checked_limits(limits)
+    low, high = limits
     unit = high - low if unit is None else unit
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
@@ -221,21 +216,6 @@ def _walk(curve: ScaledCurve, first: CurvePoint) -> tuple[list[CurvePoint], bool
         point = segment.last
     stopped = f"stopped at {_where(curve, point)} after {len(points)} points"
     return points, False, False, f"{stopped}: raise max_points, largest or the scale"
-
-
-def _checked_limits(limits) -> tuple[float, float]:
-    """Low and high end of the range of the parameter."""
-    try:
-        low, high = (float(value) for value in limits)
-        valid = bool(np.isfinite([low, high]).all() and low < high)
-    except (TypeError, ValueError):
-        valid = False
-    if not valid:
-        raise CaseError(
-            f"a range of {limits}", code="E-RANGE", key="limits", limit="low < high, both finite",
-            remedy="give limits=(low, high) of the parameter",
-        )  # fmt: skip
-    return low, high
 
 
 def _longest(point: CurvePoint, options: StepOptions) -> float:

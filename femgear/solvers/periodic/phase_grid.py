@@ -30,11 +30,6 @@ class _GridSeries:
 
     def at(self, theta) -> np.ndarray:
         """The stored values; theta must be the grid."""
-        if len(theta) != len(self.values):
-            raise CaseError(
-                f"{len(theta)} phases on a grid of {len(self.values)}", code="E-SHAPE",
-                limit="the grid itself",
-            )  # fmt: skip
         return self.values
 
 

@@ -303,12 +303,6 @@ def _largest_at_speeds(modes: Modes, stiffness, number: int, period: np.ndarray,
 
 def _kicks(stiffness: np.ndarray, flexibility: np.ndarray, steps: int) -> np.ndarray:
     """``kappa = k~ (I + T_res k~)^-1`` (2 steps, n, n) at the ends and middles of the steps [N/m]."""
-    lines = stiffness.shape[-1] - 1
-    if steps <= lines:
-        raise CaseError(
-            f"{steps} steps cannot follow {lines} harmonics", code="E-HARMONICS", key="steps",
-            value=steps, limit=f">= {lines + 1}", remedy="take more steps",
-        )  # fmt: skip
     change = sample(stiffness, 2 * steps).T
     return stiffness_in_series(change[:, :, None] * np.eye(len(stiffness)), flexibility)
 

@@ -214,8 +214,6 @@ def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
     number = max(1, int(np.ceil(span / step * (1.0 - 1e-12))))
     step = span / number
     limit = np.inf if rule is None else stability_limit(rule)
-    if np.isnan(limit):
-        raise CaseError("a step rule of unknown stability", code="E-RANGE")
     if step > limit * period:
         raise CaseError(
             f"a step of {step:.6g} s is {step / period:.4g} of the shortest natural period, {period:.6g} s",
