@@ -418,7 +418,13 @@ def tabulated_law(problem: NonlinearSystem, theta) -> Law:
         nothing = np.zeros(len(reference))
         return lambda i, x: (nothing, nothing)
     if any(columns.shape[1] > 1 for columns, _ in parts):
-        return _coupled_law(problem, theta)
+        springs = np.diag(reference)
+
+        def coupled(i, x):
+            force, tangent = element_forces(problem, x, theta[i])
+            return force - reference * x, tangent - springs
+
+        return coupled
     if len(parts) == 1 and np.array_equal(parts[0][0][:, 0], every):
         only = parts[0][1]
 
@@ -498,14 +504,3 @@ def check_matrices(
         if sign and np.abs(array - sign * array.T).max(initial=0.0) > 1e-9 * size:
             kind = "symmetric" if sign > 0 else "skew-symmetric"
             raise CaseError(f"{name} is not {kind}", code="E-SYMMETRY", limit=f"{kind} to 1e-9")
-
-
-def _coupled_law(problem: NonlinearSystem, theta) -> Law:
-    """Elements on groups of columns, evaluated as they are."""
-    reference, springs = problem.reference, np.diag(problem.reference)
-
-    def law(i, x):
-        force, tangent = element_forces(problem, x, theta[i])
-        return force - reference * x, tangent - springs
-
-    return law

@@ -148,23 +148,27 @@ def solve_modes(
     omega = np.sqrt(np.where(rigid, 0.0, values))
     loads = np.column_stack([springs, system.load])
     static = springs.T @ pseudo_solve(system.M, stiffness, shape[:, rigid], loads)
-    # of the modes left out, and of the meshes themselves
-    residual = static[:, :-1] - _modal_flexibility(rows, rows, omega)
-    if system.flexibility is not None:
-        residual += _spring_share(system, mesh_stiffness) @ system.flexibility
     return Modes(
         frequency=omega / (2.0 * np.pi),
         damping_ratio=_damping_ratios(system, shape, omega, damping_ratio),
         shape=shape,
         mesh_stiffness=np.asarray(mesh_stiffness, dtype=float),
         mesh_deflection=rows,
-        residual=0.5 * (residual + residual.T),
+        residual=_residual_flexibility(system, mesh_stiffness, static[:, :-1], rows, omega),
         load_deflection=static[:, -1],
         kind=tuple("rigid" if flag else "elastic" for flag in rigid),
         nodal_diameter=np.full(len(omega), -1),
         dofs=system.dofs,
         modal_load=modal_load,
     )
+
+
+def _residual_flexibility(system, mesh_stiffness, static, rows, omega) -> np.ndarray:
+    """Flexibility (n_meshes, n_meshes) [m/N] of the modes left out and of the meshes themselves."""
+    residual = static - _modal_flexibility(rows, rows, omega)
+    if system.flexibility is not None:
+        residual += _spring_share(system, mesh_stiffness) @ system.flexibility
+    return 0.5 * (residual + residual.T)
 
 
 def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:

@@ -23,7 +23,7 @@ from femgear.solvers.periodic.phase_grid import equidistant_phases
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import constant, fluctuation, line_tail
+from femgear.system.fourier import constant, fluctuation, line_tail, orders_of
 from femgear.system.mesh_directions import free_motions, mesh_elements, pin_directions
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
 from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
@@ -188,7 +188,7 @@ def _gravity(case: PlanarCase, gears: PlanetarySet, mesh_frequency: bool) -> Gra
     given, sense = case.planar.gravity, carrier_sense(case, gears)
     if given is None:
         return None
-    orders = None if sense == 0 else (sense, 0) if mesh_frequency else (sense,)
+    orders = orders_of(0, 1 + mesh_frequency, sense) if sense else None
     return Gravity(given.acceleration, given.direction, orders)
 
 
