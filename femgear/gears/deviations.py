@@ -82,11 +82,9 @@ class SetDeviations:
         Separation of each tooth's loaded flank from its cumulative pitch deviation [m].
     planet_pitch, planet_ring_side_pitch : (N, z_p) array
         The same of the sun-side (left) and ring-side (right) flanks of every planet [m].
-    sun_runout, ring_runout, carrier_runout : Runout
     planet_runout : tuple of Runout, one a planet
     pin_errors : (N, 2) array
         Radial (outwards) and tangential (counter-clockwise) displacement of the planet axes [m].
-    ovality : Ovality
     sun_thickness, ring_thickness : float
         Reduction of the tooth thickness at the reference circle [m]; it only adds backlash.
     planet_thickness : (N,) array
@@ -184,16 +182,11 @@ def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarr
 def profile_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, kind: int, roll_1, roll_2, *, back: bool = False
 ):
-    """Compute the separation [m] of two flanks by their modifications, of the shape of both roll lengths.
+    """Compute the separation [m] of two flanks by their modifications, of the shape of both roll lengths [m].
 
-    Parameters
-    ----------
-    kind : int
-        0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
-    roll_1, roll_2 : arrays that broadcast
-        Roll lengths of the facing points on gear 1 and gear 2 [m].
-    back : bool
-        The other flanks of the teeth; those of a planet are its ring side in the mesh with the sun.
+    The roll lengths of the facing points on gear 1 and gear 2 broadcast; ``kind`` is 0 for sun-planet (gear 1
+    is the sun), 1 for planet-ring (gear 1 is the planet). With ``back`` the other flanks of the teeth; those
+    of a planet are its ring side in the mesh with the sun.
     """
     s = planetary_set
     one, two = deviations.mesh_forms(kind, back)
@@ -204,15 +197,9 @@ def profile_separation(
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):
     """Compute the separation [m] of the loaded flanks of teeth by pitch deviations, of the teeth's shape.
 
-    Parameters
-    ----------
-    deviations : SetDeviations
-    mesh : int
-        0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring.
-    tooth_1, tooth_2 : integer arrays that broadcast
-        Numbers of the teeth on gear 1 and gear 2, taken modulo the tooth numbers.
-    back : bool
-        The other flanks of the teeth: a tooth of sun or ring moves as a whole.
+    The numbers of the teeth on gear 1 and gear 2 broadcast, and are taken modulo the tooth numbers; the mesh
+    is 0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring. With ``back`` the other flanks of the teeth: a
+    tooth of sun or ring moves as a whole.
     """
     d, N = deviations, len(deviations.planet_pitch)
     planets = d.planet_pitch if (mesh < N) != back else d.planet_ring_side_pitch
@@ -224,20 +211,12 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
 def body_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, position, *, back: bool = False
 ) -> np.ndarray:
-    """Compute the separation of every mesh by runouts, pin errors, ovality and planet thickness.
+    """Compute the separation (2N, P) [m] of every mesh by runouts, pin errors, ovality and planet thickness.
 
-    Parameters
-    ----------
-    position : (P,) array
-        tau, as a fraction of mesh periods; may exceed 1.
-    back : bool
-        Of the other flanks: what adds to the backlash of the set there, thickness of all gears included.
-
-    Returns
-    -------
-    (2N, P) array
-        ``n . (u_2 - u_1)`` [m] with the normals of `mesh_normals` and the displacements of both bodies, and
-        the part of the reduced tooth thickness on that side.
+    ``n . (u_2 - u_1)`` at positions tau (P,), in mesh periods and beyond 1 too, with the normals of
+    `mesh_normals` and the displacements of both bodies, and the part of the reduced tooth thickness on that
+    side. Of the other flanks, with ``back``, it is what adds to the backlash of the set, thickness of all
+    gears too.
     """
     d, s = deviations, planetary_set
     moved = _relative_displacements(d, s, np.atleast_1d(np.asarray(position, float)))
@@ -347,14 +326,9 @@ def mirrored_deviations(
 
     The image is taken at the line through the first planet, with the sun where it was and the play of all
     meshes taken up the other way. The sun then drives the right flanks of the planets, here the ring side;
-    a tooth of sun or ring has the same form on both flanks and its pitch deviation moves it as a whole.
-
-    Parameters
-    ----------
-    mirrored : PlanetarySet
-        Planet angles ``2 psi_1 - psi``, ascending from the first planet.
-    order : (N,) integer array
-        Mirrored planet ``i`` is original planet ``order[i]``.
+    a tooth of sun or ring has the same form on both flanks and its pitch deviation moves it as a whole. The
+    mirrored set has the planet angles ``2 psi_1 - psi``, ascending from the first planet; its planet ``i`` is
+    original planet ``order[i]``, (N,) whole numbers.
     """
     d, s, order = deviations, planetary_set, [int(n) for n in order]
     axis = 2.0 * s.planet_angles[0]
@@ -395,6 +369,16 @@ def _reflected(runout: Runout, axis: float) -> Runout:
     return replace(runout, phase=axis - runout.phase)
 
 
+def loaded_flanks(d: SetDeviations, s: PlanetarySet) -> tuple[tuple[str, FlankForm, Gear], ...]:
+    """Name the four kinds of loaded flanks, with their forms and gears."""
+    return (
+        ("sun", d.sun, s.sun),
+        ("planet, sun side", d.planet_sun_side, s.planet),
+        ("planet, ring side", d.planet_ring_side, s.planet),
+        ("ring", d.ring, s.ring),
+    )
+
+
 def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[GeometryWarning, ...]:
     """Check the deviations of a planetary set, and list what deserves a warning.
 
@@ -409,16 +393,10 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
     GeometryError
         E-MODIFICATION: modifications of a flank that together exceed 0.2 modules.
     """
-    d, s = deviations, planetary_set
     found: list[GeometryWarning] = []
-    for flank, form, gear in (
-        ("sun", d.sun, s.sun),
-        ("planet, sun side", d.planet_sun_side, s.planet),
-        ("planet, ring side", d.planet_ring_side, s.planet),
-        ("ring", d.ring, s.ring),
-    ):
+    for flank, form, gear in loaded_flanks(deviations, planetary_set):
         found += check_flank(flank, form, gear)
-    return (*found, *_wedging(d, s))
+    return (*found, *_wedging(deviations, planetary_set))
 
 
 def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[float, float]:
@@ -454,15 +432,12 @@ def _worst(d: SetDeviations, s: PlanetarySet, *, back: bool) -> np.ndarray:
     first, second = d.planet_pitch.min(axis=1), d.planet_ring_side_pitch.min(axis=1)
     sun_side, ring_side = (second, first) if back else (first, second)
     pitch = np.concatenate([(side * d.sun_pitch).min() + sun_side, ring_side + (side * d.ring_pitch).min()])
-    profile = [_thickest(d, s, kind, back=back) for kind in (0, 1)]
+    sun, planet, ring = (np.linspace(g.form_roll, g.tip_roll, 101) for g in (s.sun, s.planet, s.ring))
+    profile = [
+        profile_separation(d, s, kind, one[:, None], two, back=back).min()
+        for kind, one, two in ((0, sun, planet), (1, planet, ring))
+    ]
     return pitch + np.repeat(profile, N)
-
-
-def _thickest(d: SetDeviations, s: PlanetarySet, kind: int, *, back: bool) -> float:
-    """Smallest separation [m] of any points of the flanks of one kind of mesh."""
-    gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
-    rolls = [np.linspace(gear.form_roll, gear.tip_roll, 101) for gear in gears]
-    return float(profile_separation(d, s, kind, rolls[0][:, None], rolls[1][None, :], back=back).min())
 
 
 def _wedging(d: SetDeviations, s: PlanetarySet):

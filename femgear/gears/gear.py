@@ -35,15 +35,7 @@ PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
 
 @dataclass(frozen=True)
 class GeometryWarning(Finding):
-    """A finding on gears, with what is usual.
-
-    Parameters
-    ----------
-    code, key, text : str
-        As of `femgear.errors.Finding`.
-    limit : str
-        What would not be warned about.
-    """
+    """A finding on gears, with the ``limit`` within which there would be no warning."""
 
     limit: str
 
@@ -204,11 +196,6 @@ def half_thickness_angle(gear: Gear, radius):
 def tooth_thickness(gear: Gear, radius):
     """Compute the arc [m] of the tooth at a radius [m] (float or array), ``2 r eta(r)``."""
     return 2.0 * radius * half_thickness_angle(gear, radius)
-
-
-def roll_length(gear: Gear, radius):
-    """Compute the roll length ``sqrt(r^2 - r_b^2)`` [m] of flank points at a radius [m] (float or array)."""
-    return roll(radius, gear.base_radius)
 
 
 def working_half_angles(one: Gear, two: Gear, angle: float) -> tuple[float, float]:

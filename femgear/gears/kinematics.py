@@ -74,20 +74,8 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
     """Compute the speeds [rad/s] of every body from one driven and one held member (Willis).
 
     ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)``; the mesh frequency is
-    ``|w_s - w_c| z_s / (2 pi)``.
-
-    Parameters
-    ----------
-    planetary : PlanetarySet
-    input, fixed : {"sun", "carrier", "ring"}
-        Driven and held member; they differ.
-    speed : float
-        Absolute speed of the driven member [rad/s].
-
-    Raises
-    ------
-    GeometryError
-        E-MECHANISM: one member is both driven and held.
+    ``|w_s - w_c| z_s / (2 pi)``. ``input`` and ``fixed`` are two of "sun", "carrier" and "ring", refused
+    where they are one (GeometryError, E-MECHANISM); ``speed`` is that of the driven member [rad/s].
     """
     if input == fixed:
         raise GeometryError(
@@ -176,19 +164,9 @@ def unheld_members(
 ) -> tuple[str, ...]:
     """Find the members that float without being held by the planets.
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    floating : sequence of str
-        Members without a radial support: any of "sun", "carrier" and "ring".
-    both_flanks : bool
-        The back flanks carry too.
-
-    Returns
-    -------
-    tuple of str
-        The first member that the planets cannot hold though the others stand still; all of `floating` when
-        they can hold each but not all at once; empty when everything is held.
+    Of members without a radial support, any of "sun", "carrier" and "ring": the first one that the planets
+    cannot hold though the others stand still; all of them when they can hold each but not all at once; none
+    when everything is held. With ``both_flanks`` the back flanks carry too.
     """
     for name in floating:
         if not _held(planetary_set, (name,), both_flanks):

@@ -59,14 +59,10 @@ class RootRelief(_Relief):
 
 @dataclass(frozen=True)
 class _WholeProfile:
-    """A change of the evaluated part of a profile.
+    """A change of the evaluated part of a profile by an amount [m].
 
-    Parameters
-    ----------
-    amount : float
-        [m]
-    start, end : float, optional
-        Roll lengths at the root end and the tip end of that part [m]; form and tip circle.
+    ``start`` and ``end`` are roll lengths [m] at the root end and the tip end of that part, by default those
+    of form and tip circle.
     """
 
     amount: float
@@ -92,12 +88,8 @@ class ProfileCrowning(_WholeProfile):
 class MeasuredProfile:
     """Any profile from its points, straight between them and constant beyond the first and the last.
 
-    Parameters
-    ----------
-    roll : tuple of float
-        Roll lengths, ascending [m].
-    removed : tuple of float
-        Material missing there [m]; measuring machines draw the opposite sign.
+    ``roll`` are ascending roll lengths [m], ``removed`` is the material missing there [m]; measuring machines
+    draw the opposite sign.
     """
 
     roll: tuple[float, ...]

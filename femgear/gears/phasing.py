@@ -42,7 +42,6 @@ class MeshPhasing:
 
     Parameters
     ----------
-    sun_teeth, ring_teeth : int
     positions : tuple of int
         m_n, assembly positions of the planets counted from the first.
     rotation : {1, -1}
@@ -122,14 +121,9 @@ def mesh_phasing(
     convention: str = "rotation",
     lag: float = 0.0,
 ) -> MeshPhasing:
-    """Find the phases of the meshes of planets at given angles [rad].
+    """Find the phases of the meshes of planets at given angles psi_n (N,) [rad], ascending within one turn.
 
-    Parameters
-    ----------
-    planet_angles : (N,) sequence of float
-        psi_n [rad], ascending within one turn.
-    sun_teeth, ring_teeth, rotation, flank, convention, lag
-        See `MeshPhasing`.
+    The other arguments are those of `MeshPhasing`.
 
     Raises
     ------
@@ -144,17 +138,11 @@ def mesh_phasing(
     return MeshPhasing(sun_teeth, ring_teeth, positions, rotation, flank, convention, lag)
 
 
-def phasing_of_set(
-    planetary_set: PlanetarySet, *, rotation: int = 1, flank: int = 1, convention: str = "rotation"
-) -> MeshPhasing:
-    """Find the phases of the meshes of a geared set, the lag of its planets from their tooth thickness.
-
-    ``rotation``, ``flank`` and ``convention`` are those of `MeshPhasing`.
-    """
+def phasing_of_set(planetary_set: PlanetarySet) -> MeshPhasing:
+    """Find the phases of the meshes of a geared set, the lag of its planets from their tooth thickness."""
     s, phases = planetary_set, planetary_set.mesh_phases
-    options = {"rotation": rotation, "flank": flank, "convention": convention}
     lag = float(np.mod(phases[0] - phases[s.n_planets], 1.0))
-    return mesh_phasing(s.sun.teeth, s.ring.teeth, s.planet_angles, lag=lag, **options)
+    return mesh_phasing(s.sun.teeth, s.ring.teeth, s.planet_angles, lag=lag)
 
 
 def standard_lag(planet_teeth: int) -> float:
@@ -186,16 +174,8 @@ def planet_sums(turns, positions, teeth_sum, harmonics, orders) -> np.ndarray:
     their whirl), any q the motion ``exp(i q psi_n)`` of the planets. With equal spacing the mean is 1 where
     ``h turns + q`` is a multiple of N and 0 elsewhere (R. G. Parker, J. Sound Vib. 236, 2000, 561-573).
 
-    Parameters
-    ----------
-    turns, teeth_sum : (...) int arrays
-        Periods by which the phase grows over one turn, and Z; see `MeshPhasing`.
-    positions : (..., N) int array
-    harmonics, orders : (H,), (Q,) int arrays
-
-    Returns
-    -------
-    (..., H, Q) complex array
+    From whole numbers: turns and teeth_sum (...) and positions (..., N) of `MeshPhasing`, harmonics (H,) and
+    orders (Q,); (..., H, Q) complex.
     """
     turns, positions, teeth_sum = (np.asarray(a, np.int64) for a in (turns, positions, teeth_sum))
     rank = np.multiply.outer(turns, np.asarray(harmonics))[..., :, None] + np.asarray(orders)
@@ -264,11 +244,6 @@ class PhasingTable:
     separate: bool
 
     @property
-    def cancelled(self) -> np.ndarray:
-        """Whether a resultant vanishes on sun, ring, carrier, (H, 3, 4) bool."""
-        return self.members < ZERO
-
-    @property
     def excited(self) -> tuple[tuple[str, ...], ...]:
         """Kinds of modes that every harmonic can excite.
 
@@ -295,7 +270,6 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
 
     Parameters
     ----------
-    phasing : MeshPhasing
     harmonics : (H,) sequence of int
 
     Raises
@@ -467,7 +441,6 @@ def neighbouring_teeth(
 
     Parameters
     ----------
-    sun_teeth, planet_teeth, ring_teeth, planets : int
     distance : int
         Largest change of each tooth number, up to 30.
     ratio_tolerance : float
@@ -503,16 +476,8 @@ def neighbouring_teeth(
 def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     """Check the tooth numbers of a set, and remark on those that profile shifts must help to one.
 
-    Parameters
-    ----------
-    phasing : MeshPhasing
-        With the teeth of sun and ring and the positions of the planets.
-    planet_teeth : int
-
-    Returns
-    -------
-    tuple of str
-        Remarks in words: the shifts that are needed, tips of unshifted planets that overlap [modules].
+    The phasing has the teeth of sun and ring and the positions of the planets. The remarks are words: the
+    shifts that are needed, tips of unshifted planets that overlap [modules].
 
     Raises
     ------

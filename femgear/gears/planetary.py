@@ -196,7 +196,6 @@ def close_set(
 
     Parameters
     ----------
-    sun, planet, ring : Gear
     planet_angles : tuple of float
         [rad]
     centre_distance : float, optional

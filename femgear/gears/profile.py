@@ -110,10 +110,7 @@ def transverse_angle(normal_pressure_angle: float, helix_angle: float) -> float:
 
 
 def transverse_tool(module: float, pressure_angle: float, helix_angle: float) -> tuple[float, float]:
-    """Compute the transverse module [m] and pressure angle [rad] of normal ones under a helix angle [rad].
-
-    ``m_t = m_n / cos(beta)``, ``tan(alpha_t) = tan(alpha_n) / cos(beta)`` (ISO 21771, section 4.2).
-    """
+    """Compute ``m_t = m_n / cos(beta)`` [m] and `transverse_angle` [rad] (ISO 21771, section 4.2)."""
     return module / math.cos(helix_angle), transverse_angle(pressure_angle, helix_angle)
 
 
@@ -143,13 +140,8 @@ ISO_53_C = BasicRack()
 class PinionCutter:
     """Pinion cutter that generates the gaps of an internal gear.
 
-    Parameters
-    ----------
-    teeth : int
-    profile_shift : float
-        Shift of the cutter in modules (0 when half worn).
-    tip_radius : float, optional
-        Rounding of the cutter's tips in modules; None takes the basic rack's ``root_radius``.
+    ``profile_shift`` in modules is 0 when it is half worn, ``tip_radius`` in modules rounds its tips; None
+    takes the basic rack's ``root_radius``.
     """
 
     teeth: int

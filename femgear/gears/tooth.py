@@ -61,7 +61,6 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
 
     Parameters
     ----------
-    gear : Gear
     flank_elements : int
         Element edges along the flank, 2 or more, uniform in roll angle, before `refine`.
     refine : float
@@ -74,7 +73,10 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     """
     count = max(2, round(flank_elements * refine))
     sizes = _Sizes(unit=gear.module / refine, growth=GROWTH / refine)
-    rolls = np.linspace(gear.tip_roll, _flank_end_roll(gear, count), 2 * count + 1)
+    # steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and mid
+    # points drift to the quarter point there: the last micrometres of the involute belong to the fillet
+    end = max(gear.form_roll, gear.tip_roll / (count + 1))
+    rolls = np.linspace(gear.tip_roll, end, 2 * count + 1)
     flank = flank_points(gear, rolls)
     fillet, split = _fillet(gear, flank, rolls[-1], sizes)
     root = _root(gear, fillet, sizes)
@@ -135,15 +137,6 @@ def _arc(radius: float, start: float, end: float, fractions: np.ndarray) -> np.n
 def _last_edge(points: np.ndarray) -> float:
     """Length [m] of the last element edge of a curve."""
     return math.dist(points[-3], points[-1])
-
-
-def _flank_end_roll(gear: Gear, flank_elements: int) -> float:
-    """Roll length [m] where the curve "flank" ends: the form radius, or one element from the base circle.
-
-    Steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and their
-    mid points drift to the quarter point there; that bit of involute, some micrometres, goes to "fillet".
-    """
-    return max(gear.form_roll, gear.tip_roll / (flank_elements + 1))
 
 
 def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tuple[np.ndarray, int]:

@@ -45,7 +45,6 @@ class ParetoFront:
         Of the case as it is [SI].
     dominated : (k, 2) array
         Objectives of the other designs within the limits.
-    designs, failures : int
     complete : bool
         Whether the search was not cut short by ``max_designs``.
     """
@@ -67,7 +66,6 @@ class ParetoFront:
         return int(((self.values - low) / np.where(high > low, high - low, 1.0)).max(axis=1).argmin())
 
 
-@one_blas_thread()
 def check_second(problem: Problem, second: Quantity) -> None:
     """Refuse (E-OBJECTIVE) the objective of a problem as the second one of its front."""
     if second.name == problem.objective.name:
@@ -81,6 +79,7 @@ def check_second(problem: Problem, second: Quantity) -> None:
         )
 
 
+@one_blas_thread()
 def pareto_front(
     problem: Problem,
     second: Quantity,

@@ -229,13 +229,7 @@ def _check_variables(case: Case, variables: Sequence[Variable]) -> None:
 
 @dataclass(frozen=True)
 class Limit:
-    """What a quantity may be, in SI units.
-
-    Parameters
-    ----------
-    low, high : float, optional
-        At least one of them.
-    """
+    """What a quantity may be, in SI units; at least one of ``low`` and ``high``."""
 
     quantity: Quantity
     low: float = -math.inf

@@ -293,14 +293,8 @@ def relief_grid(
 ) -> ReliefGrid:
     """Compute the transmission error [m] of the sun-planet meshes over amount and length of their relief.
 
-    Parameters
-    ----------
-    basis : DesignBasis
-        The reliefs are added to its deviations.
-    amounts, lengths, torques : (A,), (L,), (T,) sequences
-        See `ReliefGrid`; torques are of one sign.
-    power, progress
-        As for `with_tip_relief` and `harris_map`.
+    The reliefs are added to the deviations of the basis. Amounts (A,), lengths (L,) and torques (T,) of one
+    sign are those of `ReliefGrid`; ``power`` and ``progress`` as for `with_tip_relief` and `harris_map`.
     """
     amounts, lengths, torques = (np.array(a, float) for a in (amounts, lengths, torques))
     back = loads_back(torques)

@@ -369,12 +369,8 @@ class TurningSprings:
 def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSeries:
     """Make the cosine and sine of ``phi = phase + orders . theta`` as two coefficients.
 
-    Parameters
-    ----------
-    orders : tuple of int
-        Multiples of the base frequencies; negative ones for a frame that turns clockwise.
-    phase : float
-        phi at time zero [rad].
+    ``orders`` are multiples of the base frequencies, negative for a frame that turns clockwise; ``phase`` is
+    phi at time zero [rad].
     """
     if not math.isfinite(phase):
         raise CaseError(f"a phase of {phase} rad", code="E-RANGE", key="phase", limit="finite")

@@ -89,12 +89,8 @@ def pad(amplitudes: np.ndarray, count: int) -> np.ndarray:
 class Product:
     """Multiplication of the harmonics of signals by periodic factors, without aliasing.
 
-    By a matrix, or in time where there are many harmonics.
-
-    Parameters
-    ----------
-    factor : (n, H + 1) complex array
-        One-sided harmonics of the factors.
+    ``factor`` (n, H + 1) complex are one-sided harmonics. By a matrix, or in time where there are many
+    harmonics.
     """
 
     factor: np.ndarray
@@ -236,6 +232,11 @@ def phase_of(theta, orders) -> np.ndarray:
     return theta[..., : len(used)] @ used
 
 
+def orders_of(base: int, bases: int, order: int = 1) -> tuple[int, ...]:
+    """Make the orders (n_bases,) that name one base frequency, counted from 0, alone."""
+    return tuple(order if place == base else 0 for place in range(bases))
+
+
 def constant(values) -> FourierSeries:
     """Make a series of coefficients (n,) that do not change."""
     return FourierSeries(np.atleast_1d(np.asarray(values, float))[:, None])
@@ -247,14 +248,9 @@ def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> Fourier
 
 
 def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
-    """Make the tooth errors (2N, H) [m] of one wave of each kind, shifted by the mesh phases.
+    """Make the tooth errors (2N, H) [m] of one wave of each kind, shifted by the mesh phases (2N,) [periods].
 
-    Parameters
-    ----------
-    sun_planet, planet_ring : (H,) complex arrays
-        Harmonics 1 to H at phase zero [m].
-    phases : (2N,) array
-        Fractions of the mesh period, see `femgear.trains.rigid.phased_series`.
+    The waves are harmonics 1 to H at phase zero [m]; phases as of `femgear.trains.rigid.phased_series`.
 
     Raises
     ------
@@ -278,12 +274,9 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SummedSeries:
-    """``sum_p parts[p]``, each with its own orders; elements take it where they take a `FourierSeries`.
+    """``sum_p parts[p]``, each with its own orders and all of the same number of coefficients.
 
-    Parameters
-    ----------
-    parts : tuple of FourierSeries
-        All of the same number of coefficients.
+    Elements take it where they take a `FourierSeries`.
     """
 
     parts: tuple[FourierSeries, ...]
@@ -321,20 +314,10 @@ Series = FourierSeries | StepSeries | SummedSeries
 
 
 def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
-    """List the mean and all lines with ``sum_b |orders_b| <= harmonics``, none of them twice.
+    """List the mean and all lines (L, bases) with ``sum_b |orders_b| <= harmonics``, none of them twice.
 
-    Parameters
-    ----------
-    harmonics : int
-        Highest harmonic; with several bases the highest sum of orders.
-    bases : int
-        Number of base frequencies.
-
-    Returns
-    -------
-    (L, bases) int array
-        Line 0 is the mean; of a line and its mirror image only the one whose last order that is not zero is
-        positive.
+    Line 0 is the mean; of a line and its mirror image only the one whose last order that is not zero is
+    positive.
     """
     if int(harmonics) != harmonics or harmonics < 0 or bases < 1:
         raise CaseError(
@@ -347,17 +330,13 @@ def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
 
 
 def side_bands(carrier: int, mesh: int, bands: int) -> np.ndarray:
-    """List the lines of the extended harmonic balance: carrier and mesh harmonics with side bands.
+    """List the lines (L, 2) of the extended harmonic balance: carrier and mesh harmonics with side bands.
 
     ``m omega_1`` (m <= carrier), ``n omega_2`` (n <= mesh) and ``n omega_2 +- q omega_1`` (q <= bands), with
     the carrier frequency first and the mesh frequency second (Guo, Keller and Parker, NREL/CP-5000-55355,
-    Eqs. 2-13; Eur. J. Mech. A/Solids 47, 2014, 45-57).
-
-    Returns
-    -------
-    (L, 2) int array
-        Line 0 is the mean. Lines whose frequencies coincide because the mesh frequency is a multiple of the
-        carrier frequency stay distinct: the phases are treated as independent.
+    Eqs. 2-13; Eur. J. Mech. A/Solids 47, 2014, 45-57). Line 0 is the mean. Lines whose frequencies coincide
+    because the mesh frequency is a multiple of the carrier frequency stay distinct: the phases are treated as
+    independent.
     """
     for name, value in (("carrier harmonics", carrier), ("mesh harmonics", mesh), ("side bands", bands)):
         if int(value) != value or value < 0:
@@ -368,16 +347,7 @@ def side_bands(carrier: int, mesh: int, bands: int) -> np.ndarray:
 
 
 def distinct_lines(orders) -> np.ndarray:
-    """Sort lines by their size, the mean first, without mirror images and repetitions.
-
-    Parameters
-    ----------
-    orders : (n, n_bases) int array
-
-    Returns
-    -------
-    (L, n_bases) int array
-    """
+    """Sort lines (n, n_bases) int by their size, the mean first, without mirror images and repetitions."""
     orders = np.atleast_2d(np.array(orders, int))
     orders = np.vstack([np.zeros_like(orders[:1]), orders])
     orders = np.unique(orders * _mirror_sign(orders)[:, None], axis=0)
@@ -439,11 +409,7 @@ def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _
 def coincidence_note(orders: np.ndarray, frequency) -> str:
     """Write what to know of a solution in which two lines have one frequency; empty where none have.
 
-    Parameters
-    ----------
-    orders : (L, n_bases) int array
-    frequency : (n_bases,) array
-        [rad/s]; with a single base frequency no two lines coincide.
+    Of lines (L, n_bases) at base frequencies (n_bases,) [rad/s]; with a single one no two lines coincide.
     """
     if orders.shape[1] < 2:
         return ""

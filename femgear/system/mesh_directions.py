@@ -189,7 +189,6 @@ def mesh_elements(
 
     Parameters
     ----------
-    data : RigidSet
     stiffness : FourierSeries, StepSeries or MeshExcitation, optional
         Of the mesh columns [N/m], or their static record; the constant stiffnesses of the set when not given.
     harmonics, orders
@@ -253,7 +252,6 @@ def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
 
     Parameters
     ----------
-    data : RigidSet
     flank : {1, -1}
     """
     N, S = data.n_planets, len(data.contact_lines.heights)
@@ -297,18 +295,14 @@ def free_motions(data: RigidSet) -> np.ndarray:
 def support_diagonal(data: RigidSet) -> np.ndarray:
     """Collect the finite stiffnesses (N + 3, axes) [N/m] of the supports in all coordinates."""
     diagonal = np.zeros((data.n_planets + 3, len(data.axes)))
-    diagonal[:3] = data.support_stiffness / _arcs(data)[:3] ** 2
+    # tilts and rotations are arcs on the radius of the body
+    diagonal[:3] = data.support_stiffness / np.where(_turning(data), data.radii[:3, None], 1.0) ** 2
     return np.where(np.isfinite(diagonal), diagonal, 0.0)
 
 
 def _turning(data: RigidSet) -> np.ndarray:
     """Whether the motions (axes,) of a body are rotations."""
     return np.isin(data.axes, ROTATIONS)
-
-
-def _arcs(data: RigidSet) -> np.ndarray:
-    """Lengths (N + 3, axes) per unit of every motion: 1 of translations, the radius of rotations [m]."""
-    return np.where(_turning(data), data.radii[:, None], 1.0)
 
 
 def _kept(data: RigidSet) -> np.ndarray:

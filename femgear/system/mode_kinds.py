@@ -8,7 +8,7 @@ serves all models: they bring their shapes into `SetMotions`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +53,12 @@ class SetMotions:
     def weighted(self) -> np.ndarray:
         """Planet motions whose squares are twice the kinetic energy, (N, 3, m)."""
         return np.sqrt(self.planet_mass)[:, :, None] * self.planets
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Twice the kinetic energy (m,) of all bodies, without units of time."""
+        central = np.einsum("ba,bam->m", self.central_mass, np.abs(self.central) ** 2)
+        return central + (np.abs(self.weighted) ** 2).sum(axis=(0, 1))
 
 
 def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, planet_angles):
@@ -100,18 +106,11 @@ def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, plane
 
 
 def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
-    """Collect the motions of the bodies by the names of their coordinates.
+    """Collect the motions of the bodies by the names of their coordinates, from shapes (n, m).
 
-    Parameters
-    ----------
-    shape : (n, m) array
-    mass : (n,) array
-        Diagonal mass matrix [kg, kg m^2].
-    dofs : sequence of str
-        ``"sun: x"``, ``"carrier: rotation"`` or ``"ring: u"``, ``"planet 1: x"`` or ``"planet 1: radial"``;
-        other names and names that are missing do not count.
-    planet_angles : (N,) array
-        [rad]
+    Masses (n,) are the diagonal [kg, kg m^2], planet angles (N,) [rad]. Names are ``"sun: x"``,
+    ``"carrier: rotation"`` or ``"ring: u"``, ``"planet 1: x"`` or ``"planet 1: radial"``; other names and
+    names that are missing do not count.
     """
     shape, place = np.asarray(shape), {name: i for i, name in enumerate(dofs)}
     planet_angles = np.asarray(planet_angles, float)
@@ -161,10 +160,6 @@ def class_energies(motions: SetMotions) -> np.ndarray:
 def phase_shares(motions: SetMotions) -> np.ndarray:
     """Compute the shares of the cyclic harmonics in the planets' kinetic energy, 0 to 1.
 
-    Parameters
-    ----------
-    motions : SetMotions
-
     Returns
     -------
     (N // 2 + 1, m) array
@@ -176,9 +171,8 @@ def phase_shares(motions: SetMotions) -> np.ndarray:
     """
     weighted, N = motions.weighted, len(motions.planet_angles)
     total = (np.abs(weighted) ** 2).sum(axis=(0, 1))
-    whole = total + np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
     energy = np.array([_inside(_harmonic(motions.planet_angles, j), weighted) for j in range(N // 2 + 1)])
-    moves = total > 1e-12 * whole
+    moves = total > 1e-12 * motions.energy
     return np.where(moves, energy / np.where(moves, total, 1.0), np.nan)
 
 
@@ -204,46 +198,46 @@ def phasing(motions: SetMotions) -> tuple[str, ...]:
     return tuple(found)
 
 
-def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> np.ndarray:
-    """Find the orthogonal matrix Q (m, m) that gives modes ``shape @ Q`` one phasing each, where it can.
+def mixture(frequency, energy: Callable[[np.ndarray], np.ndarray], *, tolerance: float = 1e-7) -> np.ndarray:
+    """Find the orthogonal matrix Q (m, m) that parts the modes ``shape @ Q`` of each frequency [Hz].
 
-    Modes of one frequency may be mixed at will; with six planets and more the planet modes of several
-    harmonics coincide on a rigid ring. Within each frequency Q diagonalises ``sum_j j E_j``, E_j the planets'
-    energy in harmonic j, so that harmonics come apart where they are independent, as at equal spacing.
-
-    Parameters
-    ----------
-    motions : SetMotions
-        Of real mass-normalised shapes.
-    frequency : (m,) array
-        [Hz], ascending.
-    tolerance : float
-        Relative distance of frequencies that count as one.
+    Modes of one frequency, to a relative tolerance, may be mixed at will: Q diagonalises the symmetric matrix
+    (k, k) that ``energy`` gives of the numbers (k,) of such modes.
     """
-    frequency, weighted = np.asarray(frequency, float), motions.weighted
+    frequency = np.asarray(frequency, float)
     Q = np.eye(len(frequency))
     starts = np.flatnonzero(np.diff(frequency) > tolerance * frequency[1:]) + 1
     for group in np.split(np.arange(len(frequency)), starts):
-        order = np.zeros((len(group),) * 2)
+        # a single mode stays as it is, sign included
+        if len(group) > 1:
+            Q[np.ix_(group, group)] = np.linalg.eigh(energy(group))[1]
+    return Q
+
+
+def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> np.ndarray:
+    """Find the orthogonal matrix Q (m, m) that gives modes ``shape @ Q`` one phasing each, where it can.
+
+    With six planets and more the planet modes of several harmonics coincide on a rigid ring. Within each
+    frequency [Hz] the `mixture` is that of ``sum_j j E_j``, E_j the planets' energy in harmonic j, of motions
+    of real mass-normalised shapes: harmonics come apart where they are independent, as at equal spacing.
+    """
+    weighted = motions.weighted
+
+    def energy(group: np.ndarray) -> np.ndarray:
+        total = np.zeros((len(group),) * 2)
         for j in range(1, len(motions.planet_angles) // 2 + 1):
             pattern = _harmonic(motions.planet_angles, j)
             part = np.einsum("nk,nam->kam", pattern, weighted[:, :, group]).reshape(-1, len(group))
-            order += j * part.T @ part
-        # a single mode stays as it is, sign included
-        if len(group) > 1:
-            Q[np.ix_(group, group)] = np.linalg.eigh(order)[1]
-    return Q
+            total += j * part.T @ part
+        return total
+
+    return mixture(frequency, energy, tolerance=tolerance)
 
 
 def named_kinds(share, frequency) -> tuple[str, ...]:
     """Name modes ``rigid``, by the class with at least 99 % of the kinetic energy, or ``mixed``.
 
-    Parameters
-    ----------
-    share : (3, m) array
-        `class_energies` over the whole kinetic energy.
-    frequency : (m,) array
-        [Hz], zero for rigid-body modes.
+    From the `class_energies` over the whole kinetic energy (3, m), and frequencies (m,), zero if rigid [Hz].
     """
     best, most = share.argmax(axis=0), share.max(axis=0)
     return tuple(
@@ -275,26 +269,15 @@ def class_shares(data: RigidSet, shape) -> np.ndarray:
     translational-tilting and planet motion; see `class_energies`, also for unequal spacing.
     """
     motions = gear_set_motions(data, shape)
-    central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
-    return class_energies(motions) / (central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1)))
+    return class_energies(motions) / motions.energy
 
 
 def gear_set_motions(data: RigidSet, shape) -> SetMotions:
     """Collect the motions of all bodies in every mode, held ones and planets tied to pins included.
 
-    The central members of bodies that move in space stand twice: x, y and rotation, then tilt about x, tilt
-    about y and z, which turn with the frame as those do. Planets have all their motions.
-
-    Parameters
-    ----------
-    data : RigidSet
-    shape : (n, m) array
-        In the coordinates of `gear_set_system`.
-
-    Raises
-    ------
-    CaseError
-        Shapes of another system (E-SHAPE).
+    Shapes (n, m) are in the coordinates of `gear_set_system`, others are refused (CaseError, E-SHAPE). The
+    central members of bodies that move in space stand twice: x, y and rotation, then tilt about x, tilt about
+    y and z, which turn with the frame as those do. Planets have all their motions.
     """
     shape, T, axes = np.asarray(shape), free_motions(data), data.axes
     if shape.ndim != 2 or len(shape) != T.shape[1]:
@@ -319,7 +302,6 @@ def gear_set_kinds(data: RigidSet, shape, *, frequency) -> tuple[str, ...]:
 
     Parameters
     ----------
-    data : RigidSet
     shape : (n, m) array
         In the coordinates of `gear_set_system`.
     frequency : (m,) array

@@ -82,7 +82,6 @@ class RigidSet(ABC):
 
     Parameters
     ----------
-    sun, ring, carrier : PlanarBody or HelicalBody
     planet : PlanarBody or HelicalBody
         Each of the N equal planets; it has no supports but its bearing.
     sun_radius, ring_radius, planet_radius : float
@@ -199,15 +198,9 @@ class RigidSet(ABC):
 class PlanarSet(RigidSet):
     """Data of the lumped set; bodies, radii, angles and mesh stiffnesses as in `RigidSet`.
 
-    Parameters
-    ----------
-    planet_bearing : float or (N,) array
-        Isotropic stiffness between planet and carrier [N/m]; infinite fixes the planet's axis to its pin.
-
-    Notes
-    -----
-    Published data are often rounded, or mix reference and working angles: radii that do not close are
-    taken as they are, and `closure` tells by how much.
+    ``planet_bearing`` is the isotropic stiffness between planet and carrier, a number or one a planet [N/m];
+    infinite fixes the planet's axis to its pin. Published data are often rounded, or mix reference and
+    working angles: radii that do not close are taken as they are, and `closure` tells by how much.
     """
 
     axes: ClassVar[tuple[int, ...]] = (0, 1, 5)
@@ -260,16 +253,8 @@ class PlanarTorque:
 class HelicalSupport:
     """Isotropic support of a body in all six directions; infinite holds a motion, zero leaves it free.
 
-    Parameters
-    ----------
-    radial, axial : float
-        [N/m]
-    tilt, torsional : float
-        Against rotation about the two axes in the plane, and about the axis of the body [N m/rad].
-
-    Notes
-    -----
-    As `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
+    Radial and axial [N/m], against tilts about the two axes in the plane and against rotation about the axis
+    of the body [N m/rad]; as `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
 
     Raises
     ------
@@ -335,11 +320,7 @@ class HelicalBody:
 def planar_from_set(planetary_set: PlanetarySet, **data: Any) -> PlanarSet:
     """Make a planar set with the base radii, working pressure angles and planet angles of a geared one.
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    **data
-        Bodies, mesh stiffnesses and planet bearing of `PlanarSet`.
+    ``data`` are the bodies, mesh stiffnesses and planet bearing of `PlanarSet`.
     """
     return PlanarSet(**data, **gear_geometry(planetary_set))
 
@@ -369,21 +350,10 @@ def torque_shares(data: RigidSet) -> dict[str, float]:
 
 
 def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -> np.ndarray:
-    """Compute the load (n,) [N] on ``u`` of the driven member and the output, in static balance.
+    """Compute the load (n,) [N] on ``u`` of the driven member and the output, balanced by `torque_shares`.
 
-    The balance is that of `torque_shares`.
-
-    Parameters
-    ----------
-    data : RigidSet
-    torque : PlanarTorque, optional
-    kept : (n,) bool array
-        Coordinates that no infinite stiffness holds; as many a body, ``u`` being the last.
-
-    Raises
-    ------
-    CaseError
-        A torque on a held member (E-MECHANISM).
+    ``kept`` (n,) are the coordinates that no infinite stiffness holds; as many a body, ``u`` being the last.
+    A torque on a held member is refused (CaseError, E-MECHANISM).
     """
     load, kept = np.zeros(kept.size), kept.reshape(data.n_planets + 3, -1)
     if torque is None:

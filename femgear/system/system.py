@@ -174,7 +174,6 @@ class Response:
         Lowest force of all meshes within the period [N]; teeth cannot pull.
     method : tuple of str
         ``"fixed point"`` or ``"direct"``, one a speed.
-    message : str
     periods : int
         Mesh periods in one period of the excitation record: harmonic ``h`` has the frequency
         ``h mesh_frequency / periods``.
@@ -239,16 +238,8 @@ def gear_meshes(
 def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the harmonics of stiffness, deflection and force of the meshes, ``count`` mesh harmonics each.
 
-    Parameters
-    ----------
-    excitation : MeshExcitation
-    count : int
-        Mesh harmonics kept; a record of several periods keeps all its lines up to that frequency.
-
-    Returns
-    -------
-    stiffness, deflection, force : (n_meshes, count periods + 1) complex arrays
-        [N/m], [m], [N].
+    [N/m], [m] and [N], (n_meshes, count periods + 1) complex each: a record of several periods keeps all its
+    lines up to that frequency.
 
     Raises
     ------
@@ -275,14 +266,9 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
 
 @dataclass(frozen=True)
 class HarmonicForce:
-    """``Re(force exp(i orders . theta))`` on the degrees of freedom.
+    """``Re(force exp(i orders . theta))`` on the degrees of freedom, ``force`` (n,) complex [N, N m].
 
-    Parameters
-    ----------
-    force : (n,) complex array
-        [N, N m].
-    orders : tuple of int
-        Multiples of the base frequencies.
+    ``orders`` are multiples of the base frequencies.
     """
 
     force: np.ndarray
@@ -388,13 +374,7 @@ def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
 def element_forces(problem: NonlinearSystem, x, theta) -> tuple[np.ndarray, np.ndarray]:
     """Compute forces (..., n_columns) [N] and tangents (..., n_columns, n_columns) [N/m] of all elements.
 
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    x : (..., n_columns) array
-        Deflections [m].
-    theta : (..., n_bases) array
-        Phases of the base frequencies [rad].
+    At deflections x (..., n_columns) [m] and phases theta (..., n_bases) of the base frequencies [rad].
     """
     x = np.asarray(x, float)
     force = np.zeros(x.shape)
@@ -421,7 +401,6 @@ def tabulated_law(problem: NonlinearSystem, theta) -> Law:
 
     Parameters
     ----------
-    problem : NonlinearSystem
     theta : (n_times, n_bases) array
         Phases of the instants [rad].
 
@@ -439,7 +418,13 @@ def tabulated_law(problem: NonlinearSystem, theta) -> Law:
         nothing = np.zeros(len(reference))
         return lambda i, x: (nothing, nothing)
     if any(columns.shape[1] > 1 for columns, _ in parts):
-        return _coupled_law(problem, theta)
+        springs = np.diag(reference)
+
+        def coupled(i, x):
+            force, tangent = element_forces(problem, x, theta[i])
+            return force - reference * x, tangent - springs
+
+        return coupled
     if len(parts) == 1 and np.array_equal(parts[0][0][:, 0], every):
         only = parts[0][1]
 
@@ -499,13 +484,8 @@ def check_matrices(
 ) -> None:
     """Refuse matrices of wrong shapes (E-SHAPE), not finite (E-FINITE) or of wrong symmetries (E-SYMMETRY).
 
-    Parameters
-    ----------
-    system : MechanicalSystem
-    symmetric : tuple of str
-        Matrices that must be; circulatory forces make K unsymmetric, which time integration takes.
-    columns : int, optional
-        Of ``W``; one or more when not given.
+    Circulatory forces make K unsymmetric, which time integration takes: ``symmetric`` names those that must
+    be. ``W`` has so many ``columns``; one or more when that is not given.
     """
     n = len(system.M)
     shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "load": (n,), "gyroscopic": (n, n), "W": (n, columns)}
@@ -524,14 +504,3 @@ def check_matrices(
         if sign and np.abs(array - sign * array.T).max(initial=0.0) > 1e-9 * size:
             kind = "symmetric" if sign > 0 else "skew-symmetric"
             raise CaseError(f"{name} is not {kind}", code="E-SYMMETRY", limit=f"{kind} to 1e-9")
-
-
-def _coupled_law(problem: NonlinearSystem, theta) -> Law:
-    """Elements on groups of columns, evaluated as they are."""
-    reference, springs = problem.reference, np.diag(problem.reference)
-
-    def law(i, x):
-        force, tangent = element_forces(problem, x, theta[i])
-        return force - reference * x, tangent - springs
-
-    return law

@@ -61,16 +61,13 @@ def read_case(path: str | os.PathLike) -> Any:
 def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     """Read the case of a TOML text; see `read_case`.
 
-    Parameters
-    ----------
-    text : str
-    name : str
-        File name for messages.
-    numbered : bool
-        Messages name the lines of the text: it is the user's.
+    Messages give the name of the file and, of a ``numbered`` text, which is the user's, its lines.
     """
     data, lines = case_text.parse(text, name), text if numbered else ""
-    train = _train_of_file(data, lines, name)
+    try:
+        train = _train_of_file(data)
+    except CaseError as error:
+        raise combine([error], lines, name) from None
     own_file = train.own_file or _SET_FILE
     files, unread = _embedded_files(own_file, data, name)
     case_text.check_tree(data, name)
@@ -144,7 +141,6 @@ def with_value(case: Case, key: str, value: object) -> Case:
 
     Parameters
     ----------
-    case : Case
     key : str
         Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
         ``"sun.modifications[0].amount"``.
@@ -161,7 +157,6 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
     Parameters
     ----------
-    case : Case
     values : mapping
         Keys and values as of `with_value`, as in
         ``{"operation.input": "carrier", "operation.fixed": "ring"}``.
@@ -273,11 +268,11 @@ def every_section() -> type[Case]:
     return create_model("Case", __base__=Case, __doc__=Case.__doc__, **fields)
 
 
-def _train_of_file(data: dict, lines: str, name: str) -> Train:
-    """Train that the tables of a file are of; its lines and name are for refusals."""
+def _train_of_file(data: dict) -> Train:
+    """Train that the tables of a file are of."""
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
-        problem = CaseError(
+        raise CaseError(
             "the file is written for a newer femgear",
             code="E-FORMAT",
             key="format",
@@ -285,23 +280,21 @@ def _train_of_file(data: dict, lines: str, name: str) -> Train:
             limit=f"up to {FORMAT}",
             remedy="update femgear",
         )
-        raise combine([problem], lines, name)
     own = _own_files()
     if "model" in data:
         model = data["model"]
         if not isinstance(model, str) or model not in own:
-            raise combine([_unknown_model(model)], lines, name)
+            raise _unknown_model(model)
         return own[model]
     for train in own.values():
         if train.own_file is not None and (what := train.own_file.claims(data)):
-            problem = CaseError(
+            raise CaseError(
                 f"a file with {what} needs its model",
                 code="E-KEY-MISSING",
                 key="model",
                 remedy=f'write model = "{train.name}" before the first table',
             )
-            raise combine([problem], lines, name)
-    return _train_of_set(data, lines, name)
+    return _train_of_set(data)
 
 
 def _own_files() -> dict[str, Train]:
@@ -325,12 +318,12 @@ def _unknown_model(value: object) -> CaseError:
     )
 
 
-def _train_of_set(data: dict, lines: str, name: str) -> Train:
+def _train_of_set(data: dict) -> Train:
     """Train whose section the tables of a planetary set hold; that without one where they hold none."""
     given = [train for train in reversed(registry.TRAINS) if train.section and train.section in data]
     if len(given) > 1:
         sections = [train.section for train in given]
-        problem = CaseError(
+        raise CaseError(
             f"a set is {' or '.join(sections)}",
             code="E-CHOICE",
             key=sections[-1],
@@ -338,5 +331,4 @@ def _train_of_set(data: dict, lines: str, name: str) -> Train:
             limit="one of the sections",
             remedy="leave one of them out",
         )
-        raise combine([problem], lines, name)
     return given[0] if given else next(t for t in registry.TRAINS if not t.section and t.own_file is None)

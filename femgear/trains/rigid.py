@@ -51,14 +51,9 @@ def listed(names: list[str]) -> str:
 
 
 def entries_without_effect(data: dict, others: Sequence[str] = ()) -> list[str]:
-    """List entries that no set of rigid bodies takes up: machines, housing, others, foundation of the ring.
+    """List entries that no set of rigid bodies takes up: machines, housing, foundation of the ring, others.
 
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file that was checked.
-    others : sequence of str
-        Further entries without effect.
+    ``data`` are the tables of a case file that was checked.
     """
     machines = [name for name in ("motor", "brake", "housing") if name in data]
     keys = ("foundation_radial", "foundation_tangential")
@@ -78,13 +73,7 @@ def flank_entries(data: dict) -> list[str]:
 def rigid_refusals(case: RigidCase, kind: str, *, without_torque: str) -> Iterator[CaseError]:
     """Refuse elastic supports of the static solution, and a torque of zero.
 
-    Parameters
-    ----------
-    case : RigidCase
-    kind : str
-        "planar" or "helical".
-    without_torque : str
-        What a torque of zero means.
+    ``kind`` is "planar" or "helical", ``without_torque`` tells what a torque of zero means.
     """
     if case.static.members == "elastic":
         yield CaseError(
@@ -119,12 +108,7 @@ def unheld_member(case: RigidCase, key: str, remedy: str) -> CaseError:
 def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
     """Refuse errors whose static record spans several mesh periods (E-PERIODS).
 
-    Parameters
-    ----------
-    case : Case
-    gears : PlanetarySet
-    takes : str
-        "the planar model takes", or whatever takes one period alone.
+    ``takes`` is "the planar model takes", or whatever takes one period alone.
     """
     # whatever the longest record: one period cut out of many is no period
     periods, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
@@ -228,14 +212,8 @@ class Gravity:
 class MemberBearing:
     """A radial bearing between two central members, or between one and the housing.
 
-    Parameters
-    ----------
-    stiffness : float
-        [N/m]
-    clearance : float or None
-        Radial, from the centred position [m]; None leaves the columns without a bearing.
-    inner, outer : str
-        ``"carrier"``, ``"ring"`` or ``"sun"``; ``outer`` also ``"housing"``.
+    ``stiffness`` [N/m] and radial clearance from the centred position [m], None for columns without a
+    bearing; ``inner`` and ``outer`` are "carrier", "ring" or "sun", ``outer`` also "housing".
     """
 
     stiffness: float
@@ -307,7 +285,6 @@ def gear_set_modes(
 
     Parameters
     ----------
-    data : RigidSet
     system : MechanicalSystem, optional
         `gear_set_system` of the set, with the flanks that a torque loads; without torque when not given.
     mesh_stiffness : (n_columns,) array, optional
@@ -358,15 +335,11 @@ def gear_set_problem(
 
     Parameters
     ----------
-    data : RigidSet
     meshes : GearMeshes, optional
         From `mesh_elements`; constant stiffnesses without back side when not given.
     back_flanks : bool
         The back flanks act on their own lines of action, with the stiffness of the drive side, so that teeth
         can wedge; otherwise they act on the line of the drive flanks.
-    torque : PlanarTorque, optional
-    bearings : Bearings, optional
-    gravity : Gravity, optional
     pin_errors : (N, 2) array, optional
         Radial (outwards) and tangential (counter-clockwise) displacement of the pins [m], from which the
         coordinates of the planets then count. Not to be given again when the static record holds them.
@@ -404,7 +377,9 @@ def gear_set_problem(
         C = modal_damping(still, springs, mode_ratios(modes.frequency, damping))
     system = bearings.join(data, gear_set_system(data, carrier_speed=carrier_speed, **options))
     steady, forces = _weight(data, gravity)
-    load = system.load + steady + _pin_inertia(data, pins, carrier_speed)
+    # centrifugal force of the planets by the displacement of their pins
+    thrown = _of_planets(data, carrier_speed**2 * data.planet.mass * pins)
+    load = system.load + steady + free_motions(data).T @ thrown
     return NonlinearSystem(replace(system, load=load, C=C), elements, forces, speed=carrier_speed)
 
 
@@ -412,13 +387,7 @@ def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] =
     """Choose springs (n_columns,) [N/m] near which a set works: bearings closed, back flanks open.
 
     The elements' own reference counts back flanks on their own lines as closed, far from where the set works.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-        Of `gear_set_problem`.
-    members : sequence of MemberBearing
-        On the last columns; closed whatever their clearance.
+    Those of ``members`` stand on the last columns of a `gear_set_problem`; closed whatever their clearance.
     """
     springs = problem.reference
     for element in problem.elements[1:]:
@@ -430,15 +399,10 @@ def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] =
 
 
 def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float] | np.ndarray) -> np.ndarray:
-    """Assign a damping ratio (m,) to every mode from one a natural frequency.
+    """Assign damping ratios (m,) to modes of ascending frequency (m,) [Hz], from one of all modes or several.
 
-    Parameters
-    ----------
-    frequency : (m,) array
-        Of the modes, ascending [Hz].
-    ratios : float or sequence of float
-        Of all modes; a sequence gives one a natural frequency (a pair of modes has one), ascending, the last
-        one for the rest. Motions at frequency zero have none and do not count.
+    Several are one a natural frequency (a pair of modes has one), ascending, the last one for the rest.
+    Motions at frequency zero have none and do not count.
     """
     given = np.atleast_1d(np.asarray(ratios, float))
     moving = frequency > 0.0
@@ -452,17 +416,9 @@ def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float] | np.ndar
 def pin_deflections(data: RigidSet, pin_errors, *, flank: int = 1) -> np.ndarray:
     """Compute the approach of the flanks (n_columns,) [m] by displaced pins, all bodies at rest in bearings.
 
-    Parameters
-    ----------
-    data : RigidSet
-    pin_errors : (N, 2) array
-        See `gear_set_problem` [m].
-    flank : {1, -1}
-        See `mesh_directions`.
+    Pin errors (N, 2) [m] are those of `gear_set_problem`, ``flank`` (1 or -1) that of `mesh_directions`.
     """
-    shifted = np.zeros((data.n_planets + 3, len(data.axes)))
-    shifted[3:, :2] = _pins(data, pin_errors)
-    return mesh_directions(data, flank).T @ shifted.ravel()
+    return mesh_directions(data, flank).T @ _of_planets(data, _pins(data, pin_errors))
 
 
 def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, ...] = (1,)) -> FourierSeries:
@@ -566,11 +522,11 @@ def _pins(data: RigidSet, pin_errors) -> np.ndarray:
     return pins
 
 
-def _pin_inertia(data: RigidSet, pins: np.ndarray, carrier_speed: float) -> np.ndarray:
-    """Centrifugal force (n,) of the planets by the displacement of their pins."""
-    force = np.zeros((data.n_planets + 3, len(data.axes)))
-    force[3:, :2] = carrier_speed**2 * data.planet.mass * pins
-    return free_motions(data).T @ force.ravel()
+def _of_planets(data: RigidSet, values: np.ndarray) -> np.ndarray:
+    """Radial and tangential values (N, 2) of the planets in all coordinates (n_all,)."""
+    found = np.zeros((data.n_planets + 3, len(data.axes)))
+    found[3:, :2] = values
+    return found.ravel()
 
 
 def modes_dataset(
@@ -584,17 +540,8 @@ def modes_dataset(
 ) -> xr.Dataset:
     """Collect modes.nc: frequencies, kinds and shapes of all bodies, mesh deflections, no elastic ring.
 
-    Parameters
-    ----------
-    data : RigidSet
-    gears : PlanetarySet
-    modes : Modes
-    attrs : dict
-        Of the file; the number of unknowns is added behind its title.
-    phasing : (m,) tuple of str, optional
-        Of every mode.
-    along : str
-        What is added to the descriptions of stiffness and deflection of the meshes.
+    The number of unknowns is added behind the title in the attributes of the file; ``phasing`` (m,) is that
+    of every mode, ``along`` what the descriptions of stiffness and deflection of the meshes end with.
     """
     shape, dofs = in_space(data, modes.shape)
     count, slices = 2 * data.n_planets, len(data.contact_lines.heights)
@@ -617,18 +564,8 @@ def modes_dataset(
 def in_space(data: RigidSet, shape: np.ndarray) -> tuple[np.ndarray, list[str]]:
     """Compute motions of all bodies along and about the axes of the set, held ones included.
 
-    Parameters
-    ----------
-    data : RigidSet
-    shape : (n, m) array
-        In the coordinates of `gear_set_system`.
-
-    Returns
-    -------
-    motions : (n_all, m) array
-        [m] and [rad] per unit of the shapes.
-    names : list of str
-        Body and motion, as in "planet 2: tilt x".
+    Of shapes (n, m) in the coordinates of `gear_set_system` the motions (n_all, m) [m] and [rad] per unit,
+    and their names: body and motion, as in "planet 2: tilt x".
     """
     N, axes = data.n_planets, len(data.axes)
     full = (free_motions(data) @ shape).reshape(N + 3, axes, -1)

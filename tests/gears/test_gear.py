@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import Gear, flank_points, half_thickness_angle, roll_length, tooth_thickness
-from femgear.gears.profile import BasicRack, PinionCutter, inv
+from femgear.gears.gear import Gear, flank_points, half_thickness_angle, tooth_thickness
+from femgear.gears.profile import BasicRack, PinionCutter, inv, roll
 
 ALPHA = math.radians(20.0)
 SUN = Gear(27, 1.5e-3, ALPHA, 0.52681, 25e-3, 9e-3, name="sun")
@@ -57,7 +57,7 @@ def test_flank_points_lie_on_the_involute(gear):
     assert np.allclose(foot[1], rolls, rtol=0, atol=1e-8 * gear.base_radius)
     radius = np.hypot(*points.T)
     assert np.allclose(np.arctan2(points[:, 1], points[:, 0]), half_thickness_angle(gear, radius), atol=1e-14)
-    np.testing.assert_allclose(roll_length(gear, radius), rolls, rtol=1e-12)
+    np.testing.assert_allclose(roll(radius, gear.base_radius), rolls, rtol=1e-12)
 
 
 def test_undercut_is_what_the_tool_does():

@@ -30,8 +30,5 @@ def test_factors():
 
 
 def test_numbers_outside_the_method_are_refused():
-    with pytest.raises(GeometryError) as caught:
-        mesh_stiffness_method_b(20, 40, 0.0, 0.0, 0.9)
-    assert caught.value.code == "E-ISO6336"
-    with pytest.raises(GeometryError):
+    with pytest.raises(GeometryError, match="E-ISO6336"):
         theoretical_single_stiffness(20, 5, 0.0, 10.0)

@@ -6,7 +6,6 @@ from validation.reference.free_vibration import solve_free_vibration
 from validation.reference.sections import bifurcation_diagram, stroboscopic_section
 
 from femgear.errors import CaseError
-from femgear.solvers.continuation.arclength import continue_curve
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.receptance import modal_response
 from femgear.solvers.linear.tracking import campbell_data
@@ -101,7 +100,6 @@ def test_empty_lists_and_ranges_are_refused(duffing):
     system, unit, k = duffing.system, np.ones(1), np.ones(1)
     modes = solve_modes(system, k)
     for call, code in (
-        (lambda: continue_curve(lambda u, p: (u, np.eye(1), unit), [0.0], 0.0, limits=()), "E-RANGE"),
         (lambda: modal_response(system, modes, [], unit, unit), "E-RANGE"),
         (lambda: sweep_response(duffing, []), "E-RANGE"),
         (lambda: bifurcation_diagram(lambda value: (duffing, value), []), "E-RANGE"),

@@ -32,8 +32,6 @@ from femgear.solvers.continuation.corrector import (
 
 # A loop is closed when it meets its start within this (scaled) distance.
 _CLOSED = 1e-6
-# One that starts in a branch point is closed by the same one within this part of the step.
-_CLOSED_BRANCH = 1e-2
 # Steps below this part of the largest one may turn in a corner of the curve; of a larger one than that of
 # a tenth of the scales they are no shorter than gaps between curves.
 _CORNER, _CORNER_LARGEST = 1e-3, 0.1
@@ -108,14 +106,13 @@ def continue_curve(
     parameter : float
         Where to start, within the limits.
     limits : (low, high)
-        The curve ends exactly there.
+        Two different numbers; the curve ends exactly there.
     scale : float or (n,) array
         Typical size of ``u``.
     unit : float, optional
         Typical change of the parameter; by default the width of the range.
     direction : int
         +1 starts towards larger parameters, -1 towards smaller ones.
-    options : StepOptions, optional
     describe : callable
         The parameter as text with its name and unit, for messages.
 
@@ -126,18 +123,13 @@ def continue_curve(
     Raises
     ------
     CaseError
-        A start or limits that cannot be used.
+        Scales that are not positive (E-RANGE).
     ConvergenceError
         No solution near the start.
     """
     curve = _scaled_curve(
         evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, describe=describe
     )
-    if not limits[0] <= parameter <= limits[1]:
-        raise CaseError(
-            f"the start at {describe(parameter)} lies outside the range", code="E-RANGE",
-            limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
-        )  # fmt: skip
     axis = np.zeros(len(curve.scale) + 1)
     axis[-1] = 1.0
     try:
@@ -165,7 +157,7 @@ def _scaled_curve(
 
     Arguments as for :func:`continue_curve`.
     """
-    low, high = _checked_limits(limits)
+    low, high = limits
     unit = high - low if unit is None else unit
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
@@ -180,7 +172,7 @@ def _scaled_curve(
 
 
 def _collect(curve: ScaledCurve, first: CurvePoint) -> Curve:
-    """The whole curve from a corrected point, of orientation zero in a branch point, along its tangent."""
+    """The whole curve from a corrected point along its tangent."""
     points, closed, complete, message = _walk(curve, first)
     z = np.array([p.z for p in points])
     parameter = z[:, -1] * curve.unit
@@ -224,21 +216,6 @@ def _walk(curve: ScaledCurve, first: CurvePoint) -> tuple[list[CurvePoint], bool
         point = segment.last
     stopped = f"stopped at {_where(curve, point)} after {len(points)} points"
     return points, False, False, f"{stopped}: raise max_points, largest or the scale"
-
-
-def _checked_limits(limits) -> tuple[float, float]:
-    """Low and high end of the range of the parameter."""
-    try:
-        low, high = (float(value) for value in limits)
-        valid = bool(np.isfinite([low, high]).all() and low < high)
-    except (TypeError, ValueError):
-        valid = False
-    if not valid:
-        raise CaseError(
-            f"a range of {limits}", code="E-RANGE", key="limits", limit="low < high, both finite",
-            remedy="give limits=(low, high) of the parameter",
-        )  # fmt: skip
-    return low, high
 
 
 def _longest(point: CurvePoint, options: StepOptions) -> float:
@@ -334,8 +311,6 @@ def _at_bound(segment: Segment, low, high, bound: float):
 
 def _closing(segment: Segment, first: CurvePoint, events, count: int):
     """Events up to the start of the curve, when the segment meets it again in the same sense."""
-    if first.orientation == 0.0:
-        return _closing_branch(segment, first, events, count)
     offset = first.z - segment.first.z
     h = float(segment.first.tangent @ offset)
     if count < 3 or not 0.0 < h <= segment.length or segment.first.tangent @ first.tangent < 0.5:
@@ -349,12 +324,3 @@ def _closing(segment: Segment, first: CurvePoint, events, count: int):
     if np.linalg.norm(met.z - first.z) > _CLOSED or met.tangent @ first.tangent < 0.9:
         return events, False
     return [e for e in events if e[0] < h - 1e-9] + [(h, replace(first, kind="regular"))], True
-
-
-def _closing_branch(segment: Segment, first: CurvePoint, events, count: int):
-    """The same for a curve that starts in a branch point, where Newton's method would not converge."""
-    for place, point in events if count >= 3 else ():
-        near = np.linalg.norm(point.z - first.z) <= _CLOSED_BRANCH * segment.length
-        if point.kind == "branch point" and near and point.tangent @ first.tangent > 0.9:
-            return [e for e in events if e[0] < place] + [(place, replace(first, kind="regular"))], True
-    return events, False

@@ -173,7 +173,6 @@ def frequency_response_curve(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : (first, last)
         [rad/s]; the curve starts at the first one towards the last one, which may be lower. With stability
         both are above zero.

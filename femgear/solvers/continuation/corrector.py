@@ -157,7 +157,6 @@ class CurvePoint:
         Scaled derivative of the equations.
     orientation : float
         Sign of the determinant of the derivative bordered by the tangent.
-    iterations : int
     contraction : float
         Second Newton step, with the derivative of the first one, over the first; zero when one was enough.
     error : float
@@ -186,7 +185,6 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
 
     Parameters
     ----------
-    curve : ScaledCurve
     guess, normal : (n + 1,) arrays
         In the scaled unknowns.
     along : (n + 1,) array, optional
@@ -250,21 +248,9 @@ def step_effort(
     """Compare a step between two points with the angle [rad] and contraction aimed at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
-    a jump from curve to curve turns the chord but not the tangents.
-
-    Parameters
-    ----------
-    options : StepOptions
-    point, new : CurvePoint
-        Both ends of the step.
-    corner, sharp : bool
-        The step is so short that the curve may turn in a corner, or that any turn is one of a sharp corner,
-        between whose sides the chord lies.
-
-    Returns
-    -------
-    float
-        A ratio without unit: above one the next step has to be shorter.
+    a jump from curve to curve turns the chord but not the tangents. A ``corner`` says that the step is so
+    short that the curve may turn in one, ``sharp`` that any turn is one of a sharp corner, between whose
+    sides the chord lies. Above one the next step has to be shorter.
 
     Raises
     ------

@@ -174,18 +174,8 @@ def _residual_flexibility(system, mesh_stiffness, static, rows, omega) -> np.nda
 def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
     """Compute the static flexibility [m/N] of the modes left out, from mesh forces to outputs ``L q``.
 
-    Parameters
-    ----------
-    system : MechanicalSystem
-    modes : Modes
-        Of that system.
-    outputs : (n_outputs, n) array
-        ``L``.
-
-    Returns
-    -------
-    (n_outputs, n_meshes) array
-        ``L K^+ W - sum (L phi) r^T / omega^2`` [m/N per unit of L].
+    ``L K^+ W - sum (L phi) r^T / omega^2`` (n_outputs, n_meshes) [m/N per unit of L] of the outputs ``L``
+    (n_outputs, n) and the modes of the system.
     """
     outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
     springs = _spring_directions(system, modes.mesh_stiffness)
@@ -286,24 +276,15 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
 
 
 def whirl(shape, mass, planes) -> np.ndarray:
-    """Find the sense of the orbits of every mode, from -1 (backward) over 0 (straight) to 1 (forward).
+    """Find the sense of the orbits of every mode (m,), from -1 (backward) over 0 (straight) to 1 (forward).
 
     An orbit ``Re((X, Y) exp(i omega t))`` covers area at the rate ``-omega Im(conj(X) Y)``, positive for a
     counter-clockwise one; the sum over the planes, weighted with their masses, is divided by its bound (G.
-    Genta, Dynamics of Rotating Systems, 2005, section 2.5). In a rotating frame it is the sense seen there.
+    Genta, Dynamics of Rotating Systems, 2005, section 2.5). In a rotating frame it is the sense seen there;
+    zero where nothing moves in the planes.
 
-    Parameters
-    ----------
-    shape : (n, m) complex array
-    mass : (n,) array
-        Diagonal of the mass matrix [kg, kg m^2].
-    planes : (k, 2) int array
-        Rows of x and y, or of radial and tangential, of one body each.
-
-    Returns
-    -------
-    (m,) array
-        Zero where nothing moves in the planes.
+    Of complex shapes (n, m), the diagonal of the mass matrix (n,) [kg, kg m^2] and planes (k, 2): rows of x
+    and y, or of radial and tangential, of one body each.
     """
     shape, mass, planes = np.asarray(shape), np.asarray(mass, float), np.asarray(planes, int).reshape(-1, 2)
     x, y = shape[planes[:, 0]], shape[planes[:, 1]]
@@ -317,15 +298,9 @@ def whirl(shape, mass, planes) -> np.ndarray:
 def state_matrix(stiffness: np.ndarray, damping: np.ndarray, scale: float) -> np.ndarray:
     """Make ``A`` (..., 2 m + r, 2 m + r) [1/s] of the first-order form ``y' = A y``, ``y = (q, q' / scale)``.
 
-    Parameters
-    ----------
-    stiffness : (..., m, m) array
-        Over the masses [1/s^2].
-    damping : (m + r, m + r) array
-        Over the masses [1/s]; the last r motions are rigid and enter by their velocity alone, without a
-        double zero.
-    scale : float
-        A mean frequency [1/s] keeps the matrix balanced.
+    Stiffness (..., m, m) [1/s^2] and damping (m + r, m + r) [1/s] are over the masses; the last r motions are
+    rigid and enter by their velocity alone, without a double zero. A mean frequency [1/s] as ``scale`` keeps
+    the matrix balanced.
     """
     m = stiffness.shape[-1]
     state = np.zeros((*stiffness.shape[:-2], m + len(damping), m + len(damping)))

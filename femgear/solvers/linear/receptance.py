@@ -55,7 +55,6 @@ def modal_response(system: MechanicalSystem, modes: Modes, frequency, inputs, ou
 
     Parameters
     ----------
-    system : MechanicalSystem
     modes : Modes
         Of that system.
     frequency : (F,) array

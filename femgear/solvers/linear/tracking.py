@@ -72,18 +72,7 @@ class TrackedModes:
 
 @dataclass(frozen=True)
 class CriticalSpeed:
-    """A line of excitation at a natural frequency.
-
-    Parameters
-    ----------
-    speed : float
-        [rad/s]
-    frequency : float
-        [Hz]
-    branch : int
-    order : float
-        Of the line, in multiples of the speed.
-    """
+    """A line of excitation, ``order`` times the speed [rad/s], at a natural frequency [Hz] of a branch."""
 
     speed: float
     frequency: float
@@ -183,7 +172,16 @@ def track_modes(
             points.append(new)
             agreements.append(fits)
             pending.pop()
-    return _tracked(points, values, root, agreements, unresolved)
+    value = np.array([point.value for point in points])
+    return TrackedModes(
+        value=value,
+        given=np.isin(value, values),
+        eigenvalue=np.array([point.eigenvalue for point in points]),
+        # the vectors are weighted with the masses
+        shape=np.linalg.solve(root, np.array([point.vector for point in points])),
+        agreement=np.array(agreements),
+        unresolved=tuple(unresolved),
+    )
 
 
 def oscillating(modes: ComplexModes) -> tuple[np.ndarray, np.ndarray]:
@@ -256,22 +254,10 @@ class _Point:
     slope: np.ndarray | None = None
 
 
-def _tracked(points: list[_Point], values, root, agreements, unresolved) -> TrackedModes:
-    """The points as arrays, with shapes instead of mass-weighted vectors."""
-    value = np.array([point.value for point in points])
-    return TrackedModes(
-        value=value,
-        given=np.isin(value, values),
-        eigenvalue=np.array([point.eigenvalue for point in points]),
-        shape=np.linalg.solve(root, np.array([point.vector for point in points])),
-        agreement=np.array(agreements),
-        unresolved=tuple(unresolved),
-    )
-
-
 def _solved(family, value: float, root: np.ndarray) -> _Point:
     eigenvalue, shape = family(value)
-    return _Point(value, np.asarray(eigenvalue, complex), _unit(root @ np.asarray(shape)))
+    vector = root @ np.asarray(shape)
+    return _Point(value, np.asarray(eigenvalue, complex), vector / np.linalg.norm(vector, axis=0))
 
 
 def _assigned(old: _Point, new: _Point) -> tuple[_Point, np.ndarray]:
@@ -347,10 +333,6 @@ def _refined(old: _Point, new: _Point, fits: np.ndarray) -> float | None:
         # an end that is hit exactly would repeat a point
         return float(old.value + step * min(max(share, 0.02), 0.98))
     return float(old.value + 0.5 * step) if fits.min() < _AGREEMENT else None
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector, axis=0)
 
 
 def _critical(tracked: TrackedModes, orders) -> tuple[CriticalSpeed, ...]:

@@ -62,11 +62,8 @@ class HarmonicBalance:
 
     Parameters
     ----------
-    problem : NonlinearSystem
     orders : (L, n_bases) int array
         Lines; line 0 is the mean.
-    reduction : Reduction
-    grid : PhaseGrid
     elements : tuple of Element
         With their coefficients on the grid.
     pairs : (n_pairs, 2) int array
@@ -231,7 +228,6 @@ def harmonic_balance(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     harmonics : int, optional
         Highest harmonic; with several base frequencies the highest sum of orders (`harmonic_lines`).
     orders : (L, n_bases) int array, optional

@@ -6,6 +6,7 @@ phases (Kim and Choi, J. Vib. Acoust. 119 (1997) 107).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,11 +30,6 @@ class _GridSeries:
 
     def at(self, theta) -> np.ndarray:
         """The stored values; theta must be the grid."""
-        if len(theta) != len(self.values):
-            raise CaseError(
-                f"{len(theta)} phases on a grid of {len(self.values)}", code="E-SHAPE",
-                limit="the grid itself",
-            )  # fmt: skip
         return self.values
 
 
@@ -122,14 +118,19 @@ def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
                 f"{count} samples along base {base + 1} cannot show order {highest}", code="E-HARMONICS",
                 limit=f"at least {2 * highest + 1}", remedy="ask for more samples or fewer harmonics",
             )  # fmt: skip
-    axes = [2.0 * np.pi * np.arange(count) / count for count in samples]
-    theta = np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=-1)
+    theta = equidistant_phases(samples)
     left, right = orders[:, None, :], orders[None, :, :]
     flat = np.flatnonzero(orders[:, -1] == 0)
     return PhaseGrid(
         orders, samples, theta, _places(orders, samples), _places(left - right, samples),
         _places(left + right, samples), (flat, _places(-orders[flat], samples)[0]),
     )  # fmt: skip
+
+
+def equidistant_phases(samples: Sequence[int]) -> np.ndarray:
+    """Make all phases (N, n_bases) [rad] with so many samples along every base, the last base fastest."""
+    axes = [2.0 * np.pi * np.arange(count) / count for count in samples]
+    return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=-1)
 
 
 def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ...]:

@@ -83,7 +83,6 @@ class ShootingOptions:
         Tolerance of the integrator, which stops at contact changes.
     tolerance : float
         Of the distance between start and end, relative to the size of the motion.
-    max_iterations : int
     """
 
     harmonics: int = 20
@@ -116,14 +115,12 @@ def solve_shooting(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s]; all must be multiples of the first over ``periods``.
     start : pair of (n,) arrays, optional
         First guess [m, m/s]; without one the motion ``settle`` periods after rest.
     periods : int
         Periods of the first base frequency that make one period of the motion.
-    settle : int
     options
         Fields of `ShootingOptions`.
 

@@ -31,11 +31,9 @@ class PeriodicSolution:
         ``W^T q`` [m].
     force : (n_columns, L) complex array
         Forces of the elements [N].
-    converged : bool
     residual : float
         Largest violation of the harmonic equations relative to the largest deflection, of which a mean that
         runs away counts up to a million times the static one; one where nothing carries the mean load.
-    iterations : int
     factorisations : int
         Matrices factorised on the way.
     tail : float
@@ -110,7 +108,6 @@ class FloquetVerdict:
         point, pitchfork, transcritical), ``"flip"`` (through -1) or ``"Neimark-Sacker"`` (complex pair).
     method : str
         ``"exact exponentials"``, ``"splitting"``, ``"shooting"`` or ``""``.
-    message : str
     error : float
         Estimated relative error of the monodromy matrix.
     """
@@ -152,7 +149,6 @@ def verdict_of(
     multipliers : (m,) complex array
     period : float
         [s].
-    method : str
     error, tolerance : float
         Estimated and allowed relative error of the monodromy matrix.
     positions : int

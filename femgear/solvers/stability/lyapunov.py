@@ -173,7 +173,6 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s] with a common period, see `stroboscopic_map`.
     start : pair of (n,) arrays, optional
@@ -208,17 +207,9 @@ def exponents_of(
 ) -> LyapunovExponents:
     """Compute Lyapunov exponents (count,) [1/s] of a run, and their error from a coarser one beside it.
 
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    finer, coarser
-        Integrators of the problem and its tangents from passage to passage, with ``size``, ``period`` [s],
-        ``divergence`` [1/s] and ``passages(start)``.
-    start : pair of (n,) arrays
-        Displacement [m] and velocity [m/s] at the first passage.
-    chosen : LyapunovOptions
-    beside : int
-        Points that the coarser run covers.
+    Both integrate the problem and its tangents from passage to passage, with ``size``, ``period`` [s],
+    ``divergence`` [1/s] and ``passages(start)``; the start is displacement (n,) [m] and velocity (n,) [m/s]
+    at the first passage. The coarser run covers ``beside`` points.
     """
     count, points = chosen.count, chosen.points
     if count > finer.size:

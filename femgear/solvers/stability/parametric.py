@@ -136,19 +136,8 @@ def decisive_harmonics(modes: Modes, excitation: MeshExcitation, kept: int) -> i
 
     ``q'' + 2 zeta w q' + w^2 (1 + eps cos 2 w t) q = 0`` is stable below ``eps = 4 zeta`` (Nayfeh and Mook,
     Nonlinear Oscillations, 1979, section 5.3), and a mode whose strain is all in the mesh has
-    ``eps = |k_h|/k_0``; half of that is taken.
-
-    Parameters
-    ----------
-    modes, excitation
-        As given to `stability`.
-    kept : int
-        Mesh harmonics of the response.
-
-    Returns
-    -------
-    int
-        Six or more, as far as there are so many; at most 64: the amplitudes fall as one over the harmonic.
+    ``eps = |k_h|/k_0``; half of that is taken. Six or more of the harmonics ``kept`` by the response, as far
+    as there are so many; at most 64: the amplitudes fall as one over the harmonic.
     """
     most = min(kept, 64)
     stiffness = np.abs(mesh_harmonics(excitation, most)[0])
@@ -211,7 +200,6 @@ def stability_chart(
         Base frequencies [rad/s], positive.
     depth : (n_d,) array
         Factors of the fluctuation, 1 for the stiffness as given.
-    harmonics : int
     tolerance : float
         Relative error of the monodromy matrices.
 
@@ -315,12 +303,6 @@ def _largest_at_speeds(modes: Modes, stiffness, number: int, period: np.ndarray,
 
 def _kicks(stiffness: np.ndarray, flexibility: np.ndarray, steps: int) -> np.ndarray:
     """``kappa = k~ (I + T_res k~)^-1`` (2 steps, n, n) at the ends and middles of the steps [N/m]."""
-    lines = stiffness.shape[-1] - 1
-    if steps <= lines:
-        raise CaseError(
-            f"{steps} steps cannot follow {lines} harmonics", code="E-HARMONICS", key="steps",
-            value=steps, limit=f">= {lines + 1}", remedy="take more steps",
-        )  # fmt: skip
     change = sample(stiffness, 2 * steps).T
     return stiffness_in_series(change[:, :, None] * np.eye(len(stiffness)), flexibility)
 

@@ -38,7 +38,6 @@ class Flow:
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : (n_bases,) array
         [rad/s].
     rate : float
@@ -292,8 +291,6 @@ def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, toler
 def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
     from scipy import integrate
 
-    if method not in METHODS or (motion.variational and method != "DOP853"):
-        raise CaseError(f"no integrator {method}", code="E-CHOICE", limit=", ".join(METHODS))
     options = {"rtol": max(tolerance, 3e-14), "atol": atol}
     if first is not None:
         options["first_step"] = min(first, stop - t)

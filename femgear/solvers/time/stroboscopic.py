@@ -80,7 +80,6 @@ def stroboscopic_map(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s]; all must repeat after ``periods`` periods of the first one.
     steps : int
@@ -130,16 +129,9 @@ def common_period(frequency, periods: int) -> float:
 
 @dataclass(frozen=True)
 class PoincareSection:
-    """Points of a section.
+    """Points of a section: times (n_points,) [s], displacement [m] and velocity [m/s] (n_points, n).
 
-    Parameters
-    ----------
-    time : (n_points,) array
-        [s].
-    displacement, velocity : (n_points, n) arrays
-        [m, m/s]
-    deflection : (n_points, n_columns) array
-        ``W^T q`` [m].
+    ``deflection`` (n_points, n_columns) is ``W^T q`` [m].
     """
 
     time: np.ndarray
@@ -222,7 +214,6 @@ def sweep_response(
         Periods of the map for settling.
     tolerance : float
         Change of the state from period to period, relative to its size, at which it has settled.
-    harmonics : int
     steps
         ``steps``, ``periods``, ``method`` of `stroboscopic_map`.
 

@@ -149,11 +149,7 @@ def drivetrain_of(case: DrivetrainCase) -> Drivetrain:
 def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[TorqueHistory, ...]:
     """Make the torques of a case over time [N m]; a share balances the others over the speed ratios.
 
-    Parameters
-    ----------
-    case : DrivetrainCase
-    ratio : mapping of str to float
-        Speeds of the bodies over that of the first one.
+    ``ratio`` holds the speeds of the bodies over that of the first one.
     """
     found = [
         TorqueHistory(one.body, np.array(one.times or [0.0]), np.array(one.torques or [one.torque]))

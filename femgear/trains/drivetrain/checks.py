@@ -79,20 +79,12 @@ def speed_range(
     speed: float,
     start: float = 0.0,
 ) -> SpeedRange:
-    """Compute the speeds of the first body as the rigid chain turns under its torques.
+    """Compute the speeds of the first body as the rigid chain turns under its torques, from start to end [s].
 
     Newton's law of the rigid chain, d omega / dt = sum(ratio_b T_b(t)) / I with its inertia I about the axis
-    of the first body. Torques are linear between their instants, so that the speed there is a sum of
-    trapezoids, and a parabola in between with its vertex where the sum is zero.
-
-    Parameters
-    ----------
-    model : DrivetrainModel
-    torques : sequence of TorqueHistory
-    duration, start : float
-        End and begin of the range [s].
-    speed : float
-        Of the first body at time zero [rad/s].
+    of the first body, whose ``speed`` is that at time zero [rad/s]. Torques are linear between their
+    instants, so that the speed there is a sum of trapezoids, and a parabola in between with its vertex where
+    the sum is zero.
     """
     instants = np.concatenate([[0.0, start, duration], *(one.times for one in torques)])
     times = np.unique(np.clip(instants, 0.0, duration))
@@ -143,12 +135,8 @@ def mesh_mode(model: DrivetrainModel, limit: float) -> float:
 
     Modes at standstill with mean mesh stiffnesses; the share of the meshes in the strain energy of a mode
     ``phi`` is ``sum(k (w^T phi)^2) / omega^2`` (R. G. Parker and J. Lin, J. Vib. Acoust. 126, 2004, 68-76).
-
-    Parameters
-    ----------
-    model : DrivetrainModel
-    limit : float
-        The highest line of the mesh stiffness [Hz]; modes above answer it as springs do, without resonance.
+    Modes above the limit, the highest line of the mesh stiffness [Hz], answer it as springs do, not by
+    resonance.
     """
     modes, stiffness = solve_modes(model.still, model.mean_stiffness), model.mean_stiffness
     driven = stiffness @ modes.mesh_deflection**2 > _MESH_SHARE * (2.0 * math.pi * modes.frequency) ** 2
@@ -401,19 +389,8 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     Whether a motion is resisted does not depend on how stiff the springs are. Therefore all of them get like
     stiffnesses, 1 N/m across and 1 N/m times a length squared against rotation; the coordinates are scaled by
     their own stiffness, ``D K D`` with ones on the diagonal, and what is left is a matter of rank (null space
-    of the stiffness: M. Geradin and D. J. Rixen, Mechanical Vibrations, 3rd ed., section 2.9).
-
-    Parameters
-    ----------
-    train : Drivetrain
-    turning : bool
-        As of `drivetrain_model`, whose refusals apply.
-
-    Returns
-    -------
-    count : int
-    names : tuple of str
-        Coordinates that move most, rotations last; at most six.
+    of the stiffness: M. Geradin and D. J. Rixen, Mechanical Vibrations, 3rd ed., section 2.9). Refuses what
+    `drivetrain_model` does. At most six coordinates are named, rotations last.
     """
     model = drivetrain_model(replace(train, damping_ratio=0.0), harmonics=0, turning=turning)
     lengths = [one.length for one in train.shafts]

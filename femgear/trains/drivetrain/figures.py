@@ -58,7 +58,6 @@ def over_time(
         With curves a sequence of (text, values (n,)).
     unit : str
         After the factor, with the quantity.
-    factor : float
     title : str
         Above all panels.
     zero : bool
@@ -100,7 +99,6 @@ def spectra(
         Marked above the first panel and drawn through all.
     unit : str
         After the factor, with the quantity.
-    factor : float
     x : str
         Label of the abscissa.
     title : str
@@ -233,7 +231,7 @@ def _campbell_figure(modes: xr.Dataset) -> Figure:
 def transient_figures(data: xr.Dataset) -> dict[str, Figure]:
     """Draw speeds [rpm], deviations [mrad] and mesh forces [kN] of transient.nc over time, by file name."""
     time, count, meshes = data["time"].values, data.sizes["body"], chosen_meshes(data)
-    passed = _pass_band(data)
+    passed = "" if data.attrs["filter"] == "none" else f"low-passed to {pass_band(data):.4g} Hz"
     shown = list(range(1, count))[-MOST_PANELS:] or [0]
     deviations = _curves(data, "deviation", shown)
     figures = {
@@ -275,20 +273,10 @@ def _curves(data: xr.Dataset, name: str, columns, kept=slice(None)) -> list[tupl
     ]
 
 
-def _pass_band(data: xr.Dataset) -> str:
-    """What the low pass of the records of transient.nc leaves."""
-    return "" if data.attrs["filter"] == "none" else f"low-passed to {pass_band(data):.4g} Hz"
-
-
 def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:
     """Draw spectra [kN] over frequency, and side bands over orders, by file name; none without meshes.
 
-    Parameters
-    ----------
-    data : Dataset
-        spectrum.nc
-    transient : Dataset, optional
-        transient.nc, for the speeds between which the spectra were taken.
+    Of spectrum.nc; transient.nc has the speeds between which the spectra were taken.
     """
     meshes = chosen_meshes(data)
     if not meshes:

@@ -392,10 +392,7 @@ class FlankContacts:
     def mesh_forces(self, approach, stiffness):
         """Compute forces (..., n_meshes) [N], drive less back flank, and whether any flank touches.
 
-        Parameters
-        ----------
-        approach, stiffness : (..., n_contacts) arrays
-            [m], [N/m]
+        From approach [m] and stiffness [N/m] of the contacts (..., n_contacts).
         """
         n = int(self.mesh.max(initial=-1)) + 1
         overlap = approach - self.gap
@@ -415,8 +412,6 @@ def flank_contacts(
 
     Parameters
     ----------
-    train : Drivetrain
-    place : Coordinates
     spin : (n_all,) array
         Of `rigid_rotation`.
     T : (n_all, n) array

@@ -136,25 +136,11 @@ def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.nda
 def shaft_lines(
     model: DrivetrainModel, layout: Layout, shape, *, points: int = 8
 ) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """Compute the centre lines of the shafts under a motion: places at rest and displacements, (k, 3) each.
+    """Compute the centre lines (k, 3) [m] of the shafts under a motion (n_free,): at rest, and displacements.
 
-    A shaft passes through its stations, between them by the shape functions of its elements; one that is
-    modelled as a joint is drawn as the one element whose static stiffness the joint stands for.
-
-    Parameters
-    ----------
-    model : DrivetrainModel
-    layout : Layout
-        Of ``model.train``.
-    shape : (n_free,) array
-        Motion of the free coordinates.
-    points : int
-        Pieces of an element of a beam.
-
-    Returns
-    -------
-    tuple of (rest, displacement)
-        In the order of the shafts of the chain [m].
+    A shaft passes through its stations, between them by the shape functions of its elements, each drawn in so
+    many ``points``; one that is modelled as a joint is drawn as the one element whose static stiffness the
+    joint stands for. In the order of the shafts of the chain.
     """
     place, full = model.place, model.free @ shape
     found = []
@@ -220,14 +206,12 @@ def draw_motion(
 
     Parameters
     ----------
-    path : Path
     layout : Layout
         Discs, and the names of the places that are written beside them.
     move, turn : (n, 3) arrays
         Translation and rotation vector of every place, in the proportions of the motion [m], [rad].
     shafts : sequence of (rest (k, 3), displacement (k, 3))
         Centre lines [m].
-    title : str
     size : int
         Width in pixels.
 

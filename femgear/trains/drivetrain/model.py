@@ -26,7 +26,7 @@ from femgear.errors import CaseError
 from femgear.fe.shaft import beam_element, disc_matrices
 from femgear.solvers.linear.modal import modal_damping
 from femgear.system.force_laws import positive_part
-from femgear.system.fourier import FourierSeries, phase_of
+from femgear.system.fourier import FourierSeries, orders_of, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, torque_histories
 from femgear.trains.drivetrain.kinematics import (
@@ -57,7 +57,6 @@ class DrivetrainModel:
 
     Parameters
     ----------
-    train : Drivetrain
     system : MechanicalSystem
         ``W`` holds the mesh directions with the carriers at angle zero, ``load`` the weight, ``C`` the modal
         damping; ``gyroscopic`` multiplies the speed of the first body.
@@ -144,13 +143,8 @@ def drivetrain_model(
 ) -> DrivetrainModel:
     """Assemble matrices, mesh directions and mesh stiffness of a drivetrain.
 
-    Parameters
-    ----------
-    train : Drivetrain
-    harmonics : int
-        Terms of the mesh stiffness series.
-    turning : bool
-        Mesh directions of planetary stages turn with the carrier; False freezes them at angle zero.
+    The series of the mesh stiffness has so many ``harmonics``. Mesh directions of planetary stages turn with
+    the carrier, or are those at angle zero.
 
     Raises
     ------
@@ -204,7 +198,6 @@ def drivetrain_problem(
 
     Parameters
     ----------
-    model : DrivetrainModel
     torques : dict
         Constant torque on bodies [N m], by their names; they must balance over the spin.
     separates : bool
@@ -281,8 +274,8 @@ def _flanks(
     if not model.turning:
         fixed, even, odd = fixed + even, empty, empty
     used = [contacts.columns[j] for j in own]
-    order = tuple(int(b == model.mesh_base[meshes[0]]) for b in range(n_bases))
-    turn = tuple(int(planetary and b == 2 * stage) for b in range(n_bases))
+    order = orders_of(int(model.mesh_base[meshes[0]]), n_bases)
+    turn = orders_of(2 * stage, n_bases, int(planetary))
     fixed, even, odd = (np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd))
     stiffness = FourierSeries(model.stiffness[meshes], order)
     return _TurningMeshes(np.array(used), fixed, even, odd, stiffness, turn, contacts.gap[own], separates)
@@ -407,13 +400,8 @@ def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:
 def static_flexibility(model: DrivetrainModel, W, k) -> np.ndarray:
     """Compute the deviations (n, n) per unit of loads that do not drive the spin [m/N].
 
-    Parameters
-    ----------
-    model : DrivetrainModel
-    W : (n, n_meshes) array
-        Directions of the drive flanks at one instant, all in touch.
-    k : (n_meshes,) array
-        Their stiffnesses [N/m].
+    At one instant: directions W (n, n_meshes) of the drive flanks, all in touch, and stiffnesses k
+    (n_meshes,) [N/m].
     """
     carried, total = model.system.M @ model.rigid, model.system.K + (W * k) @ W.T
     size = (np.abs(total).max() or 1.0) / np.abs(carried).max() ** 2
@@ -449,24 +437,12 @@ def refusals_located(case: DrivetrainCase) -> Iterator[None]:
 
 
 def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
-    """Choose the driver of every stage by the torques.
+    """Choose the driver of every stage by the torques; stages whose driver is given keep it.
 
-    The torques, as means over the run, and the inertia forces of the acceleration of the free spin that they
-    give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so that
-    the load of parallel paths follows their stiffness. Weight does not count.
-
-    Parameters
-    ----------
-    train : Drivetrain
-        Stages whose driver is given keep it.
-    duration : float
-        Of the run [s].
-
-    Returns
-    -------
-    Drivetrain
-        A stage without load on its flanks, and one that its first body (the carrier) drives, stay as they
-        are.
+    The torques, as means over the run [s], and the inertia forces of the acceleration of the free spin that
+    they give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so
+    that the load of parallel paths follows their stiffness. Weight does not count. A stage without load on
+    its flanks, and one that its first body (the carrier) drives, stay as they are.
 
     Raises
     ------

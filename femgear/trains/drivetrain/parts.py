@@ -378,13 +378,7 @@ class Drivetrain:
 class TorqueHistory:
     """Torque on one body, linear between the instants and constant outside them.
 
-    Parameters
-    ----------
-    body : str
-    times : (m,) array
-        Ascending [s].
-    values : (m,) array
-        [N m], positive about z.
+    ``times`` (m,) ascend [s]; ``values`` (m,) [N m] are positive about z.
     """
 
     body: str

@@ -58,15 +58,10 @@ _BLOCK = 4096
 
 @dataclass(frozen=True)
 class Records:
-    """What a run keeps of its steps.
+    """What a run keeps of its steps: one record of ``every`` so many.
 
-    Parameters
-    ----------
-    every : int
-        Steps a record.
-    lowpass : bool
-        Records are low-passed (`Decimator`), so that nothing beyond half their rate appears as something
-        else; False takes the motion at these instants as it is.
+    With ``lowpass`` they are low-passed (`Decimator`), so that nothing beyond half their rate appears as
+    something else; otherwise they are the motion at these instants as it is.
     """
 
     every: int = 1
@@ -87,13 +82,10 @@ class DrivetrainRun:
         Of the drive flanks [m]; of the meshes, drive less back flank [N].
     spin, spin_speed : (n,) arrays
         Angle and speed of the first body without its deviation [rad], [rad/s].
-    meshes : tuple of str
-    energy_balance : EnergyBalance
     drift : float
         Largest spin found in the deviations after a block, before it was taken out [rad].
     momentum : float
         Error of the angular momentum about the first body's axis, over the largest impulse or momentum.
-    steps : int
     step : float
         [s]
     extremes : (2, n_meshes) array
@@ -103,7 +95,6 @@ class DrivetrainRun:
         more than the drive flank.
     lost : (n_meshes,) array
         Share of the steps in which no flank touches; zeros where meshes are linear.
-    contact_loss : bool
     growth : float
         Mean rate of the logarithm of the free motion after the first third of the run [1/s]; NaN where
         nothing moves but the spin.
@@ -149,8 +140,6 @@ def march_drivetrain(
 
     Parameters
     ----------
-    model : DrivetrainModel
-    torques : sequence of TorqueHistory
     duration, step : float
         [s]. Any step is taken; cases are refused below four steps a mesh period
         (`femgear.trains.drivetrain.checks.check_drivetrain`, E-RATE), and warned of below thirty and of modes
@@ -162,7 +151,6 @@ def march_drivetrain(
         or given.
     outputs : sequence of str, optional
         Coordinates to record; all rotations when not given.
-    records : Records
     contact_loss : bool
         Drive flanks part, and back flanks touch after the backlash; False lets meshes pull.
 

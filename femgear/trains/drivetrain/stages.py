@@ -225,16 +225,9 @@ def resolved_lines(model: DrivetrainModel, lines, distance: float) -> np.ndarray
 def line_amplitudes(signal, angle, speed, lines, *, record_rate: float) -> np.ndarray:
     """Compute amplitudes (L, c) of lines in signals (n, c), by projection on them at their exact orders.
 
-    Hann's window over the angle; the mean is taken off. NaN beyond the pass band of the records.
-
-    Parameters
-    ----------
-    signal : (n, c) array
-        Records of equal distance in time.
-    angle, speed : (n,) arrays
-        Of the first body [rad], [rad/s].
-    record_rate : float
-        [Hz]
+    The signals are records of equal distance in time, ``record_rate`` [Hz]; angle (n,) [rad] and speed (n,)
+    [rad/s] are those of the first body. Hann's window over the angle; the mean is taken off. NaN beyond the
+    pass band of the records.
     """
     part = (angle - angle[0]) / (angle[-1] - angle[0])
     weight = (0.5 - 0.5 * np.cos(2.0 * np.pi * part)) * speed
@@ -252,15 +245,8 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     """Compute the spectrum of a signal (n, ...) sampled every ``step`` [s], segments under Hann's window.
 
     P. D. Welch, IEEE Trans. Audio Electroacoust. 15, 1967, 70-73, of amplitudes instead of densities; the
-    segments overlap by half, and the mean of every one is taken off.
-
-    Parameters
-    ----------
-    signal : (n, ...) array
-    step : float
-        [s], or turns for orders.
-    resolution : float
-        Wanted distance of lines [Hz]; the segments take ``1 / resolution`` seconds of the signal.
+    segments overlap by half, take ``1 / resolution`` seconds of the signal for lines ``resolution`` [Hz]
+    apart, and the mean of every one is taken off. With steps in turns the lines are orders.
     """
     from scipy.signal import welch, windows
 

@@ -41,12 +41,8 @@ def amplitude_and_mean(
 ) -> Figure:  # fmt: skip
     """Draw amplitude and mean of a deflection over frequency, dashed where it is not known to be stable.
 
-    Parameters
-    ----------
-    curves : sequence of (text, ratio (p,), amplitude (p,), mean (p,), stable (p,) bool)
-    sweeps : sequence of (text, ratio (f,), amplitude (f,), mean (f,))
-        Drawn as markers.
-    x, unit, title : str
+    Curves are (text, ratio (p,), amplitude (p,), mean (p,), stable (p,) bool); sweeps, drawn as markers, are
+    (text, ratio (f,), amplitude (f,), mean (f,)).
     """
     figure, (top, bottom) = new_figure(rows=2, width=8.5, height=7.0, sharex=True)
     for number, (text, ratio, amplitude, mean, stable) in enumerate(curves):
@@ -74,12 +70,8 @@ def amplitude_and_mean(
 def state_bands(rows: Sequence[tuple]) -> Figure:
     """Draw the contact state over the frequency ratio, one band a row.
 
-    A border is drawn halfway between two ratios; sparse rows show these as dots.
-
-    Parameters
-    ----------
-    rows : sequence of (text, ratio (p,), state (p,) int)
-        Sweeps, or pieces of a curve between limit points; numbers of states in `STATE_NAMES`.
+    A border is drawn halfway between two ratios; sparse rows show these as dots. Rows are (text, ratio (p,),
+    state (p,) int) of sweeps, or of pieces of a curve between limit points; states count as in `STATE_NAMES`.
     """
     figure, (ax,) = new_figure(width=8.5, height=1.6 + 0.5 * len(rows))
     marked = False

@@ -33,7 +33,7 @@ import numpy as np
 from femgear.solvers.continuation.branches import Branch
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import FourierSeries, constant
+from femgear.system.fourier import FourierSeries, constant, orders_of
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 # deflections of drive and back contact in half backlashes
@@ -46,16 +46,10 @@ _SHORT = 1e-3
 
 @dataclass(frozen=True)
 class PairBearings:
-    """Bearings of both gears along the line of action.
+    """Bearings of both gears along the line of action, two numbers each: gear 1 and gear 2.
 
-    Parameters
-    ----------
-    mass : (float, float)
-        Of gears 1 and 2 over the equivalent mass m_e.
-    stiffness : (float, float)
-        Of their bearings over the mean mesh stiffness.
-    damping_ratio : float
-        ``c_i = 2 xi sqrt(k_i m_i)``.
+    Masses over the equivalent mass m_e, stiffnesses over the mean mesh stiffness, and the damping ratio xi of
+    ``c_i = 2 xi sqrt(k_i m_i)``.
     """
 
     mass: tuple[float, ...]
@@ -117,8 +111,7 @@ class ImpactPair:
 
     def mesh(self) -> GearMeshes:
         """Make the mesh with its play on the one column, see `ImpactPair.problem`."""
-        orders = _orders(0, 1, len(self.frequency))
-        k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders)
+        k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders_of(0, len(self.frequency)))
         return GearMeshes(np.array([0]), k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
 
     def _matrices(self):
@@ -136,11 +129,11 @@ class ImpactPair:
         count, base = len(self.frequency), 0
         for h, error in enumerate(self.tooth_error, 1):
             if error:
-                yield HarmonicForce((ratio * h) ** 2 * error * along, _orders(0, h, count))
+                yield HarmonicForce((ratio * h) ** 2 * error * along, orders_of(0, count, h))
         for error, z in zip(self.eccentricity, self.teeth):
             if error:
                 base += 1
-                yield HarmonicForce((ratio / z) ** 2 * error * along, _orders(base, 1, count))
+                yield HarmonicForce((ratio / z) ** 2 * error * along, orders_of(base, count))
 
 
 def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tuple[float, ...]:
@@ -161,15 +154,9 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
     """Find the ratios (n,) along the branch at which the smallest deflection passes a level, to 1e-6.
 
     The harmonic balance equations are solved again between two points of the branch; at limit points, where
-    two points lie within 1e-3 of the ratio, the border is interpolated.
-
-    Parameters
-    ----------
-    pair : ImpactPair
-    branch : Branch
-        Over the frequency ratio, from ``parameter_curve(pair.problem, ..., 1.0)``.
-    level : float
-        In half backlashes: `DRIVE` for the first impacts, `BACK` for impacts on both flanks.
+    two points lie within 1e-3 of the ratio, the border is interpolated. The branch is one over the frequency
+    ratio, of ``parameter_curve(pair.problem, ..., 1.0)``; the level in half backlashes is `DRIVE` for the
+    first impacts, `BACK` for impacts on both flanks.
     """
     from scipy.optimize import brentq
 
@@ -196,10 +183,6 @@ def _lowest_deflection(solution) -> float:
     return float(solution.at(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES).min())
 
 
-def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
-    return tuple(order if place == base else 0 for place in range(count))
-
-
 NORMAL, ONE_SIDED, TWO_SIDED, UNKNOWN = 0, 1, 2, 3
 STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
 """One flank stays closed; it opens and the other does not close; both close."""
@@ -208,12 +191,8 @@ STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
 def range_states(lowest, highest) -> np.ndarray:
     """Tell the contact states (...), indices into `STATE_NAMES`, from the range of the relative deflection.
 
-    `UNKNOWN` where an extreme is nan or infinite, as of a motion that did not settle.
-
-    Parameters
-    ----------
-    lowest, highest : (...) arrays
-        Extremes of the deflection, in half backlashes.
+    ``lowest`` and ``highest`` (...) are in half backlashes. `UNKNOWN` where one is nan or infinite, as of a
+    motion that did not settle.
     """
     lowest, highest = np.asarray(lowest, float), np.asarray(highest, float)
     both = (highest > DRIVE) & (lowest < BACK)
@@ -225,10 +204,7 @@ def range_states(lowest, highest) -> np.ndarray:
 def contact_shares(x) -> dict[str, np.ndarray]:
     """Compute the shares (...) of the instants with the drive flanks, none or the back flanks in contact.
 
-    Parameters
-    ----------
-    x : (..., T) array
-        Relative deflections over a period, in half backlashes.
+    Relative deflections x (..., T) over a period are in half backlashes.
     """
     drive, back = np.asarray(x) > DRIVE, np.asarray(x) < BACK
     touching = {"drive": drive, "free": ~drive & ~back, "back": back}

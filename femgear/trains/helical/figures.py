@@ -135,17 +135,8 @@ def _limits(ax, data, high: float) -> None:
 def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float = 0.16) -> Figure:
     """Draw the first twelve modes that are no rigid-body motions, from the front and, below, from the side.
 
-    Parameters
-    ----------
-    modes : xarray.Dataset
-    gears : PlanetarySet
-    scale : float
-        Largest displacement of each view as a share of the ring's radius.
-
-    Raises
-    ------
-    CaseError
-        No mode to show (E-MODES).
+    The largest displacement of each view is the share ``scale`` of the ring's radius. E-MODES (CaseError):
+    there is no such mode.
     """
     frequency = modes["frequency"].values
     shown = np.flatnonzero(frequency > 0.0)[:_SHOWN]
@@ -241,11 +232,7 @@ def _mark(ax, modes: xr.Dataset, top: float) -> None:
 def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 4)) -> Figure:
     """Draw the phases of sun and ring meshes as hands of a dial at every planet, one picture a harmonic.
 
-    Parameters
-    ----------
-    phasing : MeshPhasing
-    harmonics : sequence of int
-        A hand upwards has phase zero; phase grows counter-clockwise.
+    A hand upwards has phase zero; phase grows counter-clockwise.
     """
     table, factors = phasing_table(phasing, list(harmonics)), phase_factors(phasing, list(harmonics))
     columns = min(4, len(harmonics))

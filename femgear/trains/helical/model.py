@@ -143,12 +143,8 @@ class HelicalSet(RigidSet):
 def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
     """Make the helical set of a case: bodies and supports of its entries, radii and angles of its gears.
 
-    Parameters
-    ----------
-    gears : PlanetarySet
-        Of the transverse section.
-    mesh_stiffness : (2N,) array, optional
-        Mean stiffnesses along the tooth normals [N/m] where the case gives none.
+    The gears are those of the transverse section; mean stiffnesses (2N,) along the tooth normals [N/m] are
+    taken where the case gives none.
     """
     helical = case.helical
     bodies = {}
@@ -181,16 +177,8 @@ def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_widt
     """Compute the transverse and overlap contact ratio (2, 2) of the sun-planet and the planet-ring mesh.
 
     ``eps_gamma = eps_alpha + eps_beta``, ``eps_beta = b sin|beta| / (pi m_n)`` (ISO 21771, sections 5.4.2.3
-    and 5.4.4); a row is one mesh.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-        Its gears in the transverse section.
-    helix_angle : float
-        [rad]
-    face_width : float
-        That both gears of a mesh have in common [m].
+    and 5.4.4); a row is one mesh. The gears are those of the transverse section; helix angle [rad] and the
+    face width that both gears of a mesh have in common [m].
     """
     s = planetary_set
     normal_module = s.sun.module * math.cos(helix_angle)
@@ -260,14 +248,9 @@ def helical_excitation(
 
 
 def slice_phases(phases, overlap_ratio, *, slices: int, hand: int = 1) -> np.ndarray:
-    """Compute phases (n_meshes S,) of the slices of meshes, as fractions of the mesh period.
+    """Compute phases (n_meshes S,) of the slices, in mesh periods, from those at mid-face (n_meshes,).
 
-    Parameters
-    ----------
-    phases : (n_meshes,) array
-        At mid-face.
-    overlap_ratio, slices, hand
-        See `helical_excitation`.
+    The overlap ratio, slices and hand are those of `helical_excitation`.
     """
     phases = np.asarray(phases, float)
     overlap = np.broadcast_to(np.asarray(overlap_ratio, float), len(phases))
@@ -325,16 +308,8 @@ def section_stiffness(
 ) -> SectionStiffness:
     """Compute the stiffness of the teeth of both sections, from one planet each under equal load a length.
 
-    The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse.
-
-    Parameters
-    ----------
-    case : Case
-        With a section helical.
-    gears : PlanetarySet
-        Of its transverse section.
-    cache : path, optional
-        Folder of generated grids.
+    The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse. The
+    gears are those of the transverse section; ``cache`` is the folder of generated grids.
 
     Raises
     ------
@@ -401,16 +376,11 @@ def normal_record(
 
 
 def shared_load(record: MeshExcitation) -> MeshExcitation:
-    """Move tangent lines to the static state of a set with fixed centres.
+    """Move tangent lines of a record, 2N rows, to the static state of a set with fixed centres.
 
     Each planet passes the force on that it takes, ``F = k_s (d_s - e_s) = k_r (d_r - e_r)``, and one rotation
     of the sun closes the meshes of all planets, ``d_s + d_r = X``; the forces on the sun add up to those of
     the record.
-
-    Parameters
-    ----------
-    record : MeshExcitation
-        2N rows, one a mesh.
     """
     meshes = (2, len(record.stiffness) // 2, -1)
     k = record.stiffness.reshape(meshes)

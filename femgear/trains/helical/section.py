@@ -101,17 +101,14 @@ def _slow_notice(data: dict) -> Iterator[Finding]:
     given = data["operation"]["speeds"]
     speeds = given["count"] if isinstance(given, dict) else len(given)
     seconds = _SECONDS * speeds * (2 * planets * slices) ** 3
+    time = f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
     if slices > 1 and seconds > _LONG:
         yield Finding(
             "W-SLICES",
             "helical.slices",
             f"{slices} slices of {2 * planets} meshes at {speeds} speeds take "
-            f"dynamics about {_duration(seconds)} (usual: 8 slices or fewer)",
+            f"dynamics about {time} (usual: 8 slices or fewer)",
         )
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
 
 
 class HelicalCase(RigidCase):

@@ -70,7 +70,6 @@ class PlanetaryStage:
 
     Parameters
     ----------
-    data : PlanarSet
     teeth : (3,) tuple of int, optional
         Of sun, planet and ring (positive); speeds and mesh frequencies need them.
     fixed : {"carrier", "ring", "sun"}, optional
@@ -187,10 +186,7 @@ def in_series(
 ) -> MultistageSet:
     """Join stages one after the other: each carrier turns the next sun.
 
-    Parameters
-    ----------
-    torsional, lateral : float
-        Of every coupling [N m/rad], [N/m], see `StageCoupling`.
+    All couplings have the same torsional [N m/rad] and lateral [N/m] stiffness, see `StageCoupling`.
     """
     couplings = tuple(
         StageCoupling(Member(n, "carrier"), Member(n + 1, "sun"), torsional, lateral)
@@ -219,12 +215,8 @@ class TrainSpeeds:
 class TrainTorques:
     """Torques without losses [N m], positive counter-clockwise.
 
-    Parameters
-    ----------
-    sun, ring, carrier : (S,) arrays
-        What couplings, housing, input and output give the members; they add up to zero in every stage.
-    output : float
-        On the output member.
+    What couplings, housing, input and output give sun, ring and carrier, (S,) arrays which add up to zero in
+    every stage; ``output`` is that on the output member.
     """
 
     sun: np.ndarray
@@ -234,19 +226,9 @@ class TrainTorques:
 
 
 def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
-    """Compute the speeds of all bodies from that of the input member.
+    """Compute the speeds of all bodies from that of the input member [rad/s], with the teeth of every stage.
 
-    Parameters
-    ----------
-    data : MultistageSet
-        With the teeth of every stage.
-    speed : float
-        Of the input [rad/s].
-
-    Returns
-    -------
-    TrainSpeeds
-        ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)`` in every stage (Willis).
+    ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)`` in every stage (Willis).
 
     Raises
     ------
@@ -263,16 +245,10 @@ def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
 
 
 def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) -> TrainTorques:
-    """Compute the torques on all members from that on the input, without losses.
+    """Compute the torques on all members from that on the input [N m], without losses.
 
-    Parameters
-    ----------
-    data : MultistageSet
-    torque : float
-        On the input [N m].
-    radii : bool
-        Balance of the lumped sets, from base radii and pressure angles (see `torque_shares`), instead of
-        tooth numbers. Both agree where the radii close.
+    With ``radii`` the balance is that of the lumped sets, from base radii and pressure angles
+    (`torque_shares`), instead of tooth numbers. Both agree where the radii close.
     """
     weights = _radius_weights(data) if radii else _tooth_weights(data)
     # unknown: lambda of every row, and the torque of the output
@@ -368,7 +344,6 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
 
     Parameters
     ----------
-    data : MultistageSet
     torque : float
         On the input [N m]; it reacts on the output and on the fixed members, and chooses the loaded flanks
         of every stage. Zero: flanks of suns that drive counter-clockwise.
@@ -398,8 +373,12 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     for number, coupling in enumerate(data.couplings):
         columns, stiffness = _springs(data, motions, coupling, lateral=number not in turning)
         K += (columns * stiffness) @ columns.T
-    meshes = [free_motions(one.data).T @ mesh_directions(one.data, sign)
-              for one, sign in zip(data.stages, _stage_flanks(data, torque))]  # fmt: skip
+    # torques that load the flanks of every stage; without any those of suns that drive counter-clockwise
+    on_sun = train_torques(data, torque, radii=True).sun if torque else np.ones(len(data.stages))
+    flanks = [flank_sign(one.data, PlanarTorque(float(t))) for one, t in zip(data.stages, on_sun)]
+    meshes = [
+        free_motions(one.data).T @ mesh_directions(one.data, flank) for one, flank in zip(data.stages, flanks)
+    ]
     turned = [member for n in turning for member in (data.couplings[n].first, data.couplings[n].second)]
     ends = [motions[member][:2].T for member in turned]
     load = np.concatenate([part.load for part in parts]) + _torque_load(data, motions, torque)
@@ -425,27 +404,10 @@ def mean_mesh_stiffness(data: MultistageSet) -> np.ndarray:
     return np.concatenate([stage.data.mesh_stiffness for stage in data.stages])
 
 
-def _stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
-    """Loaded flanks of every stage: 1 where the sun drives counter-clockwise, else -1."""
-    if not torque:
-        return (1,) * len(data.stages)
-    on_sun = train_torques(data, torque, radii=True).sun
-    return tuple(flank_sign(one.data, PlanarTorque(float(t))) for one, t in zip(data.stages, on_sun))
-
-
 def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
-    """Find the lateral couplings between frames that turn against one another.
+    """Find the lateral couplings between frames that turn against one another, at an input's speed [rad/s].
 
-    Parameters
-    ----------
-    data : MultistageSet
-    speed : float
-        Of the input [rad/s].
-
-    Returns
-    -------
-    dict of int to float
-        Number of the coupling (from 0): speed of the second frame less that of the first [rad/s].
+    By the number of the coupling (from 0) the speed of the second frame less that of the first [rad/s].
 
     Raises
     ------

@@ -40,7 +40,6 @@ class MultistageModes:
 
     Parameters
     ----------
-    data : MultistageSet
     modes : Modes
         ``kind``: ``rigid``; ``rotational``, ``translational`` or ``planet`` where at least 99 % of the
         kinetic energy belongs to that class in all stages together; else ``mixed``. With equally spaced

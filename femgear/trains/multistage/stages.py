@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
-from femgear.solvers.linear.receptance import MeshErrorResponse, modal_response
+from femgear.solvers.linear.receptance import MeshErrorResponse, modal_error_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.force_laws import GearMeshes, TurningSprings, turning_wave
-from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample, tooth_lines
+from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, orders_of, sample, tooth_lines
 from femgear.system.mesh_directions import gear_set_system, mesh_elements
-from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
+from femgear.system.mode_kinds import class_energies, gear_set_motions, mixture, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 from femgear.trains.multistage.case_file import (
     MultistageCase,
@@ -53,9 +53,6 @@ from femgear.trains.multistage.results import (
 from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread, silent
 from femgear.trains.rigid import mixed_modes
 
-# relative distance of frequencies that count as one
-_MULTIPLE = 1e-7
-
 
 def multistage_modes(data: MultistageSet, *, damping_ratio: float | Sequence[float] = 0.0) -> MultistageModes:
     """Solve for the modes of the train at rest with mean mesh stiffnesses, their kinds and stages.
@@ -64,23 +61,14 @@ def multistage_modes(data: MultistageSet, *, damping_ratio: float | Sequence[flo
     """
     system = multistage_system(data)
     modes = solve_modes(system, mean_mesh_stiffness(data), damping_ratio=damping_ratio)
-    masses = _stage_masses(data)
-    modes = _by_stage(modes, masses)
-    share = _stage_shares(masses, modes.shape)
-    kinds = _multistage_kinds(data, modes.shape, frequency=modes.frequency)
-    return MultistageModes(data, replace(modes, kind=kinds), share, _strain(data, system, modes))
-
-
-def _stage_masses(data: MultistageSet) -> np.ndarray:
-    """Mass matrix of every stage in the coordinates of the train, (S, n, n)."""
+    # mass matrices of the stages in the coordinates of the train
     Z, parts = joined_motions(data), zip(data.stages, stage_slices(data))
-    return np.array([Z[rows].T @ gear_set_system(stage.data).M @ Z[rows] for stage, rows in parts])
-
-
-def _stage_shares(masses: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """Share (S, m) of every stage in the kinetic energy of shapes (n, m)."""
-    energy = (shape * (masses @ shape)).sum(axis=1)
-    return energy / energy.sum(axis=0)
+    masses = np.array([Z[rows].T @ gear_set_system(stage.data).M @ Z[rows] for stage, rows in parts])
+    modes = _by_stage(modes, masses)
+    energy = (modes.shape * (masses @ modes.shape)).sum(axis=1)
+    kinds = _multistage_kinds(data, modes.shape, frequency=modes.frequency)
+    share, strain = energy / energy.sum(axis=0), _strain(data, system, modes)
+    return MultistageModes(data, replace(modes, kind=kinds), share, strain)
 
 
 def _multistage_kinds(data: MultistageSet, shape, *, frequency) -> tuple[str, ...]:
@@ -89,27 +77,22 @@ def _multistage_kinds(data: MultistageSet, shape, *, frequency) -> tuple[str, ..
     classes, total = 0.0, 0.0
     for stage, rows in zip(data.stages, stage_slices(data)):
         motions = gear_set_motions(stage.data, full[rows])
-        central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
         classes = classes + class_energies(motions)
-        total = total + central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1))
+        total = total + motions.energy
     return named_kinds(classes / total, frequency)
 
 
 def _by_stage(modes: Modes, masses: np.ndarray) -> Modes:
     """Modes of one frequency, mixed so that each belongs to one stage as far as it can.
 
-    Within a frequency the shapes may be mixed at will. The orthogonal mixture that diagonalises ``sum_s s
-    M_s`` parts stages that do not know of each other.
+    The mixture of ``sum_s s M_s`` parts stages that do not know of each other.
     """
-    size, shape = len(modes.frequency), modes.shape
-    Q = np.eye(size)
-    apart = np.diff(modes.frequency) > _MULTIPLE * modes.frequency[1:]
-    for group in np.split(np.arange(size), np.flatnonzero(apart) + 1):
-        if len(group) > 1:
-            own = shape[:, group]
-            weighted = sum(number * own.T @ mass @ own for number, mass in enumerate(masses, 1))
-            Q[np.ix_(group, group)] = np.linalg.eigh(weighted)[1]
-    return mixed_modes(modes, Q)
+
+    def weighted(group: np.ndarray) -> np.ndarray:
+        own = modes.shape[:, group]
+        return np.sum([number * own.T @ mass @ own for number, mass in enumerate(masses, 1)], axis=0)
+
+    return mixed_modes(modes, mixture(modes.frequency, weighted))
 
 
 def _strain(data: MultistageSet, system: MechanicalSystem, modes: Modes) -> np.ndarray:
@@ -158,21 +141,17 @@ def error_response(
         By the stage that excites; deflection and force of all meshes of the train.
     """
     speed = np.atleast_1d(np.asarray(speed, float))
-    system, k = multistage_system(data), mean_mesh_stiffness(data)
     if modes is None:
         modes = multistage_modes(data, damping_ratio=damping_ratio).modes
     unit, found = train_speeds(data, math.copysign(1.0, speed[0])), {}
     for number, error in errors.items():
-        columns, hertz = mesh_columns(data)[number - 1], np.abs(speed) * unit.mesh_frequency[number - 1]
+        hertz = np.abs(speed) * unit.mesh_frequency[number - 1]
+        forward = unit.sun[number - 1] > unit.carrier[number - 1]
+        every = np.zeros((data.n_meshes, np.shape(error)[1]), complex)
         # where the sun turns backwards the mesh runs through its period from the end
-        error = np.asarray(error) if unit.sun[number - 1] > unit.carrier[number - 1] else np.conj(error)
-        harmonics, inputs = np.arange(1, error.shape[1] + 1), system.W[:, columns] * k[columns]
-        transfer = modal_response(system, modes, np.outer(hertz, harmonics).ravel(), inputs, system.W.T)
-        transfer = transfer.reshape(len(hertz), len(harmonics), len(k), len(columns))
-        deflection = np.einsum("fhoj,jh->fho", transfer, error)
-        force = k * deflection
-        force[..., columns] -= k[columns] * error.T
-        found[number] = MeshErrorResponse(hertz, harmonics, deflection, force)
+        every[mesh_columns(data)[number - 1]] = error if forward else np.conj(error)
+        one = modal_error_response(modes, hertz, every)
+        found[number] = replace(one, deflection=one.deflection[0], force=one.force[0])
     return found
 
 
@@ -194,7 +173,6 @@ def multistage_problem(
 
     Parameters
     ----------
-    data : MultistageSet
     meshes : mapping of int to GearMeshes, optional
         By stage (from 1), from `mesh_elements` of its set with orders ``(1,)`` of the stage's own mesh
         frequency; a stage that is not named has constant stiffnesses and meshes that part.
@@ -249,9 +227,7 @@ def _stage_elements(
     """The meshes of all stages on their columns, each with its own base frequency."""
     for number, (stage, columns) in enumerate(zip(data.stages, mesh_columns(data)), 1):
         made = meshes.get(number) or mesh_elements(stage.data)
-        orders = [0] * bases
-        orders[number - 1] = 1 if forward[number - 1] else -1
-        own = {}
+        orders, own = orders_of(number - 1, bases, 1 if forward[number - 1] else -1), {}
         for name in ("stiffness", "deflection", "force"):
             series = getattr(made, name)
             own[name] = replace(series, orders=tuple(series.orders[0] * one for one in orders))
@@ -262,11 +238,10 @@ def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int
     """Lateral springs between frames that turn apart, each with its own base frequency."""
     for place, (number, relative) in enumerate(turning.items()):
         one = data.couplings[number]
-        orders = [0] * bases
-        orders[len(data.stages) + place] = 1 if relative > 0.0 else -1
+        orders = orders_of(len(data.stages) + place, bases, 1 if relative > 0.0 else -1)
         phase = data.stages[one.second.stage - 1].angle - data.stages[one.first.stage - 1].angle
         first = data.n_meshes + 4 * place
-        wave = turning_wave(tuple(orders), phase=phase)
+        wave = turning_wave(orders, phase=phase)
         yield TurningSprings(np.arange(first, first + 4)[None], np.array([one.lateral]), wave)
 
 

@@ -48,13 +48,7 @@ def pieces(stable, wanted: int) -> list[slice]:
 
 
 def orbits(curves: Sequence[tuple], *, title: str = "") -> Figure:
-    """Draw paths of a member's centre in the carrier frame.
-
-    Parameters
-    ----------
-    curves : sequence of (text, path (2, n) [m])
-    title : str
-    """
+    """Draw paths of a member's centre in the carrier frame: curves (text, path (2, n) [m])."""
     figure, (ax,) = new_figure(width=6.2, height=6.2)
     for number, (text, path) in enumerate(curves):
         closed = 1e6 * np.concatenate([path, path[:, :1]], axis=1)
@@ -71,13 +65,7 @@ def bearing_forces(
 ) -> Figure:
     """Draw sizes of bearing forces over one turn, of the weight against the carrier or of the carrier.
 
-    Parameters
-    ----------
-    angle : (n,) array
-        [rad]
-    curves : sequence of (text, force (2, n) [N])
-    title, over : str
-        Above the figure, and under its axis.
+    Over the angle (n,) [rad], whose name is ``over``: curves (text, force (2, n) [N]).
     """
     figure, (ax,) = new_figure()
     for number, (text, force) in enumerate(curves):

@@ -19,10 +19,11 @@ from femgear.solvers.continuation.branches import Branch, frequency_response_cur
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.harmonic_balance import displacements
+from femgear.solvers.periodic.phase_grid import equidistant_phases
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import constant, fluctuation, line_tail
+from femgear.system.fourier import constant, fluctuation, line_tail, orders_of
 from femgear.system.mesh_directions import free_motions, mesh_elements, pin_directions
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
 from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
@@ -65,13 +66,7 @@ _STILL = 1e-6
 class PlanarModel:
     """A lumped set ready to be solved, and where its elements act.
 
-    Parameters
-    ----------
-    data : PlanarSet
-    problem : NonlinearSystem
-    back_flanks : bool
-        The back flanks have columns of their own.
-    bearings : Bearings
+    ``back_flanks`` tells whether these have columns of their own.
     """
 
     data: PlanarSet
@@ -98,12 +93,7 @@ class PlanarModel:
 def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None = None) -> PlanarSet:
     """Make the lumped set of a case: bodies and supports of its entries, radii and angles of its gears.
 
-    Parameters
-    ----------
-    case : Case
-    gears : PlanetarySet
-    static : StaticResult, optional
-        Its mean stiffnesses are taken where the case gives none.
+    Mean stiffnesses of the static solution are taken where the case gives none.
     """
     planar, bodies = case.planar, {}
     for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
@@ -133,8 +123,6 @@ def planar_model(
 
     Parameters
     ----------
-    case : Case
-    gears : PlanetarySet
     static : StaticResult, optional
         Needed where the case gives no mesh stiffness.
     mesh_frequency : bool
@@ -200,7 +188,7 @@ def _gravity(case: PlanarCase, gears: PlanetarySet, mesh_frequency: bool) -> Gra
     given, sense = case.planar.gravity, carrier_sense(case, gears)
     if given is None:
         return None
-    orders = None if sense == 0 else (sense, 0) if mesh_frequency else (sense,)
+    orders = orders_of(0, 1 + mesh_frequency, sense) if sense else None
     return Gravity(given.acceleration, given.direction, orders)
 
 
@@ -274,7 +262,6 @@ def weight_curve(
         As for `frequency_response_curve`.
     largest : float
         Longest step, see `StepOptions`.
-    max_points : int
     """
     return frequency_response_curve(
         problem,
@@ -295,13 +282,7 @@ def judged_branch(
 ) -> Branch:
     """Judge a branch by Floquet multipliers: coarse first, fine where open or near the unit circle.
 
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    branch : Branch
-        Followed without stability.
-    progress : callable, optional
-        Called with (done, total).
+    The branch was followed without stability; ``progress`` is called with (done, total).
     """
     solutions = branch.solutions
     found = []
@@ -366,15 +347,8 @@ def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
 def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple[np.ndarray, np.ndarray]:
     """Compute the forces (n, 2N) [N] of drive flanks, and of back flanks on their own lines, by their laws.
 
-    The deflections are those of the solution. Its force lines, cut at the last one, would ring beside a short
-    contact; the law of a one-sided contact does not.
-
-    Parameters
-    ----------
-    model : PlanarModel
-    solution : PeriodicSolution
-    theta : (n, n_bases) array
-        Phases of the base frequencies [rad].
+    At phases theta (n, n_bases) [rad], with the deflections of the solution. Its force lines, cut at the last
+    one, would ring beside a short contact; the law of a one-sided contact does not.
     """
     x = np.real(np.exp(1j * (theta @ solution.orders.T)) @ solution.deflection.T)
     force, groups = element_forces(model.problem, x, theta)[0], model.groups
@@ -404,22 +378,14 @@ def column_contact(problem: NonlinearSystem, solution: PeriodicSolution) -> np.n
 def _phases(orders: np.ndarray) -> np.ndarray:
     """Instants (n, bases) [rad] that fill the phases evenly; one phase of a base that no line has."""
     used = np.any(orders != 0, axis=0)
-    counts = np.where(used, _GRID[: len(used)] if used.sum() > 1 else _SAMPLES, 1)
-    axes = [2.0 * np.pi * np.arange(count) / count for count in counts]
-    return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
+    return equidistant_phases(np.where(used, _GRID[: len(used)] if used.sum() > 1 else _SAMPLES, 1).tolist())
 
 
 def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[tuple[int, str]]:
     """Choose points of a branch to draw over the phase, in order, with what they are; the last is the top.
 
-    Parameters
-    ----------
-    rms : (p,) array
-        Amplitude along the branch.
-    back : (p,) array
-        Share of the cycle in which back flanks touch.
-    stable : (p,) int array
-        1 where known to be stable, 0 where known not to be, -1 where not known.
+    Along the branch, (p,) each: amplitude, share of the cycle in which back flanks touch, and stability: 1
+    where known to be stable, 0 where known not to be, -1 where not known.
     """
     sure = stable == 1
     top, words = int(np.argmax(rms)), "largest response"
@@ -435,11 +401,7 @@ def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[
 def merged_folds(frequency: np.ndarray, fold: np.ndarray) -> np.ndarray:
     """Find the limit points of a branch, neighbours at one frequency as one: the outermost of them.
 
-    Parameters
-    ----------
-    frequency : (p,) array
-        Along the branch.
-    fold : (p,) bool array
+    From the frequencies (p,) along the branch, and whether each point is a fold (p,).
     """
     groups: list[list[int]] = []
     for point in np.flatnonzero(fold):

@@ -392,14 +392,8 @@ def branch_warnings(data: xr.Dataset) -> Iterator[Finding]:
 
 def response_warnings(data: xr.Dataset) -> tuple[Finding, ...]:
     """Tell what truncation of the lines does to response.nc."""
-    return tail_warnings(data, _response_key(data))
-
-
-def _response_key(data: xr.Dataset) -> str:
-    """Entries of the case file that hold the lines of response.nc."""
-    if not data.attrs["mesh_lines"]:
-        return "planar.response.carrier_harmonics"
-    return "planar.response.carrier_harmonics, side_bands or dynamics.response_harmonics"
+    more = ", side_bands or dynamics.response_harmonics" if data.attrs["mesh_lines"] else ""
+    return tail_warnings(data, f"planar.response.carrier_harmonics{more}")
 
 
 def _truncation(data: xr.Dataset) -> Iterator[str]:
@@ -439,8 +433,11 @@ def describe_response(data: xr.Dataset) -> Block:
         "tail": lambda i: f"{float(data['tail'][i]):.2g}",
         "force tail": lambda i: f"{float(data['force_tail'][i]):.2g}",
     }
+    lines = "lines of the weight alone: a constant mesh stiffness leaves none of the mesh frequency"
+    if data.attrs["mesh_lines"]:
+        lines = "lines of weight and mesh frequency"
     notes = [
-        f"{data.sizes['line']} {_kind_of_lines(data)}; mesh force: the largest fluctuation of "
+        f"{data.sizes['line']} {lines}; mesh force: the largest fluctuation of "
         "all meshes; contact: least share of the time of the drive flanks, largest of the back flanks",
         "the stability of these responses is not computed",
     ]
@@ -452,12 +449,6 @@ def describe_response(data: xr.Dataset) -> Block:
         )
     notes += map(str, response_warnings(data))
     return tabulate("Weight and mesh frequency", chosen(data.sizes["speed"]), columns, notes)
-
-
-def _kind_of_lines(data: xr.Dataset) -> str:
-    if data.attrs["mesh_lines"]:
-        return "lines of weight and mesh frequency"
-    return "lines of the weight alone: a constant mesh stiffness leaves none of the mesh frequency"
 
 
 def published_modes(case: PlanarCase, data: xr.Dataset) -> tuple[Block, ...]:

@@ -272,12 +272,7 @@ def _end_of_branch(branch: Branch, wanted: BranchSection) -> str:
 def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> PlanarModesResult:
     """Solve for natural frequencies, modes and their kinds.
 
-    Parameters
-    ----------
-    case : Case
-        With a section planar.
-    static : StaticResult, optional
-        Needed where the case gives no mesh stiffness.
+    The static solution is needed where the case gives no mesh stiffness.
 
     Raises
     ------

@@ -21,9 +21,9 @@ from femgear.contact.bodies import Sectors, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.tooth_loads import deformed_set
 from femgear.fe.grid import copy_nodes, rotated_copies
-from femgear.gears.deviations import SetDeviations
+from femgear.gears.deviations import SetDeviations, loaded_flanks
 from femgear.gears.gear import Gear
-from femgear.gears.modifications import FlankForm, form_deviation
+from femgear.gears.modifications import form_deviation
 from femgear.gears.planetary import PlanetarySet
 from femgear.report.scene import Body, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.style import (
@@ -75,14 +75,9 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
 
 
 def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Figure:
-    """Draw the tangent and secant stiffness of every mesh.
+    """Draw the tangent and secant stiffness of every mesh (static.nc).
 
-    Parameters
-    ----------
-    static : xarray.Dataset
-        Contents of static.nc.
-    face_width : float, optional
-        [m]; adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
+    The face width [m] adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
     """
     lines = distinct_lines(static["mesh"].values, static["mesh_stiffness"])
     # two families of curves that differ from planet to planet would cover one another
@@ -367,7 +362,7 @@ def _four_panels(draw: Callable[[int, Any], str], y: str, *, columns: int, share
 
 def has_profiles(deviations: SetDeviations, planetary_set: PlanetarySet) -> bool:
     """Tell whether any loaded flank differs from its involute, so that `profile_chart` shows something."""
-    flanks = _flanks(deviations, planetary_set)
+    flanks = loaded_flanks(deviations, planetary_set)
     return any(form_deviation(form, gear, _stations(form, gear)).any() for _, form, gear in flanks)
 
 
@@ -382,7 +377,7 @@ def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Fig
 
     The involute is the zero line; the part that meets the mate is marked.
     """
-    active, flanks = active_rolls(planetary_set), _flanks(deviations, planetary_set)
+    active, flanks = active_rolls(planetary_set), loaded_flanks(deviations, planetary_set)
 
     def draw(number: int, ax) -> str:
         name, form, gear = flanks[number]
@@ -429,16 +424,6 @@ def _deviation_panels(draw: Callable[[int, Any], str]) -> Figure:
     low, high = figure.axes[0].get_ylim()
     figure.axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
     return figure
-
-
-def _flanks(d: SetDeviations, s: PlanetarySet) -> tuple[tuple[str, FlankForm, Gear], ...]:
-    """Name the four kinds of loaded flanks, with their forms and gears."""
-    return (
-        ("sun", d.sun, s.sun),
-        ("planet, sun side", d.planet_sun_side, s.planet),
-        ("planet, ring side", d.planet_ring_side, s.planet),
-        ("ring", d.ring, s.ring),
-    )
 
 
 def active_rolls(planetary_set: PlanetarySet) -> tuple[tuple[float, float], ...]:

@@ -166,14 +166,9 @@ class StaticResult:
 class NominalStresses:
     """Nominal stresses after ISO 6336 with equal load on all planets and no load factors.
 
-    Parameters
-    ----------
-    contact : (2,) array
-        sigma_H0 of sun-planet and planet-ring [Pa] (ISO 6336-2, method B).
-    root : (2, 2) array
-        sigma_F0 of gear 1 and gear 2 of both [Pa] (ISO 6336-3, method B).
-    message : str
-        Why a value is NaN: gears outside the range of the method; otherwise empty.
+    ``contact`` (2,) is sigma_H0 of sun-planet and planet-ring [Pa] (ISO 6336-2, method B), ``root`` (2, 2)
+    sigma_F0 of gear 1 and gear 2 of both [Pa] (ISO 6336-3, method B); ``message`` tells why a value is NaN,
+    of gears outside the range of the method.
     """
 
     contact: np.ndarray
@@ -187,7 +182,6 @@ class StressResult:
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
     cycle : MeshCycle
         The static solution that it belongs to.
     influences : RootStresses
@@ -200,8 +194,6 @@ class StressResult:
         Mesh period of the record with which each of `roots` begins.
     ranges : tuple of RootRange
         In the same order.
-    spectrum : LoadSpectrum
-    nominal : NominalStresses
     sun_torque : float
         [N m]
     closes : bool
@@ -302,15 +294,8 @@ class StressResult:
 def root_values(roots: tuple[RootCycle, ...]) -> dict[str, np.ndarray]:
     """Follow the worst tooth of every gear through every mesh: stresses of both roots and loads.
 
-    Parameters
-    ----------
-    roots : tuple of RootCycle
-        As `femgear.contact.root_stress.root_stress_cycle` gives them.
-
-    Returns
-    -------
-    dict of str to array
-        Variables of `STRESS_VARIABLES`, which has shapes and units; points that a root does not have are NaN.
+    Roots are those of `femgear.contact.root_stress.root_stress_cycle`. The variables are some of
+    `STRESS_VARIABLES`, which has shapes and units; points that a root does not have are NaN.
     """
     histories = [root.history() for root in roots]
     return {
@@ -338,10 +323,7 @@ def _by_gear(rows) -> np.ndarray:
 def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
     """List what is wrong with the contents of static.nc in an engineer's eyes.
 
-    Parameters
-    ----------
-    module : float
-        Of the gears, of helical ones in their transverse section [m].
+    The module is that of the gears, of helical ones in their transverse section [m].
     """
     names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
     force, back, pressure, motion, approach = (data[name].values for name in names)

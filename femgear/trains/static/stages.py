@@ -57,15 +57,8 @@ def solve_static(
 ) -> StaticResult:
     """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
 
-    Parameters
-    ----------
-    case : Case
-    cache : path, optional
-        Folder of generated grids.
-    progress : callable, optional
-        Called with (stage, done, total).
-    steps : Steps, optional
-        Flank compliances of other cases, taken where they are those of this one.
+    ``cache`` is the folder of generated grids, ``progress`` is called with (stage, done, total), and flank
+    compliances of other cases are taken from ``steps`` where they are those of this one.
 
     Raises
     ------
@@ -138,13 +131,7 @@ def flank_compliances(
 ) -> tuple[Sectors, Bodies]:
     """Make the sector grids of all gears and their flank compliances, the ring held or on its foundation.
 
-    Parameters
-    ----------
-    case : Case
-    gears : PlanetarySet
-        Of that case.
-    cache : path, optional
-        Folder of generated grids.
+    The gears are those of the case; ``cache`` is the folder of generated grids.
     """
     material = material_of(case)
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
@@ -156,16 +143,8 @@ def flank_compliances(
 def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silent) -> StressResult:
     """Find root stresses of every gear in every mesh, their ranges over a turn, load and nominal stresses.
 
-    The static solution need not have pressures (`StaticResult.cycle.pressure`); where it has, they are part
-    of the result.
-
-    Parameters
-    ----------
-    case : Case
-    static : StaticResult
-        Of that case.
-    progress : callable, optional
-        Called with (stage, done, total).
+    The static solution of the case need not have pressures (`StaticResult.cycle.pressure`); where it has,
+    they are part of the result. ``progress`` is called with (stage, done, total).
 
     Raises
     ------
@@ -202,13 +181,7 @@ def nominal_stresses(
 ) -> NominalStresses:
     """Compute sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    sun_torque : float
-        Of either sign [N m].
-    youngs_modulus, poisson_ratio : float
-        [Pa, 1]
+    The torque on the sun may have either sign [N m]; Young's modulus [Pa] and Poisson's ratio [1].
     """
     s = planetary_set
     # torque over reference radius: the same at all three gears

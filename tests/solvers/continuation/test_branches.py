@@ -310,7 +310,7 @@ def test_two_masses_with_stops_against_integration_in_time(stops, hertz, leg):
 
 def test_motions_that_lost_their_symmetry_form_a_closed_loop(stops):
     side, mirrored = crossing_branches(
-        stops, stops.branch_points[0], stability=False, options=StepOptions(largest=0.2)
+        stops, stops.branch_points[0], stability=False, options=StepOptions(largest=0.2, max_points=200)
     )
     for loop in (side, mirrored):
         assert loop.closed and loop.message == "closed loop"

@@ -28,6 +28,8 @@ from femgear.solvers.periodic.solution import PeriodicSolution
 
 # Share of the largest second derivative below which the crossing curve has no curvature term.
 _FLAT = 1e-6
+# Distance over the step within which a curve has come back to the branch point that it starts in.
+_BACK = 1e-2
 
 
 def crossing_branches(
@@ -148,7 +150,25 @@ def switch_branch(
             code="E-CONVERGENCE", remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
     along, back = (_collect(curve, replace(point, tangent=sign * tangent)) for sign in (1.0, -1.0))
-    return along, back
+    return _up_to_start(along), _up_to_start(back)
+
+
+def _up_to_start(curve: Curve) -> Curve:
+    """The curve up to the branch point that it starts in, where it comes back to it in the same sense.
+
+    Within a hundredth of a step: beside a branch point Newton's method does not find the start itself.
+    """
+    z = np.column_stack([curve.points / curve.scale, curve.parameter / curve.unit])
+    for i in curve.branch_points[(curve.branch_points >= 3) & (curve.branch_points < len(z) - 1)]:
+        near = np.linalg.norm(z[i] - z[0]) <= _BACK * np.linalg.norm(z[i + 1] - z[i - 1])
+        if near and curve.tangent[i] @ curve.tangent[0] > 0.9:
+            names = ("points", "parameter", "tangent", "iterations", "error")
+            kept = {name: getattr(curve, name)[: i + 1] for name in names}
+            kept |= {
+                name: getattr(curve, name)[getattr(curve, name) < i] for name in ("folds", "branch_points")
+            }
+            return replace(curve, **kept, closed=True, complete=True, message="closed loop")
+    return curve
 
 
 def _crossing_tangent(curve: ScaledCurve, point: CurvePoint) -> np.ndarray:
