@@ -8,9 +8,12 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from datetime import date, time
 from functools import lru_cache
 from html import escape
+from typing import Any, ClassVar
 
 from pydantic import BaseModel, PrivateAttr
 
@@ -336,8 +339,9 @@ def _value(value: object) -> str:
 
 
 class ReadCase(BaseModel):
-    """Values of a case file that know where they were read."""
+    """Values of a case file that know where they were read, and in ``train`` what they are."""
 
+    train: ClassVar[str]
     _source: str = PrivateAttr(default="")
     _lines: str = PrivateAttr(default="")
     _name: str = PrivateAttr(default="")
@@ -387,6 +391,35 @@ class ReadCase(BaseModel):
     def notices(self) -> tuple[Finding, ...]:
         """Remarks on how the file was read."""
         return self._notices
+
+
+@dataclass(frozen=True)
+class CaseFile:
+    """How the cases of a train are read; it stands beside their model, away from what solves them.
+
+    Parameters
+    ----------
+    model : type
+        Of the cases, whose ``train`` is the name of the train.
+    cross_check : callable
+        ``(case) -> problems``: what no entry shows alone.
+    notices : callable
+        ``(tables, case) -> findings``: what was read in a way that deserves to be said.
+    claims : callable
+        ``(tables) -> str``: what only files of this kind have, such as "bodies"; empty where they have not.
+    embed : callable
+        ``(tables, name of the file) -> files by key``: puts the points of other files into the tables.
+    points, remedy : str
+        What such points are, and what to do where they are too many.
+    """
+
+    model: type
+    cross_check: Callable[[Any], Iterable[CaseError]] = lambda case: ()
+    notices: Callable[[dict, Any], Iterable[Finding]] = lambda tables, case: ()
+    claims: Callable[[dict], str] = lambda tables: ""
+    embed: Callable[[dict, str], dict[str, str]] = lambda tables, name: {}
+    points: str = ""
+    remedy: str = ""
 
 
 def shown(number: int) -> str:
