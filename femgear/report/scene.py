@@ -24,7 +24,8 @@ from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
-from femgear.storage.files import write_bytes, write_text
+from femgear.report.style import PNG_LEVEL
+from femgear.storage.files import write_bytes
 
 if sys.platform == "linux":
     import resource
@@ -237,10 +238,13 @@ def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
     # in memory, and then to the file: VTK ends the process where a disk fails under it
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(grid)
-    writer.SetDataModeToBinary()
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressionLevel(1)  # of zlib: meshio knows no LZ4
     writer.WriteToOutputStringOn()
     writer.Write()
-    write_text(writer.GetOutputString(), path)
+    text: Any = writer.GetOutputString()  # bytes where they are no text
+    write_bytes(text.encode() if isinstance(text, str) else text, path)
 
 
 def deformed_picture(
@@ -410,7 +414,7 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(image).save(stream, "PNG")
+    Image.fromarray(image).save(stream, "PNG", compress_level=PNG_LEVEL)
     write_bytes(stream.getvalue(), path)
 
 
