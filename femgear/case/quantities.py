@@ -238,9 +238,8 @@ def _root(unit: str) -> tuple[float, dict[str, float]] | None:
     """Factor to and exponents of root units (radian among them); None if pint does not know the unit."""
     import pint
 
-    registry = _registry()
     try:
-        quantity = registry.Quantity(1.0, registry.parse_units(unit)).to_root_units()
+        quantity = _registry().Quantity(1.0, _registry().parse_units(unit)).to_root_units()
     except (pint.errors.PintError, ValueError):
         return None
     exponents: Any = quantity._units

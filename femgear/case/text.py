@@ -281,10 +281,8 @@ def write(data: dict) -> str:
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
-    """Write tables that the points of other files were put into as TOML text; see `write`.
-
-    The file's ``name``, what its ``points`` are of, and the ``remedy`` are words of the refusal.
+def text_with_points(data: dict, name: str) -> str:
+    """Write tables of a file that the points of other files were put into as TOML text; see `write`.
 
     Raises
     ------
@@ -294,11 +292,11 @@ def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
     text = write(data)
     if len(text.encode()) > _MAX_BYTES:
         raise CaseError(
-            f"the case is too long with the points of its {points}",
+            "the case is too long with the points of the files that it names",
             code="E-FILE",
             value=f"{len(text.encode())} bytes",
             limit=f"{_MAX_BYTES} bytes",
-            remedy=remedy,
+            remedy="give them at fewer points",
             file=name or None,
         )
     return text
@@ -409,8 +407,6 @@ class CaseFile:
         ``(tables) -> str``: what only files of this kind have, such as "bodies"; empty where they have not.
     embed : callable
         ``(tables, name of the file) -> files by key``: puts the points of other files into the tables.
-    points, remedy : str
-        What such points are, and what to do where they are too many.
     """
 
     model: type
@@ -418,8 +414,6 @@ class CaseFile:
     notices: Callable[[dict, Any], Iterable[Finding]] = lambda tables, case: ()
     claims: Callable[[dict], str] = lambda tables: ""
     embed: Callable[[dict, str], dict[str, str]] = lambda tables, name: {}
-    points: str = ""
-    remedy: str = ""
 
 
 def shown(number: int) -> str:

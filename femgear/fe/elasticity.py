@@ -122,11 +122,8 @@ def mass(grid: Grid, material: Material, thickness=1.0):
     form = BilinearForm(lambda u, v, w: w.weight * u * v)
     one = form.assemble(scalar, weight=np.broadcast_to(weight, scalar.dx.shape)).tocoo()
     shape = (grid.n_nodes, grid.n_nodes)
-    return scipy.sparse.kron(
-        scipy.sparse.csc_array((one.data, (nodes[one.row], nodes[one.col])), shape=shape),
-        np.eye(2),
-        format="csc",
-    )
+    both = scipy.sparse.csc_array((one.data, (nodes[one.row], nodes[one.col])), shape=shape)
+    return scipy.sparse.kron(both, np.eye(2), format="csc")
 
 
 def _per_element(grid: Grid, value) -> np.ndarray:

@@ -22,8 +22,7 @@ DASHES = ("-", "--", "-.", ":")
 MARKERS = "osD^vPX*<>"
 SIZE = 11
 _DPI = 120
-PNG_LEVEL = 3
-"""Of zlib: a third faster than 6, files a fifteenth larger."""
+PNG_LEVEL = 3  # of zlib: a third faster than 6, files a fifteenth larger
 _LEGEND_ROW = 0.21
 """Height of a row of the legend [in]."""
 

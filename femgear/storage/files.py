@@ -85,20 +85,20 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         _to_netcdf(dataset, temporary)
 
 
-def _to_netcdf(dataset: xr.Dataset, path: Path, along: str = "") -> None:
-    """Write a dataset as `write_dataset` does, under the name itself; it can grow along one dimension."""
+def _to_netcdf(dataset: xr.Dataset, path: Path, growing: Sequence[str] = ()) -> None:
+    """Write a dataset as `write_dataset` does, under the name itself; some dimensions can grow."""
     for name, variable in dataset.variables.items():
         _check_variable(str(name), variable, coordinate=name in dataset.coords, path=path)
-    write_hdf5(path, lambda stream: _create(dataset, stream, along))
+    write_hdf5(path, lambda stream: _create(dataset, stream, growing))
 
 
-def _create(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
+def _create(dataset: xr.Dataset, stream: io.RawIOBase, growing: Sequence[str]) -> None:
     """Write a dataset into an open file in the form of NetCDF-4, whose dimensions are scales of HDF5."""
     import h5py
 
     sizes = dataset.sizes
     # NetCDF knows no empty dimension of fixed size
-    longest = {dim: None if dim == along or not size else size for dim, size in sizes.items()}
+    longest = {dim: None if dim in growing or not size else size for dim, size in sizes.items()}
     stored = {"O": h5py.string_dtype(), "U": h5py.string_dtype(), "f": np.dtype(float), "b": np.dtype("i1")}
     with h5py.File(stream, "w", track_order=True) as file:
         file.attrs.update(dataset.attrs, femgear_format=_FORMAT, femgear_version=__version__)
@@ -138,7 +138,7 @@ def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
     if path.stat().st_size:
         write_hdf5(path, lambda stream: _append(dataset, stream, along))
     else:
-        _to_netcdf(dataset, path, along)
+        _to_netcdf(dataset, path, [along])
 
 
 def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
@@ -150,11 +150,9 @@ def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
             if along in variable.dims:
                 axis, stored = variable.dims.index(along), file[str(name)]
                 assert isinstance(stored, h5py.Dataset)
-                end = stored.shape[axis] + variable.shape[axis]
-                place = [slice(None)] * variable.ndim
-                place[axis] = slice(stored.shape[axis], end)
-                stored.resize(end, axis=axis)
-                stored[tuple(place)] = variable.values
+                start = stored.shape[axis]
+                stored.resize(start + variable.shape[axis], axis=axis)
+                stored[(*[slice(None)] * axis, slice(start, None))] = variable.values
         file.attrs.update({str(name): text for name, text in dataset.attrs.items() if isinstance(text, str)})
 
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +22,7 @@ from femgear.case.csv_columns import embed_profiles
 from femgear.case.gear_set import with_shafts
 from femgear.case.mistakes import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
-from femgear.case.text import CaseFile, described, text_with_points
+from femgear.case.text import described, text_with_points
 from femgear.errors import CaseError, Finding
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
@@ -70,11 +69,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     data, lines = case_text.parse(text, name), text if numbered else ""
     known = _train_of_file(data, lines, name)
     file, of_set = known.file, known.key != "model"
-    if of_set:
-        file = replace(
-            file, embed=embed_profiles, points="measured profiles", remedy="measure at fewer points"
-        )
-    files, unread = _embedded_files(file, data, name)
+    files, unread = _embedded_files(embed_profiles if of_set else file.embed, data, name)
     case_text.check_tree(data, name)
     try:
         case = file.model.model_validate(data)
@@ -87,27 +82,25 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     if unread:
         raise combine(unread, lines, name)
     if files:
-        text = text_with_points(data, name, points=file.points, remedy=file.remedy)
+        text = text_with_points(data, name)
     try:
-        more = file.cross_check(case)
-        problems = cross_check(case, more) if of_set else list(more)
+        problems = [*(cross_check(case, file.cross_check(case)) if of_set else file.cross_check(case))]
     except CaseError as error:
         problems = [error]
     if problems:
         raise combine(problems, lines, name)
-    said = tuple(file.notices(data, case))
-    if of_set:
-        said = (*notices(data, case), *said, *added_material(case))
+    said = file.notices(data, case)
+    said = (*notices(data, case), *said, *added_material(case)) if of_set else said
     case.read_from(text, lines, name, notices=said, profile_files=files)
     return with_shafts(case) if of_set else case
 
 
-def _embedded_files(file: CaseFile, data: dict, name: str) -> tuple[dict[str, str], list[CaseError]]:
+def _embedded_files(embed: Callable, data: dict, name: str) -> tuple[dict[str, str], list[CaseError]]:
     """Files whose points are put into the tables of a case, and the refusals of others."""
     unread: dict[str | None, CaseError] = {}
     while True:
         try:
-            return file.embed(data, name), list(unread.values())
+            return embed(data, name), list(unread.values())
         except CaseError as error:
             # a refused file is not read again
             if error.key in unread or len(unread) == _MOST_UNREAD:

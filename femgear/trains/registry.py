@@ -15,17 +15,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Known:
-    """A train by name; what reads its cases, and what solves them, is imported when a case is one of it.
+    """A train by name; what `reads` its cases, and what `solves` them, is imported when a case is one of it.
 
-    Parameters
-    ----------
-    name : str
-        As the ``train`` of its cases.
-    key : str
-        Table of the case file that makes a planetary set one of it, and the field of the model; ``"model"``
-        where a file of its own names it there, ``""`` for sets without such a table.
-    reads, solves : str
-        Module and name of its `CaseFile` and of its `Train`.
+    ``key`` is the table of the case file that makes a planetary set one of it, and the field of the model;
+    ``"model"`` where a file of its own names it there, ``""`` for sets without such a table.
     """
 
     name: str

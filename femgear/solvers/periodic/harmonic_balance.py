@@ -87,13 +87,11 @@ def solve_harmonic_balance(
     """
     balance = harmonic_balance(problem, **equations)
     frequency = _checked_frequency(balance, frequency)
-    tolerance = checked_tolerance(tolerance)
-    max_iterations = checked_count(max_iterations, "max_iterations", code="E-RANGE")
-    told = {"tolerance": tolerance, "max_iterations": max_iterations}
-    told["radius"] = stability if radius is None else radius
-    found = _newton(balance, frequency, _start(balance, frequency, start), **told)
+    wanted = {"tolerance": checked_tolerance(tolerance), "radius": stability if radius is None else radius}
+    wanted["max_iterations"] = checked_count(max_iterations, "max_iterations", code="E-RANGE")
+    found = _newton(balance, frequency, _start(balance, frequency, start), **wanted)
     if start is None and not found.converged:
-        found = _embed(balance, frequency, found, **told)
+        found = _embed(balance, frequency, found, **wanted)
     if note := coincidence_note(balance.orders, frequency):
         found = replace(found, message=found.message + note)
     return judged(problem, [found], tolerance=stability_tolerance)[0] if stability else found
@@ -187,7 +185,7 @@ def _newton(
     )  # fmt: skip
 
 
-def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **told) -> PeriodicSolution:
+def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **wanted) -> PeriodicSolution:
     """Solution found by Newton's method from the end of an embedding; ``failed`` where it has no end.
 
     The arc of ``X + t T (F - reference X) = T_load S`` from t = 0, where it is linear, to t = 1: reference
@@ -216,7 +214,7 @@ def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **told
     if curve is None or curve.parameter[-1] != 1.0:
         note = " The embedding of the reference springs was lost."
         return replace(failed, message=failed.message + note)
-    found = _newton(balance, frequency, curve.points[-1], **told)
+    found = _newton(balance, frequency, curve.points[-1], **wanted)
     note = f" Newton's method alone failed; started from {len(curve.points) - 1} steps of embedding."
     work = failed.factorisations + int(curve.iterations.sum()) + found.factorisations
     return replace(

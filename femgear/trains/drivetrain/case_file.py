@@ -624,6 +624,4 @@ FILE = CaseFile(
     lambda tables, case: drivetrain_notices(case),
     claims=lambda tables: "bodies" if isinstance(tables.get("body"), list) else "",
     embed=embed_torques,
-    points="torque series",
-    remedy="give them at fewer points",
 )

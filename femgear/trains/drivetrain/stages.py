@@ -17,11 +17,7 @@ import numpy as np
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import campbell_data
-from femgear.trains.drivetrain.case_file import (
-    DrivetrainCase,
-    settle_time,
-    torque_histories,
-)
+from femgear.trains.drivetrain.case_file import DrivetrainCase, settle_time, torque_histories
 from femgear.trains.drivetrain.checks import (
     check_drivetrain,
     check_spectrum,
