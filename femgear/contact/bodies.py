@@ -101,6 +101,8 @@ class FlankCompliance:
         Degrees of freedom of the whole body that the sector stands for.
     root : ObservedRoot, optional
         For the stresses in the roots, where they were observed too.
+    surface : SectorSchur, optional
+        Sector with unit loads at the stations, observed where they act; of the ring.
     """
 
     roll: np.ndarray
@@ -110,6 +112,7 @@ class FlankCompliance:
     corner: TipCorner
     unknowns: int
     root: ObservedRoot | None = None
+    surface: SectorSchur | None = None
 
 
 @dataclass(frozen=True)
@@ -199,21 +202,24 @@ def flank_compliance(
     depth : float, optional
         Largest joining depth [m]; see `joining_depth`.
     root_state : str, optional
-        Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks.
+        Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks,
+        otherwise the displacements of the stations themselves.
 
     Raises
     ------
     CaseError
         When the depth reaches out of the tooth or the sector can move freely.
     """
+    stations = flank_stations(grid, gear)
     along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
-    stations, depths, schur = _condensed(grid, gear, stiffness, held, depth, along)
-    root = None
-    if along is not None:
-        schur, seen = _split_observations(schur, 2 * len(stations.roll))
-        root = ObservedRoot(along, stations, seen)
-    found = _without_half_plane(gear, material, stations, depths, tooth_compliance(schur), len(grid.points))
-    return replace(found, root=root)
+    further = flank_load_columns(grid, stations) if along is None else along.columns
+    depths, schur = _condensed(grid, gear, stations, stiffness, held, depth, further)
+    inside, seen = 2 * len(stations.roll), schur.observed(slice(2 * len(stations.roll), None))
+    compliance = tooth_compliance(schur.observed(slice(inside)))
+    found = _without_half_plane(gear, material, stations, depths, compliance, len(grid.points))
+    if along is None:
+        return replace(found, surface=seen)
+    return replace(found, root=ObservedRoot(along, stations, seen))
 
 
 def flank_stations(grid: Grid, gear: Gear) -> _FlankStations:
@@ -250,19 +256,24 @@ def flank_load_columns(grid: Grid, stations: _FlankStations) -> np.ndarray:
     return loads
 
 
-def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> np.ndarray:
-    """Spread a unit inward normal force evenly over the active flank of the ring tooth, (2n, 1) nodal forces.
-
-    ``grid`` is the sector of the ring; ``side`` +1 loads the left flank, -1 the right one.
-    """
-    stations = flank_stations(grid, planetary_set.ring)
+def active_flank_weights(stations: _FlankStations, planetary_set: PlanetarySet) -> np.ndarray:
+    """Spread a unit force evenly over the active flank of the ring tooth: share (n,) of each station."""
     pair = mesh_pairs(planetary_set)[1]
     active = pair.roll_on(1, pair.path)
     # every station carries the part of its own piece of the flank that is active
     middle = 0.5 * (stations.roll[1:] + stations.roll[:-1])
     ends = np.concatenate([stations.roll[:1], middle, stations.roll[-1:]])
     weight = np.diff(np.clip(ends, active.min(), active.max()))
-    load = flank_load_columns(grid, stations) @ (weight / weight.sum())[:, None]
+    return weight / weight.sum()
+
+
+def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> np.ndarray:
+    """Spread a unit inward normal force evenly over the active flank of the ring tooth, (2n, 1) nodal forces.
+
+    ``grid`` is the sector of the ring; ``side`` +1 loads the left flank, -1 the right one.
+    """
+    stations = flank_stations(grid, planetary_set.ring)
+    load = flank_load_columns(grid, stations) @ active_flank_weights(stations, planetary_set)[:, None]
     return load if side > 0 else mirrored_columns(load, mirror_nodes(grid))
 
 
@@ -299,37 +310,25 @@ def _ring_compliance(ring: Sector, material: Material, depth, foundation) -> Fla
     return flank_compliance(ring.grid, ring.gear, material, stiffness, held=held, depth=depth)
 
 
-def _condensed(grid, gear, stiffness, held, depth, along=None):
-    """Stations, joining depths (n, 1) and the condensed sector that observes at both depths, and `along`."""
-    stations = flank_stations(grid, gear)
+def _condensed(grid, gear, stations, stiffness, held, depth, further):
+    """Joining depths (n, 1), and the condensed sector that observes at both, and by `further` columns."""
     depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
     _check_depth(depth, stations)
-    observations = [
+    inside = [
         directional(
             interpolation(grid, stations.points + factor * depths * stations.normals), stations.normals
         )
         for factor in (1.0, 2.0)
     ]
-    if along is not None:
-        observations.append(along.columns)
     schur = condense_sector(
         grid,
         stiffness,
         count=gear.teeth,
         held=held,
         loads=flank_load_columns(grid, stations),
-        observations=np.hstack(observations),
+        observations=np.hstack([*inside, further]),
     )
-    return stations, depths, schur
-
-
-def _split_observations(schur: SectorSchur, first: int) -> tuple[SectorSchur, SectorSchur]:
-    """The first observations, and the others."""
-    compliance, cut = schur.compliance, schur.observation_cut
-    return (
-        replace(schur, compliance=compliance[:, :first], observation_cut=cut[..., :first]),
-        replace(schur, compliance=compliance[:, first:], observation_cut=cut[..., first:]),
-    )
+    return depths, schur
 
 
 def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:

@@ -16,7 +16,7 @@ with ``S`` the Schur complements of the half sector on its cut and ``P`` what lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -50,6 +50,24 @@ class SectorSchur:
     compliance: np.ndarray
     load_cut: np.ndarray
     observation_cut: np.ndarray
+
+    def observed(self, some: slice) -> SectorSchur:
+        """Give the same sector with some of the observations."""
+        return replace(
+            self,
+            compliance=self.compliance[:, some],
+            observation_cut=self.observation_cut[..., some],
+        )
+
+    def at_distribution(self, weights: np.ndarray, side: float = 1.0) -> SectorSchur:
+        """Give one load of the weights (n_loads,), seen where it acts; loads must be their own observations.
+
+        ``side`` -1 is the image of that load.
+        """
+        signs = np.array([1.0, side])[:, None, None]
+        compliance = weights @ self.compliance @ weights
+        cut = signs * (self.load_cut @ weights)[..., None]
+        return replace(self, compliance=compliance[:, None, None], load_cut=cut, observation_cut=cut)
 
 
 def symmetric_factor(matrix, *, ordering: str = "MMD_AT_PLUS_A") -> SuperLU:
@@ -338,11 +356,11 @@ class HalfSector:
         _check_residual((np.abs(missed).max(axis=0) / np.where(largest == 0.0, 1.0, largest)).max())
         return solution
 
-    def on_cut(self) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement (inner, nb) of the interior per unit one of the cut; Schur complement [N/m]."""
-        coupling = self.stiffness[: self.inner, self.inner :].toarray()
+    def on_cut(self, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement (inner, k) of the interior per unit of shapes (nb, k) of the cut; their stiffness."""
+        coupling = self.stiffness[: self.inner, self.inner :] @ shapes
         interior = -self.held(coupling)
-        schur = self.stiffness[self.inner :, self.inner :].toarray() + coupling.T @ interior
+        schur = shapes.T @ (self.stiffness[self.inner :, self.inner :] @ shapes) + coupling.T @ interior
         return interior, 0.5 * (schur + schur.T)
 
 
@@ -364,6 +382,24 @@ def cut_ties(nodal_diameter: float, count: int, size: int) -> np.ndarray:
     return np.tile(ties, size // 2)
 
 
+def _tied(schur: SectorSchur, n) -> tuple[np.ndarray, np.ndarray]:
+    """Ties (2, nb, 1) of a harmonic, and the stiffness (nb, nb) of its ``w`` [N/m]."""
+    ties = cut_ties(n, schur.count, schur.stiffness.shape[1])[..., None]
+    return ties, (ties * schur.stiffness * ties.transpose(0, 2, 1)).sum(axis=0)
+
+
+def static_cut_shapes(schur: SectorSchur, harmonics) -> np.ndarray:
+    """Compute how the nodes of the cut move under the loads: radial and tangential parts, (nb / 2, k) [m/N].
+
+    Of the symmetric and the antisymmetric part of every load in each cyclic harmonic.
+    """
+    found = []
+    for n in harmonics:
+        ties, A = _tied(schur, n)
+        found.append(np.linalg.solve(A, np.concatenate(ties * schur.load_cut, axis=1)))
+    return np.hstack([np.hstack([shape[0::2], shape[1::2]]) for shape in found])
+
+
 def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     """Compute the compliance [m/N] of each cyclic harmonic.
 
@@ -382,8 +418,7 @@ def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     # the image of an observation or a load takes antisymmetric fields the other way
     seen, acting = np.array([1.0, -1.0])[:, None, None, None], np.array([1.0, -1.0])[:, None]
     for row, n in enumerate(harmonics):  # one at a time: all the matrices of a deep body would take gigabytes
-        ties = cut_ties(n, schur.count, schur.stiffness.shape[1])[..., None]
-        A = (ties * schur.stiffness * ties.transpose(0, 2, 1)).sum(axis=0)
+        ties, A = _tied(schur, n)
         if n % schur.count in (0, 1, schur.count - 1):  # rotation is the harmonic 0, translation the first
             values = np.linalg.eigvalsh(A)
             if values[0] < 1e-13 * values[-1]:
@@ -437,7 +472,7 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
         on_sector = sector.fields.T @ forces
         parts = on_sector[: sector.inner]
         found = sector.held(np.hstack([parts.real, parts.imag]))
-        interior, schur = sector.on_cut()
+        interior, schur = sector.on_cut(np.eye(len(on_sector) - sector.inner))
         solved.append((interior, found[:, :n_h] + 1j * found[:, n_h:]))
         pulls.append(on_sector[sector.inner :] + interior.T @ parts)
         schurs.append(schur)

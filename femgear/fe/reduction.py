@@ -1,8 +1,10 @@
 """Modes of a cyclic body from one sector: Craig-Bampton on the sector, one small problem a nodal diameter.
 
 The symmetric and the antisymmetric fields of the sector are condensed on its cut (Craig and Bampton, AIAA J.
-6, 1968) with fixed-interface modes and the static shape of the loads. The cyclic tie of `n` nodal diameters
-(Thomas 1979) leaves one real vector for both, see `femgear.fe.compliance`, and so a real symmetric
+6, 1968) with fixed-interface modes and the static shape of the loads. The cut, along which displacements are
+smooth, may be left a few shapes instead of all its nodes (Castanier, Tan and Pierre, AIAA J. 39, 2001): where
+static ones are among them the static response is exact. The cyclic tie of `n` nodal diameters (Thomas 1979)
+leaves one real vector for both kinds of fields, see `femgear.fe.compliance`, and so a real symmetric
 eigenproblem for each `n`, whose nodal diameter is known by construction.
 """
 
@@ -16,6 +18,11 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femgear.fe.compliance import HalfSector, boundary_nodes, check_loads, cut_ties, half_sectors
 from femgear.fe.grid import Grid
+
+_CUT_DEGREE = 8
+"""Of the polynomials along a cut."""
+_STATIC = 1e-6
+"""Share of a static shape of the cut below which nothing is added for it."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +77,11 @@ class CyclicModes:
 class _SectorBasis:
     """Craig-Bampton basis of one of ``count`` sectors.
 
-    Each of the pairs is of symmetric and of antisymmetric fields, reduced to ``(u_cut, eta)``.
+    Each of the pairs is of symmetric and of antisymmetric fields, reduced to ``(cut, eta)``.
     """
 
     count: int
-    cut: int  # unknowns of the cut, nb
+    cut: int  # shapes of the cut, nb, radial and tangential in turn
     stiffness: tuple[np.ndarray, np.ndarray]  # (nb + nv, nb + nv) [N/m]
     mass: tuple[np.ndarray, np.ndarray]  # [kg]
     vectors: tuple[np.ndarray, np.ndarray]  # (2n, nb + nv)
@@ -89,10 +96,40 @@ class _SectorBasis:
         return places
 
 
+def smooth_cut_shapes(grid: Grid, static: np.ndarray) -> np.ndarray:
+    """Find shapes (nb / 2, k) of the cut, orthogonal to one another: polynomials, and what spans static ones.
+
+    Parameters
+    ----------
+    grid : Grid
+        Sector with the boundary ``cut_left``, none of it held.
+    static : (nb / 2, m) array
+        See `femgear.fe.compliance.static_cut_shapes`.
+    """
+    radius = np.sort(np.hypot(*grid.points[boundary_nodes(grid, "cut_left")].T))
+    place = 2.0 * (radius - radius[0]) / (radius[-1] - radius[0]) - 1.0
+    degree = min(_CUT_DEGREE, len(radius) - 1)
+    smooth, _ = np.linalg.qr(np.polynomial.legendre.legvander(place, degree))
+    length = np.linalg.norm(static, axis=0)
+    unit = static[:, length > 1e-12 * length.max()] / length[length > 1e-12 * length.max()]
+    # twice: what the first time leaves of the polynomials is of the size of rounding
+    for _ in range(2):
+        unit = unit - smooth @ (smooth.T @ unit)
+    shapes, size, _ = np.linalg.svd(unit, full_matrices=False)
+    return np.hstack([smooth, shapes[:, size > _STATIC]])
+
+
 def sector_basis(
-    grid: Grid, stiffness, mass, *, count: int, loads: np.ndarray, interior_modes: int = 24
+    grid: Grid,
+    stiffness,
+    mass,
+    *,
+    count: int,
+    loads: np.ndarray,
+    interior_modes: int = 24,
+    cut_shapes: np.ndarray | None = None,
 ) -> _SectorBasis:
-    """Reduce one sector to its cut, `interior_modes` fixed-interface modes and the static load shapes.
+    """Reduce one sector to its cut, fixed-interface modes and the static load shapes.
 
     Parameters
     ----------
@@ -106,22 +143,26 @@ def sector_basis(
         Load functionals; they must not act on the cuts.
     interior_modes : int
         Half of them symmetric.
+    cut_shapes : (nb / 2, k) array, optional
+        Shapes over the nodes of the cut by radius that its radial and its tangential displacement may have,
+        see `smooth_cut_shapes`; any by default.
     """
     check_loads(loads, np.concatenate([boundary_nodes(grid, f"cut_{side}") for side in ("right", "left")]))
+    shapes = np.eye(len(boundary_nodes(grid, "cut_left"))) if cut_shapes is None else cut_shapes
     parts = [
-        _reduced(sector, mass, sector.fields.T @ loads, interior_modes // 2)
+        _reduced(sector, mass, sector.fields.T @ loads, np.kron(shapes, np.eye(2)), interior_modes // 2)
         for sector in half_sectors(grid, stiffness, None)
     ]
     K, M, vectors, cut = zip(*parts, strict=True)
     return _SectorBasis(count=count, cut=cut[0], stiffness=K, mass=M, vectors=vectors)
 
 
-def _reduced(sector: HalfSector, mass, loads: np.ndarray, count: int):
-    """Reduced stiffness and mass of the fields of one kind, their basis, and the unknowns of the cut."""
+def _reduced(sector: HalfSector, mass, loads: np.ndarray, shapes: np.ndarray, count: int):
+    """Reduced stiffness and mass of the fields of one kind, their basis, and the number of `shapes`."""
     inner = sector.inner
     M = (sector.fields.T @ mass @ sector.fields).tocsc()
     K_ii, M_ii = sector.interior, M[:inner, :inner]
-    constraint, schur = sector.on_cut()
+    constraint, schur = sector.on_cut(shapes)
     static = sector.held(loads[:inner])
     # the types that scipy's constructor shows are those of a subclass
     inverse = LinearOperator(K_ii.shape, matvec=sector.factor.solve, dtype=float)  # type: ignore[call-arg]
@@ -133,9 +174,9 @@ def _reduced(sector: HalfSector, mass, loads: np.ndarray, count: int):
     new = left > 1e-9 * whole
     interior = np.hstack([modes, rest[:, new] / left[new]])
     nb, nv = len(schur), interior.shape[1]
-    basis = np.zeros((inner + nb, nb + nv))
+    basis = np.zeros((inner + len(shapes), nb + nv))
     basis[:inner] = np.hstack([constraint, interior])
-    basis[inner:, :nb] = np.eye(nb)
+    basis[inner:, :nb] = shapes
     K = np.zeros((nb + nv, nb + nv))
     K[:nb, :nb], K[nb:, nb:] = schur, interior.T @ (K_ii @ interior)
     reduced = basis.T @ (M @ basis)

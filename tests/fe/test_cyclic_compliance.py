@@ -18,13 +18,14 @@ from femgear.fe.compliance import (
     interpolation,
     mirror_nodes,
     mirrored_columns,
+    static_cut_shapes,
     symmetric_factor,
     tooth_compliance,
 )
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
-from femgear.fe.reduction import cyclic_modes, sector_basis
+from femgear.fe.reduction import cyclic_modes, sector_basis, smooth_cut_shapes
 from femgear.gears.gear import Gear
 from femgear.gears.tooth import half_sector
 
@@ -270,16 +271,31 @@ def test_cyclic_modes_are_those_of_the_whole_body(gear, sector, whole):
         np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
-def test_reduced_ring_is_statically_complete(gear, sector):
-    """Modes plus static shape give the exact cyclic compliance of the load, whatever the cut-off."""
+@pytest.mark.parametrize("smooth", [False, True])
+def test_reduced_ring_is_statically_complete(gear, sector, smooth):
+    """Modes plus static shape give the exact cyclic compliance of the load, whatever the cut-off.
+
+    Also where the cut has a few shapes alone; natural frequencies are those of the whole cut then.
+    """
     K = stiffness(sector, STEEL, state="plane stress", thickness=THICKNESS)
     K = K + foundation(sector, "rim", 1e11, 1e11, thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))[:, 3:4]
-    basis = sector_basis(sector, K, mass(sector, STEEL, THICKNESS), count=gear.teeth, loads=loads)
-    exact = cyclic_harmonics(
-        condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads),
-        np.arange(10),
-    )[:, 0, 0].real
+    schur = condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads)
+    exact = cyclic_harmonics(schur, np.arange(10))[:, 0, 0].real
+    shapes = smooth_cut_shapes(sector, static_cut_shapes(schur, np.arange(10)))
+    whole, basis = (
+        sector_basis(
+            sector, K, mass(sector, STEEL, THICKNESS), count=gear.teeth, loads=loads, cut_shapes=chosen
+        )
+        for chosen in (None, shapes if smooth else None)
+    )
+    frequency = [
+        cyclic_modes(b, nodal_diameters=range(10), loads=loads, outputs=loads, max_frequency=6e4).frequency
+        for b in (whole, basis)
+    ]
+    assert basis.cut == (2 * shapes.shape[1] if smooth else whole.cut)
+    assert shapes.shape[1] < 0.5 * len(shapes)
+    np.testing.assert_allclose(*frequency, rtol=2e-6)
     for top in (1.0, 3e4):
         modes = cyclic_modes(basis, nodal_diameters=range(10), loads=loads, outputs=loads, max_frequency=top)
         terms = np.abs(modes.load[:, 0]) ** 2 / (2 * np.pi * modes.frequency) ** 2

@@ -16,15 +16,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.contact.bodies import active_flank_load, active_flank_weights, flank_stations
 from femgear.errors import ContactError
-from femgear.fe.compliance import condense_sector, cyclic_harmonics
-from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis
+from femgear.fe.compliance import cyclic_harmonics, static_cut_shapes
+from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis, smooth_cut_shapes
 from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
+    from femgear.contact.bodies import FlankCompliance, Sector
     from femgear.fe.grid import Grid
     from femgear.gears.planetary import PlanetarySet
 
@@ -367,27 +369,26 @@ class RingModel:
 
 def ring_model(
     planetary_set: PlanetarySet,
-    grid: Grid,
-    stiffness,
+    sector: Sector,
     mass,
     foundation,
-    load,
+    flanks: tuple[FlankCompliance, FlankCompliance],
     *,
     max_diameter: int,
     max_frequency: float,
     side: float = 1.0,
 ) -> RingModel:
-    """Compute ring modes for nodal diameters 0..max_diameter.
+    """Compute ring modes for nodal diameters 0..max_diameter under a unit load on the active flank.
 
     Parameters
     ----------
     planetary_set : PlanetarySet
-    grid : Grid
-        Sector of the ring.
-    stiffness, mass, foundation : (2n, 2n) sparse matrices
-        Of the sector [N/m], [kg], [N/m].
-    load : (2n, 1) array
-        Unit force into the ring at the flank that carries [1].
+    sector : Sector
+        Of the ring.
+    mass, foundation : (2n, 2n) sparse matrices
+        Of the sector [kg], [N/m].
+    flanks : (FlankCompliance, FlankCompliance)
+        Of the ring on its foundation, and with its outer surface held.
     max_diameter : int
         Largest nodal diameter.
     max_frequency : float
@@ -395,9 +396,19 @@ def ring_model(
     side : float
         Sign of the sun's torque: which flanks carry.
     """
-    ring = planetary_set.ring
+    ring, grid = planetary_set.ring, sector.grid
     diameters = np.arange(max_diameter + 1)
-    basis = sector_basis(grid, stiffness + foundation, mass, count=ring.teeth, loads=load)
+    weights = active_flank_weights(flank_stations(grid, ring), planetary_set)
+    schurs = [body.surface.at_distribution(weights, side) for body in flanks]  # type: ignore[union-attr]
+    load = active_flank_load(grid, planetary_set, side)
+    basis = sector_basis(
+        grid,
+        sector.stiffness + foundation,
+        mass,
+        count=ring.teeth,
+        loads=load,
+        cut_shapes=smooth_cut_shapes(grid, static_cut_shapes(schurs[0], diameters)),
+    )
     modes = cyclic_modes(
         basis,
         nodal_diameters=diameters,
@@ -405,15 +416,7 @@ def ring_model(
         outputs=_outer_surface_outputs(grid),
         max_frequency=max_frequency,
     )
-    compliance = [
-        np.real(
-            cyclic_harmonics(
-                condense_sector(grid, matrix, count=ring.teeth, held=held, loads=load, observations=load),
-                diameters,
-            )[:, 0, 0]
-        )
-        for matrix, held in ((stiffness + foundation, None), (stiffness, "rim"))
-    ]
+    compliance = [np.real(cyclic_harmonics(schur, diameters)[:, 0, 0]) for schur in schurs]
     pitch_radius = ring.base_radius / np.cos(planetary_set.working_pressure_angle_planet_ring)
     return RingModel(
         modes=modes,

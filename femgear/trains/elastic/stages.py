@@ -32,7 +32,7 @@ from femgear.case.dependencies import (
 from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case
-from femgear.contact.bodies import Bodies, active_flank_load, with_ring
+from femgear.contact.bodies import Bodies, with_ring
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
 from femgear.errors import Finding
@@ -308,7 +308,7 @@ def solve_modes(
     stiffness = state.resampled("held_stiffness", _RECORD).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
     reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
-    ring = _ring_of_case(case, static, steps, reach)
+    ring = _ring_of_case(case, static, bodies, steps, reach)
     excitation, flexibility = _excitation(gears, ring, state)
     model = elastic_set(case, gears, ring, sun_torque=torque, flexibility=flexibility)
     modes = solve_eigenproblem(
@@ -351,7 +351,9 @@ def linear_supports(case: Case) -> Supports:
     return replace(case_supports(case), planet_clearance=0.0)
 
 
-def _ring_of_case(case: Case, static: StaticResult, steps: Steps, reach: float) -> RingModel:
+def _ring_of_case(
+    case: Case, static: StaticResult, bodies: tuple[Bodies, Bodies], steps: Steps, reach: float
+) -> RingModel:
     """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz]."""
     gears, sector, side = static.planetary_set, static.sectors.ring, 1.0 if static.sun_torque >= 0 else -1.0
     known = {**ring_entries(case), "reach": reach, "side": side}
@@ -360,11 +362,10 @@ def _ring_of_case(case: Case, static: StaticResult, steps: Steps, reach: float) 
         known,
         ring_model(
             gears,
-            sector.grid,
-            sector.stiffness,
+            sector,
             mass(sector.grid, material_of(case), gears.ring.face_width),
             ring_foundation(case, sector),
-            active_flank_load(sector.grid, gears, side),
+            (bodies[0].ring, bodies[1].ring),
             max_diameter=max_nodal_diameter(case),
             max_frequency=_MODES_ABOVE * reach,
             side=side,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from femgear.contact.bodies import FlankCompliance, _condensed, _without_half_plane
+from femgear.contact.bodies import FlankCompliance, _condensed, _without_half_plane, flank_stations
 from femgear.fe.elasticity import Material
 from femgear.fe.grid import Grid
 from femgear.gears.gear import Gear
@@ -15,7 +15,8 @@ def held_sector_compliance(
 
     Parameters and errors are those of `femgear.contact.bodies.flank_compliance`; the result counts one tooth.
     """
-    stations, depths, schur = _condensed(grid, gear, stiffness, held, depth)
+    stations, nothing = flank_stations(grid, gear), np.empty((2 * grid.n_nodes, 0))
+    depths, schur = _condensed(grid, gear, stations, stiffness, held, depth, nothing)
     even, odd = schur.compliance
     held_compliance = np.block([[even + odd, even - odd], [even - odd, even + odd]])[None]
     return _without_half_plane(gear, material, stations, depths, held_compliance, len(grid.points))
