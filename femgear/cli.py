@@ -206,7 +206,7 @@ def run(
     from femgear.trains.reading import open_results, read_case
     from femgear.trains.registry import TRAINS, check_case, train_of
 
-    known = dict.fromkeys(stage.name for train in TRAINS for stage in train.stages)
+    known = () if only is None else dict.fromkeys(one.name for known in TRAINS for one in known.train.stages)
     if only is not None and only not in known:
         raise CaseError(
             "no train has this stage",

@@ -22,7 +22,7 @@ from femgear import cli
 from femgear import run as run_module
 from femgear.errors import ConvergenceError
 from femgear.storage.files import write_dataset, write_text
-from femgear.trains import registry
+from femgear.trains.elastic.stages import ELASTIC
 from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value, with_values
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
@@ -374,10 +374,10 @@ def test_an_interrupted_run_says_how_far_it_came(tmp_path, capsys, monkeypatch):
 
     stages = tuple(
         replace(one, solve=lambda *_, name=one.name, **__: solve(name), parts=None, verdict=lambda _: {})
-        for one in registry.ELASTIC.stages
+        for one in ELASTIC.stages
     )
     monkeypatch.setattr("femgear.run.write_result", lambda result, path, **_: path.write_bytes(b""))
-    monkeypatch.setattr(registry, "TRAINS", (replace(registry.ELASTIC, stages=stages),))
+    monkeypatch.setattr("femgear.trains.elastic.stages.ELASTIC", replace(ELASTIC, stages=stages))
     out = tmp_path / "out"
     assert cli.main(["run", str(CASE), "-o", str(out)]) == 130
     assert cli.main(["report", str(out)]) == 4

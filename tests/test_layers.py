@@ -27,7 +27,8 @@ RANK = {part: rank for rank, parts in enumerate(LAYERS) for part in parts}
 # Who may know a train: the registry, which lists them, and `static`, which every set of gears begins with.
 COMMON = ("trains.protocol", "trains.static")
 STUDY = {"trains.elastic"}  # whose stages a study runs
-HEAVY = {"gmsh", "pyvista", "vtk", "matplotlib", "dask", "skfem", "pint"}
+HEAVY = {"gmsh", "pyvista", "vtk", "matplotlib", "dask", "skfem", "pint", "xarray", "pandas"}
+SOLVING = {"scipy.linalg", "scipy.sparse", "femgear.trains.protocol"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -142,8 +143,8 @@ def test_small_modules_are_few():
     assert small == ["fe/_gmsh_worker.py"]
 
 
-def heavy_after(code: str) -> set[str]:
-    script = f"import sys\n{code}\nprint()\nprint('|'.join({HEAVY!r} & sys.modules.keys()))"
+def heavy_after(code: str, heavy: set[str] = HEAVY) -> set[str]:
+    script = f"import sys\n{code}\nprint()\nprint('|'.join({heavy!r} & sys.modules.keys()))"
     run = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=True
     )
@@ -166,7 +167,12 @@ def test_heavy_libraries_are_imported_late(code):
 
 def test_checking_a_case_loads_no_library_that_draws_or_solves():
     case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
-    assert heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])") == {"pint"}
+    assert heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])") == set()
+
+
+def test_reading_a_case_loads_no_stage():
+    case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
+    assert heavy_after(f"import femgear; femgear.read_case({str(case)!r})", HEAVY | SOLVING) == set()
 
 
 def test_no_function_is_longer_than_70_lines():

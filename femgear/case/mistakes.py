@@ -259,10 +259,15 @@ def added_material(case: Case) -> Iterator[Finding]:
                 )
 
 
-def notices(data: dict) -> Iterator[Finding]:
+def notices(data: dict, case: Case) -> Iterator[Finding]:
     """Remark on what a case file, its tables checked, gives in a way that deserves to be said."""
     if (teeth := data["ring"]["teeth"]) < 0:
         yield remark(
             f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
             "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
+        )
+    if not case.rigid and "bearing_clearance" in data["planet"] and case.static.members == "fixed":
+        yield remark(
+            'planet.bearing_clearance has no effect while static.members is "fixed": write '
+            'static.members = "elastic"'
         )

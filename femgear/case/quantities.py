@@ -25,30 +25,24 @@ _FACTOR = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)[ ]?-?\d{1,2}|[²³])?"
 _UNIT = re.compile(rf"(?:1[ ]?/[ ]?)?{_FACTOR}(?:(?:[ ]?[*/·⋅.][ ]?|[ ]){_FACTOR}){{0,7}}")
 
 
-# The definitions of pint for what most cases are written in: reading all of pint's takes longer than a case.
-_COMMON = """
-pi = 3.1415926535897932384626433832795028841971693993751
-nano- = 1e-9 = n-
-micro- = 1e-6 = µ- = μ- = u- = mu- = mc-
-milli- = 1e-3 = m-
-kilo- = 1e3 = k-
-mega- = 1e6 = M-
-giga- = 1e9 = G-
-meter = [length] = m = metre
-second = [time] = s = sec
-gram = [mass] = g
-radian = [] = rad
-degree = pi / 180 * radian = deg
-turn = 2 * pi * radian = _ = revolution
-minute = 60 * second = min
-hertz = 1 / second = Hz
-newton = kilogram * meter / second ** 2 = N
-pascal = newton / meter ** 2 = Pa
-revolutions_per_minute = revolution / minute = rpm
-joule = newton * meter = J
-gray = joule / kilogram = Gy
-rads = 0.01 * gray
-"""
+# What most cases are written in, with its SI value: loading all units of pint takes longer than a case.
+_FACTORS = {
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "rad": {"rad": 1.0, "deg": math.pi / 180},
+    "rad/s": {"rad/s": 1.0, "rpm": math.pi / 30},
+    "N m": {"N m": 1.0, "kN m": 1e3},
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "kg m^2": {"kg m^2": 1.0, "kg mm^2": 1e-6},
+    "kg/m^3": {"kg/m^3": 1.0},
+    "Pa": {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6},
+    "N/m": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6, "N/µm": 1e6},
+    "N m/rad": {"N m/rad": 1.0, "kN m/rad": 1e3},
+    "Hz": {"Hz": 1.0, "kHz": 1e3},
+    "s": {"s": 1.0, "ms": 1e-3},
+    "m/s^2": {"m/s^2": 1.0},
+    "N/m^3": {"N/m^3": 1.0},
+}
+_SPELLING = str.maketrans({"*": " ", "·": " ", "⋅": " ", "²": "^2", "³": "^3", "μ": "µ"})
 
 
 @dataclass(frozen=True)
@@ -222,9 +216,10 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
             limit="unit names with * / ^ or blanks, without brackets",
             remedy=example,
         )
-    found, expected = (_root(one, "common") for one in (unit, dimension.si))
-    if found is None:
-        found, expected = (_root(one, "all") for one in (unit, dimension.si))
+    usual = " ".join(unit.replace("**", "^").translate(_SPELLING).split())
+    if (factor := _FACTORS.get(dimension.si, {}).get(usual)) is not None:
+        return factor
+    found, expected = _root(unit), _root(dimension.si)
     if found is None or expected is None:
         raise CaseError(f"unknown unit {unit!a}", code="E-UNIT", value=text, remedy=example)
     if found[1] != expected[1]:
@@ -239,13 +234,12 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
 
 
 @functools.lru_cache(maxsize=256)
-def _root(unit: str, units: str) -> tuple[float, dict[str, float]] | None:
-    """Factor to and exponents of root units (radian among them) in a registry; None if unknown there."""
+def _root(unit: str) -> tuple[float, dict[str, float]] | None:
+    """Factor to and exponents of root units (radian among them); None if pint does not know the unit."""
     import pint
 
-    registry = _registry(units)
     try:
-        quantity = registry.Quantity(1.0, registry.parse_units(unit)).to_root_units()
+        quantity = _registry().Quantity(1.0, _registry().parse_units(unit)).to_root_units()
     except (pint.errors.PintError, ValueError):
         return None
     exponents: Any = quantity._units
@@ -253,15 +247,11 @@ def _root(unit: str, units: str) -> tuple[float, dict[str, float]] | None:
 
 
 @functools.cache
-def _registry(units: str):
-    """Common units or all of pint's, loaded when the first quantity needs them."""
+def _registry():
+    """All units of pint, loaded when the first unusual one needs them."""
     import pint
 
-    if units == "all":
-        return pint.UnitRegistry()
-    registry: Any = pint.UnitRegistry(None)  # type: ignore[arg-type]
-    registry.load_definitions(_COMMON.strip().splitlines())
-    return registry
+    return pint.UnitRegistry()
 
 
 class Section(BaseModel):

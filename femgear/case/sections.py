@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
@@ -37,7 +37,7 @@ from femgear.case.quantities import (
     Values,
     at_most,
 )
-from femgear.case.text import ReadCase, described
+from femgear.case.text import CaseFile, ReadCase, described
 from femgear.errors import CaseError, Finding, remark
 
 LARGEST_DEVIATION = 0.2
@@ -428,6 +428,7 @@ class Case(Section, ReadCase):
     ``notices`` what was read in a way that deserves to be said.
     """
 
+    train: ClassVar[str] = "elastic"
     format: Annotated[int, Count(1, FORMAT)] = FORMAT
     title: Title
     set: SetSection
@@ -464,6 +465,9 @@ class Case(Section, ReadCase):
         """Harmonics of the response: as given, or three times those of the mesh; None as there."""
         found = self.mesh_harmonics
         return self.dynamics.response_harmonics or (None if found is None else 3 * found)
+
+
+FILE = CaseFile(Case)
 
 
 class RigidCase(Case):

@@ -8,9 +8,12 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from datetime import date, time
 from functools import lru_cache
 from html import escape
+from typing import Any, ClassVar
 
 from pydantic import BaseModel, PrivateAttr
 
@@ -278,10 +281,8 @@ def write(data: dict) -> str:
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
-    """Write tables that the points of other files were put into as TOML text; see `write`.
-
-    The file's ``name``, what its ``points`` are of, and the ``remedy`` are words of the refusal.
+def text_with_points(data: dict, name: str) -> str:
+    """Write tables of a file that the points of other files were put into as TOML text; see `write`.
 
     Raises
     ------
@@ -291,11 +292,11 @@ def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
     text = write(data)
     if len(text.encode()) > _MAX_BYTES:
         raise CaseError(
-            f"the case is too long with the points of its {points}",
+            "the case is too long with the points of the files that it names",
             code="E-FILE",
             value=f"{len(text.encode())} bytes",
             limit=f"{_MAX_BYTES} bytes",
-            remedy=remedy,
+            remedy="give them at fewer points",
             file=name or None,
         )
     return text
@@ -336,8 +337,9 @@ def _value(value: object) -> str:
 
 
 class ReadCase(BaseModel):
-    """Values of a case file that know where they were read."""
+    """Values of a case file that know where they were read, and in ``train`` what they are."""
 
+    train: ClassVar[str]
     _source: str = PrivateAttr(default="")
     _lines: str = PrivateAttr(default="")
     _name: str = PrivateAttr(default="")
@@ -387,6 +389,31 @@ class ReadCase(BaseModel):
     def notices(self) -> tuple[Finding, ...]:
         """Remarks on how the file was read."""
         return self._notices
+
+
+@dataclass(frozen=True)
+class CaseFile:
+    """How the cases of a train are read; it stands beside their model, away from what solves them.
+
+    Parameters
+    ----------
+    model : type
+        Of the cases, whose ``train`` is the name of the train.
+    cross_check : callable
+        ``(case) -> problems``: what no entry shows alone.
+    notices : callable
+        ``(tables, case) -> findings``: what was read in a way that deserves to be said.
+    claims : callable
+        ``(tables) -> str``: what only files of this kind have, such as "bodies"; empty where they have not.
+    embed : callable
+        ``(tables, name of the file) -> files by key``: puts the points of other files into the tables.
+    """
+
+    model: type
+    cross_check: Callable[[Any], Iterable[CaseError]] = lambda case: ()
+    notices: Callable[[dict, Any], Iterable[Finding]] = lambda tables, case: ()
+    claims: Callable[[dict], str] = lambda tables: ""
+    embed: Callable[[dict, str], dict[str, str]] = lambda tables, name: {}
 
 
 def shown(number: int) -> str:

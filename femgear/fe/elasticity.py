@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_array, kron
+import scipy
 
 from femgear.fe.grid import Grid, boundary_edges
 
@@ -106,7 +106,7 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
     nodes = node_of_dof(grid, scalar)[scalar.element_dofs].T
     dofs = (2 * nodes[..., None] + np.array([0, 1])).reshape(m, 12)
     rows, columns = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
-    K = csc_array((local.ravel(), (rows, columns)), shape=(size, size))
+    K = scipy.sparse.csc_array((local.ravel(), (rows, columns)), shape=(size, size))
     return 0.5 * (K + K.T).tocsc()
 
 
@@ -120,7 +120,8 @@ def mass(grid: Grid, material: Material, thickness=1.0):
     form = BilinearForm(lambda u, v, w: w.weight * u * v)
     one = form.assemble(scalar, weight=np.broadcast_to(weight, scalar.dx.shape)).tocoo()
     shape = (grid.n_nodes, grid.n_nodes)
-    return kron(csc_array((one.data, (nodes[one.row], nodes[one.col])), shape=shape), np.eye(2), format="csc")
+    both = scipy.sparse.csc_array((one.data, (nodes[one.row], nodes[one.col])), shape=shape)
+    return scipy.sparse.kron(both, np.eye(2), format="csc")
 
 
 def _per_element(grid: Grid, value) -> np.ndarray:
@@ -156,7 +157,7 @@ def foundation(grid: Grid, boundary: str, radial: float, tangential: float, *, t
     dofs = (2 * edges[..., None] + np.array([0, 1])).reshape(-1, 6)
     rows, columns = np.repeat(dofs, 6, axis=1).ravel(), np.tile(dofs, (1, 6)).ravel()
     size = 2 * grid.n_nodes
-    return csc_array((local.ravel(), (rows, columns)), shape=(size, size))
+    return scipy.sparse.csc_array((local.ravel(), (rows, columns)), shape=(size, size))
 
 
 def _by_region(value):

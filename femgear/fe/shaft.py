@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import block_array, csc_array
-from scipy.sparse.linalg import splu
+import scipy
 
 from femgear.errors import CaseError, GeometryError
 from femgear.fe.elasticity import basis, node_of_dof
@@ -271,9 +270,9 @@ def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1
     # a tilt that goes with a positive deflection lowers the side towards which the shaft bends
     prescribed[3 * face + 2, 1] = -grid.points[face, 0]
     matrix = (shapes.T @ K @ shapes).tocsc()
-    solved = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
-        shapes.T @ (K @ prescribed)
-    )
+    solved = scipy.sparse.linalg.splu(
+        matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+    ).solve(shapes.T @ (K @ prescribed))
     u = prescribed - shapes @ solved
     return np.linalg.inv(u.T @ (K @ u))
 
@@ -356,10 +355,10 @@ def _stiffness(grid, material):
 
         return BilinearForm(form).assemble(scalar)
 
-    blocks = block_array([[block(i, j) for j in range(3)] for i in range(3)]).tocoo()
+    blocks = scipy.sparse.block_array([[block(i, j) for j in range(3)] for i in range(3)]).tocoo()
     n = grid.n_nodes
     row, column = (3 * nodes[index % n] + index // n for index in (blocks.row, blocks.col))
-    K = csc_array((blocks.data, (row, column)), shape=(3 * n, 3 * n))
+    K = scipy.sparse.csc_array((blocks.data, (row, column)), shape=(3 * n, 3 * n))
     return 0.5 * (K + K.T)
 
 
@@ -375,4 +374,4 @@ def _free_shapes(grid, face, held):
     own = len(dofs) + np.arange(len(axis))
     columns = np.concatenate([np.arange(len(dofs)), own, own])
     values = np.concatenate([np.ones(len(dofs) + len(axis)), -np.ones(len(axis))])
-    return csc_array((values, (rows, columns)), shape=(3 * n, len(dofs) + len(axis)))
+    return scipy.sparse.csc_array((values, (rows, columns)), shape=(3 * n, len(dofs) + len(axis)))

@@ -24,7 +24,8 @@ from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
-from femgear.storage.files import write_bytes, write_text
+from femgear.report.style import PNG_LEVEL
+from femgear.storage.files import write_bytes
 
 if sys.platform == "linux":
     import resource
@@ -237,10 +238,13 @@ def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
     # in memory, and then to the file: VTK ends the process where a disk fails under it
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(grid)
-    writer.SetDataModeToBinary()
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressionLevel(1)  # of zlib: meshio knows no LZ4
     writer.WriteToOutputStringOn()
     writer.Write()
-    write_text(writer.GetOutputString(), path)
+    text: Any = writer.GetOutputString()  # bytes where they are no text
+    write_bytes(text.encode() if isinstance(text, str) else text, path)
 
 
 def deformed_picture(
@@ -291,7 +295,7 @@ def deformed_picture(
     surface.point_data[colour_label] = colour_factor * length
     plotter = new_plotter(size, size)
     plotter.add_mesh(rest, color="#A0A0A0", line_width=1.0, lighting=False)
-    add_coloured(plotter, surface, colour_label, size, cmap="cividis")
+    add_coloured(plotter, surface, colour_label, size)
     plotter.add_mesh(surface.extract_feature_edges(**_OUTLINE), color="black", line_width=1.2, lighting=False)
     # a factor below one is that of a normalised shape, which has no magnification
     text = f"{title}\ndeformation × {rounded(scale)}" if scale >= 1 else title
@@ -315,16 +319,7 @@ def _linear_surface(grid: pv.UnstructuredGrid) -> pv.PolyData:
     return load_pyvista().PolyData.from_regular_faces(np.array(grid.points), cells[:, _SPLIT].reshape(-1, 3))
 
 
-def add_coloured(
-    plotter: pv.Plotter,
-    mesh: pv.PolyData,
-    text: str,
-    size: int,
-    *,
-    cmap: str,
-    limits=None,
-    colours: int = 256,
-) -> None:
+def add_coloured(plotter: pv.Plotter, mesh: pv.PolyData, text: str, size: int, *, limits=None) -> None:
     """Add a mesh coloured by a field on its points, with a colour bar under the scene.
 
     Parameters
@@ -333,34 +328,14 @@ def add_coloured(
         Name of the field with its unit, also the title of the bar.
     size : int
         Width and height of the picture [pixels].
-    cmap : str
-        Colour map of Matplotlib.
     limits : (float, float), optional
         Of the colours, in the unit of the field; its own range when left out.
-    colours : int
-        Number of colours.
     """
-    plotter.add_mesh(
-        mesh,
-        scalars=text,
-        cmap=cmap,
-        clim=limits,
-        n_colors=colours,
-        lighting=False,
-        scalar_bar_args={
-            # the title of a horizontal bar runs into its labels: it is set apart below
-            "title": " ",
-            "vertical": False,
-            "position_x": 0.2,
-            "position_y": 0.045,
-            "width": 0.6,
-            "height": 0.07,
-            "label_font_size": max(size // 45, 11),
-            "n_labels": 5,
-            "fmt": "%.3g",
-            "color": "black",
-        },
-    )
+    bar: Any = {"position_x": 0.2, "position_y": 0.045, "width": 0.6, "height": 0.07, "color": "black"}
+    # the title of a horizontal bar runs into its labels: it is set apart below
+    bar |= {"title": " ", "vertical": False, "n_labels": 5, "fmt": "%.3g"}
+    bar["label_font_size"] = max(size // 45, 11)
+    plotter.add_mesh(mesh, scalars=text, cmap="cividis", clim=limits, lighting=False, scalar_bar_args=bar)
     # Arial is about half as wide as high; text is placed by its lower left corner in pixels
     left = 0.5 * size - 0.42 * _font(size) * len(text)
     _add_text_at(plotter, text, (left, 0.012 * size), size, "bar title")
@@ -410,7 +385,7 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(image).save(stream, "PNG")
+    Image.fromarray(image).save(stream, "PNG", compress_level=PNG_LEVEL)
     write_bytes(stream.getvalue(), path)
 
 

@@ -22,6 +22,7 @@ DASHES = ("-", "--", "-.", ":")
 MARKERS = "osD^vPX*<>"
 SIZE = 11
 _DPI = 120
+PNG_LEVEL = 3  # of zlib: a third faster than 6, files a fifteenth larger
 _LEGEND_ROW = 0.21
 """Height of a row of the legend [in]."""
 
@@ -127,7 +128,7 @@ def png_bytes(figure: Figure) -> bytes:
         engine.execute(figure)
         figure.set_layout_engine("none")
     try:
-        canvas.print_png(stream, metadata={"Software": None})
+        canvas.print_png(stream, metadata={"Software": None}, pil_kwargs={"compress_level": PNG_LEVEL})
     finally:
         figure.dpi = dpi
         figure.set_layout_engine(engine)

@@ -85,18 +85,42 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         _to_netcdf(dataset, temporary)
 
 
-def _to_netcdf(dataset: xr.Dataset, path: Path, **options: Any) -> None:
-    """Write a dataset as `write_dataset` does, under the name itself."""
-    encoding = {}
+def _to_netcdf(dataset: xr.Dataset, path: Path, growing: Sequence[str] = ()) -> None:
+    """Write a dataset as `write_dataset` does, under the name itself; some dimensions can grow."""
     for name, variable in dataset.variables.items():
-        kind = variable.dtype.kind
         _check_variable(str(name), variable, coordinate=name in dataset.coords, path=path)
-        encoding[name] = {"_FillValue": None} if kind in "OUS" or variable.ndim == 0 else {"fletcher32": True}
-        if kind == "f":
-            encoding[name] |= {"dtype": "float64", "_FillValue": None}
-    stamped = dataset.assign_attrs(femgear_format=_FORMAT, femgear_version=__version__)
-    options |= {"engine": "h5netcdf", "encoding": encoding}
-    write_hdf5(path, lambda stream: stamped.to_netcdf(stream, **options))
+    write_hdf5(path, lambda stream: _create(dataset, stream, growing))
+
+
+def _create(dataset: xr.Dataset, stream: io.RawIOBase, growing: Sequence[str]) -> None:
+    """Write a dataset into an open file in the form of NetCDF-4, whose dimensions are scales of HDF5."""
+    import h5py
+
+    sizes = dataset.sizes
+    # NetCDF knows no empty dimension of fixed size
+    longest = {dim: None if dim in growing or not size else size for dim, size in sizes.items()}
+    stored = {"O": h5py.string_dtype(), "U": h5py.string_dtype(), "f": np.dtype(float), "b": np.dtype("i1")}
+    with h5py.File(stream, "w", track_order=True) as file:
+        file.attrs.update(dataset.attrs, femgear_format=_FORMAT, femgear_version=__version__)
+        if beside := [str(name) for name in dataset.coords if name not in sizes]:
+            file.attrs["coordinates"] = " ".join(beside)
+        made: dict[Any, h5py.Dataset] = {}
+        for name, one in dataset.variables.items():
+            kind = stored.get(one.dtype.kind, one.dtype)
+            options = {"maxshape": [longest[dim] for dim in one.dims], "fletcher32": kind.kind != "O"}
+            values = one.values.astype(kind, copy=False)
+            made[name] = file.create_dataset(str(name), data=values, **(options if one.dims else {}))
+            made[name].attrs.update(one.attrs, **({"dtype": "bool"} if one.dtype.kind == "b" else {}))
+        for number, (dim, size) in enumerate(sizes.items()):
+            text = str(dim)
+            if dim not in made:
+                made[dim] = file.create_dataset(text, (size,), ">f4", maxshape=(longest[dim],))
+                text = f"This is a netCDF dimension but not a netCDF variable.{size:10d}"
+            made[dim].make_scale(text)
+            made[dim].attrs["_Netcdf4Dimid"] = np.int32(number)
+        for name, one in dataset.variables.items():
+            for axis, dim in enumerate(() if name in sizes else one.dims):
+                made[name].dims[axis].attach_scale(made[dim])
 
 
 def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
@@ -114,7 +138,7 @@ def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
     if path.stat().st_size:
         write_hdf5(path, lambda stream: _append(dataset, stream, along))
     else:
-        _to_netcdf(dataset, path, unlimited_dims=[along])
+        _to_netcdf(dataset, path, [along])
 
 
 def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
@@ -126,11 +150,9 @@ def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
             if along in variable.dims:
                 axis, stored = variable.dims.index(along), file[str(name)]
                 assert isinstance(stored, h5py.Dataset)
-                end = stored.shape[axis] + variable.shape[axis]
-                place = [slice(None)] * variable.ndim
-                place[axis] = slice(stored.shape[axis], end)
-                stored.resize(end, axis=axis)
-                stored[tuple(place)] = variable.values
+                start = stored.shape[axis]
+                stored.resize(start + variable.shape[axis], axis=axis)
+                stored[(*[slice(None)] * axis, slice(start, None))] = variable.values
         file.attrs.update({str(name): text for name, text in dataset.attrs.items() if isinstance(text, str)})
 
 
@@ -681,12 +703,12 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
 
 def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path: str | os.PathLike) -> None:
     """Refuse a variable of a type that no file holds, or without unit or text."""
-    if variable.dtype.kind not in "fiubOUS":
+    if variable.dtype.kind not in "fiubOU":
         raise StorageError(
             f"{name} has the type {variable.dtype}", code="E-FORMAT", file=os.fspath(path),
             remedy="store complex numbers as real and imaginary part",
         )  # fmt: skip
-    labels = coordinate and variable.dtype.kind in "OUS"
+    labels = coordinate and variable.dtype.kind in "OU"
     missing = [key for key in ("units", "long_name") if key not in variable.attrs]
     if missing and not labels:
         raise StorageError(

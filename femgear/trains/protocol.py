@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from femgear.errors import FemgearError
 from femgear.report.tables import Block
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from femgear.errors import CaseError, Finding
+    from femgear.errors import Finding
     from femgear.storage.results import Results
 
 Progress = Callable[[str, float, float], None]
@@ -158,26 +158,6 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class OwnFile:
-    """Case file of a train that is no planetary set: it names the train as its model.
-
-    Parameters
-    ----------
-    claims : callable
-        ``(tables) -> str``: what only files of this kind have, such as "bodies"; empty where they have not.
-    embed : callable
-        ``(tables, name of the file) -> files by key``: puts the points of other files into the tables.
-    points, remedy : str
-        What such points are, and what to do where they are too many.
-    """
-
-    claims: Callable[[dict], str] = lambda tables: ""
-    embed: Callable[[dict, str], dict[str, str]] = lambda tables, name: {}
-    points: str = ""
-    remedy: str = ""
-
-
-@dataclass(frozen=True)
 class Train:
     """A kind of case and what is computed of it.
 
@@ -185,8 +165,6 @@ class Train:
     ----------
     name, words : str
         ``"planar"``, ``"a planar case"``.
-    model : type
-        Of its cases; a case is one of the train with the most special model.
     stages : tuple of Stage
         In order.
     describe : callable
@@ -197,28 +175,15 @@ class Train:
         By stage; ``""`` are those of the case, whatever is computed of it.
     remarks : callable
         ``(Results, name of a picture) -> sentences`` that this case adds to a caption.
-    section : str
-        Table that makes a planetary set one of this train, and the field of the model; ``""`` for none.
-    own_file : OwnFile, optional
-        Where the case file is not that of a planetary set.
-    cross_check : callable
-        ``(case) -> problems``: what no entry shows alone.
-    notices : callable
-        ``(tables, case) -> findings``: what was read in a way that deserves to be said.
     """
 
     name: str
     words: str
-    model: type
     stages: tuple[Stage, ...]
     describe: Callable[[Any], tuple[Block, ...]]
     warnings: Callable[[Any], Iterable[Finding]]
     figures: Mapping[str, Figures] = field(default_factory=dict)
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
-    section: str = ""
-    own_file: OwnFile | None = None
-    cross_check: Callable[[Any], Iterable[CaseError]] = lambda case: ()
-    notices: Callable[[dict, Any], Iterable[Finding]] = lambda tables, case: ()
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -26,13 +26,10 @@ from femgear.case.text import described, text_with_points
 from femgear.errors import CaseError, Finding
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
-from femgear.trains.protocol import OwnFile, Train
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_SET_FILE = OwnFile(embed=embed_profiles, points="measured profiles", remedy="measure at fewer points")
-"""Case file of a planetary set, whatever its train."""
 _MOST_UNREAD = 20
 """Files of a case that are refused at once."""
 
@@ -65,16 +62,16 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     """
     data, lines = case_text.parse(text, name), text if numbered else ""
     try:
-        train = _train_of_file(data)
+        known = _train_of_file(data)
     except CaseError as error:
         raise combine([error], lines, name) from None
-    own_file = train.own_file or _SET_FILE
-    files, unread = _embedded_files(own_file, data, name)
+    file, of_set = known.file, known.key != "model"
+    files, unread = _embedded_files(embed_profiles if of_set else file.embed, data, name)
     case_text.check_tree(data, name)
     try:
-        case = train.model.model_validate(data)
+        case = file.model.model_validate(data)
     except ValidationError as error:
-        keys = every_section() if own_file is _SET_FILE else train.model
+        keys = every_section() if of_set else file.model
         # tables whose files cannot be read have no points
         tables = {(problem.key or "").rpartition(".")[0] for problem in unread}
         problems = [problem for problem in translate(error, keys) if problem.key not in tables]
@@ -82,27 +79,25 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     if unread:
         raise combine(unread, lines, name)
     if files:
-        text = text_with_points(data, name, points=own_file.points, remedy=own_file.remedy)
+        text = text_with_points(data, name)
     try:
-        more = train.cross_check(case)
-        problems = cross_check(case, more) if own_file is _SET_FILE else list(more)
+        problems = [*(cross_check(case, file.cross_check(case)) if of_set else file.cross_check(case))]
     except CaseError as error:
         problems = [error]
     if problems:
         raise combine(problems, lines, name)
-    said = tuple(train.notices(data, case))
-    if own_file is _SET_FILE:
-        said = (*notices(data), *said, *added_material(case))
+    said = file.notices(data, case)
+    said = (*notices(data, case), *said, *added_material(case)) if of_set else said
     case.read_from(text, lines, name, notices=said, profile_files=files)
-    return with_shafts(case) if own_file is _SET_FILE else case
+    return with_shafts(case) if of_set else case
 
 
-def _embedded_files(own_file: OwnFile, data: dict, name: str) -> tuple[dict[str, str], list[CaseError]]:
+def _embedded_files(embed: Callable, data: dict, name: str) -> tuple[dict[str, str], list[CaseError]]:
     """Files whose points are put into the tables of a case, and the refusals of others."""
     unread: dict[str | None, CaseError] = {}
     while True:
         try:
-            return own_file.embed(data, name), list(unread.values())
+            return embed(data, name), list(unread.values())
         except CaseError as error:
             # a refused file is not read again
             if error.key in unread or len(unread) == _MOST_UNREAD:
@@ -254,21 +249,19 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
             "there is no such model", code="E-MODEL", key="--model", value=model, limit=", ".join(own),
             remedy="planetary sets have no model: leave it out",
         )  # fmt: skip
-    return own[model].model.model_json_schema()
+    return own[model].file.model.model_json_schema()
 
 
 @cache
 def every_section() -> type[Case]:
     """Make the model of a planetary set with the sections of all trains, for its keys and what they are."""
     fields: dict[str, Any] = {
-        train.section: (train.model.model_fields[train.section].annotation | None, None)
-        for train in reversed(registry.TRAINS)
-        if train.section
+        one.key: (one.file.model.model_fields[one.key].annotation | None, None) for one in _sections()
     }
     return create_model("Case", __base__=Case, __doc__=Case.__doc__, **fields)
 
 
-def _train_of_file(data: dict) -> Train:
+def _train_of_file(data: dict) -> registry.Known:
     """Train that the tables of a file are of."""
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
@@ -286,8 +279,9 @@ def _train_of_file(data: dict) -> Train:
         if not isinstance(model, str) or model not in own:
             raise _unknown_model(model)
         return own[model]
-    for train in own.values():
-        if train.own_file is not None and (what := train.own_file.claims(data)):
+    foreign = data.keys() - {*Case.model_fields, *(one.key for one in _sections())}
+    for train in own.values() if foreign else ():
+        if what := train.file.claims(data):
             raise CaseError(
                 f"a file with {what} needs its model",
                 code="E-KEY-MISSING",
@@ -297,9 +291,14 @@ def _train_of_file(data: dict) -> Train:
     return _train_of_set(data)
 
 
-def _own_files() -> dict[str, Train]:
+def _own_files() -> dict[str, registry.Known]:
     """Trains with a case file of their own, by the model that the file names."""
-    return {train.name: train for train in registry.TRAINS if train.own_file is not None}
+    return {one.name: one for one in registry.TRAINS if one.key == "model"}
+
+
+def _sections() -> list[registry.Known]:
+    """Trains that a section makes of a planetary set."""
+    return [one for one in reversed(registry.TRAINS) if one.key not in ("", "model")]
 
 
 def _unknown_model(value: object) -> CaseError:
@@ -318,11 +317,11 @@ def _unknown_model(value: object) -> CaseError:
     )
 
 
-def _train_of_set(data: dict) -> Train:
+def _train_of_set(data: dict) -> registry.Known:
     """Train whose section the tables of a planetary set hold; that without one where they hold none."""
-    given = [train for train in reversed(registry.TRAINS) if train.section and train.section in data]
+    given = [one for one in _sections() if one.key in data]
     if len(given) > 1:
-        sections = [train.section for train in given]
+        sections = [one.key for one in given]
         raise CaseError(
             f"a set is {' or '.join(sections)}",
             code="E-CHOICE",
@@ -331,4 +330,4 @@ def _train_of_set(data: dict) -> Train:
             limit="one of the sections",
             remedy="leave one of them out",
         )
-    return given[0] if given else next(t for t in registry.TRAINS if not t.section and t.own_file is None)
+    return given[0] if given else next(one for one in registry.TRAINS if not one.key)

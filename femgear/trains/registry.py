@@ -2,25 +2,52 @@
 
 from __future__ import annotations
 
-from femgear.case.text import described
-from femgear.errors import CaseError
-from femgear.trains.drivetrain.stages import DRIVETRAIN
-from femgear.trains.elastic.stages import ELASTIC
-from femgear.trains.gear_pair.stages import GEAR_PAIR
-from femgear.trains.helical.stages import HELICAL
-from femgear.trains.multistage.stages import MULTISTAGE
-from femgear.trains.planar.stages import PLANAR
-from femgear.trains.protocol import Stage, Train
+from dataclasses import dataclass
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, cast
 
-TRAINS: tuple[Train, ...] = (MULTISTAGE, GEAR_PAIR, DRIVETRAIN, HELICAL, PLANAR, ELASTIC)
-"""Special models before more general ones: a case belongs to the first whose model it is one of."""
+from femgear.case.text import CaseFile, described
+from femgear.errors import CaseError
+
+if TYPE_CHECKING:
+    from femgear.trains.protocol import Stage, Train
+
+
+@dataclass(frozen=True)
+class Known:
+    """A train by name; what `reads` its cases, and what `solves` them, is imported when a case is one of it.
+
+    ``key`` is the table of the case file that makes a planetary set one of it, and the field of the model;
+    ``"model"`` where a file of its own names it there, ``""`` for sets without such a table.
+    """
+
+    name: str
+    key: str
+    reads: str
+    solves: str
+
+    file = property(lambda self: cast(CaseFile, resolve_name(self.reads)))
+    train = property(lambda self: cast("Train", resolve_name(self.solves)))
+
+
+TRAINS = tuple(
+    Known(name, key, f"femgear.{reads}:FILE", f"femgear.trains.{name}.stages:{name.upper()}")
+    for name, key, reads in (
+        ("multistage", "model", "trains.multistage.case_file"),
+        ("gear_pair", "model", "trains.gear_pair.case_file"),
+        ("drivetrain", "model", "trains.drivetrain.case_file"),
+        ("helical", "helical", "trains.helical.section"),
+        ("planar", "planar", "trains.planar.section"),
+        ("elastic", "", "case.sections"),
+    )
+)
 
 
 def train_of(case) -> Train:
     """Find the train that a case is one of; other things are refused (E-TYPE)."""
-    for train in TRAINS:
-        if isinstance(case, train.model):
-            return train
+    for known in TRAINS:
+        if known.name == getattr(case, "train", None):
+            return known.train
     raise CaseError(
         f"a case is needed, not {described(case)}", code="E-TYPE", remedy="femgear.read_case(path) reads one"
     )

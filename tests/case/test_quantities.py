@@ -1,5 +1,6 @@
 """Units of case files."""
 
+import functools
 from functools import partial
 from types import FunctionType
 
@@ -10,20 +11,19 @@ from femgear.case.quantities import MASS, Number, to_si
 from femgear.errors import CaseError
 
 
-def test_common_units_are_those_of_pint():
-    """Every name with every prefix, one or several: none is another unit in all of pint's definitions."""
-    lines = [[part.strip() for part in line.split("=")] for line in quantities._COMMON.strip().splitlines()]
-    named = [[line[0], *line[2:]] for line in lines if line[0] != "pi"]
-    prefixes = [name.rstrip("-") for names in named if names[0].endswith("-") for name in names]
-    units = [name for names in named if not names[0].endswith("-") for name in names if name != "_"]
-    assert {"m", "mm", "kN", "GPa", "rpm", "um"} < {p + u for p in ["", *prefixes] for u in units}
-    for unit in (p + u for p in ["", *prefixes] for u in units):
-        common = quantities._root(unit, "common")
-        assert common is not None and common == quantities._root(unit, "all"), unit
-        several = quantities._root(f"{unit}s", "common")
-        assert several is None or several == quantities._root(f"{unit}s", "all"), unit
-    for unit in ("N m/rad", "kg mm^2", "kN/um", "rad/s", "kg m^2"):
-        assert quantities._root(unit, "common") == quantities._root(unit, "all")
+def test_usual_units_are_those_of_pint():
+    """Every spelling of every unit that is known without pint: the same dimension, the same factor."""
+    spellings = [("", "")], [(" ", "*"), ("^", "**")], [(" ", " · "), ("^2", "²"), ("^3", "³")]
+    for si, usual in quantities._FACTORS.items():
+        dimension = quantities.Dimension("a quantity", si, si, 1.0)
+        base = quantities._root(si)
+        assert base is not None
+        for unit, factor in usual.items():
+            for changes in spellings:
+                spelt = functools.reduce(lambda text, change: text.replace(*change), changes, unit)
+                found = quantities._root(spelt)
+                assert found is not None and found[1] == base[1], spelt
+                assert found[0] / base[0] == factor == quantities.to_si(f"1 {spelt}", dimension), spelt
 
 
 @pytest.mark.parametrize("read", [partial(to_si, dimension=MASS), Number(0.0, 1.0).read])
@@ -54,6 +54,6 @@ def test_absorbed_doses_are_no_angles():
         quantities.to_si("0.3 rads", quantities.ANGLE)
 
 
-def test_other_units_than_common_ones_are_known():
+def test_other_units_than_usual_ones_are_known():
     assert quantities.to_si("2 inch", quantities.LENGTH) == 2 * 0.0254
-    assert quantities._root("inch", "common") is None
+    assert "inch" not in quantities._FACTORS["m"]

@@ -1,11 +1,11 @@
 """Case file of the oscillator: ``model = "oscillator"``."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict
 
 from femgear.case.quantities import MASS, STIFFNESS, Number, Quantity, Title
-from femgear.case.text import ReadCase
+from femgear.case.text import CaseFile, ReadCase
 
 
 class OscillatorSection(BaseModel):
@@ -21,6 +21,10 @@ class OscillatorCase(ReadCase):
     """A simple oscillator."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    train: ClassVar[str] = "oscillator"
     model: Literal["oscillator"]
     title: Title
     oscillator: OscillatorSection
+
+
+FILE = CaseFile(OscillatorCase)

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from oscillator.section import OscillatorCase
 
 from femgear.report.tables import Block
 from femgear.storage.results import dataset
-from femgear.trains.protocol import Figures, OwnFile, Stage, Train
+from femgear.trains.protocol import Figures, Stage, Train
 
 
 @dataclass(frozen=True)
@@ -68,8 +67,6 @@ def draw(drawn):
 OSCILLATOR = Train(
     name="oscillator",
     words="an oscillator",
-    model=OscillatorCase,
-    own_file=OwnFile(),
     stages=(
         Stage(
             name="modes",

@@ -138,8 +138,8 @@ def trace_stages(path: Path) -> None:
 
         return solved
 
-    for train in TRAINS:
-        for stage in train.stages:
+    for known in TRAINS:
+        for stage in known.train.stages:
             object.__setattr__(stage, "solve", traced(stage.name, stage.solve))
             if stage.parts is not None:
                 object.__setattr__(stage, "parts", traced(stage.name, stage.parts))

@@ -60,6 +60,33 @@ def test_round_trip_keeps_every_bit_and_every_attribute(tmp_path):
     assert os.listdir(tmp_path) == ["static.nc"]
 
 
+def test_a_file_reads_as_one_that_xarray_has_written(tmp_path):
+    """Dimensions without coordinate or without length, coordinates beside, texts, truth values, lists."""
+    data = dataset().assign_attrs(numbers=[1.0, 2.0], names=["sun", "ring"], count=3)
+    data = data.assign(
+        plain=(("mesh", "way"), np.arange(12.0).reshape(6, 2), NAMED),
+        moved=(("member", "position"), np.zeros((0, 64)), NAMED),
+        words=(("way",), ["there", "back"], NAMED),
+    ).assign_coords(teeth=("mesh", np.arange(6), NAMED), path=(("mesh", "way"), np.ones((6, 2)), NAMED))
+    write_dataset(data, tmp_path / "ours.nc")
+    stamp = {"femgear_format": 1, "femgear_version": files.__version__}
+    data["single"] = data["single"].astype(float)
+    data.assign_attrs(stamp).to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf")
+    ours, theirs = (read_dataset(tmp_path / f"{name}.nc") for name in ("ours", "theirs"))
+    xr.testing.assert_identical(ours, theirs)
+    assert [*ours.data_vars, *ours.sizes] == [*theirs.data_vars, *theirs.sizes]
+    for name, one in theirs.variables.items():
+        assert ours[name].dtype == one.dtype, name
+    with h5py.File(tmp_path / "ours.nc") as file:
+        assert {scale.name for axis in file["moved"].dims for scale in axis.values()} == {
+            "/member",
+            "/position",
+        }
+    write_dataset(ours.drop_attrs(deep=False), tmp_path / "again.nc")
+    write_dataset(ours.drop_attrs(deep=False), tmp_path / "once more.nc")
+    assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "once more.nc").read_bytes()
+
+
 def test_others_read_it_with_plain_xarray_and_every_array_has_a_checksum(tmp_path):
     write_dataset(dataset(), tmp_path / "static.nc")
     with xr.open_dataset(tmp_path / "static.nc", engine="h5netcdf") as plain:

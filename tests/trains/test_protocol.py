@@ -22,7 +22,10 @@ stiffness = "0.8 N/um"
 
 @pytest.fixture
 def path(tmp_path, monkeypatch):
-    monkeypatch.setattr(registry, "TRAINS", (OSCILLATOR, *registry.TRAINS))
+    oscillator = registry.Known(
+        "oscillator", "model", "oscillator.section:FILE", "oscillator.stages:OSCILLATOR"
+    )
+    monkeypatch.setattr(registry, "TRAINS", (oscillator, *registry.TRAINS))
     path = tmp_path / "oscillator.toml"
     path.write_text(TEXT, encoding="utf-8")
     return path

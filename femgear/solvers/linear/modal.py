@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.system import MechanicalSystem, Modes, Response, check_matrices, damping_matrix, freeze
@@ -248,8 +248,8 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
         raise CaseError("the speed is not finite", code="E-SPEED", value=speed)
     stiffness = total_stiffness(system, mesh_stiffness)
     try:
-        square, real = linalg.eigh(stiffness, system.M)
-    except linalg.LinAlgError as error:
+        square, real = scipy.linalg.eigh(stiffness, system.M)
+    except scipy.linalg.LinAlgError as error:
         raise mass_error() from error
     limit = max(_RIGID, 10.0 * len(square) * np.finfo(float).eps) * np.abs(square).max()
     rigid = np.abs(square) <= limit
@@ -258,7 +258,7 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     order = np.concatenate([np.flatnonzero(elastic), np.flatnonzero(rigid)])
     scale = np.exp(0.5 * np.mean(np.log(np.abs(square[elastic])))) if m else 1.0
     state = state_matrix(np.diag(square[elastic]), damping[np.ix_(order, order)], scale)
-    pairs = linalg.eig(state)
+    pairs = scipy.linalg.eig(state)
     value, vector = np.asarray(pairs[0], np.complex128), np.asarray(pairs[1])
     inverse = _inverse(vector)
     zero = max(_ZERO * np.abs(value).max(), 100.0 * np.finfo(float).eps * np.linalg.norm(state))
@@ -382,7 +382,7 @@ def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
     """
     carried = mass @ rigid
     loads = loads - carried @ (rigid.T @ loads)
-    out = linalg.cho_solve(_held(mass, stiffness, rigid), loads)
+    out = scipy.linalg.cho_solve(_held(mass, stiffness, rigid), loads)
     return out - rigid @ (carried.T @ out)
 
 
@@ -409,8 +409,8 @@ def _eigen(mass, stiffness, count, max_frequency):
         factor = np.linalg.cholesky(0.5 * (mass + mass.T))
     except np.linalg.LinAlgError as error:
         raise mass_error() from error
-    standard = linalg.solve_triangular(factor, stiffness, lower=True)
-    standard = linalg.solve_triangular(factor, standard.T, lower=True)
+    standard = scipy.linalg.solve_triangular(factor, stiffness, lower=True)
+    standard = scipy.linalg.solve_triangular(factor, standard.T, lower=True)
     standard = 0.5 * (standard + standard.T)
     scale = np.abs(standard).sum(axis=1).max()
     subset: dict[str, Any] = {"driver": "evd"}
@@ -424,7 +424,7 @@ def _eigen(mass, stiffness, count, max_frequency):
             raise CaseError("the highest frequency must be positive", code="E-MODES", value=max_frequency)
         top = (2.0 * np.pi * max_frequency) ** 2 * (1.0 + 10.0 * _MULTIPLE)
         subset = {"subset_by_value": (-np.inf, top)}
-    values, vectors = linalg.eigh(standard, **subset)
+    values, vectors = scipy.linalg.eigh(standard, **subset)
     if not np.all(np.isfinite(values)) or not len(values):
         raise ConvergenceError(
             f"no natural frequency below {max_frequency} Hz", code="E-MODES",
@@ -435,7 +435,7 @@ def _eigen(mass, stiffness, count, max_frequency):
         while kept < len(values) and values[kept] - values[kept - 1] < _MULTIPLE * abs(values[kept]):
             kept += 1
         values, vectors = values[:kept], vectors[:, :kept]
-    shape = linalg.solve_triangular(factor, vectors, lower=True, trans=1)
+    shape = scipy.linalg.solve_triangular(factor, vectors, lower=True, trans=1)
     return values, shape, _rigid(values, scale, n)
 
 
@@ -453,9 +453,9 @@ def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
 def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
     """Rigid modes cleaned of elastic parts, mass-orthonormal: twice ``x - (K + a M x x^T M)^-1 K x``."""
     for _ in range(2):
-        shape = shape - linalg.cho_solve(_held(mass, stiffness, shape), stiffness @ shape)
+        shape = shape - scipy.linalg.cho_solve(_held(mass, stiffness, shape), stiffness @ shape)
         lower = np.linalg.cholesky(shape.T @ mass @ shape)
-        shape = linalg.solve_triangular(lower, shape.T, lower=True).T
+        shape = scipy.linalg.solve_triangular(lower, shape.T, lower=True).T
     return shape
 
 
@@ -467,8 +467,8 @@ def _held(mass, stiffness, rigid):
     weight = own[own > 0.0].min(initial=np.inf)
     weight = weight if np.isfinite(weight) else 1.0
     try:
-        return linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
-    except linalg.LinAlgError:
+        return scipy.linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
+    except scipy.linalg.LinAlgError:
         raise ConvergenceError(
             "rounding of the largest stiffness hides the smallest", code="E-STIFFNESS",
             remedy="bring the stiffnesses closer together",

@@ -187,7 +187,7 @@ class HarmonicBalance:
     def solution(self, y, frequency, *, radius: bool = False, **what_happened) -> PeriodicSolution:
         """Make a solution of unknowns (n_y,) [m]; keywords are fields of `PeriodicSolution` on how it came.
 
-        With ``radius`` the spectral radius of the fixed point is among them.
+        With ``radius`` the spectral radius of the fixed point is among them, where the lines are finite.
         """
         frequency = np.atleast_1d(np.asarray(frequency, float))
         lines = self.lines(y)
@@ -198,7 +198,7 @@ class HarmonicBalance:
 
         if "residual" not in what_happened:
             what_happened["residual"] = relative_residual(self, self.unknowns(residual()), y)
-        if radius:
+        if radius and np.all(np.isfinite(lines)):
             what_happened["spectral_radius"] = self.spectral_radius(y, frequency, products)
         told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
         if note := _uncarried_note(self, lines, residual, told["converged"]):

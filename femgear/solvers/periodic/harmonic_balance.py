@@ -87,15 +87,13 @@ def solve_harmonic_balance(
     """
     balance = harmonic_balance(problem, **equations)
     frequency = _checked_frequency(balance, frequency)
-    tolerance = checked_tolerance(tolerance)
-    max_iterations = checked_count(max_iterations, "max_iterations", code="E-RANGE")
-    found = _newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
+    wanted = {"tolerance": checked_tolerance(tolerance), "radius": stability if radius is None else radius}
+    wanted["max_iterations"] = checked_count(max_iterations, "max_iterations", code="E-RANGE")
+    found = _newton(balance, frequency, _start(balance, frequency, start), **wanted)
     if start is None and not found.converged:
-        found = _embed(balance, frequency, found, tolerance, max_iterations)
+        found = _embed(balance, frequency, found, **wanted)
     if note := coincidence_note(balance.orders, frequency):
         found = replace(found, message=found.message + note)
-    if stability if radius is None else radius:
-        found = _with_radius(balance, found)
     return judged(problem, [found], tolerance=stability_tolerance)[0] if stability else found
 
 
@@ -152,7 +150,7 @@ def periodic_response(problem: NonlinearSystem, frequency, **options) -> Periodi
 
 
 def _newton(
-    balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int
+    balance: HarmonicBalance, frequency, y, *, tolerance: float, max_iterations: int, radius: bool
 ) -> PeriodicSolution:
     """Solve harmonic equations by Newton's method with backtracking, from the unknowns y (n_y,) [m] on."""
     receptance = balance.receptance(frequency)[0]
@@ -181,14 +179,13 @@ def _newton(
         history.append(relative_residual(balance, error, y))
     converged, steps = bool(history[-1] <= tolerance), len(history) - 1 + bool(trouble)
     return balance.solution(
-        y, frequency, converged=converged, residual=history[-1], iterations=steps, factorisations=steps,
+        y, frequency, radius=radius, converged=converged, residual=history[-1], iterations=steps,
+        factorisations=steps,
         message=_message(converged, steps, history[-1], trouble, tolerance), history=tuple(history),
     )  # fmt: skip
 
 
-def _embed(
-    balance: HarmonicBalance, frequency, failed: PeriodicSolution, tolerance: float, max_iterations: int
-) -> PeriodicSolution:
+def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **wanted) -> PeriodicSolution:
     """Solution found by Newton's method from the end of an embedding; ``failed`` where it has no end.
 
     The arc of ``X + t T (F - reference X) = T_load S`` from t = 0, where it is linear, to t = 1: reference
@@ -217,21 +214,13 @@ def _embed(
     if curve is None or curve.parameter[-1] != 1.0:
         note = " The embedding of the reference springs was lost."
         return replace(failed, message=failed.message + note)
-    found = _newton(balance, frequency, curve.points[-1], tolerance, max_iterations)
+    found = _newton(balance, frequency, curve.points[-1], **wanted)
     note = f" Newton's method alone failed; started from {len(curve.points) - 1} steps of embedding."
     work = failed.factorisations + int(curve.iterations.sum()) + found.factorisations
     return replace(
         found, factorisations=work, iterations=failed.iterations + found.iterations,
         message=found.message + note,
     )  # fmt: skip
-
-
-def _with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSolution:
-    """The solution with the spectral radius of its fixed point; lines that are not finite have none."""
-    if not np.all(np.isfinite(found.deflection)):
-        return found
-    value = balance.spectral_radius(balance.unknowns(found.deflection), found.frequency)
-    return replace(found, spectral_radius=value)
 
 
 def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, np.ndarray]:

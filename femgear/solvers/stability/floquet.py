@@ -35,8 +35,9 @@ _UNMOVED = 1e-9
 _UNDAMPED = 1e-10
 # Distances of the Gauss points from the middle of a step of unit length.
 _GAUSS = 0.5 / np.sqrt(3.0)
-# States treated together, and instants of a piece at which tangents are compared.
+# States treated together, rows of their motions, and instants of a piece at which tangents are compared.
 _STATES_TOGETHER = 32
+_ROWS_TOGETHER = 256
 _INSIDE = 7
 # Steps of the first sequence over one period beyond which a verdict is not sought, and the most entries of
 # stiffness matrices at these steps that are held at once.
@@ -323,11 +324,18 @@ def _through(frame: Frame, period, start, duration, tangents, states) -> np.ndar
     outer, inner = dt * (0.5 - _GAUSS), dt * (2.0 * _GAUSS)
     between = outer.copy()
     between[:, 1:] += outer[:, :-1]
-    move = drift(frame, scale, np.stack([between, inner], axis=-1).reshape(m, -1))
-    state = np.tile(np.eye(2 * n), (m, 1, 1))
-    for step, kick in enumerate(np.moveaxis(kicks.reshape(m, -1, *square), 1, 0)):
+    moves, kicks = np.stack([between, inner], axis=-1).reshape(m, -1), kicks.reshape(m, -1, *square)
+    # few modes pass through many pieces of the period at once, all filled up to equal length
+    pieces = 1 << max(min(moves.shape[1] // 2, _ROWS_TOGETHER // (m * max(n, 1))), 1).bit_length() - 1
+    short = -moves.shape[1] % pieces
+    moves = np.hstack([moves, np.zeros((m, short))]).reshape(m * pieces, -1)
+    kicks = np.hstack([kicks, np.zeros((m, short, *square))]).reshape(m * pieces, -1, *square)
+    move, state = drift(frame, scale, moves), np.tile(np.eye(2 * n), (m * pieces, 1, 1))
+    for step, kick in enumerate(np.moveaxis(kicks, 1, 0)):
         state = move(step, state)
         state[:, n:] -= back @ (kick @ (frame.rows @ state[:, :n]))
+    while len(state) > m:
+        state = state[1::2] @ state[::2]
     return drift(frame, scale, outer[:, -1:])(0, state)
 
 

@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, StrictBool
@@ -30,7 +30,7 @@ from femgear.case.quantities import (
     Values,
 )
 from femgear.case.sections import FORMAT, DampingRatio, Speed
-from femgear.case.text import ReadCase
+from femgear.case.text import CaseFile, ReadCase
 from femgear.errors import CaseError, Finding
 from femgear.trains.drivetrain.parts import (
     BearingSection,
@@ -127,6 +127,7 @@ class DrivetrainCase(Section, ReadCase):
     """
 
     format: Annotated[int, Count(1, FORMAT)] = FORMAT
+    train: ClassVar[str] = "drivetrain"
     model: Literal["drivetrain"]
     title: Title
     body: Annotated[tuple[BodySection, ...], Field(min_length=1, max_length=_MOST_PARTS)]
@@ -611,3 +612,12 @@ def _column(found: Columns, key: str) -> list[float]:
                 remedy=f"check the number, and the unit of the column {key} in the heading",
             )  # fmt: skip
     return values
+
+
+FILE = CaseFile(
+    DrivetrainCase,
+    check_entries_together,
+    lambda tables, case: drivetrain_notices(case),
+    claims=lambda tables: "bodies" if isinstance(tables.get("body"), list) else "",
+    embed=embed_torques,
+)

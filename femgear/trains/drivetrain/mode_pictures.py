@@ -252,7 +252,7 @@ def _add_shape(pv, plotter, layout: Layout, move, turn, lines, size: int):
     whole.points = np.vstack([_moved(disc.points, *own) for disc, own in zip(discs, moves)])
     length = np.concatenate(lengths[: len(discs)])
     whole[_COLOURS] = length / (length.max() or 1.0)
-    add_coloured(plotter, whole, _COLOURS, size, cmap="cividis", limits=(0.0, 1.0))
+    add_coloured(plotter, whole, _COLOURS, size, limits=(0.0, 1.0))
     spokes = [_spoke(wheel) for wheel in layout.wheels]
     turned = [_moved(spoke, *own) for spoke, own in zip(spokes, moves)]
     for mesh, colour, width, front in (

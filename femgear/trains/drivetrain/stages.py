@@ -17,14 +17,7 @@ import numpy as np
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import campbell_data
-from femgear.trains.drivetrain.case_file import (
-    DrivetrainCase,
-    check_entries_together,
-    drivetrain_notices,
-    embed_torques,
-    settle_time,
-    torque_histories,
-)
+from femgear.trains.drivetrain.case_file import DrivetrainCase, settle_time, torque_histories
 from femgear.trains.drivetrain.checks import (
     check_drivetrain,
     check_spectrum,
@@ -49,7 +42,7 @@ from femgear.trains.drivetrain.results import (
     transient_warnings,
 )
 from femgear.trains.drivetrain.simulation import PASS_BAND, DrivetrainRun, Records, march_drivetrain
-from femgear.trains.protocol import OwnFile, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
+from femgear.trains.protocol import Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -310,15 +303,6 @@ def remarks(results: Results, stem: str) -> Iterator[str]:
 DRIVETRAIN = Train(
     name="drivetrain",
     words="a drivetrain",
-    model=DrivetrainCase,
-    own_file=OwnFile(
-        claims=lambda tables: "bodies" if isinstance(tables.get("body"), list) else "",
-        embed=embed_torques,
-        points="torque series",
-        remedy="give them at fewer points",
-    ),
-    cross_check=check_entries_together,
-    notices=lambda tables, case: drivetrain_notices(case),
     stages=(
         Stage(
             name="modes",

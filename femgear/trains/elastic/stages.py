@@ -35,7 +35,7 @@ from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, with_ring
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
-from femgear.errors import Finding, remark
+from femgear.errors import Finding
 from femgear.fe.elasticity import mass
 from femgear.gears.kinematics import Speeds
 from femgear.gears.planetary import PlanetarySet, mesh_names
@@ -557,18 +557,9 @@ def _warnings(case: Case) -> Iterator[Finding]:
         )
 
 
-def _notices(data: dict, case: Case) -> Iterator[Finding]:
-    if "bearing_clearance" in data["planet"] and case.static.members == "fixed":
-        yield remark(
-            'planet.bearing_clearance has no effect while static.members is "fixed": write '
-            'static.members = "elastic"'
-        )
-
-
 ELASTIC = Train(
     name="elastic",
     words="a case with an elastic ring",
-    model=Case,
     stages=(
         STATIC,
         STRESS,
@@ -607,5 +598,4 @@ ELASTIC = Train(
     describe=describe_set,
     warnings=_warnings,
     figures=FIGURES,
-    notices=_notices,
 )  # fmt: skip

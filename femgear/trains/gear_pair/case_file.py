@@ -6,7 +6,7 @@ import cmath
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -23,7 +23,7 @@ from femgear.case.quantities import (
     Values,
 )
 from femgear.case.sections import FORMAT, Angle, DampingRatio, Inertia, Mass, Radius, Stiffness, Teeth
-from femgear.case.text import ReadCase
+from femgear.case.text import CaseFile, ReadCase
 from femgear.errors import CaseError
 from femgear.trains.gear_pair.model import ImpactPair, PairBearings
 
@@ -108,6 +108,7 @@ class GearPairCase(Section, ReadCase):
     """
 
     format: Annotated[int, Count(1, FORMAT)] = FORMAT
+    train: ClassVar[str] = "gear_pair"
     model: Literal["gear_pair"]
     title: Title
     gears: GearsSection
@@ -204,3 +205,6 @@ def pair_of(case: GearPairCase) -> ImpactPair:
 def _waves(amplitudes, angles) -> tuple[complex, ...]:
     """Complex amplitudes; without angles all are cosines."""
     return tuple(a * cmath.exp(1j * angle) for a, angle in zip(amplitudes, angles or [0.0] * len(amplitudes)))
+
+
+FILE = CaseFile(GearPairCase, cross_check)

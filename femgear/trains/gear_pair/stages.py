@@ -20,7 +20,7 @@ from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.stability.lyapunov import LyapunovExponents, lyapunov_exponents
 from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
 from femgear.storage.results import FOURIER, complex_entries, dataset
-from femgear.trains.gear_pair.case_file import GearPairCase, cross_check, pair_of, scales_of
+from femgear.trains.gear_pair.case_file import GearPairCase, pair_of, scales_of
 from femgear.trains.gear_pair.figures import FIGURES
 from femgear.trains.gear_pair.model import (
     BACK,
@@ -32,7 +32,7 @@ from femgear.trains.gear_pair.model import (
     separation_ratios,
     state_regions,
 )
-from femgear.trains.protocol import OwnFile, Progress, Stage, Train, blaming_start, one_blas_thread, silent
+from femgear.trains.protocol import Progress, Stage, Train, blaming_start, one_blas_thread, silent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -338,9 +338,6 @@ def _no_response(case: GearPairCase) -> str:
 GEAR_PAIR = Train(
     name="gear_pair",
     words="a gear pair",
-    model=GearPairCase,
-    own_file=OwnFile(),
-    cross_check=cross_check,
     stages=(
         Stage(
             name="response",

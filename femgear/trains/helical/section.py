@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from femgear.case.quantities import ANGLE, STIFFNESS, TORSION, Count, Quantity, Section
 from femgear.case.sections import Inertia, Mass, MeshStiffnessSection, RigidCase
+from femgear.case.text import CaseFile
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
 
@@ -114,6 +115,7 @@ def _slow_notice(data: dict) -> Iterator[Finding]:
 class HelicalCase(RigidCase):
     """A planetary gear set of rigid bodies with helical gears, which move in space."""
 
+    train: ClassVar[str] = "helical"
     helical: HelicalSection
 
     @property
@@ -142,3 +144,6 @@ def check_helical(case: HelicalCase) -> Iterator[CaseError]:
             f"helical.{fixed}.torsional_stiffness",
             "leave the entry out to hold the member, or hold another one",
         )
+
+
+FILE = CaseFile(HelicalCase, check_helical, lambda tables, case: helical_notices(tables))

@@ -41,7 +41,7 @@ from femgear.trains.helical.results import (
     describe_helical,
     describe_helical_static,
 )
-from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
+from femgear.trains.helical.section import HelicalCase
 from femgear.trains.protocol import (
     Progress,
     Stage,
@@ -229,8 +229,6 @@ def _given(case: HelicalCase) -> bool:
 HELICAL = Train(
     name="helical",
     words="a helical case",
-    model=HelicalCase,
-    section="helical",
     stages=(
         replace(
             STATIC,
@@ -276,6 +274,4 @@ HELICAL = Train(
     warnings=set_warnings,
     figures=FIGURES,
     remarks=_remarks,
-    cross_check=check_helical,
-    notices=lambda tables, case: helical_notices(tables),
 )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -38,7 +38,7 @@ from femgear.case.sections import (
     Speed,
     Teeth,
 )
-from femgear.case.text import ReadCase, described
+from femgear.case.text import CaseFile, ReadCase, described
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import RoundSection, joint_springs
 from femgear.gears.checks import check_set
@@ -183,6 +183,7 @@ class MultistageCase(Section, ReadCase):
     """
 
     format: Annotated[int, Count(1, FORMAT)] = FORMAT
+    train: ClassVar[str] = "multistage"
     model: Literal["multistage"]
     title: Title
     stage: Annotated[tuple[StageSection, ...], Field(min_length=1, max_length=20)]
@@ -349,3 +350,6 @@ def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, Any]:
         name: given.face_width * mesh_stiffness_method_b(*mesh, pressure_angle=given.pressure_angle)[1]
         for name, mesh in meshes.items()
     }
+
+
+FILE = CaseFile(MultistageCase, cross_check)

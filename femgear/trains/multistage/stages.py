@@ -24,7 +24,6 @@ from femgear.trains.multistage.case_file import (
     MultistageCase,
     OperationSection,
     ResponseSection,
-    cross_check,
     multistage_of,
     stage_gears,
 )
@@ -50,7 +49,7 @@ from femgear.trains.multistage.results import (
     describe_stage_modes,
     multistage_warnings,
 )
-from femgear.trains.protocol import OwnFile, Progress, Stage, Train, one_blas_thread, silent
+from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
 from femgear.trains.rigid import mixed_modes
 
 
@@ -352,9 +351,6 @@ def _no_balance(case: MultistageCase) -> str:
 MULTISTAGE = Train(
     name="multistage",
     words="a multistage case",
-    model=MultistageCase,
-    own_file=OwnFile(),
-    cross_check=cross_check,
     stages=(
         Stage(
             name="modes",

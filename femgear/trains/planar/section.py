@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
@@ -32,6 +32,7 @@ from femgear.case.sections import (
     Stiffness,
     output_member,
 )
+from femgear.case.text import CaseFile
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import (
     Gravity,
@@ -200,6 +201,7 @@ def _without_static(data: dict) -> list[str]:
 class PlanarCase(RigidCase):
     """A planetary gear set of rigid bodies that move in their plane."""
 
+    train: ClassVar[str] = "planar"
     planar: PlanarSection
 
 
@@ -276,3 +278,6 @@ def _check_branch(case: PlanarCase) -> Iterator[CaseError]:
             limit="false with planar.branch",
             remedy="leave one of them out",
         )
+
+
+FILE = CaseFile(PlanarCase, check_planar, lambda tables, case: planar_notices(tables))

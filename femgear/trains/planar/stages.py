@@ -42,7 +42,7 @@ from femgear.trains.planar.results import (
     published_modes,
     response_warnings,
 )
-from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
+from femgear.trains.planar.section import PlanarCase
 from femgear.trains.protocol import (
     Progress,
     Stage,
@@ -415,8 +415,6 @@ def _lacks(section: str) -> Callable[[PlanarCase], str]:
 PLANAR = Train(
     name="planar",
     words="a planar case",
-    model=PlanarCase,
-    section="planar",
     stages=(
         replace(STATIC, wanted=lambda case: bool(_needs_static(case))),
         replace(STRESS, wanted=lambda case: bool(_needs_static(case)) and case.static.stresses),
@@ -460,6 +458,4 @@ PLANAR = Train(
     warnings=set_warnings,
     figures=FIGURES,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
-    cross_check=check_planar,
-    notices=lambda tables, case: planar_notices(tables),
 )  # fmt: skip

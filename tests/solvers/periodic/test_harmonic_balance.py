@@ -392,7 +392,7 @@ def test_embedding_starts_from_a_linear_system_at_rest():
     balance = harmonic_balance(problem, harmonics=6)
     whole = solve_harmonic_balance(problem, 0.9, harmonics=6)
     frequency = np.array([0.9])
-    found = newton._embed(balance, frequency, whole, 1e-10, 20)
+    found = newton._embed(balance, frequency, whole, tolerance=1e-10, max_iterations=20, radius=False)
     assert found.converged and "embedding" in found.message
     np.testing.assert_allclose(found.deflection, whole.deflection, atol=1e-9)
 

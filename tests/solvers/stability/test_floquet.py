@@ -6,7 +6,8 @@ from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.solvers.stability.floquet import monodromy
+from femgear.solvers.stability import floquet
+from femgear.solvers.stability.floquet import frame_of_modes, monodromy, passage
 from femgear.solvers.stability.parametric import stability
 from femgear.system.fourier import harmonics_of
 from femgear.system.system import MechanicalSystem, MeshExcitation
@@ -50,6 +51,24 @@ def test_splitting_is_of_fourth_order(geared_chain, chain_excitation):
         for n in (10, 20, 40)
     ]
     assert error[0] / error[1] > 13 and error[1] / error[2] > 13
+
+
+@pytest.mark.parametrize("coupling", [0.0, 0.01])
+def test_pieces_of_a_period_side_by_side_equal_one_after_the_other(geared_chain, coupling, monkeypatch):
+    frame = frame_of_modes(solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03))
+    frame = replace(frame, damping=frame.damping + coupling)
+    assert frame.diagonal == (coupling == 0.0)
+
+    def tangents(fraction, states):
+        wave = 0.3 * np.cos(2 * np.pi * (fraction + 0.1 * states[:, None])) + 0.1 * (fraction > 0.3)
+        return np.diag([1.0, 1.4]) * (1.0 + wave)[..., None, None]
+
+    matrices = []
+    for rows in (256, 0):
+        monkeypatch.setattr(floquet, "_ROWS_TOGETHER", rows)
+        matrices.append(passage(frame, np.array([20.0, 33.0]), tangents, [np.array([0.3])] * 2)[0])
+    np.testing.assert_allclose(*matrices, rtol=0.0, atol=1e-12 * np.abs(matrices[0]).max())
+    assert np.any(matrices[0] != matrices[1])
 
 
 def test_speeds_in_one_call_equal_single_calls(planet_set, planet_excitation):

@@ -19,7 +19,6 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.storage.results import run_folder
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import PlanarTorque
-from femgear.trains import registry
 from femgear.trains.planar.figures import (
     branch_figures,
     contact_over_branch,
@@ -35,7 +34,7 @@ from femgear.trains.planar.model import (
     shown_points,
 )
 from femgear.trains.planar.results import branch_warnings, comparisons, describe_branch, doubts, tail_warnings
-from femgear.trains.planar.stages import solve_branch, solve_planar_modes, solve_planar_response
+from femgear.trains.planar.stages import PLANAR, solve_branch, solve_planar_modes, solve_planar_response
 from femgear.trains.reading import open_results, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
 from femgear.trains.static.stages import solve_static
@@ -240,10 +239,8 @@ def test_an_interrupted_run_keeps_its_finished_stages(tmp_path, pgb, monkeypatch
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    stages = [
-        replace(one, solve=interrupt) if one.name == "branch" else one for one in registry.PLANAR.stages
-    ]
-    monkeypatch.setattr(registry, "TRAINS", (replace(registry.PLANAR, stages=tuple(stages)),))
+    stages = [replace(one, solve=interrupt) if one.name == "branch" else one for one in PLANAR.stages]
+    monkeypatch.setattr("femgear.trains.planar.stages.PLANAR", replace(PLANAR, stages=tuple(stages)))
     with pytest.raises(KeyboardInterrupt), run_folder(tmp_path / "out") as out:
         run_case(pgb, out, pictures=False)
     with pytest.warns(UserWarning, match="interrupted after: modes"):
