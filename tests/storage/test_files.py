@@ -56,7 +56,7 @@ def test_round_trip_keeps_every_bit_and_every_attribute(tmp_path):
     xr.testing.assert_equal(back, data)
     assert back.ste.attrs == {"units": "m", "long_name": "STE"}
     assert back.attrs["contact"] == "profile" and back.attrs["femgear_format"] == 1
-    assert back.single.dtype == np.float64 and back.converged.dtype == bool
+    assert back.single.dtype == np.float32 and back.converged.dtype == bool
     assert os.listdir(tmp_path) == ["static.nc"]
 
 
