@@ -129,9 +129,11 @@ def _bands(case, static, dynamics, housing, harmonic) -> Heard:
     for name, lines in models.items():
         spectrum = OrderSpectrum(lines.order, lines.acceleration[0])
         found[name] = (spectrum, analyse_band(spectrum, gears.ring.teeth, harmonic))
-    low, high = found["exact"][1].low, found["exact"][1].high
-    order = np.arange(low, high + 1)
-    values = {name: spectrum.amplitude[low : high + 1] for name, (spectrum, _) in found.items()}
+    order = np.arange(found["exact"][1].low, found["exact"][1].high + 1)
+    values = {name: np.zeros(len(order)) for name in found}
+    for name, (spectrum, _) in found.items():
+        inside = (spectrum.order >= order[0]) & (spectrum.order <= order[-1])
+        values[name][spectrum.order[inside] - order[0]] = spectrum.amplitude[inside]
     scale = values["exact"].max() / (values["Hanning"].max() or 1.0)
     return Heard(
         harmonic,
@@ -305,7 +307,7 @@ def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
     from femgear.storage.files import replaced_file
 
     shown = slice(0, max(EXPORTED, heard.harmonic) + 1)
-    field = dynamics.ring_radial[0, shown], dynamics.ring_tangential[0, shown]
+    field = dynamics.ring_radial[0, shown], dynamics.ring_tangential[shown]
     surface = ring_surface(planetary_set, *field)
     write_vtu(surface, folder / "ring_deflection.vtu")
     radius = planetary_set.ring.rim_radius

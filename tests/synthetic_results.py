@@ -278,7 +278,7 @@ def dynamics(*, speeds: np.ndarray | None = None) -> xr.Dataset:
         "harmonic": _variable("harmonic", h, "1", "harmonic"),
     }
     if speeds is None:
-        field, dims = ring_field(), ("speed", "harmonic", "circumferential")
+        field, dims = ring_field()[-1], ("harmonic", "circumferential")
         for name, value in (("ring", field), ("ring_tangential", 0.3j * field)):
             for part in ("real", "imag"):
                 data[f"{name}_{part}"] = _variable(dims, getattr(value, part), "m", name)
@@ -287,31 +287,29 @@ def dynamics(*, speeds: np.ndarray | None = None) -> xr.Dataset:
 
 
 def housing() -> xr.Dataset:
-    """Exact lines of `ring_field` at orders h z_ring - n, and the sum of them over one revolution."""
-    field, n, top = ring_field(), np.arange(-DIAMETERS, DIAMETERS + 1), (HARMONICS + 1) * RING
-    samples = 4096
+    """Exact lines of `ring_field` at orders h z_ring - n."""
+    field, n, top = ring_field(), np.arange(-DIAMETERS, DIAMETERS + 1), HARMONICS * RING + DIAMETERS + 1
     lines = np.zeros((len(SPEEDS), top), complex)
     for h in range(HARMONICS + 1):
         for column, m in enumerate(n):
             order = h * RING - m
             if order > 0:
                 lines[:, order] += field[:, h, column]
-    lines *= (2 * np.pi * CARRIER_FREQUENCY[:, None] * np.arange(top)) ** 2
-    signal = np.fft.irfft(lines * samples / 2, samples, axis=1)
-    turn = np.arange(samples) / samples
-    st, so = ("speed", "time"), ("speed", "order")
+    speed = 2 * np.pi * CARRIER_FREQUENCY
+    acceleration = lines * (speed[:, None] * np.arange(top)) ** 2
+    so, words = ("speed", "order"), "radial displacement at the sensor"
     return xr.Dataset(
         {
-            "acceleration": _variable(st, signal, "m/s^2", "acceleration"),
-            "seconds": _variable(st, turn / CARRIER_FREQUENCY[:, None], "s", "time"),
-            "order_amplitude": _variable(so, 0.95 * np.abs(lines), "m/s^2", "amplitude, linear"),
-            "order_amplitude_exact": _variable(so, np.abs(lines), "m/s^2", "amplitude, exact"),
+            "lines_real": _variable(so, lines.real, "m", words),
+            "lines_imag": _variable(so, lines.imag, "m", words),
+            "carrier_speed": _variable("speed", speed, "rad/s", "speed of the carrier"),
             "excitation_limit": _variable("speed", np.full(len(SPEEDS), 5e3), "Hz", "limit"),
-            "level": _variable("speed", np.sqrt(np.mean(signal**2, axis=1)), "m/s^2", "level"),
+            "level": _variable(
+                "speed", np.sqrt((np.abs(acceleration) ** 2).sum(axis=1) / 2), "m/s^2", "level"
+            ),
         },
         coords={
             "speed": _variable("speed", SPEEDS, "rpm", "input speed"),
-            "time": _variable("time", turn, "1", "carrier revolutions"),
             "order": _variable("order", np.arange(top), "1", "carrier order"),
         },
         attrs={"sensor_angle": 0.0, "ring_teeth": RING, "form": "linear", "points": 54},

@@ -279,6 +279,23 @@ def test_a_large_file_is_read_where_it_is_asked_for(tmp_path, monkeypatch):
     assert not found["x"].variable._in_memory and found.equals(whole)
 
 
+def test_parts_of_different_lengths_are_filled_up_with_zeros(tmp_path):
+    """What does not extend over the speed is that of the latest part; tables are compressed."""
+    path, attrs = tmp_path / "x.nc", {"units": "1", "long_name": "values"}
+    path.touch()
+    for i, size in enumerate((3, 5, 2)):
+        values = np.arange(1.0, size + 1).astype(np.float32)
+        data = xr.Dataset(
+            {"x": (("speed", "k"), np.tile(values, (2, 1)), attrs), "last": ("k", values, attrs)},
+            {"speed": ("speed", [2.0 * i, 2.0 * i + 1], attrs), "k": ("k", np.arange(size), attrs)},
+        )
+        append_dataset(data, path, "speed")
+    found = read_dataset(path)
+    assert found["k"].values.tolist() == [0, 1, 2, 3, 4] and found["x"].dtype == np.float32
+    expected = [[1, 2, 3, 0, 0]] * 2 + [[1, 2, 3, 4, 5]] * 2 + [[1, 2, 0, 0, 0]] * 2
+    assert found["x"].values.tolist() == expected and found["last"].values.tolist() == [1, 2, 0, 0, 0]
+
+
 def test_the_size_of_many_speeds_is_said_before(many_speeds, monkeypatch):
     case, _, folder = many_speeds("planetary_27_40_108")
     assert not [one for one in elastic.ELASTIC.case_warnings(case) if one.code == "W-SIZE"]
@@ -287,5 +304,6 @@ def test_the_size_of_many_speeds_is_said_before(many_speeds, monkeypatch):
     said = re.search(r"14 speeds with up to (\d+) harmonics each fill about (\S+) GB", found.text)
     size = sum((folder / f"{stage}.nc").stat().st_size for stage in ("dynamics", "housing"))
     # whether the excitation is doubled is known with the modes
-    assert 0.95 < 1e9 * float(said[2]) / size < 2.2
+    # some of a small file is not numbers
+    assert 0.8 < 1e9 * float(said[2]) / size < 2.2
     assert int(said[1]) >= read_dataset(folder / "dynamics.nc").sizes["harmonic"] - 1

@@ -141,6 +141,15 @@ class SetDeviations:
         )
 
 
+def rotational_symmetry(d: SetDeviations, s: PlanetarySet) -> int:
+    """Find the largest g for which a turn by ``2 pi/g`` takes every planet to the place of one like it."""
+    even, places = no_deviations(s), np.exp(1j * np.asarray(s.planet_angles))
+    forms = {name: getattr(even, name) for name in ("sun", "planet_sun_side", "planet_ring_side", "ring")}
+    most = s.n_planets if replace(d, **forms).ideal else 1
+    turned = {g: places[:, None] * np.exp(2j * np.pi / g) for g in range(1, most + 1)}
+    return max(g for g, one in turned.items() if np.abs(one - places).min(axis=1).max() < 1e-6)
+
+
 def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:
     """Make the deviations of ideal gears: none. `dataclasses.replace` puts in what there is."""
     s, N = planetary_set, planetary_set.n_planets

@@ -20,7 +20,7 @@ class OrderSpectrum(ReadOnlyArrays):
     Parameters
     ----------
     order : (n_orders,) array
-        Carrier orders from 0 upwards.
+        Carrier orders from 0 upwards, ascending, whole numbers; others are silent.
     value : (..., n_orders) complex array
         Complex amplitudes in the unit of the signal (peak values, not r.m.s.).
     """
@@ -116,7 +116,7 @@ def order_spectrum(signal) -> OrderSpectrum:
 
 def order_level(lines: SensorLines) -> np.ndarray:
     """Compute the root mean square acceleration of a fixed sensor [m/s^2], shape (...), without its mean."""
-    return np.sqrt(0.5 * (np.abs(lines.acceleration[..., 1:]) ** 2).sum(axis=-1))
+    return np.sqrt(0.5 * (np.abs(lines.acceleration[..., lines.order > 0]) ** 2).sum(axis=-1))
 
 
 def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum:
@@ -147,12 +147,14 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
 
 
 def analytic_signal(spectrum: OrderSpectrum) -> np.ndarray:
-    """Compute the analytic signal sum_k value[k] exp(i order[k] theta), (..., 4 n_orders) complex samples.
+    """Compute the analytic signal sum_k value[k] exp(i order[k] theta), (..., 4 K + 4) complex samples.
 
-    Its modulus is the envelope.
+    K is the highest order. Its modulus is the envelope.
     """
-    count = 4 * spectrum.value.shape[-1]
-    return np.fft.ifft(spectrum.value, count, axis=-1) * count
+    order = spectrum.order.astype(int)
+    every = np.zeros((*spectrum.value.shape[:-1], 4 * int(order[-1]) + 4), dtype=complex)
+    every[..., order] = spectrum.value
+    return np.fft.ifft(every, axis=-1, norm="forward")
 
 
 def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:

@@ -34,7 +34,8 @@ Kahraman (2009), only the nearest planet of N is heard.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -59,11 +60,11 @@ class SensorLines(ReadOnlyArrays):
     Parameters
     ----------
     order : (n_orders,) int array
-        Carrier orders 0, 1, 2, ...
+        Carrier orders, ascending, from 0 upwards; others are silent.
     displacement : (..., n_orders) complex array
         Single-sided complex amplitudes [m].
-    base_speed : (...) array
-        Speed that orders count [rad/s]: that of the carrier against the ring, always positive.
+    carrier_speed : (...) array
+        Speed of the carrier against the ring [rad/s], counter-clockwise positive.
     sensor_angle : float
         Position of the sensor on the housing [rad].
     z_ring : int
@@ -74,10 +75,15 @@ class SensorLines(ReadOnlyArrays):
 
     order: np.ndarray
     displacement: np.ndarray
-    base_speed: np.ndarray
+    carrier_speed: np.ndarray
     sensor_angle: float
     z_ring: int
     method: str
+
+    @property
+    def base_speed(self) -> np.ndarray:
+        """Speed that orders count [rad/s], shape (...), always positive."""
+        return np.abs(self.carrier_speed)
 
     @property
     def frequency(self) -> np.ndarray:
@@ -139,14 +145,76 @@ def fixed_sensor_lines(field, z_ring: int, carrier_speed, sensor_angle: float) -
         ``E-SHAPE``, ``E-TEETH``, ``E-SPEED``, ``E-RANGE``: data of the wrong shape or not finite, a carrier
         that stands still, speeds of both directions.
     """
+    heard = component_lines(field, z_ring, carrier_speed, sensor_angle)
+    every = np.arange(_top_order(np.asarray(field), z_ring) + 1)
+    return replace(heard, order=every, displacement=_spread(heard.displacement, heard.order, every.size))
+
+
+def component_lines(
+    field, z_ring: int, carrier_speed, sensor_angle: float, *, symmetry: int = 1
+) -> SensorLines:
+    """Compute the lines of `fixed_sensor_lines` at those orders alone that components reach.
+
+    Parameters
+    ----------
+    field, z_ring, carrier_speed, sensor_angle
+        As there.
+    symmetry : int
+        Orders that are multiples of it are kept: a set that is the same after a turn by ``2 pi/symmetry``
+        has no others.
+    """
     field, n = _checked_field(field)
-    direction, base_speed = _motion(field, z_ring, carrier_speed)
-    top = _top_order(field, z_ring)
-    heard = field * np.exp(1j * n * _checked_angle(sensor_angle))
-    two_sided = _heard_orders(heard, z_ring, direction, top)
-    return SensorLines(
-        np.arange(top + 1), _folded(two_sided), base_speed, float(sensor_angle), int(z_ring), "exact"
-    )
+    direction, speed = _motion(field, z_ring, carrier_speed)
+    signed = np.arange(field.shape[-2])[:, None] * z_ring - direction * n
+    kept = np.flatnonzero(signed % symmetry == 0)
+    signed, turned = signed.ravel()[kept], np.broadcast_to(n, signed.shape).ravel()[kept]
+    along = np.argsort(np.abs(signed), kind="stable")
+    signed, kept, turned = signed[along], kept[along], turned[along]
+    heard = field.reshape(*speed.shape, -1)[..., kept] * np.exp(1j * turned * _checked_angle(sensor_angle))
+    # lines of negative order are heard at positive ones; what falls on one order adds
+    heard = np.where(signed < 0, np.conj(heard), heard)
+    order, first = np.unique(np.abs(signed), return_index=True)
+    lines = heard if len(order) == len(kept) else np.add.reduceat(heard, first, axis=-1)
+    lines = np.where(order == 0, np.real(lines), lines)
+    return SensorLines(order, lines, speed, float(sensor_angle), int(z_ring), "exact")
+
+
+def stored_lines(housing: Any, *, form: str | None = None) -> SensorLines:
+    """Read the lines of a fixed sensor from housing.nc, to the highest that is heard.
+
+    Parameters
+    ----------
+    housing : xarray.Dataset
+        Of one or some speeds, as ``results.housing.sel(speed=250, method="nearest")``.
+    form : {"exact", "linear"}, optional
+        That of the case when left out.
+    """
+    known, order = housing.attrs, housing["order"].values
+    exact = housing["lines_real"].values + 1j * housing["lines_imag"].values
+    end = np.flatnonzero(exact.any(axis=tuple(range(exact.ndim - 1)))).max(initial=1) + 1
+    place = float(known["sensor_angle"]), int(known["ring_teeth"])
+    lines = SensorLines(order[:end], exact[..., :end], housing["carrier_speed"].values, *place, "exact")
+    return lines_in_form(lines, form or known["form"], int(known["points"]), round(order[-1] / place[1]))
+
+
+def lines_in_form(exact: SensorLines, form: str, points: int, harmonics: int) -> SensorLines:
+    """Give exact lines in the form "exact" or "linear", as `heaviside_linear_lines` up to a mesh harmonic.
+
+    The static deflection (harmonic zero) is carried exactly all the same: its images, where the teeth of the
+    ring are a multiple of the number of points, would fall on the mesh orders. Every line must be that of one
+    component: less nodal diameters than half the teeth.
+    """
+    if form == "exact":
+        return exact
+    z, order, speed, angle = exact.z_ring, exact.order, exact.carrier_speed, exact.sensor_angle
+    h, top = np.rint(order / z).astype(int), (harmonics + 1) * z
+    n = int(np.sign(speed.flat[0])) * (h * z - order)
+    n_max, moving = int(np.abs(n).max()), h > 0
+    field = np.zeros((*speed.shape, h.max() + 1, 2 * n_max + 1), complex)
+    field[..., h[moving], n_max + n[moving]] = (exact.displacement * np.exp(-1j * n * angle))[..., moving]
+    found = heaviside_linear_lines(field, z, speed, angle, points=points, max_order=top)
+    still = _spread(np.where(moving, 0.0, exact.displacement), order, top + 1)
+    return replace(found, displacement=found.displacement + still)
 
 
 def heaviside_linear_lines(
@@ -174,13 +242,13 @@ def heaviside_linear_lines(
     """
     field, n = _checked_field(field)
     points = checked_count(points, "points", code="E-SYMMETRY", least=3)
-    direction, base_speed = _motion(field, z_ring, carrier_speed)
+    direction, speed = _motion(field, z_ring, carrier_speed)
     top = _top_order(field, z_ring, max_order)
     sampled = _sampled_components(field, n, points)
     two_sided = _interpolated_orders(sampled, z_ring, direction, top, _checked_angle(sensor_angle))
     method = f"linear, {points} points"
     lines = _folded(two_sided)
-    return SensorLines(np.arange(top + 1), lines, base_speed, float(sensor_angle), int(z_ring), method)
+    return SensorLines(np.arange(top + 1), lines, speed, float(sensor_angle), int(z_ring), method)
 
 
 def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
@@ -193,8 +261,8 @@ def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
     return HousingSignal(
         revolution,
         2 * np.pi * revolution / lines.base_speed[..., None],
-        _synthesised(lines.displacement, count),
-        _synthesised(lines.acceleration, count),
+        _synthesised(lines.displacement, lines.order, count),
+        _synthesised(lines.acceleration, lines.order, count),
     )
 
 
@@ -243,7 +311,7 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
 
 
 def _motion(field: np.ndarray, z_ring: int, carrier_speed) -> tuple[int, np.ndarray]:
-    """Find the direction +1 or -1 of the carrier and the speed that orders count (...) [rad/s]."""
+    """Find the direction +1 or -1 of the carrier, and its checked speed (...) [rad/s]."""
     checked_count(z_ring, "ring teeth", code="E-TEETH")
     speed = np.asarray(carrier_speed, dtype=float)
     direction = np.unique(np.sign(speed))
@@ -256,7 +324,7 @@ def _motion(field: np.ndarray, z_ring: int, carrier_speed) -> tuple[int, np.ndar
             limit=f"finite speeds of shape {field.shape[:-2]}, all of one direction, none zero",
             remedy="one speed for every field; split a sweep where the carrier changes direction",
         )
-    return int(direction[0]), z_ring * np.abs(speed) / z_ring
+    return int(direction[0]), speed
 
 
 def _top_order(field: np.ndarray, z_ring: int, max_order: int | None = None) -> int:
@@ -294,17 +362,11 @@ def _checked_angle(angle: float) -> float:
     return float(angle)
 
 
-def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> np.ndarray:
-    """Collect two-sided lines -top..top: every component added at order h z_ring - direction n."""
-    n_max = heard.shape[-1] // 2
-    two_sided = np.zeros((*heard.shape[:-2], 2 * top + 1), dtype=complex)
-    ascending = heard[..., ::-1] if direction > 0 else heard
-    for h in range(heard.shape[-2]):
-        low, high = h * z_ring - n_max, h * z_ring + n_max
-        first, last = max(low, -top), min(high, top)
-        if first <= last:
-            two_sided[..., top + first : top + last + 1] += ascending[..., h, first - low : last - low + 1]
-    return two_sided
+def _spread(lines: np.ndarray, order: np.ndarray, count: int) -> np.ndarray:
+    """Put lines (..., n_orders) at their places among the orders 0 to count - 1."""
+    every = np.zeros((*lines.shape[:-1], count), dtype=complex)
+    every[..., order] = lines
+    return every
 
 
 def _folded(two_sided: np.ndarray) -> np.ndarray:
@@ -326,19 +388,29 @@ def _sampled_components(field: np.ndarray, n: np.ndarray, points: int) -> np.nda
 def _interpolated_orders(
     sampled: np.ndarray, z_ring: int, direction: int, top: int, away: float
 ) -> np.ndarray:
-    """Collect two-sided lines -top..top of the linear interpolation: components and all their images."""
-    points = sampled.shape[-1]
+    """Collect two-sided lines -top..top of the linear interpolation: components and all their images.
+
+    With m = direction (h z_ring - order), sin^2(pi m/P) depends on residues of h z_ring and order alone.
+    """
+    points, h = sampled.shape[-1], np.arange(sampled.shape[-2])
     order = np.arange(-top, top + 1)
+    sampled = sampled * np.exp(1j * direction * away * z_ring * h)[:, None]
     two_sided = np.zeros((*sampled.shape[:-2], order.size), dtype=complex)
-    for h in range(sampled.shape[-2]):
-        m = direction * (h * z_ring - order)
-        two_sided += sampled[..., h, m % points] * (np.sinc(m / points) ** 2 * np.exp(1j * m * away))
-    return two_sided
+    for shift in np.unique(h * z_ring % points):
+        chosen = h[h * z_ring % points == shift]
+        for residue in range(points):
+            place = slice((residue + top) % points, None, points)
+            m = chosen[:, None] * z_ring - order[place]
+            same = direction * (shift - residue) % points
+            weight = np.sin(np.pi * same / points) ** 2 * (points / np.pi) ** 2 / np.where(m, m, 1) ** 2
+            weight = np.where(m, weight, 1.0) if same == 0 else weight
+            two_sided[..., place] += sampled[..., chosen, same] @ weight
+    return two_sided * np.exp(-1j * direction * away * order)
 
 
-def _synthesised(lines: np.ndarray, samples: int) -> np.ndarray:
-    """Sum Re sum_k lines[k] exp(2 pi i k t), t in equal steps of one revolution."""
-    spectrum = lines * (samples / 2)
+def _synthesised(lines: np.ndarray, order: np.ndarray, samples: int) -> np.ndarray:
+    """Sum Re sum_k lines[k] exp(2 pi i order[k] t), t in equal steps of one revolution."""
+    spectrum = _spread(lines, order, samples // 2 + 1) * (samples / 2)
     spectrum[..., 0] *= 2
     return np.fft.irfft(spectrum, samples, axis=-1)
 

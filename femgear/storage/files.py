@@ -12,6 +12,7 @@ import hashlib
 import importlib
 import io
 import json
+import math
 import mmap
 import os
 import re
@@ -61,9 +62,11 @@ _PACKAGE = "femgear."
 WRITTEN, _LINE = ".written", re.compile(rb"[0-9a-f]{64}  .+|[0-9a-f]{0,64} ?")
 # folders whose lists this process keeps
 _LISTED: set[Path] = set()
-# bytes that a file may declare beyond four times its size
-_MARGIN = 1_000_000
-# bytes of a file from which its numbers are read when they are asked for
+# bytes that a file may declare for each of its own, compressed and with pieces that are not there, and beyond
+_SPARSE, _MARGIN = 100, 1_000_000
+# numbers in a piece of a variable that grows
+_CHUNK = 2**16
+# bytes of numbers of a file from which they are read when they are asked for
 _LARGE = 200_000_000
 
 
@@ -74,7 +77,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     ----------
     dataset : xarray.Dataset
         Real, text or boolean variables, each with attributes ``units`` and ``long_name``; so the numeric
-        coordinates. Real numbers are stored as float64.
+        coordinates.
 
     Raises
     ------
@@ -85,21 +88,22 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         _to_netcdf(dataset, temporary)
 
 
-def _to_netcdf(dataset: xr.Dataset, path: Path, growing: Sequence[str] = ()) -> None:
-    """Write a dataset as `write_dataset` does, under the name itself; some dimensions can grow."""
+def _to_netcdf(dataset: xr.Dataset, path: Path, *, growing: bool = False) -> None:
+    """Write a dataset as `write_dataset` does, under the name itself; its numbers may have to grow."""
+    free = [name for name, one in dataset.coords.items() if growing and one.dtype.kind not in "OUS"]
     for name, variable in dataset.variables.items():
         _check_variable(str(name), variable, coordinate=name in dataset.coords, path=path)
-    write_hdf5(path, lambda stream: _create(dataset, stream, growing))
+    write_hdf5(path, lambda stream: _create(dataset, stream, free))
 
 
-def _create(dataset: xr.Dataset, stream: io.RawIOBase, growing: Sequence[str]) -> None:
+def _create(dataset: xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> None:
     """Write a dataset into an open file in the form of NetCDF-4, whose dimensions are scales of HDF5."""
     import h5py
 
     sizes = dataset.sizes
     # NetCDF knows no empty dimension of fixed size
-    longest = {dim: None if dim in growing or not size else size for dim, size in sizes.items()}
-    stored = {"O": h5py.string_dtype(), "U": h5py.string_dtype(), "f": np.dtype(float), "b": np.dtype("i1")}
+    longest = {dim: None if dim in free or not size else size for dim, size in sizes.items()}
+    stored = {"O": h5py.string_dtype(), "U": h5py.string_dtype(), "b": np.dtype("i1")}
     with h5py.File(stream, "w", track_order=True) as file:
         file.attrs.update(dataset.attrs, femgear_format=_FORMAT, femgear_version=__version__)
         if beside := [str(name) for name in dataset.coords if name not in sizes]:
@@ -108,6 +112,8 @@ def _create(dataset: xr.Dataset, stream: io.RawIOBase, growing: Sequence[str]) -
         for name, one in dataset.variables.items():
             kind = stored.get(one.dtype.kind, one.dtype)
             options = {"maxshape": [longest[dim] for dim in one.dims], "fletcher32": kind.kind != "O"}
+            if free and one.dtype.kind not in "OUS":
+                options |= {"chunks": _chunk(one, free), "compression": "gzip", "compression_opts": 1}
             values = one.values.astype(kind, copy=False)
             made[name] = file.create_dataset(str(name), data=values, **(options if one.dims else {}))
             made[name].attrs.update(one.attrs, **({"dtype": "bool"} if one.dtype.kind == "b" else {}))
@@ -123,13 +129,22 @@ def _create(dataset: xr.Dataset, stream: io.RawIOBase, growing: Sequence[str]) -
                 made[name].dims[axis].attach_scale(made[dim])
 
 
+def _chunk(variable: xr.Variable, free: Sequence[Any]) -> tuple[int, ...]:
+    """Shape of the pieces in which a variable is stored that grows along some dimensions: 64 000 numbers."""
+    inner = [512 if name in free else size for name, size in list(variable.sizes.items())[1:]]
+    first = max(_CHUNK // math.prod(inner), 16)
+    return (first if variable.dims[0] in free else variable.shape[0], *inner)
+
+
 def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
-    """Append a dataset to a file of its kind along one dimension; the file has the texts of the latest.
+    """Append a dataset to a file of its kind along one dimension; the other numbers are those of the latest.
+
+    Dimensions that are longer than before grow, and what is missing of a shorter one is zero.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        As for `write_dataset`; what does not extend over the dimension is that of the first one.
+        As for `write_dataset`; coordinates begin with the same numbers.
     path : path
         From `replaced_file`: the first dataset is written into an empty file.
     along : str
@@ -138,7 +153,7 @@ def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
     if path.stat().st_size:
         write_hdf5(path, lambda stream: _append(dataset, stream, along))
     else:
-        _to_netcdf(dataset, path, [along])
+        _to_netcdf(dataset, path, growing=True)
 
 
 def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
@@ -147,12 +162,16 @@ def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
 
     with h5py.File(stream, "r+") as file:
         for name, variable in dataset.variables.items():
-            if along in variable.dims:
-                axis, stored = variable.dims.index(along), file[str(name)]
-                assert isinstance(stored, h5py.Dataset)
-                start = stored.shape[axis]
-                stored.resize(start + variable.shape[axis], axis=axis)
-                stored[(*[slice(None)] * axis, slice(start, None))] = variable.values
+            stored = file[str(name)]
+            assert isinstance(stored, h5py.Dataset)
+            if along not in variable.dims:
+                if name in dataset.coords and variable.shape <= stored.shape:
+                    continue
+                stored[...] = 0
+            start = [size if one == along else 0 for one, size in zip(variable.dims, stored.shape)]
+            end = [first + size for first, size in zip(start, variable.shape)]
+            stored.resize(np.maximum(stored.shape, end))
+            stored[tuple(map(slice, start, end))] = variable.values
         file.attrs.update({str(name): text for name, text in dataset.attrs.items() if isinstance(text, str)})
 
 
@@ -233,9 +252,12 @@ def _loaded(path: str | os.PathLike) -> xr.Dataset:
         if hostile := _hostility(path):
             raise StorageError(hostile, code="E-FORMAT", file=os.fspath(path), remedy="do not use this file")
     options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
-    if os.path.getsize(path) > _LARGE:
-        return xr.open_dataset(path, cache=False, **options)
-    return xr.load_dataset(path, **options)
+    with contextlib.ExitStack() as opened:
+        found = opened.enter_context(xr.open_dataset(path, cache=False, **options))
+        if found.nbytes <= _LARGE:
+            return found.load()
+        opened.pop_all()
+    return found
 
 
 def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -> None:
@@ -736,7 +758,7 @@ def _hostility(path: str | os.PathLike) -> str:
             if kind not in "fiubS":
                 return f"{name!a} has the type {item.dtype}"
             declared += item.size * item.dtype.itemsize
-    return f"declares {declared:.3g} bytes in a file of {size}" if declared > 4 * size + _MARGIN else ""
+    return f"declares {declared:.3g} bytes in a file of {size}" if declared > _SPARSE * size + _MARGIN else ""
 
 
 def _heap_without_end(path: str | os.PathLike) -> bool:

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
-_FORMAT = 2
+_FORMAT = 3
 MANIFEST = "manifest.json"
 KEPT = ".stages"
 """Folder of results that a run goes on from when it was interrupted."""
@@ -173,10 +173,14 @@ def _header(data: xr.Dataset, name: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def complex_entries(entries) -> dict[str, tuple]:
-    """Split entries into real and imaginary parts, from ``(name, dims, values, units, long_name)``."""
+def complex_entries(entries, *, single: bool = False) -> dict[str, tuple]:
+    """Split entries into real and imaginary parts, from ``(name, dims, values, units, long_name)``.
+
+    In single precision where that is finer than the tolerance of what they come from.
+    """
     found = {}
     for name, dims, values, units, words in entries:
+        values = values.astype(np.complex64) if single else values
         found[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
         found[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
     return found

@@ -267,7 +267,7 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     """Define the largest amplitude of any carrier order at the fixed sensor over speeds [m/s^2].
 
     Speeds are as for `mesh_force`, lines the exact ones of the radial acceleration, see
-    `femgear.housing.sensor.fixed_sensor_lines`.
+    `femgear.housing.sensor.component_lines`.
     """
     at = _range(first, last, speeds)
 

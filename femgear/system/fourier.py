@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from femgear.errors import CaseError, checked_numbers
 
@@ -20,8 +20,6 @@ from femgear.errors import CaseError, checked_numbers
 _ROUNDING = 1e-12
 # Difference of two line frequencies, relative to the highest one, below which they are one.
 _COINCIDE = 1e-9
-# Harmonics up to which a matrix multiplies faster than transforms.
-_FEW = 100
 
 
 def harmonics_of(samples, count: int) -> np.ndarray:
@@ -87,46 +85,41 @@ def pad(amplitudes: np.ndarray, count: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Product:
-    """Multiplication of the harmonics of signals by periodic factors, without aliasing.
+    """Multiplication of the harmonics of signals by periodic factors, in time, without aliasing.
 
-    ``factor`` (n, H + 1) complex are one-sided harmonics. By a matrix, or in time where there are many
-    harmonics.
+    ``factor`` (n, H + 1), or (n, n_speeds, H + 1) one a speed, complex are one-sided harmonics.
     """
 
     factor: np.ndarray
 
     def __call__(self, amplitudes: np.ndarray) -> np.ndarray:
-        """Harmonics (n, ..., H + 1) of the products with one-sided harmonics of the same shape."""
-        n, size = self.factor.shape
-        if size <= _FEW:
-            flat = np.ascontiguousarray(amplitudes, dtype=complex).view(float).reshape(n, -1, 2 * size)
-            return np.matmul(flat, self.matrix.transpose(0, 2, 1)).view(complex).reshape(amplitudes.shape)
-        # with so many instants no harmonic is another one's alias
-        points = 1 << (3 * size - 1).bit_length()
-        instants = sample(self.factor, points).reshape(n, *(1,) * (amplitudes.ndim - 2), points)
-        return harmonics_of(instants * sample(amplitudes, points), size - 1)
+        """Harmonics (n, n_speeds, H + 1) of the products with one-sided harmonics of the same shape."""
+        signals = _instants(amplitudes, self._samples.shape[-1])
+        out = _fft().rfft(np.multiply(signals, self._samples, out=signals), norm="forward", overwrite_x=True)
+        out = out[..., : amplitudes.shape[-1]]
+        out[..., 0] *= 0.5
+        return out
 
     @cached_property
-    def matrix(self) -> np.ndarray:
-        """Real matrices (n, 2 (H + 1), 2 (H + 1)) from and to columns ``Re X_0, Im X_0 (zero), ...``.
+    def _samples(self) -> np.ndarray:
+        """Factors at so many instants that no harmonic of a product is another one's alias."""
+        points = _fft().next_fast_len(3 * self.factor.shape[-1] - 2, real=True)
+        samples = 0.5 * _instants(self.factor, points)
+        return samples[:, None] if samples.ndim == 2 else samples
 
-        With two-sided coefficients ``a_n`` of the factor, ``(a x)_h = sum_m a_{h-m} X_m + a_{h+m} conj(X_m)``
-        for h > 0 and half of it for h = 0: a Toeplitz and a Hankel part.
-        """
-        n, size = self.factor.shape
-        half = pad(self.factor, 2 * (size - 1)) * 0.5
-        half[:, 0] *= 2.0
-        two_sided = np.concatenate([np.conj(half[:, :0:-1]), half], axis=-1)
-        # rows that start one later each; of the Toeplitz part, turned round
-        rows = sliding_window_view(two_sided, size, axis=-1)
-        toeplitz, hankel = rows[:, size - 1 : 2 * size - 1, ::-1], rows[:, 2 * size - 2 : 3 * size - 2, :]
-        out = np.empty((n, size, 2, size, 2))
-        np.add(toeplitz.real, hankel.real, out=out[..., 0, :, 0])
-        np.add(toeplitz.imag, hankel.imag, out=out[..., 1, :, 0])
-        np.subtract(hankel.imag, toeplitz.imag, out=out[..., 0, :, 1])
-        np.subtract(toeplitz.real, hankel.real, out=out[..., 1, :, 1])
-        out[:, 0] *= np.array([0.5, 1.0])[:, None, None]
-        return out.reshape(n, 2 * size, 2 * size)
+
+def _fft() -> Any:
+    """SciPy's transforms, which take single precision too."""
+    from scipy import fft
+
+    return fft
+
+
+def _instants(amplitudes: np.ndarray, points: int) -> np.ndarray:
+    """Twice the values (..., points) at equidistant instants of a period of harmonics (..., H + 1)."""
+    spectrum = np.array(amplitudes)
+    spectrum[..., 0] *= 2.0
+    return _fft().irfft(spectrum, points, norm="forward", overwrite_x=True)
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ class Response:
     residual : (n_speeds,) array
         Relative residual of the harmonic equations.
     iterations : (n_speeds,) int array
-        Iterations of the fixed point; 0 where the direct solution was used alone.
+        Iterations of the fixed point, also where it was given up; 0 with ``method="direct"``.
     spectral_radius : (n_speeds,) array
         Spectral radius of the fixed-point operator; the iteration contracts below one.
     tail : (n_speeds,) array

@@ -167,12 +167,20 @@ def member_speeds(case: Case, gears: PlanetarySet, speed: float = 1.0) -> Speeds
     return speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
 
 
-def parts_of_speeds(case: AnyCase, count: int) -> Iterator[tuple[np.ndarray, AnyCase]]:
-    """Split the speeds of a case into parts: their numbers, and the case that has them alone."""
-    speeds = case.operation.speeds
-    for own in np.array_split(np.arange(len(speeds)), count):
-        operation = case.operation.model_copy(update={"speeds": tuple(speeds[i] for i in own)})
-        yield own, case if count == 1 else case.model_copy(update={"operation": operation})
+def parts_of_speeds(case: AnyCase, sizes, most: float) -> Iterator[tuple[np.ndarray, AnyCase]]:
+    """Split the speeds of a case into parts: their numbers, and the case that has them alone.
+
+    Every speed of a part takes as much room as the largest of them, of sizes (n_speeds,); together `most`.
+    """
+    speeds, first, largest = case.operation.speeds, 0, 0.0
+    for last, size in enumerate(sizes, 1):
+        largest = max(largest, size)
+        following = max(largest, sizes[last]) if last < len(speeds) else math.inf
+        if (last + 1 - first) * following > most or last == len(speeds):
+            operation = case.operation.model_copy(update={"speeds": speeds[first:last]})
+            whole = last - first == len(speeds)
+            yield np.arange(first, last), case if whole else case.model_copy(update={"operation": operation})
+            first, largest = last, 0.0
 
 
 def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:

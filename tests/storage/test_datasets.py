@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from page_examples import check_documented
 
+from femgear.housing.orders import order_level
+from femgear.housing.sensor import fixed_sensor_signal, stored_lines
 from femgear.storage.results import _attribute, response_entries
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_value
@@ -45,18 +47,18 @@ PLACES = {
         "spectral_radius": ("speed",),
         "floquet_multiplier": ("speed",),
         "mesh_frequency": ("speed",),
-        "ring_real": ("speed", "harmonic", "circumferential"),
-        "ring_tangential_imag": ("speed", "harmonic", "circumferential"),
+        "ring_real": ("harmonic", "circumferential"),
+        "ring_tangential_imag": ("harmonic", "circumferential"),
     },
     "housing": {
-        "acceleration": ("speed", "time"),
-        "order_amplitude": ("speed", "order"),
-        "order_amplitude_exact": ("speed", "order"),
-        "seconds": ("speed", "time"),
+        "lines_real": ("speed", "order"),
+        "lines_imag": ("speed", "order"),
+        "level": ("speed",),
+        "carrier_speed": ("speed",),
     },
 }
 UNITS = {"ste": "m", "mesh_force": "N", "mesh_stiffness": "N/m", "load_share": "1", "frequency": "Hz"}
-UNITS |= {"dte_real": "m", "mesh_force_real": "N", "acceleration": "m/s^2", "order_amplitude": "m/s^2"}
+UNITS |= {"dte_real": "m", "mesh_force_real": "N", "lines_real": "m", "level": "m/s^2"}
 
 
 @pytest.fixture(scope="module")
@@ -149,17 +151,23 @@ def test_ring_shapes_are_real_fields(datasets):
     assert list(modes.circumferential.values) == list(range(-26, 27))
 
 
-def test_housing_signal_is_the_sum_of_its_lines(datasets):
-    housing = datasets["housing"]
-    samples = housing.sizes["time"]
-    lines = np.abs(np.fft.rfft(housing.acceleration.values, axis=1)) * 2 / samples
-    lines[:, 0] /= 2
-    top = housing.sizes["order"]
-    expected = housing.order_amplitude.values
-    assert lines[:, :top] == pytest.approx(expected, abs=1e-9 * expected.max())
-    assert housing.seconds.values[:, -1] * samples / (samples - 1) == pytest.approx(
-        [108 / 90.0, 108 / 1116.0], rel=1e-12
-    )
+def test_housing_lines_are_those_of_the_result_and_make_the_signal(results, datasets):
+    housing, exact = datasets["housing"], results["housing"].exact
+    assert housing.lines_real.dtype == np.float32 and not (housing.order.values % 3).any()
+    for s in (0, 1):
+        lines = stored_lines(housing.isel(speed=s))
+        # up to the last order that is heard at this speed
+        count = len(lines.order)
+        assert np.array_equal(lines.order, exact.order[:count]) and not exact.displacement[s, count:].any()
+        largest = np.abs(exact.acceleration[s]).max()
+        assert np.abs(lines.acceleration - exact.acceleration[s, :count]).max() < 1e-7 * largest
+        assert float(housing.level[s]) == pytest.approx(order_level(lines), rel=1e-7)
+        signal = fixed_sensor_signal(lines)
+        assert np.sqrt(np.mean(signal.acceleration**2)) == pytest.approx(order_level(lines), rel=1e-12)
+        samples = len(signal.seconds)
+        assert signal.seconds[-1] * samples / (samples - 1) == pytest.approx(
+            (108 / 90.0, 108 / 1116.0)[s], rel=1e-12
+        )
     assert housing.attrs["sensor_angle"] == 0.0
 
 

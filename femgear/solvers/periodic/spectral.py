@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from scipy.sparse import linalg as sparse_linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.fourier import Product, pad, sample
@@ -23,11 +23,16 @@ _EQUAL = 1e-9
 _TAIL_ENERGY = 1e-3
 # Fluctuation, relative to the mean, below which there is none.
 _STILL = 1e-12
-# Speeds treated together: their receptances and matrices stay in the cache.
-_BATCH = 40
-# Unknowns of one speed above which Krylov steps replace elimination, and the residual that they must reach.
-_DENSE = 1500
-_ROUNDING = 1e-13
+# A receptance relative to the static one beyond the inverse of which it is infinite.
+_UNDAMPED = 1e-10
+# Harmonics of speeds treated together: their receptances and matrices stay in the cache.
+_BATCH = 4000
+# Krylov steps of a cycle at most, cycles, and the residual that they must reach.
+_KRYLOV, _CYCLES, _ROUNDING = 250, 4, 1e-13
+# Unknowns of one speed up to which the spectral radius is exact.
+_FEW = 60
+# Iterations of the fixed point after which it may be given up.
+_FIRST = 8
 
 
 def solve_spectral(
@@ -37,7 +42,6 @@ def solve_spectral(
     *,
     excitation_harmonics: int | np.ndarray = 6,
     response_harmonics: int | np.ndarray = 12,
-    lines: int = 0,
     tolerance: float = 1e-6,
     method: str = "auto",
     max_iterations: int = 100,
@@ -63,14 +67,12 @@ def solve_spectral(
     excitation_harmonics, response_harmonics : int or (n_speeds,) int array
         Mesh harmonics kept in the data and in the response, of all speeds or one a speed; products are formed
         without aliasing. The result has as many harmonics as the speed with the most, zeros beyond its own.
-    lines : int
-        Harmonics that the result has at least.
     tolerance : float
         Relative change at which the fixed point stops; the full equations of a converged solution then hold
         to ten times that.
     method : {"auto", "fixed point", "direct"}
-        ``"auto"`` uses the fixed point where its spectral radius promises convergence within
-        `max_iterations` and the direct solution of the same equations elsewhere.
+        ``"auto"`` uses the fixed point where its changes promise convergence within `max_iterations`, and
+        the direct solution of the same equations elsewhere.
     max_iterations : int
         Of the fixed point.
 
@@ -89,16 +91,19 @@ def solve_spectral(
     frequency = _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations)
     kept = np.stack(np.broadcast_arrays(frequency, excitation_harmonics, response_harmonics)[1:]).astype(int)
     _check_harmonics(*kept)
-    options = (method, tolerance, max_iterations)
-    top = max(int(kept[1].max()), lines) * excitation.periods
-    found: list = [None] * len(frequency)
-    for harmonics, own in np.unique(kept, axis=1).T:
-        data = _Data.build(modes, excitation, int(harmonics), int(own) * excitation.periods)
-        chosen = np.flatnonzero((kept.T == (harmonics, own)).all(axis=1))
-        for part in np.array_split(chosen, -(-len(chosen) // _BATCH)):
-            solved = _solve_batch(modes, data, frequency[part] / excitation.periods, options, top)
-            for i, *values in zip(part, *solved, strict=True):
-                found[i] = values
+    kept = kept * excitation.periods
+    excited, own = kept.max(axis=1)
+    data = _Data.build(modes, excitation, excited, own, frequency.max() / excitation.periods)
+    n, speeds = len(data.stiffness), len(frequency)
+    lines: Any = [np.zeros((speeds, size, own + 1), complex) for size in (n, n, len(modes.frequency))]
+    numbers: Any = [np.zeros(speeds, kind) for kind in (float, float, float, float, int, bool)]
+    found = _Solved(*lines, *numbers)
+    # speeds of similar numbers of harmonics stand together
+    along = np.lexsort((frequency, kept[1]))
+    for part in np.split(along, np.flatnonzero(np.diff(np.cumsum(kept[1, along] + 1) // _BATCH)) + 1):
+        _solve_batch(
+            modes, data, part, frequency / excitation.periods, kept, found, method, tolerance, max_iterations
+        )
     return _response(frequency, found, method, tolerance, excitation.periods)
 
 
@@ -106,8 +111,9 @@ def solve_spectral(
 class HarmonicProblem:
     """``E_h + T_h (g E)_h = S_h`` for every harmonic h, mesh and speed.
 
-    Receptance T (n, n, n_speeds, H + 1) [m/N]; multiplication by the stiffness fluctuation g (n, H + 1) of
-    each mesh [N/m]; source S (n, n_speeds, H + 1) [m].
+    Receptance T (n, n, n_speeds, H + 1) [m/N], zero beyond the harmonics of a speed; multiplication by the
+    stiffness fluctuation g (n, H + 1) or (n, n_speeds, H + 1) of each mesh [N/m]; source S
+    (n, n_speeds, H + 1) [m].
     """
 
     receptance: np.ndarray
@@ -116,7 +122,9 @@ class HarmonicProblem:
 
     def take(self, speeds) -> HarmonicProblem:
         """Take the problem at some of the speeds, indices or a mask."""
-        return HarmonicProblem(self.receptance[:, :, speeds], self.product, self.source[:, speeds])
+        factor = self.product.factor
+        product = self.product if factor.ndim == 2 else Product(factor[:, speeds])
+        return HarmonicProblem(self.receptance[:, :, speeds], product, self.source[:, speeds])
 
 
 @dataclass(frozen=True)
@@ -132,7 +140,7 @@ class Twins:
     shift: np.ndarray
 
 
-def compliance(modes: Modes, omega: np.ndarray) -> np.ndarray:
+def compliance(modes: Modes, omega: np.ndarray, chosen: Any = slice(None)) -> np.ndarray:
     """Compute modal receptances ``1 / (w_k^2 - omega^2 + 2 i zeta w_k omega)`` (..., n_modes) [s^2].
 
     Zero for rigid modes, which no self-equilibrated force moves.
@@ -142,49 +150,37 @@ def compliance(modes: Modes, omega: np.ndarray) -> np.ndarray:
     modes : Modes
     omega : (...) array
         Angular frequencies [rad/s].
+    chosen : index
+        Of the modes.
 
     Raises
     ------
     ConvergenceError
         At an undamped resonance of a mode that a mesh moves.
     """
-    natural = 2.0 * np.pi * modes.frequency
+    natural, damping = 2.0 * np.pi * modes.frequency[chosen], modes.damping_ratio[chosen]
     elastic = natural > 0.0
     w = np.where(elastic, natural, 1.0)
     ratio = np.asarray(omega)[..., None] / w
-    denominator = 1.0 - ratio * ratio + 2j * modes.damping_ratio * ratio
-    moved = elastic & np.any(modes.mesh_deflection != 0.0, axis=0)
-    infinite = (np.abs(denominator) < 1e-10) & moved
-    if np.any(infinite):
-        mode = int(np.argwhere(infinite)[0][-1])
-        raise ConvergenceError(
-            f"undamped resonance of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz: infinite response",
-            code="E-RESONANCE", key="damping_ratio", value=float(modes.damping_ratio[mode]), limit="> 0",
-            remedy="give the mode some damping or move the speed",
-        )  # fmt: skip
-    safe = np.where(np.abs(denominator) < 1e-10, 1.0, denominator)
-    return np.where(elastic, 1.0 / (safe * w * w), 0.0)
-
-
-def _modal_receptance(modes: Modes, modal: np.ndarray) -> np.ndarray:
-    """``T = sum r r^T H_k + residual`` (n, n, ...) from the modal receptances (..., n_modes) [m/N]."""
-    rows = modes.mesh_deflection
-    n, lower = len(rows), np.tril_indices(len(rows))
-    pairs = (rows[lower[0]] * rows[lower[1]]).T
-    flat = np.stack([np.real(modal) @ pairs, np.imag(modal) @ pairs], axis=-1).view(complex)[..., 0]
-    flat += modes.residual[lower]
-    out = np.empty((n, n, *modal.shape[:-1]), dtype=complex)
-    for index, (i, j) in enumerate(zip(*lower)):
-        out[i, j] = out[j, i] = flat[..., index]
-    return out
+    denominator = np.empty(ratio.shape, complex)
+    denominator.real, denominator.imag = 1.0 - ratio * ratio, 2.0 * damping * ratio
+    if damping.min(initial=1.0) < _UNDAMPED:
+        moved = elastic & np.any(modes.mesh_deflection[:, chosen] != 0.0, axis=0)
+        resonant = np.abs(denominator) < _UNDAMPED
+        if np.any(resonant & moved):
+            mode = np.arange(len(modes.frequency))[chosen][np.argwhere(resonant & moved)[0][-1]]
+            raise ConvergenceError(
+                f"undamped resonance of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz: infinite response",
+                code="E-RESONANCE", key="damping_ratio", value=float(modes.damping_ratio[mode]), limit="> 0",
+                remedy="give the mode some damping or move the speed",
+            )  # fmt: skip
+        denominator[resonant] = 1.0
+    return np.where(elastic, 1.0 / (w * w), 0.0) / denominator
 
 
 def transfer(receptances: np.ndarray, force: np.ndarray) -> np.ndarray:
     """Compute ``T_h f_h`` (n, n_speeds, H + 1) [m] of receptances (n, n, n_speeds, H + 1) and forces [N]."""
-    out = np.empty((receptances.shape[0], *force.shape[1:]), dtype=complex)
-    for i, row in enumerate(receptances):
-        np.einsum("jsh,jsh->sh", row, force, out=out[i])
-    return out
+    return np.stack([sum(part * one for part, one in zip(row, force)) for row in receptances])
 
 
 def _apply(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
@@ -192,85 +188,87 @@ def _apply(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
     return transfer(problem.receptance, problem.product(deflection))
 
 
-def _harmonic_residual(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
-    """Size of ``E + T G E - S`` relative to that of E, per speed."""
-    error = deflection + _apply(problem, deflection) - problem.source
-    return _norm(error) / np.maximum(_norm(deflection), np.finfo(float).tiny)
-
-
 def _norm(deflection: np.ndarray) -> np.ndarray:
     """Euclidean norm over meshes and harmonics, per speed."""
     return np.sqrt(np.einsum("jsh,jsh->s", deflection, deflection.conj()).real)
 
 
-def matrices(problem: HarmonicProblem) -> np.ndarray:
-    """Make ``T G`` as matrices (n_speeds, n L, n L) on real and imaginary parts in turn, L = 2 (H + 1)."""
-    n, _, speeds, size = problem.receptance.shape
-    product = problem.product.matrix.reshape(n, size, 2, 2 * size)
-    columns = product[:, :, 0] + 1j * product[:, :, 1]
-    out = np.empty((speeds, n, size, 2, n, 2 * size))
-    for i in range(n):
-        for j in range(n):
-            block = problem.receptance[i, j][:, :, None] * columns[j]
-            out[:, i, :, 0, j], out[:, i, :, 1, j] = np.real(block), np.imag(block)
-    return out.reshape(speeds, 2 * n * size, 2 * n * size)
-
-
-def solve_direct(problem: HarmonicProblem) -> np.ndarray:
+def solve_direct(problem: HarmonicProblem, accuracy: float = _ROUNDING) -> np.ndarray:
     """Solve ``(I + T G) E = S`` for the harmonics (n, n_speeds, H + 1) of the mesh deflections [m].
 
-    By Gaussian elimination; many unknowns by GMRES (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7,
-    1986, pp. 856-869) with products in time, without ever forming the matrix, and by elimination where that
-    does not reach rounding.
+    Least residual in the space of the fixed point's iterates, to an accuracy relative to S: adaptive simpler
+    GMRES (P. Jiranek and M. Rozloznik, Numer. Algorithms 53, 2010, pp. 93-112), all speeds together; but for
+    rounding none depends on the others.
+    """
+    found = np.zeros_like(problem.source)
+    limit = accuracy * _norm(problem.source)
+    for _ in range(_CYCLES):
+        rest = problem.source - found - _apply(problem, found)
+        if np.all(_norm(rest) <= limit):
+            break
+        found = found + _cycle(problem, _rows(rest), limit)
+    return found
 
-    Raises
-    ------
-    ConvergenceError
-        When the equations are singular: an undamped parametric resonance.
+
+def _cycle(problem: HarmonicProblem, rest: np.ndarray, limit: np.ndarray) -> np.ndarray:
+    """Correction (n, n_speeds, H + 1) [m] that brings residuals, as rows, below limits (n_speeds,) [m]."""
+    speeds, n, most = len(rest), len(problem.source), min(_KRYLOV, rest.shape[1])
+    ways, images = (np.empty((speeds, most, rest.shape[1])) for _ in range(2))
+    shares, steps, before = np.tile(np.eye(most), (speeds, 1, 1)), np.zeros((speeds, most, 1)), limit
+    for k in range(most + 1):
+        size = np.linalg.norm(rest, axis=1)
+        # a speed that is done takes no further part
+        todo = size > limit
+        if k == most or not todo.any():
+            break
+        ways[:, k] = rest * np.where(todo, 1.0 / np.where(todo, size, 1.0), 0.0)[:, None]
+        if k:
+            # residuals that hardly shrink are hardly independent
+            stagnant = todo & (size > 0.9 * before)
+            ways[stagnant, k] = images[stagnant, k - 1]
+        before = size
+        image = ways[:, k] + _rows(_apply(problem, _lines(ways[:, k], n)))
+        share = np.matmul(images[:, :k], image[..., None])
+        image -= np.matmul(images[:, :k].transpose(0, 2, 1), share)[..., 0]
+        length = np.where(todo, np.linalg.norm(image, axis=1), 1.0)
+        images[:, k] = image / np.maximum(length, np.finfo(float).tiny)[:, None]
+        shares[:, :k, k], shares[:, k, k] = share[..., 0], length
+        steps[:, k, 0] = np.einsum("sd,sd->s", images[:, k], rest)
+        rest = rest - steps[:, k] * images[:, k]
+    share = np.linalg.solve(shares[:, :k, :k], steps[:, :k])
+    return _lines(np.matmul(ways[:, :k].transpose(0, 2, 1), share)[..., 0], n)
+
+
+def spectral_radius(problem: HarmonicProblem) -> np.ndarray:
+    """Compute the spectral radius (n_speeds,) of the fixed point, that of ``T G``, without unit.
+
+    The largest Ritz value of Arnoldi steps from one random vector (Saad, Numerical Methods for Large
+    Eigenvalue Problems, algorithm 6.1): as many as there are unknowns, which makes it exact, of many unknowns
+    20 in single precision; all speeds together, but for rounding none depends on the others.
     """
     n, speeds, size = problem.source.shape
-    if 2 * n * size <= _DENSE:
-        return _eliminated(problem)
-    return np.concatenate([_krylov(problem.take(np.array([i]))) for i in range(speeds)], axis=1)
-
-
-def _krylov(problem: HarmonicProblem) -> np.ndarray:
-    """Harmonics (n, 1, H + 1) [m] of one speed by GMRES, or by elimination."""
-    n, _, size = problem.source.shape
-
-    def image(row: np.ndarray) -> np.ndarray:
-        deflection = np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)
-        return row + _rows(_apply(problem, deflection))[0]
-
-    right = _rows(problem.source)[0]
-    operator = sparse_linalg.LinearOperator((len(right), len(right)), matvec=image, dtype=float)  # type: ignore[call-arg]
-    row = None
-    for _ in range(4):
-        row, _ = sparse_linalg.gmres(
-            operator, right, x0=row, rtol=0.1 * _ROUNDING, atol=0.0, restart=400, maxiter=1
-        )
-        found = np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)
-        if _harmonic_residual(problem, found)[0] <= _ROUNDING:
-            return found
-    return _eliminated(problem)
-
-
-def _eliminated(problem: HarmonicProblem) -> np.ndarray:
-    """Harmonics (n, n_speeds, H + 1) [m] by Gaussian elimination; refuses singular equations."""
-    n, speeds, size = problem.source.shape
-    operator = matrices(problem)
-    diagonal = np.arange(operator.shape[-1])
-    operator[:, diagonal, diagonal] += 1.0
-    right = np.ascontiguousarray(problem.source.transpose(1, 0, 2)).view(float).reshape(speeds, -1, 1)
-    try:
-        solution = np.linalg.solve(operator, right)
-    except np.linalg.LinAlgError as error:
-        raise ConvergenceError(
-            "the harmonic equations are singular: there is no periodic response at a parametric resonance",
-            code="E-RESONANCE", remedy="give the modes some damping or move the speed",
-        ) from error  # fmt: skip
-    rows = np.ascontiguousarray(solution[..., 0]).view(complex)
-    return rows.reshape(speeds, n, size).transpose(1, 0, 2).copy()
+    few = n * (2 * size - 1) <= _FEW
+    steps, kind, real = (n * (2 * size - 1), complex, float) if few else (20, np.complex64, np.float32)
+    start = np.random.default_rng(0).standard_normal((n, 1, size, 2)).view(complex)[..., 0]
+    start[..., 0] = np.real(start[..., 0])
+    factor = Product(problem.product.factor.astype(kind))
+    rough = HarmonicProblem(problem.receptance.astype(kind), factor, problem.source)
+    basis, hessenberg = (
+        np.empty((speeds, steps + 1, 2 * n * size), real),
+        np.zeros((speeds, steps + 1, steps), real),
+    )
+    basis[:, 0] = _rows((start / _norm(start)[:, None]).astype(kind))
+    for k in range(steps):
+        image = _rows(_apply(rough, _lines(basis[:, k], n)))[..., None]
+        known = basis[:, : k + 1]
+        for _ in range(2):
+            share = np.matmul(known, image)
+            image -= np.matmul(known.transpose(0, 2, 1), share)
+            hessenberg[:, : k + 1, k] += share[..., 0]
+        length = np.linalg.norm(image[..., 0], axis=1)
+        hessenberg[:, k + 1, k] = length
+        basis[:, k + 1] = image[..., 0] / np.maximum(length, np.finfo(real).tiny)[:, None]
+    return np.abs(np.linalg.eigvals(hessenberg[:, :-1])).max(axis=-1)
 
 
 def find_twins(signals: tuple[np.ndarray, ...]) -> Twins:
@@ -292,58 +290,68 @@ def find_twins(signals: tuple[np.ndarray, ...]) -> Twins:
     return Twins(np.array(leaders), group, shift)
 
 
-def reduce_twins(problem: HarmonicProblem, twins: Twins) -> HarmonicProblem | None:
-    """Reduce a problem to the group leaders; ``None`` when the receptances do not share the symmetry."""
-    shifted = problem.receptance * twins.shift[None, :, None, :]
-    folded = np.stack([shifted[:, twins.group == g].sum(axis=1) for g in range(len(twins.leaders))], axis=1)
-    reduced = folded[twins.leaders]
-    scale = np.abs(problem.receptance).max(axis=(0, 1))
-    for j, g in enumerate(twins.group):
-        if np.any(np.abs(folded[j] - twins.shift[j] * reduced[g]) > _EQUAL * scale):
-            return None
-    product = Product(problem.product.factor[twins.leaders])
-    return HarmonicProblem(reduced, product, problem.source[twins.leaders])
+@dataclass(frozen=True)
+class _Class:
+    """Harmonics ``h`` at which twins have one shift, and the modes ``used`` that their joint forces move.
 
-
-def _expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
-    """Harmonics of all meshes from those of the group leaders."""
-    return deflection[twins.group] * twins.shift[:, None, :]
-
-
-def spectral_radius(problem: HarmonicProblem, *, exact_limit: int = 80) -> np.ndarray:
-    """Compute the spectral radius (n_speeds,) of the fixed point, that of ``T G``, without unit.
-
-    Eigenvalues of the full matrices of at most `exact_limit` rows; otherwise the largest Ritz value of 20
-    Arnoldi steps from one random vector (Saad, Numerical Methods for Large Eigenvalue Problems, algorithm
-    6.1), all speeds together; but for rounding none depends on the others.
+    ``rows`` (G, used) are the modal forces of every group, ``pairs`` (used, G G) and ``residual`` (G G,) make
+    the receptance between the leaders of modal receptances.
     """
-    n, speeds, size = problem.source.shape
-    if 2 * n * size <= exact_limit:
-        return np.abs(np.linalg.eigvals(matrices(problem))).max(axis=-1)
-    steps = min(20, n * (2 * size - 1))
-    start = np.random.default_rng(0).standard_normal((n, 1, size, 2)).view(np.complex128)[..., 0]
-    start.imag[..., 0] = 0.0
-    start = np.repeat(start, speeds, axis=1)
-    basis = np.empty((speeds, steps + 1, 2 * n * size))
-    hessenberg = np.zeros((speeds, steps + 1, steps))
-    basis[:, 0] = _rows(start / _norm(start)[None, :, None])
-    for k in range(steps):
-        vector = basis[:, k].reshape(speeds, n, 2 * size).transpose(1, 0, 2)
-        image = _rows(_apply(problem, np.ascontiguousarray(vector).view(complex)))[..., None]
-        known = basis[:, : k + 1]
-        for _ in range(2):
-            share = np.matmul(known, image)
-            image -= np.matmul(known.transpose(0, 2, 1), share)
-            hessenberg[:, : k + 1, k] += share[..., 0]
-        length = np.sqrt(np.einsum("sd,sd->s", image[..., 0], image[..., 0]))
-        hessenberg[:, k + 1, k] = length
-        basis[:, k + 1] = image[..., 0] / np.maximum(length, np.finfo(float).tiny)[:, None]
-    return np.abs(np.linalg.eigvals(hessenberg[:, :-1])).max(axis=-1)
+
+    h: np.ndarray
+    used: np.ndarray
+    rows: np.ndarray
+    pairs: np.ndarray
+    residual: np.ndarray
 
 
-def _response(frequency, found, method: str, tolerance: float, periods: int) -> Response:
-    """The batches together; refuses what even the direct solution does not satisfy."""
-    deflection, force, modal, residual, iterations, radius, tail, direct = map(np.array, zip(*found))
+def _classes(modes: Modes, twins: Twins) -> list[_Class]:
+    """Harmonics in classes of one shift; of meshes without twins all are in one."""
+    member = twins.group == np.arange(len(twins.leaders))[:, None]
+    shifts, of = np.unique(np.round(twins.shift, 6), axis=1, return_inverse=True)
+    found = []
+    for i in range(shifts.shape[1]):
+        shift = member * twins.shift[:, np.flatnonzero(of == i)[0]]
+        rows = shift @ modes.mesh_deflection
+        used = np.flatnonzero(np.abs(rows).max(axis=0) > _EQUAL * np.abs(modes.mesh_deflection).max())
+        pairs = modes.mesh_deflection[twins.leaders][:, None, used] * rows[:, used]
+        residual = modes.residual[twins.leaders] @ shift.T
+        found.append(
+            _Class(
+                np.flatnonzero(of == i), used, rows[:, used], pairs.reshape(-1, len(used)).T, residual.ravel()
+            )
+        )
+    return found
+
+
+def _alike(modes: Modes, twins: Twins, omega: float) -> bool:
+    """Whether receptances at multiples of a frequency [rad/s] share the symmetry of twins."""
+    modal = compliance(modes, omega * np.arange(twins.shift.shape[1]))
+    rows, member = modes.mesh_deflection, twins.group == np.arange(len(twins.leaders))[:, None]
+    full = np.einsum("ik,hk,jk->hij", rows, modal, rows, optimize=True) + modes.residual
+    folded = np.einsum("hij,gjh->ihg", full, member[:, :, None] * twins.shift)
+    error = folded - twins.shift[:, :, None] * folded[twins.leaders][twins.group]
+    return bool(np.all(np.abs(error).max(axis=(0, 2)) <= _EQUAL * np.abs(full).max(axis=(1, 2))))
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """What is found of every speed: harmonics (n_speeds, n, H + 1), and numbers (n_speeds,)."""
+
+    deflection: np.ndarray
+    force: np.ndarray
+    modal: np.ndarray
+    residual: np.ndarray
+    radius: np.ndarray
+    tail: np.ndarray
+    lowest: np.ndarray
+    iterations: np.ndarray
+    direct: np.ndarray
+
+
+def _response(frequency, found: _Solved, method: str, tolerance: float, periods: int) -> Response:
+    """The speeds together; refuses what even the direct solution does not satisfy."""
+    residual = found.residual
     converged = residual <= 10.0 * tolerance
     if method != "fixed point" and not np.all(converged):
         worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
@@ -352,15 +360,13 @@ def _response(frequency, found, method: str, tolerance: float, periods: int) -> 
             code="E-RESONANCE", limit=f"{10.0 * tolerance:.1e}",
             remedy="the equations are nearly singular there: give the modes more damping or move the speed",
         )  # fmt: skip
-    for array in (deflection, force, modal):
+    for array in (found.deflection, found.force, found.modal, found.tail, found.lowest):
         array[~converged] = np.nan
-    tail = np.where(converged, tail, np.nan)
-    lowest = sample(force, 4 * force.shape[-1]).min(axis=(1, 2))
     response = Response(
-        mesh_frequency=frequency, deflection=deflection, force=force, modal=modal, converged=converged,
-        residual=residual, iterations=iterations, spectral_radius=radius, tail=tail,
-        method=tuple("direct" if flag else "fixed point" for flag in direct),
-        lowest_force=lowest, message="", periods=periods,
+        mesh_frequency=frequency, deflection=found.deflection, force=found.force, modal=found.modal,
+        converged=converged, residual=residual, iterations=found.iterations, spectral_radius=found.radius,
+        tail=found.tail, method=tuple("direct" if flag else "fixed point" for flag in found.direct),
+        lowest_force=found.lowest, message="", periods=periods,
     )  # fmt: skip
     return replace(response, message=joint_message([response]))
 
@@ -406,106 +412,139 @@ def _checked(modes, excitation, mesh_frequency, method, tolerance, max_iteration
 
 @dataclass(frozen=True)
 class _Data:
-    """What does not depend on speed: the fluctuation, the forcing ``F - k s`` and who repeats whom."""
+    """What does not depend on speed: harmonics (n, H + 1) of the excitation, and who repeats whom."""
 
-    product: Product
-    forcing: np.ndarray
+    stiffness: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
     twins: Twins
+    classes: list[_Class]
 
     @classmethod
-    def build(cls, modes: Modes, excitation: MeshExcitation, harmonics: int, count: int) -> _Data:
-        stiffness, deflection, force = (
-            pad(signal, count) for signal in mesh_harmonics(excitation, harmonics)
-        )
-        forcing = force - Product(stiffness)(deflection)
-        stiffness[:, 0] -= modes.mesh_stiffness
+    def build(
+        cls, modes: Modes, excitation: MeshExcitation, excited: int, count: int, fastest: float
+    ) -> _Data:
+        excited //= excitation.periods
+        stiffness, deflection, force = (pad(one, count) for one in mesh_harmonics(excitation, excited))
         load = pad(modes.load_deflection[:, None], count)
-        twins = find_twins((stiffness, forcing, load))
-        return cls(Product(stiffness), forcing, twins)
+        twins = find_twins((stiffness, deflection, force, load))
+        few = len(np.unique(np.round(twins.shift, 6), axis=1).T) <= len(twins.group)
+        if not few or not _alike(modes, twins, 2.0 * np.pi * fastest):
+            twins = _alone(len(twins.group), count)
+        return cls(stiffness, deflection, force, twins, _classes(modes, twins))
 
 
-def _solve_batch(modes, data: _Data, fundamental, options, top: int) -> tuple[np.ndarray, ...]:
-    """Deflection, force, modal coordinates, residual, iterations, radius, tail, directness of some speeds.
+def _alone(n: int, count: int) -> Twins:
+    """Meshes of which none repeats another."""
+    return Twins(np.arange(n), np.arange(n), np.ones((n, count + 1), complex))
 
-    Harmonics are filled up with zeros to `top`.
-    """
-    method, tolerance, max_iterations = options
-    lines = np.arange(data.forcing.shape[-1])
-    modal = compliance(modes, 2.0 * np.pi * fundamental[:, None] * lines)
-    receptance = _modal_receptance(modes, modal)
-    forcing = np.repeat(data.forcing[:, None, :], len(fundamental), axis=1)
+
+def _solve_batch(
+    modes, data: _Data, part, fundamental, kept, found: _Solved, method, tolerance, max_iterations
+):
+    """Solve at some speeds, numbers ``part``, and write down what is found."""
+    excited, own = kept[:, part]
+    lines, leaders, group = np.arange(own.max() + 1), data.twins.leaders, data.twins.group
+    n, size, groups = len(group), len(lines), len(leaders)
+    heard = lines <= own[:, None]
+    stiffness, deflection, force = (
+        one[leaders, None, :size] * (lines <= excited[:, None])
+        for one in (data.stiffness, data.deflection, data.force)
+    )
+    forcing = (force - Product(stiffness)(deflection)) * heard
+    stiffness[..., 0] -= modes.mesh_stiffness[leaders, None]
+    receptance, modal = np.empty((groups, groups, len(part), size), complex), []
+    for one in data.classes:
+        h = one.h[one.h < size]
+        modal.append(compliance(modes, 2.0 * np.pi * fundamental[part, None] * h, one.used))
+        between = np.moveaxis(modal[-1] @ one.pairs + one.residual, -1, 0)
+        receptance[..., h] = between.reshape(groups, groups, len(part), -1)
+    receptance *= heard
     source = -transfer(receptance, forcing)
-    source[..., 0] += modes.load_deflection[:, None]
-    problem = HarmonicProblem(receptance, data.product, source)
-    radius = spectral_radius(problem)
-    reduced = reduce_twins(problem, data.twins) if len(data.twins.leaders) < len(source) else None
-    deflection, iterations, direct = _solve(reduced or problem, radius, method, tolerance, max_iterations)
-    if reduced is not None:
-        deflection = _expand_twins(deflection, data.twins)
-    residual = _harmonic_residual(problem, deflection)
-    # the full equations decide: planets equal to 1e-9 only, or a last iteration that grew again
-    rough = np.flatnonzero(~(residual <= tolerance))
-    if len(rough) and method != "fixed point":
-        deflection[:, rough], direct[rough] = solve_direct(problem.take(rough)), True
-        residual[rough] = _harmonic_residual(problem.take(rough), deflection[:, rough])
-    total = forcing + data.product(deflection)
-    force = total + modes.mesh_stiffness[:, None, None] * deflection
-    work = -np.tensordot(modes.mesh_deflection, total, axes=(0, 0))
+    source[..., 0] += modes.load_deflection[leaders, None]
+    problem = HarmonicProblem(receptance, Product(stiffness), source)
+    found.radius[part] = spectral_radius(problem)
+    solution, found.iterations[part], found.direct[part] = _solve(problem, method, tolerance, max_iterations)
+    total = (forcing + problem.product(solution)) * heard
+    shift = data.twins.shift[:, None, :size]
+    every, deflection = total[group] * shift, solution[group] * shift
+    force = every + modes.mesh_stiffness[:, None, None] * deflection
+    predicted = -np.tensordot(modes.residual, every, axes=1) * heard
+    for one, response in zip(data.classes, modal):
+        h = one.h[one.h < size]
+        moved = -(np.moveaxis(total[:, :, h], 0, -1) @ one.rows) * response
+        predicted[:, :, h] += np.moveaxis(moved @ modes.mesh_deflection[:, one.used].T, -1, 0)
+        found.modal[part[:, None, None], one.used[:, None], h] = moved.transpose(0, 2, 1)
+    predicted[..., 0] += modes.load_deflection[:, None]
     if modes.modal_load is not None:
-        work[..., 0] += modes.modal_load[:, None]
-    coordinates = work.transpose(1, 0, 2) * modal.transpose(0, 2, 1)
-    deflection, force = deflection.transpose(1, 0, 2), force.transpose(1, 0, 2)
-    lines = (pad(values, top) for values in (deflection, force, coordinates))
-    return (*lines, residual, iterations, radius, _tail(deflection), direct)
+        found.modal[part, :, 0] += modes.modal_load * compliance(modes, np.zeros(()))
+    size_of = np.maximum(_norm(deflection), np.finfo(float).tiny)
+    found.residual[part] = _norm(deflection - predicted) / size_of
+    found.deflection[part, :, :size], found.force[part, :, :size] = (
+        one.transpose(1, 0, 2) for one in (deflection, force)
+    )
+    found.tail[part] = _tail(deflection.transpose(1, 0, 2), own)
+    found.lowest[part] = sample(force[leaders], 4 * size).min(axis=(0, 2))
+    # the full equations decide: planets equal to 1e-9 only, or a last iteration that grew again
+    rough = ~(found.residual[part] <= tolerance)
+    if (rough.any() and method == "auto") or (rough.any() and method == "direct" and groups < n):
+        twins = _alone(n, data.stiffness.shape[1] - 1)
+        whole = replace(data, twins=twins, classes=_classes(modes, twins))
+        _solve_batch(modes, whole, part[rough], fundamental, kept, found, "direct", tolerance, max_iterations)
 
 
-def _solve(problem: HarmonicProblem, radius, method: str, tolerance: float, max_iterations: int):
+def _solve(problem: HarmonicProblem, method: str, tolerance: float, max_iterations: int):
     """Deflections, iterations and where the direct solution was used."""
-    speeds = len(radius)
-    deflection, iterations = np.empty_like(problem.source), np.zeros(speeds, dtype=int)
-    direct = np.full(speeds, method == "direct")
-    if method == "auto":
-        # the change shrinks by the radius a step: more steps than allowed means no fixed point
-        direct = radius >= tolerance ** (1.0 / max_iterations)
-    chosen = np.flatnonzero(~direct)
-    if len(chosen):
-        found, steps, done = _fixed_point(problem.take(chosen), tolerance, max_iterations)
-        deflection[:, chosen], iterations[chosen] = found, steps
-        if method == "auto":
-            direct[chosen[~done]] = True
+    speeds = problem.source.shape[1]
+    if method == "direct":
+        return solve_direct(problem), np.zeros(speeds, int), np.ones(speeds, bool)
+    deflection, iterations, done = _fixed_point(problem, tolerance, max_iterations, patient=method != "auto")
+    direct = (method == "auto") & ~done
     chosen = np.flatnonzero(direct)
     if len(chosen):
-        deflection[:, chosen] = solve_direct(problem.take(chosen))
+        deflection[:, chosen] = solve_direct(problem.take(chosen), max(0.5 * tolerance, _ROUNDING))
     return deflection, iterations, direct
 
 
-def _fixed_point(problem: HarmonicProblem, tolerance: float, max_iterations: int):
-    """``E <- S - T G E`` until the relative change is below `tolerance`, at most `max_iterations` times."""
-    value = problem.source.copy()
-    iterations = np.zeros(value.shape[1], dtype=int)
-    change = np.full(value.shape[1], np.inf)
-    limit = 1e8 * np.maximum(_norm(value), np.finfo(float).tiny)
-    active = np.arange(value.shape[1])
-    for _ in range(max_iterations):
-        old = value[:, active]
-        new = problem.source[:, active] - _apply(problem.take(active), old)
-        size = np.maximum(_norm(new), np.finfo(float).tiny)
-        change[active] = _norm(new - old) / size
-        value[:, active] = new
-        iterations[active] += 1
-        active = active[(change[active] > tolerance) & (size < limit[active])]
-        if not len(active):
-            break
-    return value, iterations, change <= tolerance
+def _fixed_point(problem: HarmonicProblem, tolerance: float, max_iterations: int, *, patient: bool):
+    """``E <- S - T G E`` until the relative change is below `tolerance`, at most `max_iterations` times.
+
+    Where the changes do not promise that it is given up, unless `patient`. Returns values, iterations, and
+    whether they converged.
+    """
+    values, active = problem.source.copy(), np.arange(problem.source.shape[1])
+    iterations, done = np.zeros(len(active), int), np.zeros(len(active), bool)
+    limit = 1e8 * np.maximum(_norm(values), np.finfo(float).tiny)
+    value, history = values, []
+    for step in range(1, max_iterations + 1):
+        new = problem.source - _apply(problem, value)
+        size, change = np.maximum(_norm(new), np.finfo(float).tiny), _norm(new - value)
+        value, history = new, [change, *history[:_FIRST]]
+        small = change <= tolerance * size
+        stop = small | ~(size < limit[active]) | (step == max_iterations)
+        if not patient and step > _FIRST:
+            shrink = change / np.maximum(history[_FIRST], np.finfo(float).tiny)
+            # as many times the shrinking of the last iterations as are left
+            left = (max_iterations - step) / _FIRST
+            stop |= change * np.minimum(shrink, 1.0) ** left > tolerance * size
+        if stop.any():
+            at, rest = active[stop], ~stop
+            values[:, at], iterations[at], done[at] = new[:, stop], step, small[stop]
+            if not rest.any():
+                break
+            active, problem, value = active[rest], problem.take(rest), value[:, rest]
+            history = [one[rest] for one in history]
+    return values, iterations, done
 
 
-def _tail(deflection: np.ndarray) -> np.ndarray:
-    """Share of the fluctuating amplitude in the harmonics above H/2 (root of the energy ratio), per speed.
+def _tail(deflection: np.ndarray, highest: np.ndarray) -> np.ndarray:
+    """Share of the fluctuating amplitude in the harmonics above half the highest (root of energies).
 
     Zero where the fluctuation is rounding of the mean.
     """
     energy = np.sum(np.abs(deflection) ** 2, axis=1)
-    upper, total = energy[:, 1 + (deflection.shape[-1] - 1) // 2 :].sum(axis=1), energy[:, 1:].sum(axis=1)
+    upper = np.where(np.arange(energy.shape[1]) > highest[:, None] // 2, energy, 0.0).sum(axis=1)
+    total = energy[:, 1:].sum(axis=1)
     still = total <= _STILL**2 * energy[:, 0]
     return np.where(still, 0.0, np.sqrt(upper / np.where(still, 1.0, total)))
 
@@ -558,7 +597,13 @@ def _phase(leader: np.ndarray, follower: np.ndarray) -> float:
     return float(-np.angle(follower[signal, h] / leader[signal, h]) / (2.0 * np.pi * h))
 
 
-def _rows(harmonics: np.ndarray) -> np.ndarray:
+def _rows(harmonics: Any) -> np.ndarray:
     """(n, n_speeds, H + 1) harmonics as one interleaved real row a speed."""
     flat = np.ascontiguousarray(harmonics.transpose(1, 0, 2))
-    return flat.view(float).reshape(len(flat), -1)
+    return flat.view(np.real(flat).dtype).reshape(len(flat), -1)
+
+
+def _lines(rows: np.ndarray, n: int) -> np.ndarray:
+    """(n, n_speeds, H + 1) harmonics of rows as `_rows` makes them."""
+    parts = np.ascontiguousarray(rows.reshape(len(rows), n, -1).transpose(1, 0, 2))
+    return parts.view(np.result_type(rows, np.complex64))

@@ -23,8 +23,8 @@ from femgear.case.quantities import RPM
 from femgear.contact.bodies import active_flank_load
 from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
-from femgear.housing.orders import BandAnalysis, analyse_band
-from femgear.housing.orders import order_spectrum as _spectrum
+from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
+from femgear.housing.sensor import fixed_sensor_signal, stored_lines
 from femgear.report.response import (
     MODE_CAPTIONS,
     RESPONSE_CAPTIONS,
@@ -104,12 +104,12 @@ def natural_frequencies(modes: xr.Dataset) -> Figure:
 def ring_mean_deflection(dynamics: xr.Dataset, planetary_set: PlanetarySet) -> Figure:
     """Draw the mean radial deflection of the ring (dynamics.nc) over the angle in the carrier frame.
 
-    That of the outer surface at the first speed, with the angles of the planets marked.
+    That of the outer surface at the last speed, with the angles of the planets marked.
     """
     figure, (ax,) = new_figure(width=6.4, height=6.6, polar=True)
     angle = np.linspace(0.0, 2 * np.pi, 721)
     zero = int(np.flatnonzero(dynamics["harmonic"].values == 0)[0])
-    component = harmonics_of(dynamics.isel(speed=0), "ring")[zero]
+    component = harmonics_of(dynamics, "ring")[zero]
     radial = (np.exp(1j * np.outer(angle, dynamics["circumferential"].values)) @ component).real * 1e6
     size = np.abs(radial).max(initial=0.0) or 1.0
     ax.plot(angle, np.zeros_like(angle), color="0.45", linewidth=1.2, label="undeformed")
@@ -123,7 +123,7 @@ def ring_mean_deflection(dynamics: xr.Dataset, planetary_set: PlanetarySet) -> F
     ax.set_ylim(-1.2 * size, 1.25 * size)
     ax.set_rlabel_position(_free_angle(planetary_set.planet_angles))
     ax.tick_params(axis="x", pad=14)
-    speed = rpm(dynamics["speed"].values[0])
+    speed = rpm(dynamics["speed"].values[-1])
     ax.set_title(f"mean radial deflection [µm] over the angle in the carrier frame, {speed}", fontsize=SIZE)
     legend_below(figure)
     return figure
@@ -139,17 +139,23 @@ def _free_angle(angles) -> float:
 
 def _shown_harmonics(housing: xr.Dataset) -> tuple[int, ...]:
     """The first mesh harmonic, and the one with the strongest line where that is another one."""
-    order, amplitude = housing["order"].values, housing["order_amplitude"].values[0]
-    return tuple(sorted({1, *_strongest_bands(order, amplitude, _ring_teeth(housing), 1)}))
+    spectrum = _spectrum(housing)
+    return tuple(sorted({1, *_strongest_bands(spectrum.order, spectrum.amplitude, _ring_teeth(housing), 1)}))
 
 
 def _ring_teeth(housing: xr.Dataset) -> int:
     return int(housing.attrs["ring_teeth"])
 
 
+def _spectrum(housing: xr.Dataset, form: str | None = None) -> OrderSpectrum:
+    """Lines of the acceleration at the first speed."""
+    lines = stored_lines(housing.isel(speed=0), form=form)
+    return OrderSpectrum(lines.order, lines.acceleration)
+
+
 def _band(housing: xr.Dataset, harmonic: int) -> BandAnalysis:
     """Lines, signal, envelope and lobes around one mesh harmonic; see `analyse_band`."""
-    return analyse_band(_spectrum(housing["acceleration"].values[0]), _ring_teeth(housing), harmonic)
+    return analyse_band(_spectrum(housing), _ring_teeth(housing), harmonic)
 
 
 def housing_signal(housing: xr.Dataset, *, harmonics: Sequence[int] | None = None) -> Figure:
@@ -161,7 +167,7 @@ def housing_signal(housing: xr.Dataset, *, harmonics: Sequence[int] | None = Non
     harmonics = _shown_harmonics(housing) if harmonics is None else harmonics
     speed, count = rpm(housing["speed"].values[0]), 1 + len(harmonics)
     figure, axes = new_figure(rows=count, width=9.5, height=1.0 + 2.5 * count, sharex=True)
-    signal = housing["acceleration"].values[0]
+    signal = fixed_sensor_signal(stored_lines(housing.isel(speed=0))).acceleration
     text = "largest and smallest within a mesh period"
     around = _extremes(signal, _ring_teeth(housing))
     title = f"{speed}{excited_to(housing, 0)}: all orders"
@@ -213,14 +219,15 @@ def order_spectrum(housing: xr.Dataset) -> Figure:
     """
     from matplotlib.ticker import MaxNLocator
 
-    order, ring_teeth = housing["order"].values, _ring_teeth(housing)
-    linear, exact = (housing[name].values[0] for name in ("order_amplitude", "order_amplitude_exact"))
+    spectrum, only, ring_teeth = _spectrum(housing), _spectrum(housing, "exact"), _ring_teeth(housing)
+    order, linear, exact = spectrum.order, spectrum.amplitude, np.zeros(len(spectrum.order))
+    exact[np.searchsorted(order, only.order)] = only.amplitude
     bands = _strongest_bands(order, linear, ring_teeth, 2)
     figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.8 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
     # what stands for the ring between its points is said where it is not the ring itself
-    form = _EXACT if np.array_equal(linear, exact) else _LINEAR
+    form = _EXACT if housing.attrs["form"] == "exact" else _LINEAR
     _stems(axes[0], order, linear, floor, text=form)
     # the record may reach further than the excitation at this speed
     end = order[np.maximum(linear, exact) > floor].max(initial=ring_teeth)

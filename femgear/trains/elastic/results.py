@@ -7,6 +7,7 @@ belong to real motions by ``x(t) = Re sum_h X_h exp(i h omega t)``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,13 +17,13 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.gears.planetary import mesh_names
-from femgear.housing.orders import analyse_band, order_level, order_spectrum
+from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
 from femgear.housing.sensor import (
-    HousingSignal,
     SensorLines,
-    fixed_sensor_lines,
-    fixed_sensor_signal,
+    component_lines,
     hanning_model,
+    lines_in_form,
+    stored_lines,
 )
 from femgear.report.response import harmonics_of
 from femgear.report.tables import Block, chosen, tabulate
@@ -66,6 +67,8 @@ class ModesResult:
         Static state of the set on its supports, whatever ``static.members`` shows.
     reach : float
         Frequency for whose excitation the basis was made [Hz].
+    symmetry : int
+        Turns by ``2 pi/symmetry`` take every planet to the place of one like it.
     """
 
     ring: RingModel
@@ -75,6 +78,7 @@ class ModesResult:
     bodies: tuple[Bodies, Bodies]
     state: LoadedPeriod
     reach: float
+    symmetry: int
     entries: Entries
 
     @property
@@ -126,11 +130,13 @@ class ModesResult:
 class DynamicsResult:
     """Periodic response at every ``input_speed`` (speeds,) [rad/s], stability, and field of the ring.
 
-    ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial`` and
-    ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its
-    outer surface. The excitation ends at ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB]
-    is what the level of the housing changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that
-    were not looked at. ``warnings`` are of all speeds of the case, should these be some of them.
+    ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial``
+    (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its outer surface, as
+    ``ring_tangential`` (H + 1, 2 n_max + 1) at the last speed; ``symmetry`` is that of `ModesResult`,
+    ``harmonics`` their number at the speed of the case that has the most. The excitation ends at
+    ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
+    changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at. ``warnings``
+    are of all speeds of the case, with the last of them.
     """
 
     input_speed: np.ndarray
@@ -141,6 +147,8 @@ class DynamicsResult:
     ring_radial: np.ndarray
     ring_tangential: np.ndarray
     ring_teeth: int
+    symmetry: int
+    harmonics: int
     excitation_limit: np.ndarray
     level_change: np.ndarray
     compared_to: float
@@ -149,14 +157,13 @@ class DynamicsResult:
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
-        response, lines, field = self.response, "speed mesh harmonic", "speed harmonic circumferential"
-        words = "outer tangential displacement of the ring"
+        response, lines, field = self.response, "speed mesh harmonic", "harmonic circumferential"
+        words = "outer tangential displacement of the ring at the last speed"
         n_max = self.ring_radial.shape[-1] // 2
         entries = (
             ("dte", lines, self.dte, "m", "dynamic transmission error"),
             ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
-            ("mesh_deflection", lines, response.deflection, "m", "deflection of the mesh spring"),
-            ("ring", field, self.ring_radial, "m", "outer radial displacement of the ring"),
+            ("ring", field, self.ring_radial[-1], "m", words.replace("tangential", "radial")),
             ("ring_tangential", field, self.ring_tangential, "m", words),
         )
         change = "change of the housing level with excitation up to the frequency compared_to"
@@ -165,7 +172,7 @@ class DynamicsResult:
             "level_change": ("speed", self.level_change, "dB", change),
         }
         return dataset(
-            response_entries(self) | reach | complex_entries(entries),
+            response_entries(self) | reach | complex_entries(entries, single=True),
             coords=coordinates(
                 speed=self.input_speed / RPM,
                 mesh=mesh_names(self.dte.shape[1] // 2),
@@ -187,46 +194,44 @@ class DynamicsResult:
 class HousingResult:
     """What a fixed sensor on the ring hears at every ``input_speed`` (speeds,) [rad/s].
 
-    ``lines`` are of the case's ``form``, "exact" or "linear" (interpolated over ``points`` points of the
-    ring), and ``signal`` is theirs; ``exact`` are the exact ones. The excitation ends at
-    ``excitation_limit`` (speeds,) [Hz].
+    ``exact`` are the lines of the components, ``lines`` those of the case's ``form``, "exact" or "linear"
+    (interpolated over ``points`` points of the ring). The excitation ends at ``excitation_limit`` (speeds,)
+    [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`.
     """
 
     input_speed: np.ndarray
-    lines: SensorLines
     exact: SensorLines
-    signal: HousingSignal
     form: str
     points: int
+    harmonics: int
+    symmetry: int
     excitation_limit: np.ndarray
 
+    @cached_property
+    def lines(self) -> SensorLines:
+        """Lines in the form of the case."""
+        return lines_in_form(self.exact, self.form, self.points, self.harmonics)
+
     def dataset(self) -> xr.Dataset:
-        """Collect the contents of housing.nc."""
-        signal, lines, exact = self.signal, self.lines, self.exact
-        heard = np.abs(lines.acceleration), np.abs(exact.acceleration), np.angle(exact.displacement)
-        variables = {
-            "seconds": ("speed time", signal.seconds, "s", "time"),
-            "acceleration": ("speed time", signal.acceleration, "m/s^2", "radial acceleration at the sensor"),
-            "displacement": ("speed time", signal.displacement, "m", "radial displacement at the sensor"),
-            "order_amplitude": ("speed order", heard[0], "m/s^2", f"acceleration, {lines.method}"),
-            "order_amplitude_exact": ("speed order", heard[1], "m/s^2", "acceleration, exact lines"),
-            "order_phase_exact": ("speed order", heard[2], "rad", "displacement phase, exact lines"),
+        """Collect the contents of housing.nc; `femgear.housing.sensor.stored_lines` reads the lines."""
+        exact, words = self.exact, "radial displacement at the sensor"
+        lines = ("lines", "speed order", exact.displacement, "m", words)
+        variables = complex_entries((lines,), single=True) | {
+            "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
-            "level": ("speed", order_level(lines), "m/s^2", "root mean square of the acceleration"),
+            "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
         }
         return dataset(
             variables,
             coords=coordinates(speed=self.input_speed / RPM)
-            | {
-                "time": ("time", signal.revolution, "1", "fraction of one carrier revolution"),
-                "order": ("order", lines.order, "1", "carrier order"),
-            },
+            | {"order": ("order", exact.order, "1", "carrier order")},
             attrs={
                 "title": "what a sensor fixed on the housing hears",
-                "sensor_angle": lines.sensor_angle,
+                "sensor_angle": exact.sensor_angle,
                 "form": self.form,
                 "points": self.points,
-                "ring_teeth": lines.z_ring,
+                "ring_teeth": exact.z_ring,
+                "symmetry": self.symmetry,
             },
         )
 
@@ -247,9 +252,10 @@ def describe_housing(data: xr.Dataset) -> Block:
 
 def _largest_lines(one: xr.Dataset) -> str:
     """Write the five largest lines of one speed."""
-    amplitude = one.order_amplitude.values
+    lines = stored_lines(one)
+    amplitude = np.abs(lines.acceleration)
     largest = np.argsort(-amplitude, kind="stable")[:5]
-    return ", ".join(f"{round(float(one.order[j]))} ({amplitude[j]:.3g})" for j in largest)
+    return ", ".join(f"{lines.order[j]} ({amplitude[j]:.3g})" for j in largest)
 
 
 def mesh_bands(results: Results) -> Block:
@@ -258,18 +264,19 @@ def mesh_bands(results: Results) -> Block:
     teeth = int(housing.attrs["ring_teeth"])
     rows, threshold = [], 0.0
     for s in checked_speeds(housing.sizes["speed"], _FEW):
-        spectrum = order_spectrum(housing["acceleration"].isel(speed=s).values)
+        lines = stored_lines(housing.isel(speed=s))
+        spectrum = OrderSpectrum(lines.order, lines.acceleration)
         windowed = _hanning_spectrum(results, s)
         rpm = float(housing["speed"][s])
         for h in _shown_harmonics(spectrum, teeth, case.dynamics.mesh_harmonics):
             found = analyse_band(spectrum, teeth, h, count=3)
             threshold = found.lobes.threshold
-            lines = [_line(line, h * teeth) for line in found.lines[:2]] + ["-", "-"]
+            two = [_line(line, h * teeth) for line in found.lines[:2]] + ["-", "-"]
             third = f"{found.lines[2].level:.1f}" if len(found.lines) > 2 else "-"
             hanning = "-" if windowed is None else str(len(analyse_band(windowed, teeth, h).lobes.position))
             lobes = str(len(found.lobes.position))
             published = _published(case, rpm, h)
-            rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *lines[:2], third, lobes, hanning, published))
+            rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *two[:2], third, lobes, hanning, published))
     header = (
         "speed [rpm]",
         "harmonic",
@@ -294,7 +301,7 @@ def mesh_bands(results: Results) -> Block:
 
 def _shown_harmonics(spectrum, teeth: int, given: int | None) -> list[int]:
     """All mesh harmonics of the excitation; of those up to a frequency the first and the strongest ones."""
-    highest = int((spectrum.order[-1] - teeth // 2) // teeth)
+    highest = round(float(spectrum.order[-1]) / teeth)
     if given is not None:
         return list(range(1, min(given, highest) + 1))
     bands = np.abs(spectrum.order[None] / teeth - np.arange(1, highest + 1)[:, None]) <= 0.5
@@ -311,13 +318,13 @@ def _hanning_spectrum(results: Results, speed: int):
     force = harmonics_of(data.isel(speed=speed), "mesh_force")[ring]
     teeth = int(results.housing.attrs["ring_teeth"])
     field = hanning_model(force, planetary_set(results.case).planet_angles)
-    lines = fixed_sensor_lines(
+    lines = component_lines(
         field,
         teeth,
         2 * np.pi * float(data["mesh_frequency"][speed]) / teeth,
         float(results.housing.attrs["sensor_angle"]),
     )
-    return order_spectrum(fixed_sensor_signal(lines).acceleration)
+    return OrderSpectrum(lines.order, lines.acceleration)
 
 
 def _published(case, rpm: float, harmonic: int) -> str:

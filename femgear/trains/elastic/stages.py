@@ -19,6 +19,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from femgear.case.dependencies import (
     Steps,
@@ -37,15 +38,10 @@ from femgear.contact.loaded_period import LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
 from femgear.errors import Finding
 from femgear.fe.elasticity import mass
-from femgear.gears.kinematics import Speeds
+from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.orders import order_level
-from femgear.housing.sensor import (
-    SensorLines,
-    fixed_sensor_lines,
-    fixed_sensor_signal,
-    heaviside_linear_lines,
-)
+from femgear.housing.sensor import SensorLines, component_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
@@ -109,10 +105,8 @@ _STEP = 2500.0
 HARMONICS = 512
 """The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide. Slower
 speeds are excited less far, and `_lost_level` tells what they lose."""
-MEMORY = 1.5e9
-"""Size of the lines and signals of a run beyond which its slowest speeds are excited less far [bytes]."""
-_PART = 100e6
-"""Size of those that are in memory at a time [bytes]."""
+_PART, _HARMONIC = 100e6, 4e3
+"""Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
 _NOTICED, _SECONDS = 2e9, 1.5e-4
 """Size of files that is said before [bytes], and what a harmonic of one speed takes (2 GHz, one core) [s]."""
 
@@ -130,7 +124,6 @@ class _FrequencyLimit:
         return {
             "excitation_harmonics": self.excitation[some],
             "response_harmonics": self.response[some],
-            "lines": int(self.response.max()),
             "tolerance": case.dynamics.tolerance,
         }
 
@@ -160,25 +153,19 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     mesh_frequency : (n_speeds,) array
         [Hz]
     up_to : float
-        [Hz]; less at the lowest of so many speeds that their lines would fill the memory.
+        [Hz]
     given : int, optional
         Mesh harmonics of the excitation at all speeds.
     """
     frequency = np.asarray(mesh_frequency, float)
     if given is None:
-        most = min(HARMONICS, max(int(MEMORY / (len(frequency) * _harmonic_size(case))), 18))
-        excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, most).astype(int)
+        excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, HARMONICS).astype(int)
     else:
         excitation = np.full(len(frequency), given)
     # products with the low harmonics of the stiffness reach beyond the excitation
     beyond = excitation + 2 * np.minimum(excitation, 6)
     response = np.maximum(case.dynamics.response_harmonics or beyond, excitation)
     return _FrequencyLimit(excitation, response, excitation * frequency)
-
-
-def _harmonic_size(case: Case) -> int:
-    """Size of a mesh harmonic of one speed: sensor with its signal, modes, ring field and meshes [bytes]."""
-    return 144 * case.ring.teeth + 8000 + 96 * planetary_set(case).n_planets
 
 
 def _level_change(
@@ -216,14 +203,15 @@ def _lost_level(case: Case, modes: ModesResult, frequency, beyond: float, sense:
 
 def _sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np.ndarray) -> SensorLines:
     """Lines of the fixed sensor at speeds of the carrier [rad/s]."""
-    field = mesh_and_ring_outputs(modes, response)[1][0]
-    return fixed_sensor_lines(field, case.ring.teeth, carrier, case.housing.sensor_angle)
+    field = mesh_and_ring_outputs(modes, response)[1]
+    angle = case.housing.sensor_angle
+    return component_lines(field, case.ring.teeth, carrier, angle, symmetry=modes.symmetry)
 
 
 def mesh_and_ring_outputs(
-    result: ModesResult, response: Response
-) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Compute the dynamic transmission error of every mesh, and radial and tangential field of the ring.
+    result: ModesResult, response: Response, output: int = RADIAL
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the dynamic transmission error of every mesh, and the radial or tangential field of the ring.
 
     Parameters
     ----------
@@ -235,28 +223,32 @@ def mesh_and_ring_outputs(
     -------
     (S, 2N, H + 1) complex array
         [m]
-    two (S, H + 1, 2 n_max + 1) complex arrays
+    (S, H + 1, 2 n_max + 1) complex array
         Of the outer surface, see `femgear.trains.elastic.model.ring_field` [m].
     """
-    model, basis = result.model, result.modes
+    model, basis, n_max = result.model, result.modes, result.max_diameter
     ring_rows = np.eye(len(model.system.M))[model.ring_slice]
+    field = ring_field(model, result.ring.modes, np.eye(len(ring_rows)), output, n_max).T
+    heard, n_meshes = np.ones(2 * n_max + 1, bool), model.rigid_directions.shape[1]
+    if result.ring.modes.count % result.symmetry == 0:
+        # planets in phase, of which one follows the other after a turn
+        heard = np.arange(-n_max, n_max + 1) % result.symmetry == 0
+    rows: Any = linalg.block_diag(np.eye(n_meshes), field[heard])
     outputs = np.vstack([model.rigid_directions.T, ring_rows])
     values = output_response(
         basis,
         response,
-        outputs @ basis.shape,
-        residual=residual_output(model.system, basis, outputs),
-        load=output_load(model.system, basis, outputs),
+        rows @ (outputs @ basis.shape),
+        residual=rows @ residual_output(model.system, basis, outputs),
+        load=rows @ output_load(model.system, basis, outputs),
     )
-    n_meshes = model.rigid_directions.shape[1]
-    coordinates = np.swapaxes(values[:, n_meshes:], 1, 2)
-    radial, tangential = (
-        ring_field(model, result.ring.modes, coordinates, output, result.max_diameter)
-        for output in (RADIAL, TANGENTIAL)
-    )
-    return values[:, :n_meshes], (radial, tangential)
+    found = np.zeros((len(values), values.shape[-1], len(heard)), complex)
+    found[..., heard] = np.swapaxes(values[:, n_meshes:], 1, 2)
+    return values[:, :n_meshes], found
 
 
+_LINES = ("deflection", "force", "modal")
+"""What a response has of every harmonic."""
 _RECORD = 2**13
 """Positions of the excitation in one mesh period at least."""
 _MODES_ABOVE = 4.0
@@ -327,7 +319,8 @@ def solve_modes(
         planet_angles=model.planet_angles,
     )
     modes = replace(modes, kind=kinds, nodal_diameter=diameters)
-    return ModesResult(ring, model, excitation, modes, bodies, state, reach, modal_entries(case))
+    symmetry = rotational_symmetry(deviations, gears)
+    return ModesResult(ring, model, excitation, modes, bodies, state, reach, symmetry, modal_entries(case))
 
 
 def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
@@ -424,19 +417,19 @@ def dynamics_parts(
 ) -> Iterator[tuple[Case, DynamicsResult]]:
     """Solve as `solve_dynamics` for some speeds after the others, each with the case that has them alone.
 
-    The numbers are those of all speeds at once but for rounding.
+    The numbers are those of all speeds at once but for rounding; what is said of all comes with the last.
 
     Parameters
     ----------
     memory : float
-        Size of the lines and signals of some speeds [bytes].
+        Size of the harmonics of some speeds [bytes].
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
     check_reach(case, modes.reach, fastest_mesh_frequency(case, static.planetary_set))
-    basis, excitation, turning = modes.modes, modes.excitation, _turning_speeds(case, modes)
-    speeds, carrier = np.array(case.operation.speeds), np.array([one.carrier for one in turning])
-    frequency, some = np.array([one.mesh_frequency for one in turning]), checked_speeds(len(turning))
+    basis, excitation, gears = modes.modes, modes.excitation, static.planetary_set
+    speeds, (frequency, carrier) = np.array(case.operation.speeds), _turning_speeds(case, modes)
+    names, pulls, some = mesh_names(gears.n_planets), list[np.ndarray](), checked_speeds(len(speeds))
     given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
     limit = limited(case, frequency, up_to, given=given)
     response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
@@ -453,32 +446,33 @@ def dynamics_parts(
     if slow.any():
         level_change[slow] = _lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
     short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
-    names, pulls = mesh_names(len(basis.mesh_stiffness) // 2), list[np.ndarray]()
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
-    size = len(speeds) * _harmonic_size(case) * limit.response.max()
-    for own, part in parts_of_speeds(case, min(max(math.ceil(size / memory), 1), len(speeds))):
+    for own, part in parts_of_speeds(case, _HARMONIC * limit.response, memory):
         if len(own) < len(speeds) or len(own) > len(some):
             response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
         pulls.append(pulls_of(response.force))
-        if part is not case:
+        if (complete := own[-1] + 1 == len(speeds)) and part is not case:
             response = replace(response, message=joint_message(told))
-        dte, field = mesh_and_ring_outputs(modes, response)
+        last = replace(response, **{name: getattr(response, name)[-1:] for name in _LINES})
+        dte, radial = mesh_and_ring_outputs(modes, response)
         yield (
             part,
             DynamicsResult(
                 input_speed=speeds[own],
-                speeds=tuple(turning[i] for i in own),
+                speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
                 response=response,
                 stability=stability(basis, excitation, frequency[own], excitation_harmonics=decisive),
                 dte=dte,
-                ring_radial=field[0],
-                ring_tangential=field[1],
-                ring_teeth=static.planetary_set.ring.teeth,
+                ring_radial=radial,
+                ring_tangential=mesh_and_ring_outputs(modes, last, TANGENTIAL)[1][0],
+                ring_teeth=gears.ring.teeth,
+                symmetry=modes.symmetry,
+                harmonics=int(limit.response.max()),
                 excitation_limit=limit.frequency[own],
                 level_change=level_change[own],
                 compared_to=beyond,
-                warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)),
+                warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
                 entries=dynamic_entries(part),
             ),
         )
@@ -494,44 +488,36 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     CaseError
         E-SPEED, as there.
     """
-    frequency = [s.mesh_frequency for s in _turning_speeds(case, modes)]
+    frequency = _turning_speeds(case, modes)[0]
     limit = limited(case, frequency, case.dynamics.up_to or modes.reach, given=case.dynamics.mesh_harmonics)
     return solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
 
 
-def _turning_speeds(case: Case, modes: ModesResult) -> tuple[Speeds, ...]:
-    """Speeds of all members at the speeds of the input, refused where the ring has no modes for them."""
-    gears = planetary_set(case)
-    found = tuple(member_speeds(case, gears, speed) for speed in case.operation.speeds)
-    check_rim_speed(modes.ring.modes, [s.carrier for s in found])
-    return found
+def _turning_speeds(case: Case, modes: ModesResult) -> tuple[np.ndarray, np.ndarray]:
+    """Mesh frequency [Hz] and speed of the carrier [rad/s], refused where the ring has no modes for them."""
+    one, speeds = member_speeds(case, planetary_set(case)), np.array(case.operation.speeds)
+    check_rim_speed(modes.ring.modes, one.carrier * speeds)
+    return one.mesh_frequency * speeds, one.carrier * speeds
 
 
 @one_blas_thread()
 def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
-    """Compute signal and carrier orders of a sensor fixed on the ring while the carrier turns past it.
+    """Compute the carrier orders that a sensor fixed on the ring hears while the carrier turns past it.
 
-    With ``housing.form = "linear"`` the static deflection (harmonic zero) is carried exactly all the same:
-    its images, where the teeth of the ring are a multiple of the number of points, would fall on the mesh
-    orders.
+    Parameters
+    ----------
+    case : Case
+    dynamics : DynamicsResult
     """
     check_entries(dynamics, DynamicsResult, dynamic_entries(case), "dynamic response")
-    carrier = np.array([s.carrier for s in dynamics.speeds])
-    arguments = (dynamics.ring_teeth, carrier, case.housing.sensor_angle)
-    lines = exact = fixed_sensor_lines(dynamics.ring_radial, *arguments)
-    if case.housing.form == "linear":
-        static = np.zeros_like(dynamics.ring_radial)
-        static[:, 0] = dynamics.ring_radial[:, 0]
-        moving = heaviside_linear_lines(dynamics.ring_radial - static, *arguments, points=case.housing.points)
-        still = fixed_sensor_lines(static, *arguments)
-        lines = replace(moving, displacement=moving.displacement + still.displacement)
+    place = dynamics.ring_teeth, np.array([s.carrier for s in dynamics.speeds]), case.housing.sensor_angle
     return HousingResult(
         input_speed=np.array(case.operation.speeds),
-        lines=lines,
-        exact=exact,
-        signal=fixed_sensor_signal(lines),
+        exact=component_lines(dynamics.ring_radial, *place, symmetry=dynamics.symmetry),
         form=case.housing.form,
         points=case.housing.points,
+        harmonics=dynamics.harmonics,
+        symmetry=dynamics.symmetry,
         excitation_limit=dynamics.excitation_limit,
     )
 
@@ -539,14 +525,14 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
 def _warnings(case: Case) -> Iterator[Finding]:
     """List what deserves a look in the case, and the size of the results of many speeds."""
     yield from case_warnings(case)
-    speeds, teeth, meshes = case.operation.speeds, case.ring.teeth, 2 * planetary_set(case).n_planets
+    speeds, meshes = case.operation.speeds, 2 * planetary_set(case).n_planets
     first = member_speeds(case, planetary_set(case), speeds[0]).mesh_frequency
     frequency = first * np.array(speeds) / speeds[0]
     # whether the excitation is doubled is known with the modes
     up_to = case.dynamics.up_to or 2.0 * highest_excitation(case, 0.0, float(frequency.max()))
     harmonics = int(limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics).response.max())
-    lines = 3 * meshes + 4 * max_nodal_diameter(case) + 2
-    size = len(speeds) * harmonics * (120 * teeth + 16 * lines)
+    symmetry = rotational_symmetry(set_deviations(case), planetary_set(case))
+    size = 8 * len(speeds) * harmonics * (2 * meshes + (2 * max_nodal_diameter(case) + 1) / symmetry)
     if size > _NOTICED:
         yield Finding(
             "W-SIZE",

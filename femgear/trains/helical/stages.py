@@ -164,7 +164,7 @@ def helical_dynamics_parts(
         remedy = "leave it out: the static solution then gives a stiffness that varies"
         raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness", remedy=remedy)
     count, told = len(case.operation.speeds), list[Response]()
-    for own, part in parts_of_speeds(case, -(-count // most)):
+    for own, part in parts_of_speeds(case, np.ones(count), most):
         speeds = part.operation.speeds
         turning = tuple(member_speeds(case, modes.planetary_set, speed) for speed in speeds)
         frequency = np.array([one.mesh_frequency for one in turning])

@@ -14,7 +14,6 @@ from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.checks import dynamics_warnings, missing_level
 from femgear.trains.elastic.stages import (
     HARMONICS,
-    MEMORY,
     highest_excitation,
     limited,
     mesh_and_ring_outputs,
@@ -104,14 +103,14 @@ def test_a_limit_below_the_modes_of_the_meshes_is_warned_of(case, static, modes,
     assert len(dynamics.warnings) == 1 and np.nanmax(dynamics.level_change) > 1.0
 
 
-def test_lines_end_at_the_frequency_and_at_what_memory_and_record_carry(case):
+def test_lines_end_at_the_frequency_and_at_what_the_record_carries(case):
     few = limited(case, [90.0, 1116.0, 30e3], 20e3)
     assert few.excitation.tolist() == [222, 17, 1]
     assert few.response.tolist() == [234, 29, 3]
     assert few.frequency == pytest.approx([222 * 90.0, 17 * 1116.0, 30e3])
     assert limited(case, [0.1], 20e3).excitation.tolist() == [HARMONICS]
-    many = limited(case, np.linspace(90.0, 1116.0, 2000), 20e3)
-    assert many.response.max() * 144 * 108 * 2000 < 1.5 * MEMORY
+    # however many speeds there are
+    assert limited(case, np.linspace(90.0, 1116.0, 2000), 20e3).excitation[0] == 222
     given = limited(case, [90.0, 1116.0], 20e3, given=6)
     assert given.excitation.tolist() == [6, 6] and given.response.tolist() == [18, 18]
 
@@ -127,7 +126,7 @@ def test_speeds_too_slow_for_the_record_are_estimated_from_faster_ones(case, sta
     wide = solve_spectral(
         modes.modes, modes.excitation, [21.6], excitation_harmonics=1041, response_harmonics=1053
     )
-    field = mesh_and_ring_outputs(modes, wide)[1][0]
+    field = mesh_and_ring_outputs(modes, wide)[1]
     lines = fixed_sensor_lines(field, 108, np.array([dynamics.speeds[0].carrier]), 0.0)
     missing = 20 * np.log10(order_level(lines)[0] / found[0])
     assert missing > 3.0 and dynamics.level_change[0] == pytest.approx(missing, abs=1.0)

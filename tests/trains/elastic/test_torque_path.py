@@ -23,7 +23,7 @@ import pytest
 import femgear
 from femgear.case.quantities import to_si
 from femgear.contact.cycle import walk_mesh_cycle
-from femgear.housing.sensor import fixed_sensor_lines
+from femgear.housing.sensor import component_lines
 from femgear.run import run_case
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.spectral import solve_spectral
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.usefixtures("coarse_states")
 ROOT = Path(__file__).parents[3]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 TORQUE = "100 N m"
-USES = (to_si, walk_mesh_cycle, solve_modes, solve_spectral, fixed_sensor_lines)
+USES = (to_si, walk_mesh_cycle, solve_modes, solve_spectral, component_lines)
 CHAIN = (
     "trains.reading.read_case",
     "trains.reading.parse_case",
@@ -50,7 +50,7 @@ CHAIN = (
     "trains.elastic.stages.dynamics_parts",
     "solvers.periodic.spectral.solve_spectral",
     "trains.elastic.stages.solve_housing",
-    "housing.sensor.fixed_sensor_lines",
+    "housing.sensor.component_lines",
 )
 
 
@@ -71,7 +71,7 @@ def name_of(code: CodeType) -> str:
 def torque_path(folder: Path) -> list[str]:
     """Functions on the way of the torque, in the order in which they are called."""
     uses = {code_of(use) for use in USES}
-    searched = {code_of(solve_spectral), code_of(fixed_sensor_lines)}
+    searched = {code_of(solve_spectral), code_of(component_lines)}
     calls: list[tuple[list[CodeType], Any]] = []
     kept: list[Any] = []
 
