@@ -166,7 +166,9 @@ def test_heavy_libraries_are_imported_late(code):
 
 def test_checking_a_case_loads_no_library_that_draws_or_solves():
     case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
-    assert heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])") == {"pint"}
+    # pint loads Dask where it is installed
+    found = heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])")
+    assert found - {"dask"} == {"pint"}
 
 
 def test_no_function_is_longer_than_70_lines():
