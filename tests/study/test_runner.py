@@ -38,7 +38,7 @@ def cluster():
     from distributed import LocalCluster
 
     settings = {"distributed.scheduler.allowed-failures": 0}
-    options = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
+    options = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": ":0"}
     with dask.config.set(settings), LocalCluster(**options, silence_logs=50) as found:
         yield found
 
