@@ -70,6 +70,7 @@ class Progress:
             progress.TextColumn("{task.description}", markup=False),
             progress.BarColumn(),
             progress.TimeElapsedColumn(),
+            progress.TimeRemainingColumn(),
             console=self._console,
             disable=not self._console.is_terminal,
         )
@@ -301,6 +302,8 @@ def sweep(
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
     of: Annotated[tuple[str, ...], Parameter(negative="")] = ("ste", "ste sun-planet", "ste planet-ring"),
     speeds: tuple[str, str] | None = None,
+    workers: int = 1,
+    cluster: str | None = None,
 ) -> int:
     """Compute quantities over values of entries of a case; goes on where it was interrupted.
 
@@ -316,16 +319,21 @@ def sweep(
         Quantities as in docs/optimise.md: ste, ste overall, mesh force, housing, ...; may be repeated.
     speeds
         First and last speed of the input, for mesh forces and the housing.
+    workers
+        Processes of this machine that compute.
+    cluster
+        Dask scheduler whose workers compute: tcp://host:port or tls://host:port (docs/cluster.md).
     """
     from femgear.case.gear_set import need_set
     from femgear.run import grid_cache
+    from femgear.study.runner import open_runner
     from femgear.study.sweep import sweep_into
     from femgear.trains.reading import read_case
 
     data = read_case(case)
     need_set(data)
-    with Progress() as progress:
-        options = {"speeds": speeds, "cache": grid_cache(), "progress": progress}
+    with open_runner(workers, cluster) as runner, Progress() as progress:
+        options = {"speeds": speeds, "cache": grid_cache(), "progress": progress, "runner": runner}
         found, names = sweep_into(data, output, over=over, of=of, **options)
     failed = sum(bool(error) for error in found.errors)
     print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")

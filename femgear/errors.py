@@ -20,6 +20,7 @@ CODES = {
     "E-CENTRE-DISTANCE": "The centre distance leaves no line of action.",
     "E-CHOICE": "The value is none of the choices.",
     "E-CLEARANCE": "The tip of a gear runs into the root of its mate.",
+    "E-CLUSTER": "The scheduler or a worker of a cluster cannot be used.",
     "E-COAXIAL": "Sun, planet and ring have no common centre distance.",
     "E-CONTACT": "The contact problem has no trustworthy solution.",
     "E-CONTACT-COMPLIANCE": "A compliance is not that of an elastic body.",
@@ -46,6 +47,7 @@ CODES = {
     "E-GRID-FREE": "Nothing holds the body, or a part of it.",
     "E-GRID-GMSH": "Gmsh failed, was stopped, or cannot be loaded.",
     "E-HARMONICS": "Harmonics, lines or samples do not fit each other.",
+    "E-INCOMPLETE": "Tasks of a study have neither a result nor an error.",
     "E-INFEASIBLE": "No design can be computed and lies within the limits.",
     "E-INTEGRATION": "A time integration stopped before its end, or missed a balance.",
     "E-INTERFERENCE": "Tips strike flanks outside the mesh.",
@@ -102,6 +104,7 @@ CODES = {
     "E-TYPE": "The value is not of the kind that is needed.",
     "E-UNIT": "A quantity lacks its unit, or has a unit of another kind.",
     "E-VARIABLE": "There is no such variable, or it has no such values.",
+    "E-WORKER": "A task ends its worker, or cannot be given to one.",
 }
 """Meaning of every code; docs/errors.md lists the messages that carry it."""
 MOST_SHOWN = 10

@@ -81,6 +81,10 @@ class Extent:
         Of the samples.
     check
         Run case and optimum anew into the folders before and after.
+    workers
+        Processes of this machine that compute samples, generations and tolerances.
+    cluster
+        Dask scheduler whose workers compute them: tcp://host:port or tls://host:port (docs/cluster.md).
     """
 
     method: Literal["auto", "minimax", "global", "simplex", "powell"] = "auto"
@@ -90,6 +94,8 @@ class Extent:
     max_designs: int | None = None
     seed: int = 0
     check: bool = True
+    workers: int = 1
+    cluster: str | None = None
 
 
 def main(
@@ -115,6 +121,7 @@ def main(
     from femgear.storage.files import resumable
     from femgear.study.front import check_second
     from femgear.study.objectives import named_quantity
+    from femgear.study.runner import open_runner
     from femgear.trains.reading import read_case, with_value
 
     data = read_case(case)
@@ -128,23 +135,24 @@ def main(
     folder = ready_folder(output, names)
     _refuse_foreign(data, problem, folder, RUNS if extent.check else ())
     with resumable(folder):
-        rough, found, options = _searched(data, problem, extent, folder)
-        _write(found, data, folder, rough)
-        if another is not None:
-            _front(problem, another, folder, options | {"start": rough.x})
+        with open_runner(extent.workers, extent.cluster) as runner:
+            rough, found, options = _searched(data, problem, extent, folder, runner)
+            _write(found, data, folder, rough)
+            if another is not None:
+                _front(problem, another, folder, options | {"start": rough.x})
         if extent.check:
             _check(found, data, folder, None if data.rigid else task.speeds, rough)
     say_files(folder, [*names, *JOURNALS, *(RUNS if extent.check else ())])
 
 
-def _searched(data, problem, extent: Extent, folder: Path):
+def _searched(data, problem, extent: Extent, folder: Path, runner):
     """The optimum of the search, that of the refinement, and the options of the search."""
     from femgear.run import grid_cache
     from femgear.study.search import SearchOptions, minimise
     from femgear.trains.reading import with_values
 
     counts = SearchOptions(seed=extent.seed, samples=extent.samples, max_designs=extent.max_designs)
-    options = {"options": counts, "cache": grid_cache()}
+    options = {"options": counts, "cache": grid_cache(), "runner": runner}
     coarsely = options | {"journal": folder / JOURNALS[0]}
     with Progress() as progress:
         rough = minimise(problem, method=extent.method, sensitivity=False, progress=progress, **coarsely)

@@ -177,9 +177,8 @@ def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
 
 def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object]) -> None:
     """Write an HDF5 file by ``write(stream)``; raises the `OSError` of a disk that fails meanwhile."""
-    with _Disk(path, "r+b") as disk, ThreadPoolExecutor(1) as pool:
+    with _Disk(path, "r+b") as disk, _other_thread() as pool:
         try:
-            # signals interrupt the main thread alone: raised within HDF5 they would be lost
             pool.submit(write, disk).result()
         except RuntimeError as error:  # of HDF5 itself
             remedy = "see that disk and memory suffice"
@@ -187,6 +186,14 @@ def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object])
         finally:
             if disk.failure is not None:
                 raise disk.failure
+
+
+@contextlib.contextmanager
+def _other_thread() -> Iterator[ThreadPoolExecutor]:
+    """Make a thread for HDF5: signals interrupt the main one alone, and would be lost if raised within it."""
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(int).result()  # it runs, and is waited for whenever an interrupt comes
+        yield pool
 
 
 class _Disk(io.FileIO):
@@ -228,8 +235,7 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     with storage_errors(path):
         if not os.path.isfile(path):
             raise StorageError("no such file", code="E-STORAGE", file=name, remedy="run the case again")
-    with ThreadPoolExecutor(1) as pool:
-        # signals interrupt the main thread alone: h5py would make a SystemError of what is raised within it
+    with _other_thread() as pool:
         reading = pool.submit(_loaded, path)
         try:
             dataset = reading.result()

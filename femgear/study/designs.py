@@ -13,12 +13,15 @@ import hashlib
 import json
 import math
 import os
+import pickle
 import stat
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from io import FileIO
 from pathlib import Path
 
@@ -30,7 +33,8 @@ from femgear.case.sections import Case
 from femgear.errors import ContactError, FemgearError, Finding, StorageError
 from femgear.storage.files import exclusive_lock, storage_errors
 from femgear.study.objectives import STAGES, Quantity, Variant
-from femgear.study.problem import Point, Problem, Variable, Vector
+from femgear.study.problem import Limit, Point, Problem, Variable, Vector
+from femgear.study.runner import Runner, check_complete
 from femgear.trains.protocol import Progress
 from femgear.trains.reading import to_toml, with_values
 
@@ -43,6 +47,8 @@ _WRITTEN = {
     "case": "for another case",
     "keys": "for other design variables",
 }
+_Values = Callable[[Sequence[Quantity]], Mapping[str, float]]
+"""Gives quantities by name [SI], and maybe others."""
 OUTSIDE, _REFUSED = 1e6, 1e9
 """Costs from which designs lie outside the limits, and of those that cannot be computed."""
 
@@ -230,13 +236,18 @@ class Designs:
         *,
         cache: Path | None = None,
         progress: Progress | None = None,
+        runner: Runner | None = None,
     ):
-        self.case, self.journal = case, journal
+        self.case, self.journal, self.runner = case, journal, runner or Runner()
         self.seconds = 0.0
         self._computed: set[str] = set()
         self._keys, self._cache, self._progress = keys, cache, progress
         self._steps, self._own = Steps(), compliance_entries(case)
         self._last: tuple[str, Variant] | None = None
+        self._packed = pickle.dumps((case, keys, cache))
+
+    def __reduce__(self):
+        return _designs, (self._packed,)
 
     @property
     def computed(self) -> int:
@@ -279,38 +290,103 @@ class Designs:
         FemgearError
             The case as it is cannot be computed.
         """
-        key = json.dumps(point)
-        record = self.journal.get(key) or {"values": {}}
-        missing = [q for q in quantities if q.name not in record["values"]]
+        key, ask = json.dumps(point), partial(_ask, tuple(quantities), ())
+        if self._lacks(key, ask):
+            self._store(key, self.record(ask, (point, self._known(key))), 1)
         # what was known before it failed still holds
-        if missing and "error" not in record:
-            record = self._compute(key, point, missing, record["values"])
-            missing = [q for q in missing if q.name not in record["values"]]
-        if missing:
-            raise Failure(record["error"])
-        return {q.name: record["values"][q.name] for q in quantities}
+        found = self._known(key)
+        if any(quantity.name not in found for quantity in quantities):
+            raise Failure(self.journal[key]["error"])
+        return {q.name: found[q.name] for q in quantities}
 
-    def _compute(self, key: str, point: Point, missing: Sequence[Quantity], known: dict) -> dict:
-        """Record of a point with the missing quantities, or with the reason why it has none."""
-        start, found = time.perf_counter(), dict(known)
+    def ahead(
+        self, points: Iterable[Point], quantities: Sequence[Quantity], limits: Sequence[Limit] = ()
+    ) -> Iterator[int]:
+        """Compute quantities of many points, of those within limits, and count after each those known.
+
+        Raises
+        ------
+        FemgearError
+            E-INCOMPLETE: a point has neither values nor an error at the end.
+        """
+        tasks, ask = {json.dumps(point): point for point in points}, partial(_ask, quantities, limits)
+        left = [key for key in tasks if self._lacks(key, ask)]
+        yield len(tasks) - len(left)
+        items = ((tasks[key], self._known(key)) for key in left)
+        for done, (index, outcome) in enumerate(self.runner.map(partial(self.record, ask), items), 1):
+            if isinstance(outcome, FemgearError):
+                outcome = {"values": self._known(left[index]), "error": _told(outcome), "seconds": 0.0}
+            self._store(left[index], outcome, len(left) - done)
+            yield len(tasks) - len(left) + done
+        check_complete(tasks, {key for key in tasks if not self._lacks(key, ask)})
+
+    def record(self, ask: Callable[[_Values], None], task: tuple[Point, Mapping[str, float]]) -> dict:
+        """Record of a point of which some values are known, with what is asked or the reason why not."""
+        (point, known), start = task, time.perf_counter()
+        found = dict(known)
+
+        def values(quantities: Sequence[Quantity]) -> dict[str, float]:
+            missing = [quantity for quantity in quantities if quantity.name not in found]
+            for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
+                found[quantity.name] = float(_finite(quantity, quantity.compute(self.variant(point))))
+            return found
+
         record: dict = {"values": found}
         try:
-            variant = self.variant(point)
-            for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
-                found[quantity.name] = float(_finite(quantity, quantity.compute(variant)))
+            ask(values)
         except StorageError:
             raise
         except FemgearError as error:
             if not point:
                 raise
-            record["error"] = {"code": error.code, "key": error.key, "message": error.message}
-        seconds = time.perf_counter() - start
-        self.seconds += seconds
+            record["error"] = _told(error)
+        return record | {"seconds": round(time.perf_counter() - start, 3)}
+
+    def _known(self, key: str) -> dict[str, float]:
+        return self.journal.get(key, {}).get("values", {})
+
+    def _lacks(self, key: str, ask: Callable[[_Values], None]) -> bool:
+        """Tell whether a point that has not failed lacks what is asked."""
+        known = self._known(key)
+        try:
+            ask(lambda quantities: {q.name: known[q.name] for q in quantities})
+        except KeyError:
+            return "error" not in self.journal.get(key, {})
+        return False
+
+    def _store(self, key: str, record: dict, left: int) -> None:
+        self.seconds += record["seconds"]
         self._computed.add(key)
-        self.journal.add(key, record | {"seconds": round(seconds, 3)})
+        self.journal.add(key, record)
         if self._progress is not None:
-            self._progress("designs", self.computed, self.computed + 1)
-        return record
+            self._progress("designs", self.computed, self.computed + left)
+
+
+@lru_cache(maxsize=1)
+def _designs(packed: bytes) -> Designs:
+    """The designs of a worker, which keeps from task to task what they share."""
+    case, keys, grids = pickle.loads(packed)
+    return Designs(case, keys, Journal(), cache=grids)
+
+
+def _told(error: FemgearError) -> dict:
+    return {"code": error.code, "key": error.key, "message": error.message}
+
+
+def _ask(quantities: Sequence[Quantity], limits: Sequence[Limit], values: _Values) -> None:
+    """Ask for quantities of a design within limits, elsewhere for those of the limits alone."""
+    if not _violation(limits, values):
+        values(quantities)
+
+
+def _violation(limits: Sequence[Limit], values: _Values) -> float:
+    """Sum the relative violations of limits of the first stage that breaks any."""
+    for stage in STAGES:
+        here = [limit for limit in limits if limit.quantity.stage == stage]
+        found = values([limit.quantity for limit in here]) if here else {}
+        if total := sum(limit.violation(found[limit.quantity.name]) for limit in here):
+            return total
+    return 0.0
 
 
 def _finite(quantity: Quantity, value: float) -> float:
@@ -329,6 +405,7 @@ def open_designs(
     journal: str | Path | None = None,
     cache: Path | None = None,
     progress: Progress | None = None,
+    runner: Runner | None = None,
 ) -> Iterator[Designs]:
     """Open the designs of a case, with a journal on disk where one is named.
 
@@ -336,7 +413,7 @@ def open_designs(
     ----------
     keys : sequence of tuple of str
         Entries of the case file that every value of a point sets.
-    journal, cache, progress
+    journal, cache, progress, runner
         As for `search.minimise`; only grids of the case itself are kept.
 
     Raises
@@ -349,7 +426,7 @@ def open_designs(
     names = [" = ".join(entries) for entries in keys]
     header = {"format": _FORMAT, "femgear": __version__, "case": fingerprint, "keys": names}
     with _open_journal(journal, header) as records:
-        yield Designs(case, tuple(keys), records, cache=cache, progress=progress)
+        yield Designs(case, tuple(keys), records, cache=cache, progress=progress, runner=runner)
 
 
 class Enough(Exception):
@@ -420,6 +497,14 @@ class Evaluations:
             self.best = np.array(x, float), found
         return found
 
+    def ahead(self, places: Iterable[Vector], also: Sequence[Quantity] = ()) -> None:
+        """Compute at once what `cost` will ask of many points, and further quantities."""
+        points = dict.fromkeys(self.problem.point(x) for x in places)
+        new = [point for point in points if point not in self._asked]
+        room = None if self._most is None else max(self._most - self.asked, 0)
+        quantities = (self.problem.objective, *also)
+        deque(self.designs.ahead(new[:room], quantities, self.problem.limits), 0)
+
     def count(self, x: Vector) -> bool:
         """Note that a point is asked for, and say whether it is new; may raise `Enough`."""
         point = self.problem.point(x)
@@ -439,13 +524,7 @@ class Evaluations:
 
     def violation(self, x: Vector) -> float:
         """Sum the relative violations of limits of the first stage that breaks any. May raise `Failure`."""
-        for stage in STAGES:
-            here = [limit for limit in self.problem.limits if limit.quantity.stage == stage]
-            values = self.values(x, [limit.quantity for limit in here]) if here else {}
-            total = sum(limit.violation(values[limit.quantity.name]) for limit in here)
-            if total:
-                return total
-        return 0.0
+        return _violation(self.problem.limits, lambda quantities: self.values(x, quantities))
 
     def scale(self, quantity: Quantity) -> float:
         """Find the value [SI] of the case as it is, by which costs are divided; 1 where it is zero."""
@@ -503,15 +582,13 @@ def tolerances(
     dict
         Quantities [SI] by name with all variables off to their worse sides; NaN where they have none.
     """
-    x, found = np.array(x, float), []
+    x, found, problem = np.array(x, float), [], evaluations.problem
     worse = x.copy()
-    for i, variable in enumerate(evaluations.problem.variables):
-        tolerance = variable.tolerance_at(float(x[i]))
-        sides = []
-        for sign in (-1.0, 1.0):
-            off = x.copy()
-            off[i] += sign * tolerance
-            sides.append(_values(evaluations, off, quantities))
+    widths = [variable.tolerance_at(float(value)) for variable, value in zip(problem.variables, x)]
+    places = x + np.array([sign * row for row in np.diag(widths) for sign in (-1.0, 1.0)])
+    deque(evaluations.designs.ahead(map(problem.point, places), quantities), 0)
+    for i, (variable, tolerance) in enumerate(zip(problem.variables, widths)):
+        sides = [_values(evaluations, off, quantities) for off in places[2 * i : 2 * i + 2]]
         found.append(Tolerance(variable, tolerance, *sides))
         objective = [side[quantities[0].name] for side in sides]
         # a side that cannot be computed is no place to go

@@ -12,6 +12,7 @@ from femgear.errors import CaseError
 from femgear.study.designs import Enough, Evaluations, Failure, evaluations
 from femgear.study.objectives import Quantity
 from femgear.study.problem import Problem, Vector
+from femgear.study.runner import Runner
 from femgear.study.search import (
     SearchOptions,
     check_count,
@@ -90,6 +91,7 @@ def pareto_front(
     journal: str | Path | None = None,
     cache: Path | None = None,
     progress: Progress | None = None,
+    runner: Runner | None = None,
 ) -> ParetoFront:
     """Find the front between the objective of a problem and a second one.
 
@@ -103,7 +105,7 @@ def pareto_front(
     ----------
     points : int
         Weights, the two ends included.
-    start, options, journal, cache, progress
+    start, options, journal, cache, progress, runner
         As for `minimise`; an optimum of the first objective is a good start. Of the options samples, seed and
         designs at most are taken.
 
@@ -118,7 +120,8 @@ def pareto_front(
     check_count("points", points, 2)
     options = options or SearchOptions()
     most = options.max_designs
-    with evaluations(problem, journal=journal, cache=cache, max_designs=most, progress=progress) as run:
+    how = {"journal": journal, "cache": cache, "progress": progress, "runner": runner}
+    with evaluations(problem, max_designs=most, **how) as run:
         both = (problem.objective, second)
         before = np.array([run.values(None, both)[q.name] for q in both])
         complete = True
@@ -153,6 +156,7 @@ def non_dominated(values: np.ndarray) -> np.ndarray:
 def _search(run: Evaluations, second: Quantity, points: int, places) -> None:
     """Both ends, and the weights between."""
     both = (run.problem.objective, second)
+    run.ahead(places, both)
     for x in places:
         run.cost(x)
         run.penalised(x, lambda x=x: sum(run.values(x, both).values()))

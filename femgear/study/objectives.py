@@ -81,7 +81,9 @@ class Variant:
             case = case.model_copy(update={"operation": operation})
 
         def compute():
+            # the torque to its last digit: which case came first decides nothing
             known = {**static_entries(case), "static.stresses": case.static.stresses}
+            known |= {"operation": (case.operation.input, case.operation.torque)}
             return steps.kept("static", known) or steps.keep(
                 "static", known, static_stages.solve_static(case, cache=self._cache, steps=steps)
             )
@@ -195,27 +197,27 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
     CaseError
         E-OBJECTIVE: no such mesh; E-TORQUE: no torque.
     """
-    signals = {
-        "largest": lambda arc, deflection, n: np.vstack([arc, deflection]),
-        "overall": lambda arc, deflection, n: np.atleast_2d(arc),
-        "sun-planet": lambda arc, deflection, n: deflection[:n],
-        "planet-ring": lambda arc, deflection, n: deflection[n:],
-    }
-    signal = _chosen(mesh, signals, "mesh")
+    signal = partial(_signal, _chosen(mesh, {name: name for name in get_args(Mesh)}, "mesh"))
     value = None if torque is None else to_si(torque, TORQUE, low=-LARGEST_TORQUE, high=LARGEST_TORQUE)
     if value is not None and abs(value) < LEAST_TORQUE:
         raise CaseError(
             "without torque no tooth bends", code="E-TORQUE", key="torque", value=torque,
             limit=f"{LEAST_TORQUE:g} N m or more of either sign",
         )  # fmt: skip
-
-    def compute(variant: Variant) -> float:
-        cycle = variant.static(value).cycle
-        rows = signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2)
-        return float(np.ptp(rows, axis=1).max())
-
+    compute = partial(_peak_to_peak, signal, value)
     where = "" if value is None else f" at {TORQUE.show(value)}"
     return Quantity(f"STE peak to peak, {mesh}{where}", _MICROMETRES, "static", compute, signal, value)
+
+
+def _signal(mesh: Mesh, arc: np.ndarray, deflection: np.ndarray, n: int) -> np.ndarray:
+    """Rows of the transmission error (K, P) [m] of one kind of mesh, the overall one, or all of them."""
+    kinds = {"sun-planet": deflection[:n], "planet-ring": deflection[n:], "overall": np.atleast_2d(arc)}
+    return np.vstack([arc, deflection]) if mesh == "largest" else kinds[mesh]
+
+
+def _peak_to_peak(signal: Callable, torque: float | None, variant: Variant) -> float:
+    cycle = variant.static(torque).cycle
+    return float(np.ptp(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2), axis=1).max())
 
 
 def mesh_force(
@@ -239,11 +241,13 @@ def mesh_force(
     """
     at = _range(first, last, speeds)
     of_mean = _chosen(part, {"dynamic": True, "peak": False}, "part")
+    return Quantity(
+        f"{part} mesh force, {_words(at)}", _FORCE, "dynamics", partial(_largest_force, at, of_mean)
+    )
 
-    def compute(variant: Variant) -> float:
-        return float(forces_over_time(variant.response(at).force, dynamic=of_mean).max())
 
-    return Quantity(f"{part} mesh force, {_words(at)}", _FORCE, "dynamics", compute)
+def _largest_force(at: Range, dynamic: bool, variant: Variant) -> float:
+    return float(forces_over_time(variant.response(at).force, dynamic=dynamic).max())
 
 
 def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
@@ -270,50 +274,56 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     `femgear.housing.sensor.component_lines`.
     """
     at = _range(first, last, speeds)
+    return Quantity(f"housing level, {_words(at)}", ACCELERATION, "housing", partial(_largest_level, at))
 
-    def compute(variant: Variant) -> float:
-        return float(np.abs(variant.housing(at).exact.acceleration).max())
 
-    return Quantity(f"housing level, {_words(at)}", ACCELERATION, "housing", compute)
+def _largest_level(at: Range, variant: Variant) -> float:
+    return float(np.abs(variant.housing(at).exact.acceleration).max())
 
 
 def contact_ratio(mesh: _MeshKind) -> Quantity:
     """Define the transverse contact ratio [1] of a mesh, from the tip circles."""
     names = {"sun-planet": "contact_ratio_sun_planet", "planet-ring": "contact_ratio_planet_ring"}
     name = _chosen(mesh, names, "mesh")
-    return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", lambda v: float(getattr(v.gears, name)))
+    return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", partial(_of_gears, name))
+
+
+def _of_gears(name: str, variant: Variant) -> float:
+    return float(getattr(variant.gears, name))
 
 
 def tip_thickness(gear: _GearName) -> Quantity:
     """Define the thickness of the teeth on the tip circle, over the module [1]."""
     name = _chosen(gear, {g: g for g in get_args(_GearName)}, "gear")
+    return Quantity(f"tip thickness over module, {gear}", NUMBER, "gears", partial(_tip_thickness, name))
 
-    def compute(variant: Variant) -> float:
-        found = getattr(variant.gears, name)
-        return float(tooth_thickness(found, found.tip_radius)) / found.module
 
-    return Quantity(f"tip thickness over module, {gear}", NUMBER, "gears", compute)
+def _tip_thickness(name: str, variant: Variant) -> float:
+    found = getattr(variant.gears, name)
+    return float(tooth_thickness(found, found.tip_radius)) / found.module
 
 
 def contact_pressure() -> Quantity:
     """Define the largest contact pressure away from the ends of the flanks [Pa]."""
-    return Quantity(
-        "contact pressure", _STRESS, "static", lambda v: float(v.static().cycle.max_pressure.max())
-    )
+    return Quantity("contact pressure", _STRESS, "static", _largest_pressure)
+
+
+def _largest_pressure(variant: Variant) -> float:
+    return float(variant.static().cycle.max_pressure.max())
 
 
 def root_stress(gear: _GearName) -> Quantity:
     """Define the largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
     places = {"sun": ((0, 0),), "planet": ((0, 1), (1, 0)), "ring": ((1, 1),)}
     wanted = _chosen(gear, places, "gear")
+    return Quantity(f"root stress, {gear}", _STRESS, "stress", partial(_largest_stress, wanted))
 
-    def compute(variant: Variant) -> float:
-        n, roots = variant.gears.n_planets, variant.stress().roots
-        # gear 1 and gear 2 of mesh 0, then of mesh 1, and so on
-        chosen = [roots[2 * mesh + i] for k, i in wanted for mesh in range(k * n, (k + 1) * n)]
-        return max(float(root.stress[:, :, LOADED].max()) for root in chosen)
 
-    return Quantity(f"root stress, {gear}", _STRESS, "stress", compute)
+def _largest_stress(wanted: tuple[tuple[int, int], ...], variant: Variant) -> float:
+    n, roots = variant.gears.n_planets, variant.stress().roots
+    # gear 1 and gear 2 of mesh 0, then of mesh 1, and so on
+    chosen = [roots[2 * mesh + i] for k, i in wanted for mesh in range(k * n, (k + 1) * n)]
+    return max(float(root.stress[:, :, LOADED].max()) for root in chosen)
 
 
 def _chosen(value, table: dict, key: str):

@@ -31,6 +31,7 @@ from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearErr
 from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Tolerance, evaluations, tolerances
 from femgear.study.problem import Point, Problem, Variable, Vector, start_point
 from femgear.study.relief import DesignBasis
+from femgear.study.runner import Runner
 from femgear.study.sensitivity import linearise, sensitivity
 from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_values
@@ -180,6 +181,7 @@ def minimise(
     sensitivity: bool = True,
     cache: Path | None = None,
     progress: Progress | None = None,
+    runner: Runner | None = None,
 ) -> Optimum:
     """Find the best design within the bounds and limits of a problem.
 
@@ -205,6 +207,8 @@ def minimise(
         Folder of generated grids.
     progress : callable, optional
         Called with (stage, done, total).
+    runner : Runner, optional
+        Who computes samples, generations and tolerances, see `runner.open_runner`; the result is the same.
 
     Raises
     ------
@@ -217,7 +221,8 @@ def minimise(
     """
     options = options or SearchOptions()
     method, x0, most = _method(problem, method), start_at(problem, start), options.max_designs
-    with evaluations(problem, journal=journal, cache=cache, max_designs=most, progress=progress) as run:
+    how = {"journal": journal, "cache": cache, "progress": progress, "runner": runner}
+    with evaluations(problem, max_designs=most, **how) as run:
         before = run.values(None, problem.reported)
         try:
             if method == "minimax":
@@ -260,6 +265,7 @@ def _descents(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple
     """
     count, starts = options.sample_count(run.problem), options.starts
     points = [x0, *(samples_of(run.problem, count, options.seed) if count else ())]
+    run.ahead(points)
     costs = np.array([run.cost(x) for x in points])
     for i in np.argsort(costs, kind="stable")[:starts]:
         if costs[i] < OUTSIDE:
@@ -279,6 +285,11 @@ def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tupl
     problem, count = run.problem, options.sample_count(run.problem)
     integral = np.array([variable.integer for variable in problem.variables])
     population = np.vstack([x0, samples_of(problem, max(count, 5) - 2, options.seed)])
+
+    def generation(cost, places) -> list[float]:
+        run.ahead(places := [*places])
+        return [cost(x) for x in places]
+
     found = differential_evolution(
         run.cost,
         problem.bounds,
@@ -288,6 +299,8 @@ def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tupl
         rng=options.seed,
         polish=False,
         tol=1e-3,
+        updating="deferred",
+        workers=generation,  # type: ignore[arg-type]  # and a map
     )
     if integral.any():
         return bool(found.success), str(found.message)

@@ -23,6 +23,7 @@ from femgear.storage.files import own_files, resumable, write_csv
 from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
+from femgear.study.runner import Runner
 from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_value
 
@@ -81,6 +82,7 @@ def sweep(
     journal: str | Path | None = None,
     cache: Path | None = None,
     progress: Progress | None = None,
+    runner: Runner | None = None,
 ) -> Sweep:
     """Compute quantities of a case over values of entries of its file.
 
@@ -92,6 +94,8 @@ def sweep(
         File that keeps every case; an interrupted sweep goes on from it.
     cache, progress
         As for `search.minimise`.
+    runner : Runner, optional
+        Who computes the cases, see `runner.open_runner`; the result is the same.
 
     Raises
     ------
@@ -102,8 +106,14 @@ def sweep(
     count = _check_sweep(case, over, quantities)
     points = tuple(itertools.product(*over.values()))
     table, errors = np.full((count, len(quantities)), np.nan), []
-    keyed, warned = [(key,) for key in keys], False
-    with open_designs(case, keyed, journal=journal, cache=cache) as designs:
+    keyed, warned = [(key,) for key in keys], count < _MANY
+    with open_designs(case, keyed, journal=journal, cache=cache, runner=runner) as designs:
+        for done in designs.ahead(points, quantities):
+            if progress is not None:
+                progress("cases", done, count)
+            if designs.computed == _TIMED and done < count and not warned:
+                warned = True
+                _warn_of_time(count - done, designs.seconds / _TIMED, designs.runner.workers)
         for i, point in enumerate(points):
             try:
                 found = designs.values(point, quantities)
@@ -111,11 +121,6 @@ def sweep(
                 errors.append("")
             except Failure as failure:
                 errors.append(f"[{failure.error['code']}] {failure}")
-            if progress is not None:
-                progress("cases", i + 1, count)
-            if count >= _MANY and i < count - 1 and not warned and designs.computed == _TIMED:
-                warned = True
-                _warn_of_time(count - i - 1, designs.seconds / _TIMED)
         return Sweep(keys, points, quantities, table, tuple(errors), designs.computed)
 
 
@@ -160,9 +165,9 @@ def _check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str
         )  # fmt: skip
 
 
-def _warn_of_time(left: int, seconds: float) -> None:
-    """Warn of how long the cases left will take, at so many seconds each."""
-    total = left * seconds
+def _warn_of_time(left: int, seconds: float, workers: int) -> None:
+    """Warn of how long the cases left will take so many workers, at so many seconds each."""
+    total = left * seconds / workers
     shown = f"{total / 3600.0:.1f} h" if total > 5400.0 else f"{total / 60.0:.1f} min"
     text = f"{left} more cases of about {seconds:.2g} s each: {shown}"
     finding = Finding("W-SWEEP", "", text, remedy="an interrupted sweep goes on where it was")
@@ -222,6 +227,7 @@ def sweep_into(
     speeds: tuple[str, str] | None = None,
     cache: Path | None = None,
     progress: Progress | None = None,
+    runner: Runner | None = None,
 ) -> tuple[Sweep, list[str]]:
     """Compute a sweep, or what is left of it, and write its table and figure.
 
@@ -233,8 +239,8 @@ def sweep_into(
         As `parse_over` takes them; quantities, see `objectives.NAMES`.
     speeds : (str, str), optional
         First and last speed of the input, for mesh forces and housing levels.
-    cache, progress
-        As for `search.minimise`.
+    cache, progress, runner
+        As for `sweep`.
 
     Raises
     ------
@@ -252,7 +258,7 @@ def sweep_into(
     quantities = [named_quantity(words, speeds=speeds) for words in of]
     _check_sweep(case, values, quantities)
     own_files(folder, (_TABLE, _FIGURE))
-    options = {"journal": folder / _JOURNAL, "cache": cache, "progress": progress}
+    options = {"journal": folder / _JOURNAL, "cache": cache, "progress": progress, "runner": runner}
     with resumable(folder):
         found = sweep(case, values, quantities, **options)
         write_csv(folder / _TABLE, found.header, found.records())
