@@ -13,16 +13,16 @@ runout nor the worst tooth: `over_a_turn` says how much larger both are in some 
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import ValidationError, model_validator
-from scipy.special import ndtr, ndtri
 
 from femgear.case import text as case_text
 from femgear.case.gear_set import need_set
@@ -43,7 +43,6 @@ from femgear.gears.deviations import (
     profile_separation,
 )
 from femgear.gears.modifications import FlankForm, ProfileSlope
-from femgear.gears.planetary import PlanetarySet
 from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figure, save_figure
 from femgear.report.tables import Block
 from femgear.storage.files import own_files, write_dataset, write_text
@@ -103,6 +102,8 @@ class Law(Section):
         """Errors [m] below which the given shares of all lie, an array of the same shape."""
         if self.distribution == "uniform":
             return self.mean + (self.limit or 0.0) * (2.0 * share - 1.0)
+        from scipy.special import ndtr, ndtri
+
         below = 0.0 if self.limit is None or not self.sigma else float(ndtr(-self.limit / self.sigma))
         return self.mean + (self.sigma or 0.0) * ndtri(np.maximum(below + share * (1.0 - 2.0 * below), 1e-17))
 
@@ -242,8 +243,8 @@ class SampleModel:
 
         Pitch errors are the places of the teeth along the reference circle, runouts are x and y.
         """
-        sizes = [np.prod(shape) for _, _, shape in self.errors]
-        total, found = int(sum(sizes)), []
+        sizes = [math.prod(shape) for _, _, shape in self.errors]
+        total, found = sum(sizes), []
         numbers = np.stack([np.random.default_rng([seed, first + i]).random(total) for i in range(count)])
         for (key, law, shape), part in zip(self.errors, np.split(numbers, np.cumsum(sizes[:-1]), axis=1)):
             part = part.reshape(count, *shape)
@@ -263,7 +264,7 @@ class SampleModel:
         gears, d = self.basis.gears, base or self.basis.deviations or no_deviations(self.basis.gears)
         N, place, found = gears.n_planets, 0, {}
         for key, _, shape in self.errors:
-            size = int(np.prod(shape))
+            size = math.prod(shape)
             found[key.replace(".pitch", ".cumulative_pitch")] = errors[place : place + size].reshape(shape)
             place += size
 
@@ -327,7 +328,7 @@ class SampleModel:
         force = np.geomspace(_LEAST * self.load[N] / N, self.load[N], _FORCES)
         shifts, tilts, place, tilted = [], [], (found.mesh, found.position[:, None], found.pair), False
         unit, ideal = 1e-6, no_deviations(self.basis.gears)
-        for one in np.eye(sum(np.prod(shape) for _, _, shape in self.errors)):
+        for one in np.eye(sum(math.prod(shape) for _, _, shape in self.errors)):
             own = self.image(self.deviations(unit * one, ideal))
             where = setup.tooth, setup.turns, self.position
             shifts.append(pair_separations(s.gears, own, *where, back=False) / unit)
@@ -380,7 +381,7 @@ def sample_model(
         errors.append((key, law, shape))
     load = np.zeros(N + 1 + int(members.free.sum()))
     load[N] = abs(sun_torque) / gears.sun.base_radius
-    position = cycle_positions(gears.equal_positions(positions) if np.ndim(positions) == 0 else positions)
+    position = cycle_positions(gears.equal_positions(positions) if isinstance(positions, int) else positions)
     position = -position[::-1] if sun_torque < 0 else position
     model = SampleModel(basis, solved, order, tuple(errors), members, load, position)
 
@@ -521,3 +522,270 @@ def _contacts(model: SampleModel, level: _Level, errors, tiles):
     overflows = (state.active[..., [0, -1]] & ~np.moveaxis(found.at_edge, 0, -1)).reshape(n, -1).any(axis=1)
     missed = _missed(model, level, shifts, force, motions)
     return _numbers(model, force, motions, stiffness), overflows, missed
+
+
+def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
+    """Make a sample a case, which `femgear.run` solves at the positions of the model, in one mesh period."""
+    gears, d = model.basis.gears, model.deviations(model.draw(seed, index, 1)[0])
+    base = model.basis.deviations or no_deviations(gears)
+    written = case_text.parse(case.source, case.name)
+
+    def lengths(values) -> list[str]:
+        return [f"{1e6 * value:.12g} um" for value in values]
+
+    def errors(runout: Runout, pitch=None, thickness: float = 0.0) -> dict[str, object]:
+        found: dict[str, object] = {"runout_amplitude": lengths([runout.amplitude])[0]}
+        found["runout_phase"] = f"{runout.phase:.12g} rad"
+        if pitch is not None:
+            found |= {"cumulative_pitch": lengths(pitch), "thickness_reduction": lengths([thickness])[0]}
+        return found
+
+    def along(gear, pitch):
+        return pitch * (gear.reference_radius / gear.base_radius)
+
+    places = along(gears.planet, d.planet_ring_side_pitch)
+    parts = zip(d.planet_runout, places, d.planet_thickness, strict=True)
+    tables = {
+        "sun": errors(d.sun_runout, -along(gears.sun, d.sun_pitch), d.sun_thickness),
+        "ring": errors(d.ring_runout, -along(gears.ring, d.ring_pitch), d.ring_thickness),
+        "carrier": errors(d.carrier_runout),
+    }
+    values: dict[str, object] = {
+        f"{name}.errors.{key}": value for name, table in tables.items() for key, value in table.items()
+    }
+    values |= {f"{name}.errors.pitch": None for name in ("sun", "ring")}
+    values["planet.individual"] = [{"planet": n + 1, **errors(*part)} for n, part in enumerate(parts)]
+    ways = ("radial", "tangential")
+    values["set.pin_errors"] = [
+        {"planet": n + 1, **dict(zip(ways, lengths(pin), strict=True))} for n, pin in enumerate(d.pin_errors)
+    ]
+    slopes: dict[str, list] = {}
+    for name in _SLOPES:
+        gear, _, side = name.partition("_")
+        key, known = f"{gear}.modifications", len(getattr(base, name).modifications)
+        tables = slopes.setdefault(key, list(written[gear].get("modifications", [])))
+        for slope in getattr(d, name).modifications[known:]:
+            table = {"kind": "profile slope", "amount": lengths([slope.amount])[0]}
+            table |= {"flank": side.replace("_", " ")} if side else {}
+            tables.append(table)
+    values |= {key: tables for key, tables in slopes.items() if tables}
+    values |= {"static.positions": len(model.position), "static.longest_record": 1}
+    values["title"] = f"{case.title[:150]}: sample {index} of seed {seed}"
+    return with_values(case, values)
+
+
+def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
+    """Compute the transmission error [m] and the largest share of a sample over a turn of the carrier.
+
+    Against the ring: as many mesh periods as it has teeth, by the springs of tooth pairs.
+
+    ``errors`` (K,) are those of the sample [m].
+    """
+    s, level, P = model.solved, model.level(*model.windows), len(model.position)
+    setup, periods = level.found.setup, np.arange(s.gears.ring.teeth)
+    turns = np.repeat(-periods if s.gears is not model.basis.gears else periods, P)
+    tau = np.tile(model.position, len(periods)) + turns
+    where = setup.tooth, np.tile(setup.turns, len(periods)) + turns, tau
+    own = pair_separations(s.gears, model.image(model.deviations(errors)), *where, back=False)
+    case = pair_separations(s.gears, s.deviations, setup.tooth, setup.turns, model.position, back=False)
+    own = np.moveaxis(own.reshape(len(own), len(periods), P, -1) - case[:, None], 1, 0)
+    found = level.found
+    separations = own[:, found.mesh, found.position[:, None], found.pair]
+    tilts = None if level.tilts is None else np.tensordot(errors, level.tilts, 1)[None]
+    force, motions, _, _ = solve_laws(level.laws, model.load, separations, tilts)
+    N = s.gears.n_planets
+    share = force.reshape(*force.shape[:2], 2, N, -1).sum(axis=-1)[:, :, 0].max() / model.load[N]
+    return float(np.ptp(motions[..., N])), float(share)
+
+
+@one_blas_thread()
+def samples_into(
+    case: Case,
+    folder: Path,
+    *,
+    tolerances: Path,
+    count: int = 1000,
+    seed: int = 1,
+    positions: int = POSITIONS,
+    exact: bool = False,
+    cache: Path | None = None,
+    progress: Progress = silent,
+) -> tuple[list[Block], list[str]]:
+    """Compute samples of a case; write their numbers, a figure and the worst of them as a case file.
+
+    The worst has the largest transmission error. Some samples are solved again exactly.
+
+    Parameters
+    ----------
+    case, folder : Case, path
+    tolerances : path
+        File of the tolerances.
+    count, seed : int
+        Samples 0 to ``count - 1`` of a seed.
+    positions, exact
+        As of `sample_model` and `sample_block`.
+    cache, progress
+        As for `femgear.study.sweep.sweep_into`.
+
+    Returns
+    -------
+    blocks : list of Block
+        What there is to say.
+    names : list of str
+        Of the files.
+
+    Raises
+    ------
+    CaseError
+        E-RANGE: a number of samples, positions or a seed that cannot be; what `prepared` raises.
+    StorageError
+    """
+    checked(count, "--number", 1)
+    checked(seed, "--seed", 0, 2**32)
+    model, text = prepared(case, tolerances, positions=positions, cache=cache)
+    own_files(folder, FILES)
+    items = [(first, min(_BLOCK, count - first)) for first in range(0, count, _BLOCK)]
+    work, found = partial(_block, model, seed, exact), {}
+    for index, outcome in ((i, work(item)) for i, item in enumerate(items)):
+        found[index] = outcome
+        progress("samples", index + 1, len(items))
+    values = {name: np.concatenate([found[i][name] for i in range(len(items))]) for name in found[0]}
+    order = np.argsort(values["transmission_error"], kind="stable")
+    worst, largest = int(order[-1]), values["planet_share"].max(axis=1)
+    chosen = order[np.linspace(0, count - 1, min(_CHECKED, count)).astype(int)]
+    chosen = np.unique(np.append(chosen, largest.argmax()))
+    errors = np.concatenate([model.draw(seed, int(i), 1) for i in chosen])
+    again = exact_numbers(model, errors)
+    turn = np.array([over_a_turn(model, one) for one in errors])
+    ideal = exact_numbers(model, np.zeros((1, errors.shape[1])))
+    attrs = {"seed": seed, "tolerances": text, "case": to_toml(case), "worst": worst}
+    data = _dataset(model, values, chosen, again, turn, attrs | {"method": "exact" if exact else "spring"})
+    write_dataset(data, folder / FILES[0])
+    save_figure(figure(data), folder / FILES[1])
+    write_text(to_toml(sample_case(case, model, seed, worst)), folder / FILES[2])
+    return [_described(data, ideal)], list(FILES)
+
+
+def _block(model: SampleModel, seed: int, exact: bool, item: tuple[int, int]) -> dict[str, np.ndarray]:
+    return sample_block(model, seed, *item, exact=exact)
+
+
+def prepared(
+    case: Case, tolerances: Path, *, positions: int = POSITIONS, cache: Path | None = None
+) -> tuple[SampleModel, str]:
+    """Prepare the samples of a case for a file of tolerances, whose text comes with the model.
+
+    Raises
+    ------
+    CaseError
+        What `read_tolerances` and `sample_model` refuse; E-SUPPORT: a record with back flanks; E-RANGE.
+    """
+    need_set(case)
+    found, text = read_tolerances(tolerances, case.sun.module)
+    checked(positions, "--positions", 8, 4096)
+    if case.static.back_flanks:
+        raise CaseError(
+            "samples are solved on their drive flanks alone", code="E-SUPPORT", key="static.back_flanks",
+            value=True, limit="false", remedy="set it to false, or solve single samples by femgear run",
+            file=case.location("static.back_flanks"),
+        )  # fmt: skip
+    basis = design_basis(case, cache=cache)
+    torque = sun_torque(case, basis.gears)
+    return sample_model(basis, found, sun_torque=torque, positions=positions), text
+
+
+def checked(value: int, key: str, least: int, most: int = _MOST) -> None:
+    """Refuse (E-RANGE) a number under the least or over the most."""
+    if not least <= value <= most:
+        message = "the number is out of range"
+        raise CaseError(message, code="E-RANGE", key=key, value=value, limit=f"{least} to {most}")
+
+
+_NUMBERS = {
+    "transmission_error": ("m", "static transmission error from sun to ring, peak to peak"),
+    "largest_share": ("1", "largest share of a planet in the torque"),
+    "stiffness_sun_planet": ("N/m", "mean tangent stiffness of the sun-planet meshes"),
+    "stiffness_planet_ring": ("N/m", "mean tangent stiffness of the planet-ring meshes"),
+}
+"""Numbers of a sample, with their units."""
+
+
+def sample_numbers(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Choose the single numbers (n,) of every sample from what `sample_block` gives, by name."""
+    columns = values["transmission_error"], values["planet_share"].max(axis=1), *values["mesh_stiffness"].T
+    return dict(zip(_NUMBERS, columns, strict=True))
+
+
+def _dataset(model: SampleModel, values, chosen, again, turn, attrs) -> xr.Dataset:
+    """Numbers of all samples, of those solved `again`, and of those over a `turn` of the carrier."""
+    numbers, exact = sample_numbers(values), sample_numbers(again)
+    entries: dict[str, tuple] = {
+        "planet_share": ("sample planet", values["planet_share"], "1", "largest share of the planet"),
+        "opens": ("sample planet", values["opens"], "1", "whether the planet loses its load at a position"),
+    }
+    for name, (unit, words) in _NUMBERS.items():
+        entries[name] = ("sample", numbers[name], unit, words)
+        quantiles = np.quantile(numbers[name], QUANTILES)
+        entries[f"{name}_quantile"] = ("quantile", quantiles, unit, f"{words}, quantiles")
+        entries[f"{name}_exact"] = ("check", exact[name], unit, f"{words}, whole contact problem")
+        error = np.abs(numbers[name][chosen] - exact[name]).max() / np.abs(exact[name]).max()
+        entries[f"{name}_error"] = ("", error, "1", f"{words}: largest error of the checked samples")
+    for name, row in zip(("transmission_error", "largest_share"), turn.T, strict=True):
+        unit, words = _NUMBERS[name]
+        entries[f"{name}_turn"] = ("check", row, unit, f"{words}, over a turn of the carrier")
+    coords = {
+        "sample": ("sample", np.arange(len(numbers["largest_share"])), "1", "sample of the seed"),
+        "planet": ("planet", np.arange(len(values["opens"][0])) + 1, "1", "planet"),
+        "quantile": ("quantile", QUANTILES, "1", "share of the samples below"),
+        "check": ("check", chosen, "1", "sample of the seed that was solved again"),
+    }
+    attrs |= {"positions": len(model.position), "mesh_periods": 1}
+    return dataset(entries, coords, attrs | {"turn": model.basis.gears.ring.teeth})
+
+
+def figure(data: xr.Dataset):
+    """Draw transmission error against largest share of all samples, and the distributions of both."""
+    ste, share = 1e6 * data.transmission_error.values, data.largest_share.values
+    found, axes = new_figure(columns=3, width=12.0, height=4.2)
+    names = "transmission error, peak to peak [µm]", "largest share of a planet [1]"
+    axes[0].plot(share, ste, ".", markersize=3, alpha=0.3, color=BLUE, rasterized=True)
+    worst = int(data.attrs["worst"])
+    axes[0].plot(share[worst], ste[worst], "D", color=VERMILION, label=f"worst: sample {worst}")
+    label(axes[0], names[1], names[0], f"{len(ste)} samples, seed {data.attrs['seed']}")
+    for ax, name, values in zip(axes[1:], names, (ste, share), strict=True):
+        ax.hist(values, 80, weights=np.full(len(values), 100.0 / len(values)), color=BLUE)
+        for part, dash in ((0.5, "-"), (0.95, "--"), (0.99, ":")):
+            at = np.quantile(values, part)
+            ax.axvline(at, color=VERMILION, linestyle=dash, label=f"{part:.0%} of the samples below")
+        label(ax, name, "samples [%]")
+    legend_below(found, columns=4)
+    return found
+
+
+def _described(data: xr.Dataset, ideal: dict[str, np.ndarray]) -> Block:
+    """Quantiles of all numbers, and how far to trust them."""
+    scales = {"m": (1e6, "um"), "N/m": (1e-6, "N/um"), "1": (1.0, "")}
+    rows, errors = [], []
+    for name, (unit, words) in _NUMBERS.items():
+        scale, shown = scales[unit]
+        values = [sample_numbers(ideal)[name][0], *data[f"{name}_quantile"].values, data[name].values.max()]
+        rows.append((f"{words} [{shown}]".replace(" []", ""), *(f"{scale * value:.5g}" for value in values)))
+        errors.append(f"{float(data[f'{name}_error']):.1e} ({name.replace('_', ' ')})")
+    worst, at, check = int(data.attrs["worst"]), int(data.largest_share.values.argmax()), data.check.values
+    exact = 1e6 * float(data.transmission_error_exact.values[check == worst][0])
+    ratios = [
+        np.quantile(data[f"{name}_turn"].values / data[f"{name}_exact"].values, (0.0, 1.0))
+        for name in ("transmission_error", "largest_share")
+    ]
+    (low, high), (least, most) = ratios
+    notes = (
+        f"method {data.attrs['method']}; {len(check)} samples solved again exactly differ by at most "
+        f"{', '.join(errors)} of the largest",
+        f"{data.attrs['positions']} positions of one mesh period; over the {data.attrs['turn']} of a turn of "
+        f"the carrier these samples have {low:.2f} to {high:.2f} times the transmission error and "
+        f"{least:.2f} to {most:.2f} times the largest share",
+        f"a planet loses its load in {float(data.opens.any('planet').mean()):.2%} of the samples",
+        f"worst.toml: sample {worst}, transmission error {exact:.6g} um exactly; largest share: sample {at}",
+    )
+    header = ("number", "ideal", *(f"{q:.0%}" for q in QUANTILES), "largest")
+    return Block(f"{len(data.sample)} samples, seed {data.attrs['seed']}", header, tuple(rows), notes)
