@@ -32,6 +32,8 @@ _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
 _REFRESHED = 3
 """Steps of Newton's method for which the moments of tooth pairs follow their forces."""
+_BOLD, _MOST_NEWTON = 10, 100
+"""Steps after which pairs open and close one at a time, and steps in all."""
 _SETTLED = 1e-8
 """Share of the load by which forces of tooth pairs may still change in the last step."""
 _SOFTEST = 1e-13
@@ -439,8 +441,8 @@ class PairLaws:
         Of the pressures over the force.
     touching : (P, W, C) array
         Force under which every cell begins to touch [N], infinite where it never does.
-    smooth : (P, W, 3, W, 3) array
-        Compliance between different windows, supports included [m/N].
+    smooth, supports : (P, W, 3, W, 3), (W, W) arrays
+        Compliance of the bodies between different windows, and of sprung members between all [m/N].
     separation : (P, W) array
         Smallest one in the field of the others; infinite where there is no window [m].
     mesh, approach : (W,), (W, m) arrays
@@ -454,6 +456,7 @@ class PairLaws:
     moments: np.ndarray
     touching: np.ndarray
     smooth: np.ndarray
+    supports: np.ndarray
     separation: np.ndarray
     mesh: np.ndarray
     approach: np.ndarray
@@ -496,12 +499,13 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
     ``force`` (K,) are those of the curves [N], in equal ratios.
     """
     (P, W, C), own = found.gap.shape, np.arange(found.gap.shape[1])
-    smooth = found.smooth + found.supports[np.ix_(found.mesh, found.mesh)][:, None, :, None]
+    smooth, supports = found.smooth.copy(), found.supports[np.ix_(found.mesh, found.mesh)]
     Pi, onto = found.polynomials, found.polynomials.swapaxes(-1, -2)
     local = found.local + Pi @ np.moveaxis(smooth[:, own, :, own], 0, 1) @ onto
     smooth[:, own, :, own] = 0.0
     loads = (onto @ state.loads[..., None])[..., 0]
     field = (smooth.reshape(P, 3 * W, 3 * W) @ loads.reshape(P, -1, 1)).reshape(P, W, 3, 1)
+    field += (loads.sum(axis=-1) @ supports)[..., None, None]
     gap = np.where(found.candidate, found.gap + (Pi @ field)[..., 0], np.inf)
     separation = gap.min(axis=-1)
     rows = np.nonzero(np.isfinite(separation))
@@ -528,6 +532,7 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
         moments=np.moveaxis(moments, 0, 2),
         touching=touching,
         smooth=smooth,
+        supports=supports,
         separation=separation,
         mesh=found.mesh,
         approach=found.approach[found.mesh],
@@ -541,8 +546,9 @@ def solve_laws(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Solve the contact of all tooth pairs as springs at P positions of n sets.
 
-    Newton's method on all of them: pairs that pull open, pairs that overlap close. A soft spring holds
-    planets that carry nothing.
+    Newton's method on all of them: pairs that pull open, pairs that overlap close, all at once; where that
+    does not end, steps stop at the first pair that opens, and the deepest closes when they have settled. A
+    soft spring holds planets that carry nothing.
 
     Parameters
     ----------
@@ -565,35 +571,63 @@ def solve_laws(
     unit = float(laws.yields.mean())
     G, position, S = laws.approach, np.tile(np.arange(P), n), laws.smooth.reshape(P, W, 3, 3 * W)
     field = (S @ laws.loads.reshape(P, 1, -1, 1))[..., 0]
+    field += (laws.loads.sum(axis=-1) @ laws.supports)[..., None]
     field = -field if tilts is None else tilts - field
     apart = laws.separation + separations
     force = np.tile(laws.loads.sum(axis=-1), (n, 1))
     motions, solved = np.tile(laws.motions, (n, 1)) / unit, np.zeros(n * P, bool)
     todo, between, bent = np.arange(n * P), np.zeros((n * P, W, W)), np.zeros((n * P, W))
     system = np.zeros((n * P, W + m, W + m))
-    system[:, W:, :W], system[:, range(W, W + m), range(W, W + m)] = G.T, -_SOFTEST
-    for step in range(_MOST_STEPS):
-        if step < _REFRESHED:
+    system[:, W:, :W], system[:, range(W, W + m), range(W, W + m)] = G.T, _SOFTEST
+    closed, late, again = force > 0.0, todo[:0], False
+    limit = _SETTLED * np.abs(load).max()
+    for step in range(_MOST_NEWTON):
+        careful = step >= _BOLD
+        if step == _BOLD:
+            force[todo], late = np.tile(laws.loads.sum(axis=-1), (n, 1))[todo], todo
+        if step < _REFRESHED or step == _BOLD or again:
+            again = False
             mu = laws.moments_under(force.reshape(n, P, W))
             half = (mu.transpose(1, 2, 0, 3) @ S).reshape(P, W, n, W, 3).transpose(2, 0, 1, 3, 4)
             between = (half * mu[:, :, None]).sum(axis=-1).reshape(-1, W, W) / unit
             bent = (apart + (mu * field).sum(axis=-1)).reshape(-1, W) / unit
         F, matrix = force[todo], system[: len(todo)]
         value, slope = laws.approaches(F, position[todo])
-        gap = bent[todo] + value / unit + (between[todo] @ F[..., None])[..., 0] - motions[todo] @ G.T
-        on = (F > 0.0) | (gap < 0.0)
-        matrix[:, :W, :W], matrix[:, :W, W:] = between[todo] * on[..., None], -G * on[..., None]
-        matrix[:, own, own] = np.where(on, slope / unit, 1.0)
-        balance = load - F @ G + _SOFTEST * motions[todo]
+        matrix[:, :W, :W] = between[todo] + laws.supports / unit
+        gap = bent[todo] + value / unit - motions[todo] @ G.T
+        gap += (matrix[:, :W, :W] @ F[..., None])[..., 0]
+        on = closed[todo] if careful else (F > 0.0) | (gap < 0.0)
+        matrix[:, own, own] += slope / unit
+        matrix[:, :W, :W], matrix[:, :W, W:] = matrix[:, :W, :W] * on[..., None], -G * on[..., None]
+        matrix[:, own, own] += ~on
+        balance = load - F @ G - _SOFTEST * motions[todo]
         right = np.concatenate([np.where(on, -gap, -F), balance], axis=1)
         change = np.linalg.solve(matrix, right[..., None])[..., 0]
-        force[todo] = np.maximum(F + change[:, :W], 0.0)
-        motions[todo] += change[:, W:]
-        ended = np.abs(force[todo] - F).max(axis=1) < _SETTLED * np.abs(load).max()
-        if step >= _REFRESHED:
-            solved[todo[ended]], todo = True, todo[~ended]
+        length = np.ones(len(todo))
+        if careful:
+            falls = on & (change[:, :W] < 0.0)
+            reach = np.divide(-F, change[:, :W], out=np.full(F.shape, np.inf), where=falls)
+            length = np.minimum(reach.min(axis=1), 1.0)
+            closed[todo] = on & (reach > length[:, None])
+        force[todo] = np.maximum(F + length[:, None] * change[:, :W], 0.0)
+        motions[todo] += length[:, None] * change[:, W:]
+        ended = (np.abs(change[:, :W]).max(axis=1) < limit) & (length == 1.0) & (step >= _REFRESHED)
+        if careful:
+            force[todo] = np.where(closed[todo], force[todo], 0.0)
+            overlap = np.where(on, 0.0, gap)
+            deepest, worst = overlap.min(axis=1), overlap.argmin(axis=1)
+            more = ended & (deepest < -limit)
+            closed[todo[more], worst[more]] = True
+            ended &= ~more
+        elif step == _BOLD - 1:
+            closed[todo] = np.tile(laws.loads.sum(axis=-1), (n, 1))[todo] > 0.0
+        solved[todo[ended]], todo = True, todo[~ended]
         if not len(todo):
-            break
+            if not len(late):
+                break
+            # once more with the moments of the forces that were found
+            todo, late, again = late, todo, True
+    solved[late] = False
     loaded, meshes = force > _FAINT * np.abs(load).max(), int(laws.mesh[-1]) + 1
     force, slope = np.where(loaded, force, 0.0), laws.approaches(force, position)[1]
     between[:, own, own] = slope / unit

@@ -429,7 +429,8 @@ def spring_numbers(model: SampleModel, errors: np.ndarray) -> dict[str, np.ndarr
     """
     parts, level = [], model.level(*model.windows)
     for some in np.split(errors, range(_TOGETHER, len(errors), _TOGETHER)):
-        numbers, left = _springs(model, level, some)
+        numbers, missed, unsolved = _springs(model, level, some)
+        left = missed | unsolved
         if left.any():
             for name, values in exact_numbers(model, some[left]).items():
                 numbers[name][left] = values
@@ -437,12 +438,15 @@ def spring_numbers(model: SampleModel, errors: np.ndarray) -> dict[str, np.ndarr
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _springs(model: SampleModel, level: _Level, errors) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Numbers of samples, and which of them (n,) have to be solved exactly."""
+def _springs(
+    model: SampleModel, level: _Level, errors
+) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Numbers of samples, in which of them (n,) other pairs touch, and which are not solved."""
     shifts, separations, tilts = _separations(level, errors)
     force, motions, stiffness, solved = solve_laws(level.laws, model.load, separations, tilts)
-    left = ~solved.all(axis=1) | _missed(model, level, shifts, force, motions)
-    return _numbers(model, force, motions, stiffness), left
+    solved = solved.all(axis=1)
+    missed = solved & _missed(model, level, shifts, force, motions)
+    return _numbers(model, force, motions, stiffness), missed, ~solved
 
 
 def _separations(level: _Level, errors: np.ndarray):
@@ -510,7 +514,7 @@ def _contacts(model: SampleModel, level: _Level, errors, tiles):
         tiles[n] = replace(level.found, **{k: np.concatenate([getattr(level.found, k)] * n) for k in names})
     gap = separations.reshape(-1, W, 1)
     if tilts is not None:
-        gap = gap + tiles[n].polynomials @ tilts.reshape(-1, W, 3, 1)[..., 0][..., None]
+        gap = gap + (tiles[n].polynomials @ tilts.reshape(-1, W, 3, 1))[..., 0]
     found = replace(tiles[n], gap=np.where(tiles[n].candidate, tiles[n].gap + gap, 0.0))
     start = (force > 0.0) & (force >= level.laws.touching)
     state = solve_batch(found, model.load, start=start.reshape(found.gap.shape))
