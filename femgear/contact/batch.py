@@ -581,6 +581,7 @@ def solve_laws(
     system[:, W:, :W], system[:, range(W, W + m), range(W, W + m)] = G.T, _SOFTEST
     closed, late, again = force > 0.0, todo[:0], False
     limit = _SETTLED * np.abs(load).max()
+    overlaps = -limit * float(laws.yields[np.isfinite(laws.separation)].mean()) / unit
     for step in range(_MOST_NEWTON):
         careful = step >= _BOLD
         if step == _BOLD:
@@ -616,7 +617,7 @@ def solve_laws(
             force[todo] = np.where(closed[todo], force[todo], 0.0)
             overlap = np.where(on, 0.0, gap)
             deepest, worst = overlap.min(axis=1), overlap.argmin(axis=1)
-            more = ended & (deepest < -limit)
+            more = ended & (deepest < overlaps)
             closed[todo[more], worst[more]] = True
             ended &= ~more
         elif step == _BOLD - 1:
