@@ -567,7 +567,8 @@ def solve_laws(
         Whether the iteration ended.
     """
     (n, P, W), m, own = separations.shape, len(load), np.arange(separations.shape[2])
-    # motions and approaches over a compliance, so that all terms are forces
+    # motions and approaches over one compliance, that of an absent window (1 m/N) among them: it keeps the
+    # soft spring far below all others
     unit = float(laws.yields.mean())
     G, position, S = laws.approach, np.tile(np.arange(P), n), laws.smooth.reshape(P, W, 3, 3 * W)
     field = (S @ laws.loads.reshape(P, 1, -1, 1))[..., 0]

@@ -444,9 +444,9 @@ def _springs(
     """Numbers of samples, in which of them (n,) other pairs touch, and which are not solved."""
     shifts, separations, tilts = _separations(level, errors)
     force, motions, stiffness, solved = solve_laws(level.laws, model.load, separations, tilts)
-    solved = solved.all(axis=1)
-    missed = solved & _missed(model, level, shifts, force, motions)
-    return _numbers(model, force, motions, stiffness), missed, ~solved
+    unsolved = np.asarray(~solved.all(axis=1))
+    missed = ~unsolved & _missed(model, level, shifts, force, motions)
+    return _numbers(model, force, motions, stiffness), missed, unsolved
 
 
 def _separations(level: _Level, errors: np.ndarray):
