@@ -1,4 +1,4 @@
-"""The command line: ``femgear check``, ``run``, ``report``, ``export``, ``sweep`` and ``schema``."""
+"""The command line: ``femgear`` check, run, report, export, sweep, samples and schema."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ with contextlib.suppress(ImportError):  # Windows has no such limits
 
 try:
     from pathlib import Path
-    from typing import Annotated, Any
+    from typing import Annotated, Any, Literal
 
     import numpy as np
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
@@ -337,6 +337,61 @@ def sweep(
         found, names = sweep_into(data, output, over=over, of=of, **options)
     failed = sum(bool(error) for error in found.errors)
     print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")
+    _say(f"files in {output}: {', '.join(names)}")
+    return 0
+
+
+@app.command
+def samples(
+    case: Path,
+    /,
+    *,
+    tolerances: Path,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    number: Annotated[int, Parameter(name=("--number", "-n"))] = 1000,
+    seed: int = 1,
+    positions: int = 16,
+    method: Literal["spring", "exact"] = "spring",
+    index: int | None = None,
+) -> int:
+    """Compute as-built sets: transmission error, load sharing and mesh stiffness over tolerances.
+
+    Parameters
+    ----------
+    case
+        TOML case file.
+    tolerances
+        TOML file of the distributions of errors, as in docs/samples.md.
+    output
+        Folder of samples.nc, samples.png and worst.toml.
+    number
+        Number of samples.
+    seed
+        Sample i of a seed is the same whatever the number of samples.
+    positions
+        Of one mesh period.
+    method
+        Tooth pairs as springs, whose error is stated, or the whole contact problem.
+    index
+        Write this sample as a case file, sample_INDEX.toml, and compute none.
+    """
+    from femgear.run import grid_cache
+    from femgear.storage.files import own_files, write_text
+    from femgear.study.samples import checked, prepared, sample_case, samples_into
+    from femgear.trains.reading import read_case, to_toml
+
+    data, options = read_case(case), {"tolerances": tolerances, "positions": positions, "cache": grid_cache()}
+    if index is not None:
+        checked(index, "--index", 0)
+        model, _ = prepared(data, **options)
+        names = [f"sample_{index}.toml"]
+        own_files(output, names)
+        write_text(to_toml(sample_case(data, model, seed, index)), output / names[0])
+    else:
+        with Progress() as progress:
+            options |= {"count": number, "seed": seed, "exact": method == "exact", "progress": progress}
+            blocks, names = samples_into(data, output, **options)
+        _print(blocks)
     _say(f"files in {output}: {', '.join(names)}")
     return 0
 

@@ -15,6 +15,7 @@ there are none. Positions where that does not end, and loads that may be roundin
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,14 @@ _FAINT = 1e-9
 """Share of the largest load below which a touching cell may be no contact at all."""
 _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
+_REFRESHED = 3
+"""Steps of Newton's method for which the moments of tooth pairs follow their forces."""
+_BOLD, _MOST_NEWTON = 10, 100
+"""Steps after which pairs open and close one at a time, and steps in all."""
+_SETTLED = 1e-8
+"""Share of the load by which forces of tooth pairs may still change in the last step."""
+_SOFTEST = 1e-13
+"""Spring on every motion, over that of a tooth pair: it holds what no loaded pair holds."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +62,9 @@ class BatchState:
     residual: np.ndarray
 
 
-def solve_batch(found: Candidates, load, springs: BearingSprings | None = None) -> BatchState:
+def solve_batch(
+    found: Candidates, load, springs: BearingSprings | None = None, *, start: np.ndarray | None = None
+) -> BatchState:
     """Solve the contact of all meshes and bearings at all positions.
 
     Parameters
@@ -63,6 +74,8 @@ def solve_batch(found: Candidates, load, springs: BearingSprings | None = None) 
         External load on the motions, the same at all positions [N].
     springs : BearingSprings, optional
         Of planet bearings with clearance.
+    start : (P, W, C) bool array, optional
+        Cells thought to touch; guessed for equal mesh forces when left out.
 
     Raises
     ------
@@ -70,10 +83,11 @@ def solve_batch(found: Candidates, load, springs: BearingSprings | None = None) 
         As `femgear.contact.solve.solve_contact`.
     """
     load, N = np.asarray(load, float), found.setup.n_planets
-    one = None if springs is not None or np.delete(load, N).any() else found.of_one_planet()
+    unlike = start is not None or springs is not None or np.delete(load, N).any()
+    one = None if unlike else found.of_one_planet()
     if one is None:
-        return _solved(found, load, springs)
-    state = _solved(one, np.array([0.0, load[N] / N]), None)
+        return _solved(found, load, springs, start)
+    state = _solved(one, np.array([0.0, load[N] / N]), None, None)
     kinds, cells = len(one.approach), {}
     for name in ("loads", "gaps", "active"):
         of_one = getattr(state, name).reshape(len(one.gap), kinds, 1, -1, one.gap.shape[-1])
@@ -105,8 +119,10 @@ def check_definite(found: Candidates) -> None:
     factor(np.eye(size) + coupled)
 
 
-def _solved(found: Candidates, load: np.ndarray, springs: BearingSprings | None) -> BatchState:
+def _solved(found: Candidates, load: np.ndarray, springs: BearingSprings | None, start) -> BatchState:
     batch = _ActiveSets(found, load, springs)
+    if start is not None:
+        batch.active = start & found.candidate
     batch.solve()
     state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
     return BatchState(*state)
@@ -253,10 +269,28 @@ class _ActiveSets:
 
     def solve(self) -> None:
         """Solve all positions: together, and those that are left one by one."""
-        found, first = self.found, (self.active.copy(), self.springs.copy())
-        todo, solved = np.arange(len(found.position)), np.zeros(len(found.position), bool)
-        changed = self.active.any(axis=-1)
-        for _ in range(_MOST_STEPS):
+        first, solved = (self.active.copy(), self.springs.copy()), np.zeros(len(self.active), bool)
+        self._pivot(np.arange(len(solved)), _MOST_STEPS, solved)
+        # what is left may have lost all contact on its way
+        self.active[~solved], self.springs[~solved] = (start[~solved] for start in first)
+        if solved.any():
+            done = np.flatnonzero(solved)
+            solved[done] = self._refined(done)
+            # cells of planets that carry nothing may touch all the same: they are released
+            idle = done[~solved[done]]
+            largest = self.loads[idle].max(axis=(1, 2), keepdims=True)
+            self.active[idle] &= self.loads[idle] > _FAINT * largest
+            self._pivot(idle, 1, solved)
+            idle = idle[solved[idle]]
+            if len(idle):
+                solved[idle] = self._refined(idle)
+        for at in np.flatnonzero(~solved):
+            self._alone(at)
+
+    def _pivot(self, todo, steps: int, solved) -> None:
+        """Change the sides of all violating cells and springs of some positions; mark the `solved` ones."""
+        found, changed = self.found, np.ones((len(todo), self.active.shape[1]), bool)
+        for _ in range(steps if len(todo) else 0):
             rows, window = np.nonzero(changed)
             place = todo[rows], window
             right = np.dstack([found.gap[place], found.polynomials[place]])
@@ -272,12 +306,6 @@ class _ActiveSets:
             self.active[todo] ^= flips
             self.springs[todo] ^= spring_flips[wrong]
             changed = flips.any(axis=-1)
-        # what is left may have lost all contact on its way
-        self.active[~solved], self.springs[~solved] = (start[~solved] for start in first)
-        if solved.any():
-            solved[solved] = self._refined(np.flatnonzero(solved))
-        for at in np.flatnonzero(~solved):
-            self._alone(at)
 
     def _linear(self, todo, offset, load, clearance):
         """Loads, motions and unrestrained motions when exactly the active cells touch.
@@ -409,3 +437,228 @@ def _local_solution(local, active, right) -> np.ndarray:
         matrix = np.where(real[:, :, None] & real[:, None, :], matrix, np.eye(cells.shape[1]))
         columns[rows, cells] = np.linalg.solve(matrix, np.where(real[..., None], right[rows, cells], 0.0))
     return columns
+
+
+@dataclass(frozen=True)
+class PairLaws:
+    """Tooth pairs as springs: what every window yields under a force of its own, at P positions.
+
+    In the field of the other windows at a given state, the approach ``lambda`` of window ``w`` over its force
+    ``F`` is a curve. Small other separations ``d`` along the window change the approach under the same force
+    by ``sum p d / F``, as all that minimises an energy does: with the moments ``mu`` of the pressure per
+    force, and the loads that the given state has,
+
+        r_w = s_w + lambda_w(F_w) + mu_w^T sum_v S_wv (mu_v F_v - z_v) + e_w - (G q)_w,   v != w,
+        r_w >= 0,   F_w >= 0,   F_w r_w = 0,   G^T F = load
+
+    is again the contact problem, with one unknown a tooth pair. At the given state it is exact.
+
+    Parameters
+    ----------
+    force : (K,) array
+        [N], in equal ratios.
+    yields : (P, W, K) array
+        Approach beyond `separation`, over the force [m/N]; constant below the first one.
+    moments : (P, W, K, 3) array
+        Of the pressures over the force.
+    touching : (P, W, C) array
+        Force under which every cell begins to touch [N], infinite where it never does.
+    smooth, supports : (P, W, 3, W, 3), (W, W) arrays
+        Compliance of the bodies between different windows, and of sprung members between all [m/N].
+    separation : (P, W) array
+        Smallest one in the field of the others; infinite where there is no window [m].
+    mesh, approach : (W,), (W, m) arrays
+        As of `Candidates`, but of every window.
+    loads, motions : (P, W, 3), (P, m) arrays
+        Moments of the loads [N], and motions [m], at the given state.
+    """
+
+    force: np.ndarray
+    yields: np.ndarray
+    moments: np.ndarray
+    touching: np.ndarray
+    smooth: np.ndarray
+    supports: np.ndarray
+    separation: np.ndarray
+    mesh: np.ndarray
+    approach: np.ndarray
+    loads: np.ndarray
+    motions: np.ndarray
+
+    @cached_property
+    def _cubics(self) -> np.ndarray:
+        """Coefficients of cubic splines of `yields` over the logarithm of the force, (K - 1, P, W, 4)."""
+        from scipy.interpolate import CubicSpline
+
+        return np.moveaxis(CubicSpline(np.log(self.force), self.yields, axis=-1).c, 0, -1)
+
+    def _between(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Interval of the curves in which forces lie, and the logarithm of the ratio to its first force."""
+        step = np.log(self.force[1] / self.force[0])
+        x = np.log(np.clip(force, *self.force[[0, -1]]) / self.force[0])
+        interval = np.minimum((x / step).astype(int), len(self.force) - 2)
+        return interval, x - interval * step
+
+    def approaches(self, force: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Approach [m] under forces (t, W) [N] at some positions (t,), and its slope [m/N]."""
+        interval, x = self._between(force)
+        a, b, c, d = np.moveaxis(self._cubics[interval, position[:, None], np.arange(force.shape[1])], -1, 0)
+        yields, inside = ((a * x + b) * x + c) * x + d, (self.force[0] < force) & (force < self.force[-1])
+        return force * yields, yields + np.where(inside, (3.0 * a * x + 2.0 * b) * x + c, 0.0)
+
+    def moments_under(self, force: np.ndarray) -> np.ndarray:
+        """Moments ``mu`` (n, P, W, 3) under forces (n, P, W) [N]."""
+        interval, x = self._between(force)
+        share = (x / np.log(self.force[1] / self.force[0]))[..., None]
+        place = np.arange(force.shape[1])[:, None], np.arange(force.shape[2])
+        low, high = (self.moments[*place, interval + one] for one in (0, 1))
+        return low + share * (high - low)
+
+
+def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLaws:
+    """Compute the load over approach of every tooth pair by itself, in the field of a solved state.
+
+    ``force`` (K,) are those of the curves [N], in equal ratios.
+    """
+    (P, W, C), own = found.gap.shape, np.arange(found.gap.shape[1])
+    smooth, supports = found.smooth.copy(), found.supports[np.ix_(found.mesh, found.mesh)]
+    Pi, onto = found.polynomials, found.polynomials.swapaxes(-1, -2)
+    local = found.local + Pi @ np.moveaxis(smooth[:, own, :, own], 0, 1) @ onto
+    smooth[:, own, :, own] = 0.0
+    loads = (onto @ state.loads[..., None])[..., 0]
+    field = (smooth.reshape(P, 3 * W, 3 * W) @ loads.reshape(P, -1, 1)).reshape(P, W, 3, 1)
+    field += (loads.sum(axis=-1) @ supports)[..., None, None]
+    gap = np.where(found.candidate, found.gap + (Pi @ field)[..., 0], np.inf)
+    separation = gap.min(axis=-1)
+    rows = np.nonzero(np.isfinite(separation))
+    local, beyond = local[rows], gap[rows] - separation[rows][:, None]
+    cells, right = found.candidate[rows], np.ones((len(rows[0]), C, 2))
+    right[..., 1] = np.where(cells, beyond, 0.0)
+    yields, moments = np.ones((len(force), P, W)), np.zeros((len(force), P, W, 3))
+    touching, active = np.full((P, W, C), np.inf), beyond == 0.0
+    for k, one in enumerate(force):
+        for _ in range(_MOST_STEPS):
+            per, offset = np.moveaxis(_local_solution(local, active, right), -1, 0)
+            approach = (one + offset.sum(axis=1)) / per.sum(axis=1)
+            pressed = per * approach[:, None] - offset
+            gaps = beyond + (local @ pressed[..., None])[..., 0] - approach[:, None]
+            flips = np.where(active, pressed < 0.0, cells & (gaps < -ROUNDING * approach[:, None]))
+            if not flips.any():
+                break
+            active ^= flips
+        yields[k][rows], moments[k][rows] = approach / one, (onto[rows] @ pressed[..., None])[..., 0] / one
+        touching[rows] = np.where(active & np.isinf(touching[rows]), one, touching[rows])
+    return PairLaws(
+        force=force,
+        yields=np.moveaxis(yields, 0, -1),
+        moments=np.moveaxis(moments, 0, 2),
+        touching=touching,
+        smooth=smooth,
+        supports=supports,
+        separation=separation,
+        mesh=found.mesh,
+        approach=found.approach[found.mesh],
+        loads=loads,
+        motions=state.motions,
+    )
+
+
+def solve_laws(
+    laws: PairLaws, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Solve the contact of all tooth pairs as springs at P positions of n sets.
+
+    Newton's method on all of them: pairs that pull open, pairs that overlap close, all at once; where that
+    does not end, steps stop at the first pair that opens, and the deepest closes when they have settled. A
+    soft spring holds planets that carry nothing.
+
+    Parameters
+    ----------
+    load : (m,) array
+        External load on the motions [N].
+    separations : (n, P, W) array
+        ``e``: what every set adds to whole pairs [m].
+    tilts : (n, P, W, 3) array, optional
+        What it adds at the nodes of the windows [m].
+
+    Returns
+    -------
+    force, motions, stiffness : (n, P, W), (n, P, m), (n, P, meshes) arrays
+        [N]; [m]; tangent stiffness of every mesh at constant loads of the others [N/m].
+    solved : (n, P) bool array
+        Whether the iteration ended.
+    """
+    (n, P, W), m, own = separations.shape, len(load), np.arange(separations.shape[2])
+    # motions and approaches over one compliance, that of an absent window (1 m/N) among them: it keeps the
+    # soft spring far below all others
+    unit = float(laws.yields.mean())
+    G, position, S = laws.approach, np.tile(np.arange(P), n), laws.smooth.reshape(P, W, 3, 3 * W)
+    field = (S @ laws.loads.reshape(P, 1, -1, 1))[..., 0]
+    field += (laws.loads.sum(axis=-1) @ laws.supports)[..., None]
+    field = -field if tilts is None else tilts - field
+    apart = laws.separation + separations
+    force = np.tile(laws.loads.sum(axis=-1), (n, 1))
+    motions, solved = np.tile(laws.motions, (n, 1)) / unit, np.zeros(n * P, bool)
+    todo, between, bent = np.arange(n * P), np.zeros((n * P, W, W)), np.zeros((n * P, W))
+    system = np.zeros((n * P, W + m, W + m))
+    system[:, W:, :W], system[:, range(W, W + m), range(W, W + m)] = G.T, _SOFTEST
+    closed, late, again = force > 0.0, todo[:0], False
+    limit = _SETTLED * np.abs(load).max()
+    overlaps = -limit * float(laws.yields[np.isfinite(laws.separation)].mean()) / unit
+    for step in range(_MOST_NEWTON):
+        careful = step >= _BOLD
+        if step == _BOLD:
+            force[todo], late = np.tile(laws.loads.sum(axis=-1), (n, 1))[todo], todo
+        if step < _REFRESHED or step == _BOLD or again:
+            again = False
+            mu = laws.moments_under(force.reshape(n, P, W))
+            half = (mu.transpose(1, 2, 0, 3) @ S).reshape(P, W, n, W, 3).transpose(2, 0, 1, 3, 4)
+            between = (half * mu[:, :, None]).sum(axis=-1).reshape(-1, W, W) / unit
+            bent = (apart + (mu * field).sum(axis=-1)).reshape(-1, W) / unit
+        F, matrix = force[todo], system[: len(todo)]
+        value, slope = laws.approaches(F, position[todo])
+        matrix[:, :W, :W] = between[todo] + laws.supports / unit
+        gap = bent[todo] + value / unit - motions[todo] @ G.T
+        gap += (matrix[:, :W, :W] @ F[..., None])[..., 0]
+        on = closed[todo] if careful else (F > 0.0) | (gap < 0.0)
+        matrix[:, own, own] += slope / unit
+        matrix[:, :W, :W], matrix[:, :W, W:] = matrix[:, :W, :W] * on[..., None], -G * on[..., None]
+        matrix[:, own, own] += ~on
+        balance = load - F @ G - _SOFTEST * motions[todo]
+        right = np.concatenate([np.where(on, -gap, -F), balance], axis=1)
+        change = np.linalg.solve(matrix, right[..., None])[..., 0]
+        length = np.ones(len(todo))
+        if careful:
+            falls = on & (change[:, :W] < 0.0)
+            reach = np.divide(-F, change[:, :W], out=np.full(F.shape, np.inf), where=falls)
+            length = np.minimum(reach.min(axis=1), 1.0)
+            closed[todo] = on & (reach > length[:, None])
+        force[todo] = np.maximum(F + length[:, None] * change[:, :W], 0.0)
+        motions[todo] += length[:, None] * change[:, W:]
+        ended = (np.abs(change[:, :W]).max(axis=1) < limit) & (length == 1.0) & (step >= _REFRESHED)
+        if careful:
+            force[todo] = np.where(closed[todo], force[todo], 0.0)
+            overlap = np.where(on, 0.0, gap)
+            deepest, worst = overlap.min(axis=1), overlap.argmin(axis=1)
+            more = ended & (deepest < overlaps)
+            closed[todo[more], worst[more]] = True
+            ended &= ~more
+        elif step == _BOLD - 1:
+            closed[todo] = np.tile(laws.loads.sum(axis=-1), (n, 1))[todo] > 0.0
+        solved[todo[ended]], todo = True, todo[~ended]
+        if not len(todo):
+            if not len(late):
+                break
+            # once more with the moments of the forces that were found
+            todo, late, again = late, todo, True
+    solved[late] = False
+    loaded, meshes = force > _FAINT * np.abs(load).max(), int(laws.mesh[-1]) + 1
+    force, slope = np.where(loaded, force, 0.0), laws.approaches(force, position)[1]
+    between[:, own, own] = slope / unit
+    between = np.where(loaded[:, :, None] & loaded[:, None], between, np.eye(W))
+    each, pairs = np.arange(meshes), W // meshes
+    own_mesh = between.reshape(-1, meshes, pairs, meshes, pairs)[:, each, :, each].swapaxes(0, 1)
+    ones = loaded.reshape(-1, meshes, pairs, 1).astype(float)
+    stiffness = (ones * np.linalg.solve(own_mesh, ones)).sum(axis=(2, 3)) / unit
+    shape = n, P, -1
+    return force.reshape(shape), motions.reshape(shape) * unit, stiffness.reshape(shape), solved.reshape(n, P)

@@ -301,7 +301,7 @@ def walk_mesh_cycle(
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
         springs = bearing_springs(solved, supports, members)
         walk = _Walk(solved, bodies, abs(sun_torque), deviations, members, springs, record, options)
-        found = in_windows(walk.attempt, *walk.first_windows())
+        found = in_windows(walk.attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
     return _seen_from_front(record, planetary_set, order) if mirrored else record
 
@@ -342,6 +342,30 @@ def cycle_without_load(
     )
 
 
+def first_windows(planetary_set: PlanetarySet, bodies: Bodies, sun_torque: float) -> tuple[float, float]:
+    """Share [N] and nearest [m] of the first windows under a torque [N m], as `mesh_windows` takes them."""
+    s, width = planetary_set, bodies.face_width
+    # without torque what one micrometre of wedging may carry
+    share = sun_torque / (s.sun.base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
+    rough = share / (ROUGH_STIFFNESS * width)
+    # a ring on a soft foundation lets flanks come nearer than teeth alone do
+    yields = max(body.regular[0].diagonal().max() for body in (bodies.sun, bodies.planet, bodies.ring))
+    return share, max(3.0 * rough, rough + share * yields)
+
+
+def check_residual(found: Candidates, state: BatchState) -> None:
+    """Refuse (E-CONTACT) a solution that violates its conditions by more than `LARGEST_RESIDUAL`."""
+    if not (state.residual <= LARGEST_RESIDUAL).all():
+        worst = int(np.argmax(~(state.residual <= LARGEST_RESIDUAL)))
+        raise ContactError(
+            f"the contact solution at position {found.position[worst]} violates its conditions by "
+            f"{state.residual[worst]:.2g}",
+            code="E-CONTACT",
+            limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
+            remedy="look for stiffnesses, clearances or separations of very different size",
+        )
+
+
 @dataclass(frozen=True)
 class _Walk:
     """A set under a torque that is not negative, and the record without load at the positions to solve."""
@@ -354,17 +378,6 @@ class _Walk:
     springs: BearingSprings | None
     empty: MeshCycle
     options: CycleOptions
-
-    def first_windows(self) -> tuple[float, float]:
-        """Share [N] and nearest [m] of the first windows, as `mesh_windows` takes them."""
-        s, width = self.planetary_set, self.bodies.face_width
-        # without torque what one micrometre of wedging may carry
-        share = self.sun_torque / (s.sun.base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
-        rough = share / (ROUGH_STIFFNESS * width)
-        # a ring on a soft foundation lets flanks come nearer than teeth alone do
-        bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
-        yields = max(body.regular[0].diagonal().max() for body in bodies)
-        return share, max(3.0 * rough, rough + share * yields)
 
     def attempt(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
         """Solve all positions in windows of one size, or up to one that needs more, see `in_windows`."""
@@ -407,15 +420,7 @@ class _Walk:
 
     def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
         """What `MeshCycle` keeps of some positions, by the names of its fields."""
-        if not (state.residual <= LARGEST_RESIDUAL).all():
-            worst = int(np.argmax(~(state.residual <= LARGEST_RESIDUAL)))
-            raise ContactError(
-                f"the contact solution at position {found.position[worst]} violates its conditions by "
-                f"{state.residual[worst]:.2g}",
-                code="E-CONTACT",
-                limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
-                remedy="look for stiffnesses, clearances or separations of very different size",
-            )
+        check_residual(found, state)
         N, P, members, options = found.setup.n_planets, len(found.position), self.members, self.options
         tooth_load = found.by_pairs(state.loads.sum(axis=-1))
         force = np.zeros((4 * N, P))

@@ -1,6 +1,6 @@
 """Studies of a case: design maps, derivatives, optimisation, sweeps.
 
-Transmission error over torque and relief, load sharing over pin errors and the derivatives of both start from
+Transmission error over torque and relief, as-built samples and the derivatives of both start from
 gears and their compliances; searches, Pareto fronts and sweeps change entries of the case file.
 """
 

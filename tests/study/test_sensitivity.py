@@ -13,8 +13,8 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, MeasuredProfile
 from femgear.study.relief import design_basis, two_pair_length, with_tip_relief
+from femgear.study.samples import Tolerances, sample_model, spring_numbers
 from femgear.study.sensitivity import linearise, pin_sensitivities, sensitivity
-from femgear.study.sharing import pin_samples, sharing_model, sharing_of_samples
 from femgear.trains.reading import read_case, with_value
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
@@ -220,17 +220,20 @@ def test_a_floating_sun_makes_the_shares_of_three_planets_insensitive_to_pins(ba
 
 @pytest.mark.parametrize("supports", [RIGID, SPRUNG], ids=["fixed", "sprung"])
 def test_linear_shares_are_those_of_monte_carlo_for_small_errors(basis, supports):
-    """Sample by sample and in their spread; the curves of `sharing_model` are another method."""
+    """Sample by sample and in their spread; the springs of tooth pairs are another method."""
     basis = replace(basis, supports=supports, positions=8)
-    pins = pin_samples(3, samples=2000, radial=0.05e-6, tangential=0.05e-6, seed=6)
-    model = sharing_model(basis, sun_torque=TORQUE, position=3, loads=24)
-    sampled = sharing_of_samples(model, pins)
+    law = {"distribution": "normal", "sigma": "0.05 um"}
+    tolerances = Tolerances.model_validate({"pin_errors": {"radial": law, "tangential": law}})
+    model = sample_model(basis, tolerances, sun_torque=TORQUE, positions=np.array([3 / 8]))
+    errors = model.draw(6, 0, 2000)
+    sampled = spring_numbers(model, errors)["planet_share"]
+    pins = np.moveaxis(errors.reshape(2000, 2, 3), 1, 2)
     linear = linearise(basis, sun_torque=TORQUE, only=[3])
     slopes = pin_sensitivities(linear)[..., 0]
     shares = linear.share[:, 0] + np.einsum("nmw,smw->sn", slopes, pins)
-    spread = sampled.share.std(axis=0)
+    spread = sampled.std(axis=0)
     np.testing.assert_allclose(shares.std(axis=0), spread, rtol=0.02)
-    assert np.abs(shares - sampled.share).max() < 0.1 * spread.max()
+    assert np.abs(shares - sampled).max() < 0.1 * spread.max()
     # the variance that the sensitivities propagate: sigma^2 sum of squares
     np.testing.assert_allclose(0.05e-6 * np.sqrt((slopes**2).sum(axis=(1, 2))), spread, rtol=0.06)
 

@@ -1,0 +1,387 @@
+"""As-built sets: closed forms of load sharing, springs against the whole contact problem, the command."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.cli import main
+from femgear.contact.batch import PairLaws, solve_laws
+from femgear.contact.solve import solve_contact
+from femgear.contact.supports import RIGID, Supports
+from femgear.errors import CaseError
+from femgear.gears.deviations import no_deviations
+from femgear.run import grid_cache, solve
+from femgear.storage.files import read_dataset
+from femgear.study.relief import design_basis
+from femgear.study.samples import (
+    Law,
+    Tolerances,
+    exact_numbers,
+    over_a_turn,
+    read_tolerances,
+    sample_block,
+    sample_case,
+    sample_model,
+    spring_numbers,
+)
+from femgear.trains.reading import read_case, with_value, with_values
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
+CASE, TOLERANCES = CASES / "planetary_27_40_108.toml", CASES / "tolerances_3um.toml"
+TORQUE = 100.0
+ALPHA = math.radians(24.6)
+"""Lin and Parker, J. Vib. Acoust. 121 (1999): pressure angle, mesh stiffness 5e8 N/m, bearings."""
+SPRUNG = Supports(sun=5e7, carrier=2e8, planet=3e8)
+
+
+def law(sigma="3 um", **more):
+    return {"distribution": "normal", "sigma": sigma, **more}
+
+
+def tolerances(**sections):
+    return Tolerances.model_validate(sections)
+
+
+PITCH_AND_PINS = tolerances(
+    **{name: {"cumulative_pitch": law()} for name in ("sun", "planet", "ring")},
+    pin_errors={"radial": law(), "tangential": law()},
+)
+ALL = tolerances(
+    sun={"pitch": law("2 um"), "runout_amplitude": law("5 um", limit="8 um"), "profile_slope": law("2 um")},
+    planet={
+        "cumulative_pitch": {"distribution": "uniform", "limit": "3 um"},
+        "runout_amplitude": law("4 um"),
+        "profile_slope": law("2 um", mean="1 um"),
+        "thickness_reduction": law("2 um", mean="20 um"),
+    },
+    ring={"profile_slope": law("3 um"), "thickness_reduction": law("2 um"), "runout_amplitude": law()},
+    carrier={"runout_amplitude": law()},
+    pin_errors={"tangential": law("2 um")},
+)
+
+
+@pytest.fixture(scope="module")
+def case():
+    return with_value(read_case(CASE), "static.flank_elements", 8)
+
+
+@pytest.fixture(scope="module")
+def basis(case):
+    return design_basis(case, cache=grid_cache())
+
+
+@pytest.fixture(scope="module")
+def model(basis):
+    return sample_model(basis, PITCH_AND_PINS, sun_torque=TORQUE)
+
+
+def linear_laws(n_planets, load, *, bearing, sun=None, others=math.inf, mesh=5e8):
+    """Planets as linear springs, both meshes under the angle ALPHA; the sun fixed, floating (0) or sprung.
+
+    Carrier and ring rest on springs `others`.
+    """
+    psi = 2 * np.pi * np.arange(n_planets) / n_planets
+    path = 2 / mesh + (2 * math.cos(ALPHA)) ** 2 / bearing
+    axis = psi + np.pi / 2 - ALPHA
+    normals = np.column_stack([np.cos(axis), np.sin(axis)])
+    on_ring = np.column_stack([np.cos(psi - np.pi / 2 + ALPHA), np.sin(psi - np.pi / 2 + ALPHA)])
+    of_carrier = on_ring - normals
+    coupling = (on_ring @ on_ring.T + of_carrier @ of_carrier.T) / others
+    coupling += normals @ normals.T / sun if sun else 0.0
+    free = normals if sun == 0 else np.zeros((n_planets, 0))
+    approach = np.column_stack([np.ones(n_planets), free])
+    own = np.arange(n_planets)
+    return PairLaws(
+        force=np.geomspace(1e-3, 1.0, 6) * load,
+        yields=np.full((1, n_planets, 6), path),
+        moments=np.tile([0.0, 1.0, 0.0], (1, n_planets, 6, 1)),
+        touching=np.zeros((1, n_planets, 1)),
+        smooth=np.zeros((1, n_planets, 3, n_planets, 3)),
+        supports=coupling,
+        separation=np.zeros((1, n_planets)),
+        mesh=own,
+        approach=approach,
+        loads=np.zeros((1, n_planets, 3)),
+        motions=np.zeros((1, approach.shape[1])),
+    )
+
+
+def spring_shares(laws, load, errors):
+    """Shares (S, N) under tangential pin errors (S, N) [m], positive away from the path."""
+    right = np.zeros(laws.approach.shape[1])
+    right[0] = load
+    found = solve_laws(laws, right, 2 * math.cos(ALPHA) * np.asarray(errors, float)[:, None])
+    assert found[3].all()
+    return found[0][:, 0] / load
+
+
+@pytest.mark.parametrize("floating", [True, False])
+@pytest.mark.parametrize("n_planets", [3, 4])
+def test_linear_meshes_share_as_the_closed_form_says(n_planets, floating):
+    """F_i = W/N - k_path 2 cos(alpha) res_i: least-squares residual by {1, cos psi, sin psi} or by {1}."""
+    load, bearing = 20e3, 1e8
+    laws = linear_laws(n_planets, load, bearing=bearing, sun=0.0 if floating else None)
+    errors = np.random.default_rng(3).normal(0.0, 8e-6, (50, n_planets))
+    psi = 2 * np.pi * np.arange(n_planets) / n_planets
+    columns = [np.ones(n_planets)] + ([np.cos(psi), np.sin(psi)] if floating else [])
+    basis = np.linalg.qr(np.column_stack(columns))[0]
+    rest = errors - errors @ basis @ basis.T
+    k_path = 1 / (1 / 5e8 + 1 / 5e8 + 4 * math.cos(ALPHA) ** 2 / bearing)
+    expected = 1 / n_planets - k_path * 2 * math.cos(ALPHA) * rest / load
+    assert expected.min() > 0
+    np.testing.assert_allclose(spring_shares(laws, load, errors), expected, rtol=1e-8)
+
+
+def test_published_shares():
+    """A pin 20 um early at 20 kN: shares to the printed digits, bearings 1e8 N/m."""
+    four = spring_shares(linear_laws(4, 20e3, bearing=1e8, sun=0.0), 20e3, [[-20e-6, 0, 0, 0]])
+    assert four[0] == pytest.approx([0.2623, 0.2377, 0.2623, 0.2377], abs=5e-5)
+    three = spring_shares(linear_laws(3, 20e3, bearing=1e8), 20e3, [[-20e-6, 0, 0]])
+    assert three[0] == pytest.approx([0.366, 0.317, 0.317], abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("n_planets", "sun", "forces"),
+    [
+        (3, 0.0, [861.1039] * 3),
+        (3, 1e9, [585.99, 998.66, 998.66]),
+        (4, 1e9, [326.18, 770.26, 716.60, 770.26]),
+        (4, 0.0, [521.39, 770.26, 521.39, 770.26]),
+    ],
+)
+def test_sharing_with_a_sprung_sun(n_planets, sun, forces):
+    """A pin 2 um late under 2583.3118 N: an independent static solution with 3 (N + 3) coordinates.
+
+    Its carrier and ring are held by 1e12 N/m.
+    """
+    load = 2583.3118
+    laws = linear_laws(n_planets, load, bearing=1e9, sun=sun, others=1e12)
+    found = spring_shares(laws, load, [[2e-6] + [0.0] * (n_planets - 1)])
+    assert found[0] * load == pytest.approx(forces, abs=6e-3)
+
+
+def test_planets_open_under_large_errors():
+    """Alone on a fixed sun; on a floating one, by statics, opposite planets lose their load together."""
+    fixed = spring_shares(linear_laws(3, 1e3, bearing=1e9), 1e3, [[1e-3, 0, 0], [0, -1e-3, 0], [0, 0, 0]])
+    np.testing.assert_allclose(fixed, [[0, 0.5, 0.5], [0, 1, 0], [1 / 3] * 3], atol=1e-9)
+    floating = linear_laws(4, 1e3, bearing=1e9, sun=0.0)
+    found = spring_shares(floating, 1e3, [[1e-3, 0, 0, 0], [0, 0, 0, -1e-3]])
+    np.testing.assert_allclose(found, [[0, 0.5, 0, 0.5]] * 2, atol=1e-8)
+
+
+@pytest.mark.parametrize("sun", [None, 0.0, 1e8])
+def test_newton_agrees_with_the_general_contact_solver(sun):
+    """Five planets, many open: every sample is a contact problem of its own."""
+    load = 4e3
+    laws = linear_laws(5, load, bearing=1e9, sun=sun)
+    errors = np.random.default_rng(9).normal(0.0, 3e-6, (60, 5))
+    shares = spring_shares(laws, load, errors)
+    assert (shares == 0).any()
+    H = laws.supports + np.diag(laws.yields[0, :, 0])
+    right = np.zeros(laws.approach.shape[1])
+    right[0] = load
+    for share, error in zip(shares, errors, strict=True):
+        state = solve_contact(H, 2 * math.cos(ALPHA) * error, laws.approach, right)
+        np.testing.assert_allclose(share, state.loads / load, atol=1e-9)
+
+
+def walked(basis, model, errors, torque):
+    """Numbers of one sample from the walk through the mesh cycle."""
+    positions = model.basis.gears.equal_positions(16)
+    cycle = replace(basis, deviations=model.deviations(errors), positions=positions).walk(torque)
+    N = basis.gears.n_planets
+    return {
+        "transmission_error": np.ptp(cycle.sun_arc),
+        "planet_share": cycle.load_share.max(axis=1),
+        "opens": (cycle.load_share <= 0).any(axis=1),
+        "mesh_stiffness": cycle.stiffness.reshape(2, N, -1).mean(axis=(1, 2)),
+    }
+
+
+def assert_equal(found, expected, rtol):
+    for name, values in expected.items():
+        np.testing.assert_allclose(found[name], values, rtol=rtol, atol=rtol * np.abs(values).max())
+
+
+@pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
+@pytest.mark.parametrize(
+    "supports", [RIGID, SPRUNG, Supports(sun=0.0)], ids=["fixed", "sprung", "floating sun"]
+)
+def test_samples_are_those_of_the_walk_through_the_mesh_cycle(basis, torque, supports):
+    basis = replace(basis, supports=supports)
+    model = sample_model(basis, PITCH_AND_PINS, sun_torque=torque)
+    errors = model.draw(1, 4, 4)
+    exact, springs = exact_numbers(model, errors), spring_numbers(model, errors)
+    for i in (0, 3):
+        one = walked(basis, model, errors[i], torque)
+        assert_equal({name: values[i] for name, values in exact.items()}, one, 1e-9)
+    assert exact["opens"].any() == (supports == RIGID)
+    np.testing.assert_array_equal(springs["opens"], exact["opens"])
+    for name, most in (("transmission_error", 3e-3), ("planet_share", 1e-3), ("mesh_stiffness", 1e-2)):
+        np.testing.assert_allclose(springs[name], exact[name], rtol=0, atol=most * exact[name].max())
+    if supports.sun == 0.0:  # statics: three forces through known lines
+        np.testing.assert_allclose(exact["planet_share"], 1 / 3, rtol=1e-8)
+
+
+@pytest.mark.parametrize("planets", [4, 5])
+def test_planets_out_of_phase(case, planets):
+    """Five planets of 36/24/84 teeth in sequential phases; four at uneven angles."""
+    values = {"set.planets": planets}
+    if planets == 4:
+        values |= {"set.planet_angles": [f"{k * 360 / 135!r} deg" for k in (0, 33, 68, 101)]}
+    else:
+        values |= {"sun.teeth": 36, "planet.teeth": 24, "ring.teeth": 84, "set.centre_distance": "45 mm"}
+        values |= {"sun.bore_radius": "12 mm", "planet.bore_radius": "9 mm", "ring.outer_radius": "80 mm"}
+        values |= {"sun.profile_shift": 0.0, "ring.profile_shift": None, "rack.root_radius": 0.2}
+    basis = design_basis(with_values(case, values), cache=grid_cache())
+    model = sample_model(basis, PITCH_AND_PINS, sun_torque=TORQUE)
+    errors = model.draw(2, 0, 2)
+    exact, springs = exact_numbers(model, errors), spring_numbers(model, errors)
+    assert_equal(
+        {name: values[1] for name, values in exact.items()}, walked(basis, model, errors[1], TORQUE), 1e-9
+    )
+    assert_equal(springs, exact, 1e-2)
+
+
+def test_all_kinds_of_errors_at_a_negative_torque(basis):
+    """Slopes tilt the windows where they are: the walk, which moves them, cuts them into other cells."""
+    model = sample_model(basis, ALL, sun_torque=-TORQUE)
+    errors = model.draw(5, 0, 3)
+    exact, springs = exact_numbers(model, errors), spring_numbers(model, errors)
+    for i in range(2):
+        one = walked(basis, model, errors[i], -TORQUE)
+        assert_equal({name: values[i] for name, values in exact.items()}, one, 6e-3)
+    assert_equal(springs, exact, 1e-2)
+
+
+def test_no_errors_give_the_set_of_the_case(basis):
+    nothing = tolerances(sun={"cumulative_pitch": law("0 um")}, pin_errors={"radial": law("0 um")})
+    own = replace(no_deviations(basis.gears), pin_errors=[[0, 2e-6], [1e-6, 0], [0, 0]])
+    for deviations in (None, own):
+        placed = replace(basis, deviations=deviations)
+        model = sample_model(placed, nothing, sun_torque=TORQUE)
+        exact, springs = (sample_block(model, 1, 0, 2, exact=way) for way in (True, False))
+        assert_equal(exact, springs, 2e-3)
+        cycle = replace(placed, positions=16).walk(TORQUE)
+        np.testing.assert_allclose(exact["transmission_error"], np.ptp(cycle.sun_arc), rtol=1e-9)
+
+
+def test_a_sample_repeats_by_itself_and_follows_its_laws(model):
+    whole, alone = sample_block(model, 7, 0, 40), sample_block(model, 7, 37, 1)
+    for name in whole:
+        np.testing.assert_allclose(alone[name][0], whole[name][37], rtol=1e-9)
+    assert not np.array_equal(model.draw(7, 0, 1), model.draw(8, 0, 1))
+    share = np.random.default_rng(1).random(100_000)
+    cut = Law(distribution="normal", mean="1 um", sigma="2 um", limit="3 um").at(share)
+    assert np.abs(cut - 1e-6).max() <= 3e-6
+    # standard deviation of a normal law cut off at 1.5 of its own
+    assert cut.std() == pytest.approx(2e-6 * 0.7426, rel=0.01)
+    free = Law(distribution="normal", sigma="2 um").at(share)
+    assert free.std() == pytest.approx(2e-6, rel=0.01) and np.abs(free).max() > 7e-6
+    even = Law(distribution="uniform", mean="1 um", limit="4 um").at(share)
+    assert even.min() == pytest.approx(-3e-6, abs=1e-9)
+    assert even.std() == pytest.approx(8e-6 / 12**0.5, rel=0.01)
+
+
+def test_over_a_turn_is_the_walk_over_as_many_periods(basis):
+    small = tolerances(sun={"runout_amplitude": law("4 um")}, pin_errors={"tangential": law("1 um")})
+    model = sample_model(basis, small, sun_torque=-TORQUE, positions=8)
+    errors = model.draw(3, 0, 1)[0]
+    cycle = replace(basis, deviations=model.deviations(errors), positions=8).walk(-TORQUE, periods=27)
+    # the sun repeats after 27 mesh periods, a quarter of the ring's 108 teeth
+    ste, share = over_a_turn(model, errors)
+    assert ste == pytest.approx(np.ptp(cycle.sun_arc), rel=3e-3)
+    assert share == pytest.approx(cycle.load_share.max(), rel=3e-3)
+
+
+def test_a_sample_is_a_case(case, basis):
+    own = with_values(case, {
+        "sun.modifications": [{"kind": "profile crowning", "amount": "2 um"}],
+        "planet.errors.runout_amplitude": "3 um",
+    })  # fmt: skip
+    model = sample_model(replace(basis, deviations=set_deviations(own)), ALL, sun_torque=TORQUE)
+    made = set_deviations(sample_case(own, model, 4, 11))
+    wanted = model.deviations(model.draw(4, 11, 1)[0])
+    for name in ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch", "pin_errors"):
+        np.testing.assert_allclose(getattr(made, name), getattr(wanted, name), atol=1e-15)
+    np.testing.assert_allclose(made.planet_thickness, wanted.planet_thickness, atol=1e-15)
+    for one, two in zip(made.planet_runout, wanted.planet_runout, strict=True):
+        assert one.amplitude == pytest.approx(two.amplitude) and one.phase == pytest.approx(two.phase)
+    for name in ("sun", "planet_sun_side", "planet_ring_side", "ring"):
+        found, expected = ([m.amount for m in getattr(d, name).modifications] for d in (made, wanted))
+        assert found == pytest.approx(expected)
+
+
+def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, capsys):
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(case.source, encoding="utf-8")
+    words = ["samples", str(path), "--tolerances", str(TOLERANCES), "-o", str(out), "--seed", "3"]
+    assert main([*words, "-n", "30"]) == 0
+    said = capsys.readouterr().out
+    data = read_dataset(out / "samples.nc")
+    assert data.sizes["sample"] == 30 and data.attrs["seed"] == 3 and "sigma" in data.attrs["tolerances"]
+    assert data.transmission_error.attrs["units"] == "m"
+    error = float(data.transmission_error_error)
+    assert 0 < error < 1e-3 and f"{error:.1e} (transmission error)" in said
+    worst = data.attrs["worst"]
+    assert worst == int(data.transmission_error.values.argmax()) and worst in data.check.values
+    assert (out / "samples.png").read_bytes()[:4] == b"\x89PNG"
+    # femgear run of the worst sample gives the exact number
+    static = solve(read_case(out / "worst.toml"), "static")["static"]
+    exact = data.transmission_error_exact.values[data.check.values == worst]
+    assert np.ptp(static.cycle.sun_arc) == pytest.approx(exact[0], rel=1e-6)
+    assert main([*words, "--index", str(worst)]) == 0
+    again = read_case(out / f"sample_{worst}.toml")
+    assert again == read_case(out / "worst.toml")
+    assert main([*words, "--method", "exact", "-n", "2"]) == 0
+    few = read_dataset(out / "samples.nc")
+    np.testing.assert_allclose(few.transmission_error, data.transmission_error[:2], rtol=1e-3)
+    assert planetary_set(again).n_planets == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[sun]\npich = { distribution = "normal", sigma = "3 um" }', "2: sun.pich: unknown key"),
+        ('[sun]\npitch = { distribution = "normal" }', "2: sun.pitch: a normal distribution needs"),
+        ('[sun]\npitch = { distribution = "gamma" }', "2: sun.pitch.distribution: not one of the choices"),
+        ('[sun]\npitch = { distribution = "normal", sigma = "3" }', "2: sun.pitch.sigma: a length needs"),
+        ('[sun]\npitch = { distribution = "normal", sigma = "-3 um" }', "not plausible"),
+        ('[ring]\npitch = { distribution = "normal", sigma = "90 um" }', "2: ring.pitch: errors of 450 um"),
+        ('[sun]\npitch = { distribution = "uniform", sigma = "3 um", limit = "1 um" }', "has no sigma"),
+        ('[gear]\npitch = 3', "gear: unknown key"),
+        ('[sun]\n[carrier]', "no error has a tolerance"),
+        ('[pin_errors]\nradial = "3 um"', "a table is needed, not a text"),
+    ],
+)  # fmt: skip
+def test_mistakes_of_a_tolerances_file(text, said, tmp_path):
+    path = tmp_path / "wrong.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CaseError) as caught:
+        read_tolerances(path, 1.5e-3)
+    assert said in str(caught.value) and "wrong.toml" in str(caught.value)
+
+
+def test_refusals(basis, case, tmp_path, capsys):
+    both = {"pitch": law(), "cumulative_pitch": law()}
+    with pytest.raises(ValueError, match="say the same"):
+        tolerances(sun=both)
+    with pytest.raises(CaseError, match="nothing touches"):
+        sample_model(basis, PITCH_AND_PINS, sun_torque=0.0)
+    with pytest.raises(CaseError, match="no clearance"):
+        loose = replace(basis, supports=Supports(planet=1e8, planet_clearance=1e-6))
+        sample_model(loose, PITCH_AND_PINS, sun_torque=1.0)
+    path = tmp_path / "case.toml"
+    path.write_text(with_value(case, "static.back_flanks", True).source, encoding="utf-8")
+    words = ["samples", str(path), "--tolerances", str(TOLERANCES), "-o", str(tmp_path / "out")]
+    for more, said in (
+        ([], "static.back_flanks"), (["-n", "0"], "--number"), (["--positions", "4"], "--positions"),
+        (["--seed=-1"], "--seed"), (["--index=-2"], "--index"),
+    ):  # fmt: skip
+        assert main([*words, *more]) == 2
+        assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
