@@ -588,43 +588,76 @@ def solve_laws(
     solved : (n, P) bool array
         Whether the iteration ended.
     """
-    (n, P, W), m, own = separations.shape, len(load), np.arange(separations.shape[2])
-    # motions and approaches over one compliance, that of an absent window (1 m/N) among them: it keeps the
-    # soft spring far below all others
-    unit = float(laws.yields.mean())
-    G, position, S = laws.approach, np.tile(np.arange(P), n), laws.smooth.reshape(P, W, 3, 3 * W)
-    field = (S @ laws.loads.reshape(P, 1, -1, 1))[..., 0]
-    field += (laws.loads.sum(axis=-1) @ laws.supports)[..., None]
-    field = -field if tilts is None else tilts - field
-    apart = laws.separation + separations
-    force = np.tile(laws.loads.sum(axis=-1), (n, 1))
-    motions, solved = np.tile(laws.motions, (n, 1)) / unit, np.zeros(n * P, bool)
-    todo, between, bent = np.arange(n * P), np.zeros((n * P, W, W)), np.zeros((n * P, W))
-    system = np.zeros((n * P, W + m, W + m))
-    system[:, W:, :W], system[:, range(W, W + m), range(W, W + m)] = G.T, _SOFTEST
-    closed, late, again = force > 0.0, todo[:0], False
-    limit = _SETTLED * np.abs(load).max()
-    overlaps = -limit * float(laws.yields[np.isfinite(laws.separation)].mean()) / unit
-    for step in range(_MOST_NEWTON):
-        careful = step >= _BOLD
-        if step == _BOLD:
-            force[todo], late = np.tile(laws.loads.sum(axis=-1), (n, 1))[todo], todo
-        if step < _REFRESHED or step == _BOLD or again:
-            again = False
-            mu = laws.moments_under(force.reshape(n, P, W))
-            half = (mu.transpose(1, 2, 0, 3) @ S).reshape(P, W, n, W, 3).transpose(2, 0, 1, 3, 4)
-            between = (half * mu[:, :, None]).sum(axis=-1).reshape(-1, W, W) / unit
-            bent = (apart + (mu * field).sum(axis=-1)).reshape(-1, W) / unit
-        F, matrix = force[todo], system[: len(todo)]
-        value, slope = laws.approaches(F, position[todo])
-        matrix[:, :W, :W] = between[todo] + laws.supports / unit
-        gap = bent[todo] + value / unit - motions[todo] @ G.T
+    newton = _SpringNewton(laws, np.asarray(load, float), separations, tilts)
+    newton.solve()
+    shape, force = (*separations.shape[:2], -1), newton.carried()
+    motions, stiffness = newton.motions * newton.unit, newton.stiffness(force)
+    solved = newton.solved.reshape(shape[:2])
+    return force.reshape(shape), motions.reshape(shape), stiffness.reshape(shape), solved
+
+
+class _SpringNewton:
+    """Newton's method of `solve_laws` on all positions of all sets, n P in a row.
+
+    Motions and approaches are over ``unit``, a mean compliance. ``todo`` are the positions that go on.
+    """
+
+    def __init__(self, laws: PairLaws, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None):
+        (n, P, W), m = separations.shape, len(load)
+        self.laws, self.load, self.sets, self.own = laws, load, n, np.arange(W)
+        self.unit = float(laws.yields[np.isfinite(laws.separation)].mean())
+        self.position, self.S = np.tile(np.arange(P), n), laws.smooth.reshape(P, W, 3, 3 * W)
+        field = (self.S @ laws.loads.reshape(P, 1, -1, 1))[..., 0]
+        field += (laws.loads.sum(axis=-1) @ laws.supports)[..., None]
+        self.field = -field if tilts is None else tilts - field
+        self.apart = laws.separation + separations
+        self.first = np.tile(laws.loads.sum(axis=-1), (n, 1))
+        self.force, self.motions = self.first.copy(), np.tile(laws.motions, (n, 1)) / self.unit
+        self.solved, self.closed = np.zeros(n * P, bool), self.first > 0.0
+        self.system = np.zeros((n * P, W + m, W + m))
+        self.system[:, W:, :W] = laws.approach.T
+        self.system[:, range(W, W + m), range(W, W + m)] = _SOFTEST
+        self.limit = _SETTLED * np.abs(load).max()
+
+    def refresh(self) -> None:
+        """Take the moments of the pressures from the forces as they are."""
+        P, W = self.field.shape[-3], len(self.own)
+        mu = self.laws.moments_under(self.force.reshape(self.sets, P, W))
+        half = (mu.transpose(1, 2, 0, 3) @ self.S).reshape(P, W, self.sets, W, 3).transpose(2, 0, 1, 3, 4)
+        self.between = (half * mu[:, :, None]).sum(axis=-1).reshape(-1, W, W) / self.unit
+        self.bent = (self.apart + (mu * self.field).sum(axis=-1)).reshape(-1, W) / self.unit
+
+    def solve(self) -> None:
+        """Iterate until all positions are solved, or for `_MOST_NEWTON` steps."""
+        todo, late, again = np.arange(len(self.position)), np.arange(0), False
+        for step in range(_MOST_NEWTON):
+            if step == _BOLD:
+                self.force[todo], self.closed[todo], late = self.first[todo], self.first[todo] > 0.0, todo
+            if step < _REFRESHED or step == _BOLD or again:
+                self.refresh()
+                again = False
+            ended = self.step(todo, careful=step >= _BOLD) & (step >= _REFRESHED)
+            self.solved[todo[ended]], todo = True, todo[~ended]
+            if not len(todo):
+                if not len(late):
+                    return
+                # once more with the moments of the forces that were found
+                todo, late, again = late, todo, True
+        self.solved[late] = False
+
+    def step(self, todo: np.ndarray, *, careful: bool) -> np.ndarray:
+        """Take a step at some positions; whether each of them has come to its end."""
+        laws, W, F = self.laws, len(self.own), self.force[todo]
+        matrix, G, own = self.system[: len(todo)], laws.approach, self.own
+        value, slope = laws.approaches(F, self.position[todo])
+        matrix[:, :W, :W] = self.between[todo] + laws.supports / self.unit
+        gap = self.bent[todo] + value / self.unit - self.motions[todo] @ G.T
         gap += (matrix[:, :W, :W] @ F[..., None])[..., 0]
-        on = closed[todo] if careful else (F > 0.0) | (gap < 0.0)
-        matrix[:, own, own] += slope / unit
+        on = self.closed[todo] if careful else (F > 0.0) | (gap < 0.0)
+        matrix[:, own, own] += slope / self.unit
         matrix[:, :W, :W], matrix[:, :W, W:] = matrix[:, :W, :W] * on[..., None], -G * on[..., None]
         matrix[:, own, own] += ~on
-        balance = load - F @ G - _SOFTEST * motions[todo]
+        balance = self.load - F @ G - _SOFTEST * self.motions[todo]
         right = np.concatenate([np.where(on, -gap, -F), balance], axis=1)
         change = np.linalg.solve(matrix, right[..., None])[..., 0]
         length = np.ones(len(todo))
@@ -632,33 +665,29 @@ def solve_laws(
             falls = on & (change[:, :W] < 0.0)
             reach = np.divide(-F, change[:, :W], out=np.full(F.shape, np.inf), where=falls)
             length = np.minimum(reach.min(axis=1), 1.0)
-            closed[todo] = on & (reach > length[:, None])
-        force[todo] = np.maximum(F + length[:, None] * change[:, :W], 0.0)
-        motions[todo] += length[:, None] * change[:, W:]
-        ended = (np.abs(change[:, :W]).max(axis=1) < limit) & (length == 1.0) & (step >= _REFRESHED)
+            self.closed[todo] = on & (reach > length[:, None])
+        # what is open carries nothing at all: an absent window would close under the last bit of a force
+        carries = self.closed[todo] if careful else on
+        self.force[todo] = np.where(carries, np.maximum(F + length[:, None] * change[:, :W], 0.0), 0.0)
+        self.motions[todo] += length[:, None] * change[:, W:]
+        ended = (np.abs(change[:, :W]).max(axis=1) < self.limit) & (length == 1.0)
         if careful:
-            force[todo] = np.where(closed[todo], force[todo], 0.0)
             overlap = np.where(on, 0.0, gap)
-            deepest, worst = overlap.min(axis=1), overlap.argmin(axis=1)
-            more = ended & (deepest < overlaps)
-            closed[todo[more], worst[more]] = True
+            more = ended & (overlap.min(axis=1) < -self.limit)
+            self.closed[todo[more], overlap.argmin(axis=1)[more]] = True
             ended &= ~more
-        elif step == _BOLD - 1:
-            closed[todo] = np.tile(laws.loads.sum(axis=-1), (n, 1))[todo] > 0.0
-        solved[todo[ended]], todo = True, todo[~ended]
-        if not len(todo):
-            if not len(late):
-                break
-            # once more with the moments of the forces that were found
-            todo, late, again = late, todo, True
-    solved[late] = False
-    loaded, meshes = force > _FAINT * np.abs(load).max(), int(laws.mesh[-1]) + 1
-    force, slope = np.where(loaded, force, 0.0), laws.approaches(force, position)[1]
-    between[:, own, own] = slope / unit
-    between = np.where(loaded[:, :, None] & loaded[:, None], between, np.eye(W))
-    each, pairs = np.arange(meshes), W // meshes
-    own_mesh = between.reshape(-1, meshes, pairs, meshes, pairs)[:, each, :, each].swapaxes(0, 1)
-    ones = loaded.reshape(-1, meshes, pairs, 1).astype(float)
-    stiffness = (ones * np.linalg.solve(own_mesh, ones)).sum(axis=(2, 3)) / unit
-    shape = n, P, -1
-    return force.reshape(shape), motions.reshape(shape) * unit, stiffness.reshape(shape), solved.reshape(n, P)
+        return ended
+
+    def carried(self) -> np.ndarray:
+        """Forces (n P, W) [N], zero where they are of the size of rounding."""
+        return np.where(self.force > _FAINT * np.abs(self.load).max(), self.force, 0.0)
+
+    def stiffness(self, force: np.ndarray) -> np.ndarray:
+        """Tangent stiffness (n P, meshes) of every mesh at constant loads of the others [N/m]."""
+        loaded, meshes = force > 0.0, int(self.laws.mesh[-1]) + 1
+        between, each, pairs = self.between.copy(), np.arange(meshes), len(self.own) // meshes
+        between[:, self.own, self.own] = self.laws.approaches(force, self.position)[1] / self.unit
+        between = np.where(loaded[:, :, None] & loaded[:, None], between, np.eye(len(self.own)))
+        own_mesh = between.reshape(-1, meshes, pairs, meshes, pairs)[:, each, :, each].swapaxes(0, 1)
+        ones = loaded.reshape(-1, meshes, pairs, 1).astype(float)
+        return (ones * np.linalg.solve(own_mesh, ones)).sum(axis=(2, 3)) / self.unit
