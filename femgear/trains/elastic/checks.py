@@ -21,7 +21,7 @@ from femgear.gears.kinematics import torques
 from femgear.report.tables import response_warnings
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
-from femgear.trains.static.description import set_warnings
+from femgear.trains.static.results import set_warnings
 
 if TYPE_CHECKING:
     import xarray as xr

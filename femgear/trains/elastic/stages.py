@@ -92,8 +92,7 @@ from femgear.trains.protocol import (
     silent,
 )
 from femgear.trains.rigid import member_speeds, parts_of_speeds
-from femgear.trains.static.description import describe_set
-from femgear.trains.static.results import StaticResult
+from femgear.trains.static.results import StaticResult, describe_set
 from femgear.trains.static.stages import STATIC, STRESS, case_supports, mesh_backlash, ring_foundation
 
 _LOWEST = 20e3
