@@ -181,9 +181,9 @@ class Quantity:
 def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> Quantity:
     """Define the static transmission error, peak to peak over the record [m].
 
-    It is "overall", from sun to ring along the base circle of the sun, or the largest of one kind of mesh
-    ("sun-planet", "planet-ring"), or of all these; the overall error may vanish while those of the meshes
-    cancel one another. The torque is that of the input, with its unit; that of the case when left out.
+    "overall" goes from sun to ring along the base circle of the sun and may vanish while the errors of the
+    meshes cancel one another; "sun-planet" and "planet-ring" are the largest of their kind, "largest" is that
+    of all these. The torque is that of the input, with its unit; that of the case when left out.
 
     CaseError: no such mesh (E-OBJECTIVE), no torque (E-TORQUE).
     """
