@@ -280,17 +280,8 @@ def _largest(value: float | tuple[float, ...] | None) -> float:
 def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False) -> None:
     """Refuse a sun, carrier or ring without support [N/m] that the forces of the planets cannot hold.
 
-    Parameters
-    ----------
-    case, planetary : Case, PlanetarySet
-        The case, and its gears with the directions of their meshes.
-    dynamic : bool
-        For modes and dynamics, where members move whatever static.members says.
-
-    Raises
-    ------
-    GeometryError
-        E-MECHANISM, with the support stiffness that is zero, or the foundation of a loose ring.
+    ``dynamic``: for modes and dynamics, where members move whatever static.members says. GeometryError:
+    E-MECHANISM, with the support stiffness that is zero, or the foundation of a loose ring.
     """
     if case.static.members == "fixed" and not dynamic:
         return

@@ -264,13 +264,9 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
 def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:
     """Read the columns of a measured profile in SI units; for the file and refusals see `read_columns`.
 
-    Its heading is ``roll angle [deg]`` or ``diameter [mm]``, and ``deviation [um]``, or in other units.
-    Deviations are positive where there is more material.
-
-    Returns
-    -------
-    dict
-        ``"roll_angles"`` [rad] or ``"diameters"`` [m], ascending or descending, and ``"deviations"`` [m].
+    Its heading is ``roll angle [deg]`` or ``diameter [mm]``, and ``deviation [um]``, or in other units. The
+    values are ``"roll_angles"`` [rad] or ``"diameters"`` [m], ascending or descending, and ``"deviations"``
+    [m], positive where there is more material.
     """
     found = read_columns(path, _PROFILE_DIMENSIONS, least=2, most=MOST_POINTS, remedy=_PROFILE_HEADING)
     if "deviation" not in found.values:

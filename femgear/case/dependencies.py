@@ -94,21 +94,10 @@ def _entries(
 
 
 def check_entries(result: Any, kind: type, case_entries: Entries, words: str) -> None:
-    """Refuse a result of another case, or what is no such result.
+    """Refuse a result of another case, or what is no such result; the words name it: ``"static solution"``.
 
-    Parameters
-    ----------
-    result, kind : object, type
-        With the ``entries`` of the case that it belongs to; the kind that is needed.
-    case_entries : mapping
-        The same entries of the case at hand.
-    words : str
-        What the result is, such as ``"static solution"``.
-
-    Raises
-    ------
-    CaseError
-        E-TYPE: another kind of result, or its dataset; E-OTHER-CASE, naming the entries that differ.
+    The result has the ``entries`` of the case that it belongs to; those of the case at hand are the same.
+    CaseError: another kind of result, or its dataset (E-TYPE); E-OTHER-CASE, naming the entries that differ.
     """
     if not isinstance(result, kind):
         raise CaseError(

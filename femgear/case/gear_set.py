@@ -80,11 +80,8 @@ def planetary_set(case: Case) -> PlanetarySet:
     Profile shifts, or the centre distance, that the case leaves out are found. Gears of a helical case are
     those of its transverse section.
 
-    Raises
-    ------
-    GeometryError
-        What cannot be made, assembled or run (see `femgear.gears.checks.check_set`), and members that float
-        without being held (E-MECHANISM), with file and line.
+    GeometryError, with file and line: what cannot be made, assembled or run (see
+    `femgear.gears.checks.check_set`), and members that float without being held (E-MECHANISM).
     """
     need_set(case)
     try:
@@ -222,11 +219,8 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
 def set_deviations(case: Case) -> SetDeviations:
     """Turn modifications and errors of a case into separations of the loaded flanks [m].
 
-    Raises
-    ------
-    GeometryError
-        Modifications that the flanks cannot have (E-MODIFICATION), with file and line, and
-        what `planetary_set` refuses.
+    GeometryError: modifications that the flanks cannot have (E-MODIFICATION), with file and line, and what
+    `planetary_set` refuses.
     """
     s = planetary_set(case)
     sun, ring = case.sun.errors or GearErrors(), case.ring.errors or RingErrors()
@@ -363,14 +357,9 @@ def _range(gear: Gear, low: float, high: float) -> str:
 def with_shafts(case: Case) -> Case:
     """Compute the support stiffness [N/m] that shafts give their members, and set it in the case.
 
-    The member stands on the free end of a stepped cantilever, its face rigidly coupled to the axis, which
-    may tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft is of the material
-    of the gears.
-
-    Raises
-    ------
-    GeometryError
-        Parts that make no shaft (E-SHAFT), with file and line.
+    The member stands on the free end of a stepped cantilever, its face rigidly coupled to the axis, which may
+    tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft is of the material of the
+    gears. GeometryError: parts that make no shaft (E-SHAFT), with file and line.
     """
     found = {}
     for name in _ON_SHAFTS:

@@ -292,12 +292,7 @@ def Number(
 ) -> _Reader:
     """Make the reader of a plain number (integer or float, no text, no boolean) within a window.
 
-    Parameters
-    ----------
-    open_low, open_high : bool
-        Whether the ends themselves are refused.
-    note : str
-        Why, for the message of a refusal.
+    Its ends themselves are refused where they are open; the note says why, for the message of a refusal.
     """
     limit = f"{'above' if open_low else 'from'} {low:g} {'to below' if open_high else 'to'} {high:g}"
 

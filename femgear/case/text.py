@@ -42,11 +42,8 @@ _LONG_KEY = re.compile(
 def read_text(path: str | os.PathLike) -> str:
     """Read the text of a small regular UTF-8 file, without its byte-order mark.
 
-    Raises
-    ------
-    CaseError
-        ``E-FILE``: missing, unreadable, not a regular file, empty or over 1 MB.
-        ``E-FILE-ENC``: not UTF-8, with the offset of the first wrong byte.
+    CaseError: missing, unreadable, not a regular file, empty or over 1 MB (E-FILE); not UTF-8, with the
+    offset of the first wrong byte (E-FILE-ENC).
     """
     name = os.fsdecode(path)
     try:
@@ -90,13 +87,8 @@ def read_text(path: str | os.PathLike) -> str:
 def parse(text: str, name: str) -> dict:
     """Read the tables of a TOML text, of limited depth and with finite numbers only.
 
-    ``name`` is that of the file, for messages.
-
-    Raises
-    ------
-    CaseError
-        ``E-TOML``: syntax, with line and column; a key given twice, with both lines; nested too deeply.
-        ``E-FINITE``, with keys and lines.
+    ``name`` is that of the file, for messages. CaseError: syntax, with line and column, a key given twice,
+    with both lines, or nested too deeply (E-TOML); E-FINITE, with keys and lines.
     """
     if len(_LONG_KEY.findall(text)) > _MOST_LONG_KEYS:
         raise _too_deep(name)
@@ -284,10 +276,7 @@ def write(data: dict) -> str:
 def text_with_points(data: dict, name: str) -> str:
     """Write tables of a file that the points of other files were put into as TOML text; see `write`.
 
-    Raises
-    ------
-    CaseError
-        It is too long for a case file (E-FILE).
+    CaseError: it is too long for a case file (E-FILE).
     """
     text = write(data)
     if len(text.encode()) > _MAX_BYTES:

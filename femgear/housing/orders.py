@@ -92,15 +92,8 @@ class BandAnalysis(ReadOnlyArrays):
 def order_spectrum(signal) -> OrderSpectrum:
     """Compute the order spectrum of a signal that spans one carrier revolution (no window, no leakage).
 
-    Parameters
-    ----------
-    signal : (..., n_samples) array
-        Equidistant samples in any unit, end point excluded; the spectrum has the same unit.
-
-    Raises
-    ------
-    CaseError
-        ``E-SHAPE`` for samples that are not finite or less than two.
+    The samples (..., n_samples), of any unit, are equidistant, the end point excluded. CaseError: less than
+    two, or not finite (E-SHAPE).
     """
     signal = np.asarray(signal, dtype=float)
     n = signal.shape[-1] if signal.ndim else 0
@@ -122,17 +115,8 @@ def order_level(lines: SensorLines) -> np.ndarray:
 def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum:
     """Take the carrier orders low..high out of a spectrum: a brick wall, exact for periodic signals.
 
-    Parameters
-    ----------
-    spectrum : OrderSpectrum
-        Values of shape (..., n_orders), in the result zero outside the band.
-    low, high : float
-        Carrier orders, both included.
-
-    Raises
-    ------
-    CaseError
-        ``E-RANGE`` for limits that hold no order of the spectrum above zero.
+    Both ends are included; values (..., n_orders) are zero outside. CaseError: limits that hold no order of
+    the spectrum above zero (E-RANGE).
     """
     inside = (spectrum.order >= low) & (spectrum.order <= high)
     if low <= 0 or not inside.any():
@@ -160,20 +144,11 @@ def analytic_signal(spectrum: OrderSpectrum) -> np.ndarray:
 def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
     """Count the maxima of a periodic envelope that stand out by at least `threshold` times its largest value.
 
-    The record is turned until it begins and ends at its lowest value, so that its seam is no edge
-    and the prominences are those of the endless signal.
+    The envelope (n_samples,) spans one carrier revolution. It is turned until it begins and ends at its
+    lowest value, so that its seam is no edge and the prominences are those of the endless signal.
 
-    Parameters
-    ----------
-    periodic_envelope : (n_samples,) array
-        Envelope over one carrier revolution, not negative.
-    threshold : float
-        Least prominence as a share of the largest envelope value, 0 < threshold < 1.
-
-    Raises
-    ------
-    CaseError
-        ``E-SHAPE`` for an envelope or a threshold that cannot be used.
+    CaseError: no envelope of one signal, finite and not negative, or a threshold that is not between 0 and 1
+    (E-SHAPE).
     """
     from scipy.signal import find_peaks
 
@@ -200,18 +175,8 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
 def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6) -> tuple[Line, ...]:
     """List the strongest lines of one spectrum (n_orders,), strongest first, down to -60 dB.
 
-    Parameters
-    ----------
-    spectrum : OrderSpectrum
-    low, high : float
-        Carrier orders, both included.
-    count : int
-        Largest number of lines; none are listed where the band is silent.
-
-    Raises
-    ------
-    CaseError
-        ``E-RANGE`` as `band_pass`; ``E-SHAPE`` for a spectrum of several signals.
+    Of the carrier orders low..high, both included, at most ``count``, none where the band is silent.
+    CaseError: E-RANGE as `band_pass`; a spectrum of several signals (E-SHAPE).
     """
     amplitude = band_pass(spectrum, low, high).amplitude
     if amplitude.ndim != 1:

@@ -155,13 +155,8 @@ def component_lines(
 ) -> SensorLines:
     """Compute the lines of `fixed_sensor_lines` at those orders alone that components reach.
 
-    Parameters
-    ----------
-    field, z_ring, carrier_speed, sensor_angle
-        As there.
-    symmetry : int
-        Orders that are multiples of it are kept: a set that is the same after a turn by ``2 pi/symmetry``
-        has no others.
+    Only multiples of ``symmetry`` are kept: a set that is the same after a turn by ``2 pi/symmetry`` has no
+    others.
     """
     field, n = _checked_field(field)
     direction, speed = _motion(field, z_ring, carrier_speed)
@@ -182,12 +177,8 @@ def component_lines(
 def stored_lines(housing: Any, *, form: str | None = None) -> SensorLines:
     """Read the lines of a fixed sensor from housing.nc, to the highest that is heard.
 
-    Parameters
-    ----------
-    housing : xarray.Dataset
-        Of one or some speeds, as ``results.housing.sel(speed=250, method="nearest")``.
-    form : {"exact", "linear"}, optional
-        That of the case when left out.
+    The dataset has one or some speeds, as ``results.housing.sel(speed=250, method="nearest")``. The form is
+    "exact" or "linear", that of the case when left out.
     """
     known, order = housing.attrs, housing["order"].values
     exact = housing["lines_real"].values + 1j * housing["lines_imag"].values

@@ -73,12 +73,7 @@ def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
 def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progress) -> list[str]:
     """Write everything that a run shows; returns the names of the files.
 
-    Parameters
-    ----------
-    train : Train
-        Of the case.
-    progress : callable
-        Called with (stage, done, total).
+    ``train`` is that of the case, ``progress`` is called with (stage, done, total).
     """
     others = [write for stage in _drawn(train, drawn) for write in stage.write]
     names, steps = [], 1 + len(others)
@@ -105,12 +100,7 @@ def page(train: Train, results: Results) -> str:
     """Make the page of a run as HTML text: tables, warnings, pictures, provenance.
 
     The pictures that its manifest names are embedded; the page loads nothing else. The same results give the
-    same text.
-
-    Raises
-    ------
-    StorageError
-        When files were changed since the run.
+    same text. StorageError: files were changed since the run.
     """
     case = results.case
     pictures, skipped = _pictures(train, results)

@@ -220,15 +220,10 @@ def transmission_error_period(
 ) -> Figure:
     """Draw the fluctuation of the dynamic transmission error over one mesh period, axes for each speed.
 
-    Parameters
-    ----------
-    dynamics : xarray.Dataset
-        With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m]; at most four speeds are drawn.
-    static : xarray.Dataset, optional
-        With ``ste`` (mesh, position) [m], drawn for comparison: thin with the harmonics of the excitation
-        alone, so that their cut does not pass for vibration, and faint as a whole.
-    together : bool
-        Meshes that differ from planet to planet share axes; otherwise each kind has its own.
+    The datasets have ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m], of which at most four speeds
+    are drawn, and for comparison ``ste`` (mesh, position) [m]: thin with the harmonics of the excitation
+    alone, so that their cut does not pass for vibration, and faint as a whole. Meshes that differ from planet
+    to planet share axes where ``together`` says so; otherwise each kind has its own.
     """
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
     position = np.linspace(0.0, 1.0, max(256, 16 * int(h.max())) + 1)
@@ -263,10 +258,7 @@ def transmission_error_period(
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     """Draw the amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
 
-    Parameters
-    ----------
-    dynamics : xarray.Dataset
-        With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m].
+    The dataset has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m].
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -326,11 +318,8 @@ def _dots(ax, h, amplitude, floor, index: int, text: str) -> None:
 def speed_sweep(dynamics: xr.Dataset) -> Figure:
     """Draw the RMS of the fluctuating transmission error over the speed, and what the solver says of it.
 
-    Parameters
-    ----------
-    dynamics : xarray.Dataset
-        With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m], and ``spectral_radius``,
-        ``floquet_multiplier`` and ``converged`` (speed,).
+    The dataset has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m], and ``spectral_radius``,
+    ``floquet_multiplier`` and ``converged`` (speed,).
     """
     figure, (top, bottom) = new_figure(rows=2, height=7.0, sharex=True)
     order = np.argsort(dynamics["speed"].values)

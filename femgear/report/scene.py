@@ -59,17 +59,10 @@ _SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
 
 
 def load_pyvista():
-    """Load PyVista, ready to draw without a screen.
+    """Load the module PyVista, ready to draw without a screen.
 
-    Returns
-    -------
-    module
-
-    Raises
-    ------
-    FemgearError
-        ``E-SYSTEM-LIBRARY`` where the machine lacks the OpenGL library that drawing needs, ``E-MEMORY``
-        where the memory of the process is limited too far: VTK would end it without a word.
+    FemgearError: the machine lacks the OpenGL library that drawing needs (E-SYSTEM-LIBRARY), or the memory of
+    the process is limited too far, where VTK would end it without a word (E-MEMORY).
     """
     if "pyvista" not in sys.modules:
         _refuse_little_memory()
@@ -155,11 +148,8 @@ def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, disp
 def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
     """Assemble all bodies in one grid of VTK quadratic triangles.
 
-    Returns
-    -------
-    pyvista.UnstructuredGrid
-        Point data ``displacement`` [m] (3 components), cell data ``body`` (number), and the
-        number of every body as field data under its name.
+    It has the point data ``displacement`` [m] (3 components), the cell data ``body`` (number), and the number
+    of every body as field data under its name.
     """
     pv = load_pyvista()
     start = np.cumsum([0] + [len(body.points) for body in bodies])
@@ -179,19 +169,10 @@ def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
 
 
 def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> pv.UnstructuredGrid:
-    """Assemble the whole ring with one displacement field a mode.
+    """Assemble the whole ring with one displacement field a mode shown, by its number.
 
-    Parameters
-    ----------
-    modes : CyclicModes
-        Of that sector; the cosine mode of every pair is shown, largest displacement 1.
-    shown : sequence of int
-        Mode numbers.
-
-    Returns
-    -------
-    pyvista.UnstructuredGrid
-        Point data ``"mode 5, n = 3, 2600 Hz"`` and so on (3 components).
+    Of the modes of that sector; the cosine mode of every pair is shown, largest displacement 1, as point data
+    ``"mode 5, n = 3, 2600 Hz"`` and so on (3 components).
     """
     whole, numbers = rotated_copies(sector, modes.count), copy_nodes(sector, modes.count)
     grid = assemble_set([Body("ring", whole.points, whole.triangles)])
@@ -207,19 +188,10 @@ def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> p
 
 
 def whole_field(sectors: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """Turn the displacements of all sectors of a body to their places.
+    """Turn the displacements of all sectors of a body to their places, (n, 2) in their unit.
 
-    Parameters
-    ----------
-    sectors : (count, n_nodes, 2) array
-        Of every sector in the frame of the first.
-    numbers : (count, n_nodes) int array
-        Nodes of the whole body; see `femgear.fe.grid.copy_nodes`.
-
-    Returns
-    -------
-    (n, 2) array
-        In the unit of `sectors`.
+    The sectors (count, n_nodes, 2) are in the frame of the first; ``numbers`` (count, n_nodes) are their
+    nodes in the whole body, see `femgear.fe.grid.copy_nodes`.
     """
     angle = 2 * np.pi * np.arange(len(numbers))[:, None] / len(numbers)
     c, s = np.cos(angle), np.sin(angle)
@@ -552,12 +524,9 @@ def _stage(size: int, reach: float, colour: float, words: str):
 
 
 def gear_outline(gear: Gear) -> np.ndarray:
-    """Draw the exact outline of all teeth, the first centred on angle 0.
+    """Draw the exact outline (n,) of all teeth, complex [m], the first centred on angle 0.
 
-    Returns
-    -------
-    (n,) complex array
-        [m], counter-clockwise: involutes with their generated fillets, tip and root circles.
+    Counter-clockwise: involutes with their generated fillets, tip and root circles.
     """
     half = half_sector(gear, flank_elements=_FLANK, refine=_COARSE)
     parts = [half.curve(name) for name, _ in half.curves if name in ("tip", "flank", "fillet", "root")]

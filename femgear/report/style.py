@@ -37,13 +37,7 @@ def new_figure(
     sharey: bool = False,
     polar: bool = False,
 ):
-    """Make a figure outside pyplot, width and height in inches, and its axes as a flat list.
-
-    Returns
-    -------
-    Figure
-    list of Axes
-    """
+    """Make a figure outside pyplot, width and height in inches, and its axes as a flat list."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
@@ -141,23 +135,10 @@ def family(name: str) -> str:
 
 
 def distinct_lines(names, values, *, partly: bool = False) -> list[tuple[str, int]]:
-    """Choose the rows of `values` to draw: one for a family of meshes whose rows agree, else each.
+    """Choose the rows of `values` to draw, with their legend texts: one for a family of meshes, else each.
 
-    Rows agree that differ by less than a millionth of the largest value.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Mesh labels.
-    values : (n, ...) array
-        One row a mesh.
-    partly : bool
-        Also one for some meshes of a family whose rows agree.
-
-    Returns
-    -------
-    list of (str, int)
-        Legend text and row number.
+    The family is drawn as one where its rows (n, ...) differ by less than a millionth of the largest value;
+    ``partly`` does so for some meshes of a family, too.
     """
     values, names = np.asarray(values), [str(name) for name in names]
     limit = 1e-6 * np.abs(values).max(initial=0.0)

@@ -36,13 +36,7 @@ class Block:
 def tabulate(
     title: str, items: Iterable, columns: Mapping[str, Callable[[Any], str]], notes: Iterable[str] = ()
 ) -> Block:
-    """Make a table with a row for every item.
-
-    Parameters
-    ----------
-    columns : mapping of str to callable
-        The text of an item in every column, by the name of the column.
-    """
+    """Make a table with a row for every item, its text in every column by the name of the column."""
     rows = tuple(tuple(text(item) for text in columns.values()) for item in items)
     return Block(title, tuple(columns), rows, tuple(notes))
 
@@ -154,12 +148,8 @@ def pulls_of(forces: np.ndarray) -> np.ndarray:
 def pulling_meshes(rpm, names, pulls: Sequence[np.ndarray]) -> Iterator[Finding]:
     """Warn where the force of a mesh turns into a pull.
 
-    Parameters
-    ----------
-    rpm, names : (n_speeds,) and (n_meshes,) arrays
-        Speeds of the input [rpm], of which the first ones are known, and names of the meshes.
-    pulls : sequence of arrays
-        From `pulls_of`, for some speeds after the other.
+    Of speeds of the input (n_speeds,) [rpm] the first ones are known: ``pulls``, from `pulls_of`, are those
+    of some speeds after the other.
     """
     least, share = np.concatenate(pulls, axis=1)
     pulling, rpm = share.any(axis=1), rpm[: len(share)]

@@ -73,16 +73,10 @@ _LARGE = 200_000_000
 def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     """Write a dataset as NetCDF-4 with a checksum (Fletcher-32) on every chunk.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Real, text or boolean variables, each with attributes ``units`` and ``long_name``; so the numeric
-        coordinates.
+    Its variables are real, text or boolean; they and the numeric coordinates have the attributes ``units``
+    and ``long_name``.
 
-    Raises
-    ------
-    StorageError
-        ``E-FORMAT``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
+    StorageError: a complex variable, a missing attribute (E-FORMAT); E-DISK-FULL, E-STORAGE.
     """
     with replaced_file(path, size=dataset.nbytes) as temporary:
         _to_netcdf(dataset, temporary)
@@ -139,16 +133,9 @@ def _chunk(variable: xr.Variable, free: Sequence[Any]) -> tuple[int, ...]:
 def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
     """Append a dataset to a file of its kind along one dimension; the other numbers are those of the latest.
 
-    Dimensions that are longer than before grow, and what is missing of a shorter one is zero.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As for `write_dataset`; coordinates begin with the same numbers.
-    path : path
-        From `replaced_file`: the first dataset is written into an empty file.
-    along : str
-        Name of the dimension.
+    Dimensions that are longer than before grow, and what is missing of a shorter one is zero; coordinates
+    begin with the same numbers. The path is that of `replaced_file`: the first dataset is written into an
+    empty file.
     """
     if path.stat().st_size:
         write_hdf5(path, lambda stream: _append(dataset, stream, along))
@@ -224,12 +211,8 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
 
     Numbers of a large file stay there until they are asked for, and are read again whenever they are: choose
     some by ``isel`` first. The file is walked before: links, data kept in other files, unusual types and
-    declared sizes that the file cannot hold are refused.
-
-    Raises
-    ------
-    StorageError
-        ``E-STORAGE`` (missing, truncated, checksum), ``E-FORMAT`` (see above; of another femgear).
+    declared sizes that the file cannot hold are refused (E-FORMAT), as is a file of another femgear.
+    StorageError: missing, truncated, checksum (E-STORAGE).
     """
     name = os.fspath(path)
     with storage_errors(path):
@@ -269,18 +252,9 @@ def _loaded(path: str | os.PathLike) -> xr.Dataset:
 def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -> None:
     """Write the result of a stage, so that a run that was interrupted goes on from it; see `read_result`.
 
-    Parameters
-    ----------
-    result : object
-        Made of dataclasses, sections of cases, arrays, sparse matrices, tables, sequences and numbers.
-    fingerprint : str
-        Of all that the result depends on.
-
-    Raises
-    ------
-    TypeError
-        Anything else, such as a function.
-    StorageError
+    It is made of dataclasses, sections of cases, arrays, sparse matrices, tables, sequences and numbers;
+    TypeError: anything else, such as a function. The fingerprint is that of all that it depends on.
+    StorageError.
     """
     arrays: list[np.ndarray] = []
     tree = {"fingerprint": fingerprint, "result": _encoded(result, arrays, {})}
@@ -292,10 +266,7 @@ def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -
 def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
     """Read the result that `write_result` wrote with a fingerprint: numbers and dataclasses alone.
 
-    Raises
-    ------
-    StorageError
-        ``E-FORMAT``: damaged, or written with another fingerprint.
+    StorageError: damaged, or written with another fingerprint (E-FORMAT).
     """
     try:
         with storage_errors(path), np.load(path, allow_pickle=False) as file:
@@ -398,17 +369,10 @@ def _own_object(module: str, name: str, state: dict) -> Any:
 def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Path]:
     """Have an empty file of another name filled in the block, force it to the disk, then give it its name.
 
-    It is in the same folder and has the same suffix; no link is followed.
+    It is in the same folder and has the same suffix; no link is followed; the disk must have room for
+    ``size`` [bytes].
 
-    Parameters
-    ----------
-    size : float
-        What the disk must have room for [bytes].
-
-    Raises
-    ------
-    StorageError
-        ``E-DISK-FULL``, ``E-STORAGE``; the old file is untouched and no temporary one stays behind.
+    StorageError: E-DISK-FULL, E-STORAGE; the old file is untouched and no temporary one stays behind.
     """
     path = Path(path)
     temporary = path.with_name(f".femgear-{secrets.token_hex(8)}.{path.name}")
@@ -502,11 +466,8 @@ def checksum(path: str | os.PathLike) -> str:
 def own_files(folder: Path, names: Iterable[str]) -> None:
     """Make a folder ready for files of these names or patterns, and replace none that was not written so.
 
-    Raises
-    ------
-    StorageError
-        ``E-OUTPUT``: a file of such a name is not on the list of the folder, see `list_own`, or was changed
-        since; results of a run.
+    StorageError: a file of such a name is not on the list of the folder, see `list_own`, or was changed
+    since; results of a run (E-OUTPUT).
     """
     with storage_errors(folder):
         if os.path.lexists(folder / "manifest.json"):
@@ -533,10 +494,7 @@ def list_own(folder: Path) -> None:
 def remove_own(folder: Path) -> None:
     """Remove a folder that was made by `list_own`, with all that was written there.
 
-    Raises
-    ------
-    StorageError
-        ``E-OUTPUT``: it holds anything else, or a file was changed; nothing is removed then.
+    StorageError: it holds anything else, or a file was changed (E-OUTPUT); nothing is removed then.
     """
     with storage_errors(folder):
         paths = [folder, *sorted(folder.rglob("*"))] if os.path.lexists(folder) else []
@@ -619,10 +577,7 @@ def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
 
     It keeps those out that ask for it, other threads of this process too; at the end the file is removed.
 
-    Raises
-    ------
-    StorageError
-        ``E-LOCKED``: another process, or another block of this one, holds it.
+    StorageError: another process, or another block of this one, holds it (E-LOCKED).
     """
     from filelock import FileLock, Timeout
 

@@ -126,12 +126,7 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
 
     ``modes_dof_mode.csv`` holds the variables over degrees of freedom and modes, a line for each pair;
     ``modes.csv`` holds single numbers and the attributes of the file, a line for each. Tables without a line
-    are left out.
-
-    Returns
-    -------
-    list of str
-        File names.
+    are left out. Returns the names of the files.
     """
     import pandas as pd
 
@@ -515,10 +510,8 @@ def versions() -> dict[str, str]:
 def read_manifest(folder: str | os.PathLike) -> Manifest:
     """Read the manifest of a results folder: its files with checksums, seconds and verdicts of the stages.
 
-    Raises
-    ------
-    StorageError
-        ``E-FORMAT``: missing, not a femgear manifest, of a newer format, or naming files outside the folder.
+    StorageError: missing, not a femgear manifest, of a newer format, or naming files outside the folder
+    (E-FORMAT).
     """
     path = Path(folder) / MANIFEST
     with storage_errors(path):

@@ -283,12 +283,8 @@ class Designs:
     def values(self, point: Point, quantities: Sequence[Quantity]) -> dict[str, float]:
         """Compute quantities at a point, by name [SI].
 
-        Raises
-        ------
-        Failure
-            The design cannot be computed, now or when it was tried before.
-        FemgearError
-            The case as it is cannot be computed.
+        Failure: the design cannot be computed, now or when it was tried before; FemgearError: nor can the
+        case as it is.
         """
         key, ask = json.dumps(point), partial(_ask, tuple(quantities), ())
         if self._lacks(key, ask):
@@ -304,10 +300,7 @@ class Designs:
     ) -> Iterator[int]:
         """Compute quantities of many points, of those within limits, and count after each those known.
 
-        Raises
-        ------
-        FemgearError
-            E-INCOMPLETE: a point has neither values nor an error at the end.
+        FemgearError: a point has neither values nor an error at the end (E-INCOMPLETE).
         """
         tasks, ask = {json.dumps(point): point for point in points}, partial(_ask, quantities, limits)
         left = [key for key in tasks if self._lacks(key, ask)]
@@ -481,12 +474,8 @@ class Evaluations:
 
         Limits are looked at first, those from the fewest stages before the others: the objective of a design
         outside them is not computed (feasible designs before others, by violation: K. Deb, Comput. Methods
-        Appl. Mech. Engrg. 186, 2000, 311-338). What cannot be computed costs a thousand times more.
-
-        Raises
-        ------
-        Enough
-            All designs that the search was given have been asked for.
+        Appl. Mech. Engrg. 186, 2000, 311-338). What cannot be computed costs a thousand times more. `Enough`:
+        all designs that the search was given have been asked for.
         """
         new = self.count(x)
         objective, scale = self.problem.objective, self.scale(self.problem.objective)
@@ -569,18 +558,9 @@ def tolerances(
 ) -> tuple[tuple[Tolerance, ...], dict[str, float]]:
     """Compute quantities with every variable off by its tolerance, alone and all at once.
 
-    Parameters
-    ----------
-    x : (n,) array
-        The optimum, in the units of the variables; points beside it may lie outside the bounds.
-    quantities : sequence of Quantity
-        The first one says which side of a variable is the worse one.
-
-    Returns
-    -------
-    tuple of Tolerance
-    dict
-        Quantities [SI] by name with all variables off to their worse sides; NaN where they have none.
+    The optimum x (n,) is in the units of the variables; points beside it may lie outside the bounds. The
+    first quantity says which side of a variable is the worse one; the last result holds the quantities [SI]
+    by name with all variables off to their worse sides, NaN where they have none.
     """
     x, found, problem = np.array(x, float), [], evaluations.problem
     worse = x.copy()

@@ -124,10 +124,7 @@ class Variant:
 def at_speeds(case: Case, speeds: Range) -> Case:
     """Set equidistant speeds of the input [rad/s] in a case, its published lines left out.
 
-    Raises
-    ------
-    CaseError
-        E-STAGE: a planar or helical case, which has no elastic ring.
+    CaseError: a planar or helical case, which has no elastic ring (E-STAGE).
     """
     need_elastic_ring(case, "mesh forces over speed and housing levels need")
     first, last, count = speeds
@@ -184,18 +181,11 @@ class Quantity:
 def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> Quantity:
     """Define the static transmission error, peak to peak over the record [m].
 
-    Parameters
-    ----------
-    mesh : {"largest", "overall", "sun-planet", "planet-ring"}
-        From sun to ring along the base circle of the sun, or the largest of one kind of mesh, or the largest
-        of all these. The overall error may vanish while those of the meshes cancel one another.
-    torque : str, optional
-        Of the input, with its unit; that of the case when left out.
+    "overall" goes from sun to ring along the base circle of the sun and may vanish while the errors of the
+    meshes cancel one another; "sun-planet" and "planet-ring" are the largest of their kind, "largest" is that
+    of all these. The torque is that of the input, with its unit; that of the case when left out.
 
-    Raises
-    ------
-    CaseError
-        E-OBJECTIVE: no such mesh; E-TORQUE: no torque.
+    CaseError: no such mesh (E-OBJECTIVE), no torque (E-TORQUE).
     """
     signal = partial(_signal, _chosen(mesh, {name: name for name in get_args(Mesh)}, "mesh"))
     value = None if torque is None else to_si(torque, TORQUE, low=-LARGEST_TORQUE, high=LARGEST_TORQUE)
@@ -227,17 +217,10 @@ def mesh_force(
     speeds: int = 51,
     part: Literal["dynamic", "peak"] = "dynamic",
 ) -> Quantity:
-    """Define the largest mesh force over a range of input speeds, of all times and meshes [N].
+    """Define the largest mesh force over equidistant input speeds, of all times and meshes [N].
 
-    The mean force of a mesh follows from the torque whatever the flanks look like: the dynamic part is the
-    largest deviation from it.
-
-    Parameters
-    ----------
-    first, last, speeds : str, str, int
-        Input speeds with their unit, and number of equidistant speeds.
-    part : {"dynamic", "peak"}
-        Largest deviation from the mean, or largest force.
+    Part "dynamic" is the largest deviation from the mean force of a mesh, which follows from the torque
+    whatever the flanks look like; "peak" is the largest force. First and last speed have their unit.
     """
     at = _range(first, last, speeds)
     of_mean = _chosen(part, {"dynamic": True, "peak": False}, "part")
@@ -381,10 +364,7 @@ def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
 
     Mesh forces and housing levels need the first and the last speed of the input, with units.
 
-    Raises
-    ------
-    CaseError
-        E-OBJECTIVE: no such quantity, or no speeds for one that needs them.
+    CaseError: no such quantity, or no speeds for one that needs them (E-OBJECTIVE).
     """
     name = " ".join(words.split()).lower()
     if name not in _WORDS:

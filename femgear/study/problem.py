@@ -308,10 +308,7 @@ class Problem:
 def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
     """Read a limit in words such as ``"root stress sun <= 300 MPa"``; speeds as for `named_quantity`.
 
-    Raises
-    ------
-    CaseError
-        E-OBJECTIVE: no limit, no such quantity, or no number; E-UNIT.
+    CaseError: no limit, no such quantity, or no number (E-OBJECTIVE); E-UNIT.
     """
     match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text, re.DOTALL)
     if not match:
@@ -356,14 +353,10 @@ def _number(text: str) -> str | float:
 def tip_reliefs(case: Case) -> tuple[Case, tuple[Variable, ...]]:
     """Add a linear tip relief to every loaded flank of a case; amounts and starts are the variables.
 
-    Returns
-    -------
-    Case
-        With one relief more on sun and ring, and two on the planets, for the flanks that touch sun and ring.
-        Their amounts are zero, so that the case computes as before.
-    tuple of Variable
-        Amounts [um], to a hundredth of the module, with a tolerance of 1 um, and start diameters [mm], from
-        the pitch circle to near the tip, with one of 0.1 mm.
+    Sun and ring have one relief more, the planets two, for the flanks that touch sun and ring. Their amounts
+    are zero, so that the case computes as before. The variables are amounts [um], to a hundredth of the
+    module, with a tolerance of 1 um, and start diameters [mm], from the pitch circle to near the tip, with
+    one of 0.1 mm.
     """
     gears, most = planetary_set(case), 0.01 * case.sun.module
     back = torques(gears, member=case.operation.input, torque=case.operation.torque).sun < 0

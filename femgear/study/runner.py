@@ -49,20 +49,11 @@ class Runner(AbstractContextManager):
     ) -> Iterator[tuple[int, Any]]:
         """Call a function with every item; give number and outcome of each as they come, every warning once.
 
-        The outcome is what the function returns, or a `FemgearError` (E-WORKER) where it ends two workers.
+        The function is that of an importable module, and sent with every task. The outcome is what it
+        returns, or a `FemgearError` (E-WORKER) where it ends two workers. At most ``window`` tasks, by
+        default twice the workers, are given out and have not come back; items beyond are not taken yet.
 
-        Parameters
-        ----------
-        function, items : callable, iterable
-            ``(item) -> value`` of an importable module, and what it is called with: both are sent with every
-            task. Items beyond the window are not taken yet.
-        window : int, optional
-            Tasks that are given out and have not come back, at most; by default twice the workers.
-
-        Raises
-        ------
-        FemgearError
-            E-WORKER: no worker starts, or takes the function; E-CLUSTER; what the function raises.
+        FemgearError: no worker starts, or takes the function (E-WORKER); E-CLUSTER; what the function raises.
         """
         source, pending, suspects, tried = enumerate(items), {}, deque(), set()
         try:
@@ -299,10 +290,8 @@ class Dask(Runner):
 def open_runner(workers: int = 1, cluster: str | None = None) -> Runner:
     """Open the runner of so many processes, or of a Dask scheduler at an address, as a context.
 
-    Raises
-    ------
-    FemgearError
-        E-ARGUMENTS: workers and a cluster; E-RANGE: workers of nothing; E-CLUSTER: no scheduler answers.
+    FemgearError: E-ARGUMENTS (workers and a cluster), E-RANGE (workers of nothing), E-CLUSTER (no scheduler
+    answers).
     """
     count = checked_count(workers, "--workers", code="E-RANGE")
     if cluster is None:

@@ -440,19 +440,9 @@ def has_derivatives(problem: Problem) -> bool:
 def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) -> tuple[bool, str]:
     """Minimise a transmission error from a start by successive linear programs.
 
-    Parameters
-    ----------
-    evaluations : Evaluations
-        Of a problem that `has_derivatives`; they hold the points of the descent, the best among them.
-    start : (n,) array
-        In the units of the variables.
-    radius : float
-        Half the first box, over the ranges of the variables.
-
-    Returns
-    -------
-    (bool, str)
-        Whether no step within the smallest box lowers the linearised objective, and how the descent ended.
+    The evaluations, of a problem that `has_derivatives`, hold the points of the descent, the best among them.
+    The start (n,) is in the units of the variables, the radius of the first box over their ranges. Returns
+    whether no step within the smallest box lowers the linearised objective, and how the descent ended.
     """
     problem = evaluations.problem
     low, high = problem.bounds.T

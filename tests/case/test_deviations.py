@@ -11,7 +11,7 @@ from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.gears.deviations import Ovality, Runout, body_separation, common_period
 from femgear.gears.modifications import ProfileCrowning, ProfileSlope, RootRelief, TipRelief, form_deviation
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
-from femgear.trains.static.description import set_warnings
+from femgear.trains.static.results import set_warnings
 
 CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.modifications import MeasuredProfile
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
-from femgear.trains.static.description import set_warnings
+from femgear.trains.static.results import set_warnings
 
 TEXT = (Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
 UM = 1e-6

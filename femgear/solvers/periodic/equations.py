@@ -279,10 +279,7 @@ def harmonic_balance(
 def reduced(problem: NonlinearSystem) -> Reduction:
     """Reduce a problem at its elements' own reference; a refusal names the element without stiffness there.
 
-    Raises
-    ------
-    ConvergenceError
-        A motion without stiffness strains an element (E-RIGID-MODE).
+    ConvergenceError: a motion without stiffness strains an element (E-RIGID-MODE).
     """
     try:
         return reduce_problem(problem)

@@ -106,10 +106,7 @@ class PhaseGrid:
 def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
     """Make the grid of ``samples`` points along every base for the lines ``orders`` (L, n_bases).
 
-    Raises
-    ------
-    CaseError
-        With no more than twice as many points as the highest order of a base (Nyquist).
+    CaseError: no more than twice as many points as the highest order of a base (Nyquist).
     """
     top = np.abs(orders).max(axis=0)
     for base, (count, highest) in enumerate(zip(samples, top)):

@@ -143,20 +143,10 @@ class Twins:
 def compliance(modes: Modes, omega: np.ndarray, chosen: Any = slice(None)) -> np.ndarray:
     """Compute modal receptances ``1 / (w_k^2 - omega^2 + 2 i zeta w_k omega)`` (..., n_modes) [s^2].
 
-    Zero for rigid modes, which no self-equilibrated force moves.
+    Zero for rigid modes, which no self-equilibrated force moves. At angular frequencies (...) [rad/s], of
+    some of the modes where they are chosen.
 
-    Parameters
-    ----------
-    modes : Modes
-    omega : (...) array
-        Angular frequencies [rad/s].
-    chosen : index
-        Of the modes.
-
-    Raises
-    ------
-    ConvergenceError
-        At an undamped resonance of a mode that a mesh moves.
+    ConvergenceError: an undamped resonance of a mode that a mesh moves.
     """
     natural, damping = 2.0 * np.pi * modes.frequency[chosen], modes.damping_ratio[chosen]
     elastic = natural > 0.0

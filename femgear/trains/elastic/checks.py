@@ -21,7 +21,7 @@ from femgear.gears.kinematics import torques
 from femgear.report.tables import response_warnings
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
-from femgear.trains.static.description import set_warnings
+from femgear.trains.static.results import set_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,11 +42,8 @@ MOST_WINDING = 1.0
 def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
     """Refuse what modes, dynamics and housing cannot represent, before anything is computed.
 
-    Raises
-    ------
-    CaseError
-        The ring is not the fixed member, there is no torque, the errors span several mesh periods, or the
-        response reaches beyond `HIGHEST_RESPONSE`.
+    CaseError: the ring is not the fixed member, there is no torque, the errors span several mesh periods, or
+    the response reaches beyond `HIGHEST_RESPONSE`.
     """
     if case.operation.fixed != "ring":
         raise CaseError(
@@ -72,20 +69,9 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
 
 
 def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
-    """Refuse a modal basis that was made for slower excitation.
+    """Refuse (E-OTHER-CASE) a modal basis that carries excitation up to a lower frequency than is needed.
 
-    Parameters
-    ----------
-    case : Case
-    reach : float
-        Frequency up to which the basis carries excitation [Hz].
-    mesh_frequency : float
-        Of the fastest speed [Hz].
-
-    Raises
-    ------
-    CaseError
-        E-OTHER-CASE.
+    Its reach and the mesh frequency of the fastest speed are in Hz.
     """
     wanted = case.dynamics.up_to or (case.mesh_harmonics or 3) * mesh_frequency
     if wanted > reach * (1.0 + 1e-9):
@@ -105,16 +91,7 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
     diameters where ``n W = 2 pi f_n`` (S. C. Huang and W. Soedel, J. Sound Vib. 115, 1987, 253-274). The
     model sees the ring from the carrier without the inertia terms of that motion: it holds far below.
 
-    Parameters
-    ----------
-    ring_modes : CyclicModes
-    carrier_speeds : (n_speeds,) sequence of float
-        [rad/s]
-
-    Raises
-    ------
-    CaseError
-        E-SPEED: a carrier at or above the lowest ``2 pi f_n / n``.
+    CaseError: a carrier speed [rad/s] at or above the lowest ``2 pi f_n / n`` (E-SPEED).
     """
     wave = ring_modes.nodal_diameter > 0
     critical = 2.0 * np.pi * ring_modes.frequency[wave] / ring_modes.nodal_diameter[wave]
@@ -184,10 +161,7 @@ def max_nodal_diameter(case: Case) -> int:
 def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
     """Compute the mesh frequency of the fastest speed [Hz].
 
-    Raises
-    ------
-    CaseError
-        When the response reaches beyond what a plane model of the ring means anything for.
+    CaseError: the response reaches beyond what a plane model of the ring means anything for.
     """
     fastest = member_speeds(case, gears, max(case.operation.speeds))
     harmonics = case.response_harmonics or 3

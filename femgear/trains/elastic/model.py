@@ -124,13 +124,7 @@ def elastic_set(
 def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.ndarray:
     """Compute the displacement (n_ring, N) into the ring at its loaded flanks per unit ring coordinate.
 
-    Parameters
-    ----------
-    ring : CyclicModes
-    ring_mode, ring_phase : (n_ring,) int arrays
-        Mode and kind (0 cosine, 1 sine) of every coordinate.
-    angles : (N,) array
-        Angles of the loaded teeth [rad].
+    Mode and kind (0 cosine, 1 sine) of every coordinate (n_ring,), angles (N,) of the loaded teeth [rad].
     """
     factor = ring.load[ring_mode, :1] * np.exp(1j * ring.nodal_diameter[ring_mode, None] * angles)
     sine = ring_phase[:, None] == 1
@@ -224,15 +218,8 @@ def _refuse_open(opened: np.ndarray) -> None:
 def ring_mesh_compliance(harmonic_compliance, count: int, angles) -> np.ndarray:
     """Compute the static compliance (N, N) of the dynamic ring between its mesh points [m/N].
 
-    Parameters
-    ----------
-    harmonic_compliance : (m,) array
-        ``H_n`` of the ring's load functional for the nodal diameters that the dynamic ring keeps, from zero
-        [m/N].
-    count : int
-        Number of teeth.
-    angles : (N,) array
-        Planet angles [rad].
+    From ``H_n`` (m,) [m/N] of the load functional of a ring with so many teeth, for the nodal diameters from
+    zero that the dynamic ring keeps, at planet angles (N,) [rad].
     """
     n = np.arange(len(harmonic_compliance))
     weight = np.where((n == 0) | (2 * n == count), 1.0, 2.0) / count
@@ -244,12 +231,8 @@ def ring_mesh_compliance(harmonic_compliance, count: int, angles) -> np.ndarray:
 def body_flexibility(compliance, held_compliance) -> np.ndarray:
     """Compute the compliance (2N, 2N) between the meshes that neither springs nor ring modes hold [m/N].
 
-    Parameters
-    ----------
-    compliance : (2N, 2N) array
-        Between the static meshes, the ring held [m/N]; its diagonal belongs to the mesh springs.
-    held_compliance : (N, N) array
-        That of the dynamic ring, see `ring_mesh_compliance` [m/N].
+    From that between the static meshes, the ring held (2N, 2N) [m/N], whose diagonal belongs to the mesh
+    springs, and that of the dynamic ring (N, N), see `ring_mesh_compliance`.
     """
     N = len(held_compliance)
     flexibility = 0.5 * (compliance + compliance.T)

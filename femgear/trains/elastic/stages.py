@@ -92,8 +92,7 @@ from femgear.trains.protocol import (
     silent,
 )
 from femgear.trains.rigid import member_speeds, parts_of_speeds
-from femgear.trains.static.description import describe_set
-from femgear.trains.static.results import StaticResult
+from femgear.trains.static.results import StaticResult, describe_set
 from femgear.trains.static.stages import STATIC, STRESS, case_supports, mesh_backlash, ring_foundation
 
 _LOWEST = 20e3
@@ -131,13 +130,8 @@ class _FrequencyLimit:
 def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
     """Choose the frequency to which the excitation reaches unless the case says less [Hz].
 
-    Parameters
-    ----------
-    case : Case
-    mesh_mode : float
-        Highest natural frequency of the rigid gears on their meshes [Hz].
-    mesh_frequency : float
-        Of the fastest speed [Hz].
+    From the highest natural frequency of the rigid gears on their meshes, and the mesh frequency of the
+    fastest speed [Hz].
     """
     lowest = _STEP * math.ceil(max(_LOWEST, _ABOVE_MESHES * mesh_mode, 3 * mesh_frequency) / _STEP)
     given = max((case.dynamics.mesh_harmonics or 0) * mesh_frequency, case.dynamics.up_to or 0.0)
@@ -147,15 +141,7 @@ def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> f
 def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = None) -> _FrequencyLimit:
     """Count the harmonics (n_speeds,) up to a frequency, or take a given number of them.
 
-    Parameters
-    ----------
-    case : Case
-    mesh_frequency : (n_speeds,) array
-        [Hz]
-    up_to : float
-        [Hz]
-    given : int, optional
-        Mesh harmonics of the excitation at all speeds.
+    Mesh frequencies (n_speeds,) and limit are in Hz; the number is that of the excitation at all speeds.
     """
     frequency = np.asarray(mesh_frequency, float)
     if given is None:
@@ -213,18 +199,8 @@ def mesh_and_ring_outputs(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the dynamic transmission error of every mesh, and the radial or tangential field of the ring.
 
-    Parameters
-    ----------
-    result : ModesResult
-    response : Response
-        At S speeds, H harmonics.
-
-    Returns
-    -------
-    (S, 2N, H + 1) complex array
-        [m]
-    (S, H + 1, 2 n_max + 1) complex array
-        Of the outer surface, see `femgear.trains.elastic.model.ring_field` [m].
+    Both complex [m], (S, 2N, H + 1), and (S, H + 1, 2 n_max + 1) of the outer surface, see
+    `femgear.trains.elastic.model.ring_field`, of a response at S speeds with H harmonics.
     """
     model, basis, n_max = result.model, result.modes, result.max_diameter
     ring_rows = np.eye(len(model.system.M))[model.ring_slice]
@@ -263,21 +239,11 @@ def solve_modes(
     """Solve for the modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
     Its loaded state, from which the meshes take stiffness and excitation, is that of the set on its supports
-    and of the ring on its foundation, whatever ``static.members`` shows.
+    and of the ring on its foundation, whatever ``static.members`` shows. ``progress`` is called with (stage,
+    done, total); compliances, loaded states and ring models of other cases are taken from ``steps`` where
+    they are those of this one.
 
-    Parameters
-    ----------
-    case : Case
-    static : StaticResult
-    progress : callable, optional
-        Called with (stage, done, total).
-    steps : Steps, optional
-        Compliances, loaded states and ring models of other cases, taken where they are those of this one.
-
-    Raises
-    ------
-    CaseError
-        Without torque, or when the ring, which is the housing of this model, is not the fixed member.
+    CaseError: no torque, or the ring, which is the housing of this model, is not the fixed member.
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_dynamic_case(case, static.planetary_set)
@@ -398,11 +364,7 @@ def solve_dynamics(
     The response is compared with that to excitation up to a higher frequency. Where the case sets no limit it
     is doubled once where that changes the level by 1 dB or more.
 
-    Raises
-    ------
-    CaseError
-        A carrier that runs around the ring faster than its waves (E-SPEED).
-    ConvergenceError
+    CaseError: a carrier that runs around the ring faster than its waves (E-SPEED). ConvergenceError.
     """
     return next(dynamics_parts(case, static, modes, progress=progress, memory=math.inf))[1]
 
@@ -417,12 +379,8 @@ def dynamics_parts(
 ) -> Iterator[tuple[Case, DynamicsResult]]:
     """Solve as `solve_dynamics` for some speeds after the others, each with the case that has them alone.
 
-    The numbers are those of all speeds at once but for rounding; what is said of all comes with the last.
-
-    Parameters
-    ----------
-    memory : float
-        Size of the harmonics of some speeds [bytes].
+    The harmonics of some speeds fill so much memory [bytes]. The numbers are those of all speeds at once but
+    for rounding; what is said of all comes with the last.
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
@@ -481,12 +439,9 @@ def dynamics_parts(
 
 @one_blas_thread()
 def solve_response(case: Case, modes: ModesResult) -> Response:
-    """Solve for the periodic response at the case's speeds, without stability and fields (`solve_dynamics`).
+    """Solve for the periodic response at the case's speeds, without stability and fields.
 
-    Raises
-    ------
-    CaseError
-        E-SPEED, as there.
+    CaseError: E-SPEED, as `solve_dynamics`.
     """
     frequency = _turning_speeds(case, modes)[0]
     limit = limited(case, frequency, case.dynamics.up_to or modes.reach, given=case.dynamics.mesh_harmonics)
@@ -502,13 +457,7 @@ def _turning_speeds(case: Case, modes: ModesResult) -> tuple[np.ndarray, np.ndar
 
 @one_blas_thread()
 def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
-    """Compute the carrier orders that a sensor fixed on the ring hears while the carrier turns past it.
-
-    Parameters
-    ----------
-    case : Case
-    dynamics : DynamicsResult
-    """
+    """Compute the carrier orders that a sensor fixed on the ring hears while the carrier turns past it."""
     check_entries(dynamics, DynamicsResult, dynamic_entries(case), "dynamic response")
     place = dynamics.ring_teeth, np.array([s.carrier for s in dynamics.speeds]), case.housing.sensor_angle
     return HousingResult(

@@ -59,8 +59,7 @@ from femgear.trains.rigid import (
     parts_of_speeds,
     rotation_sense,
 )
-from femgear.trains.static.description import describe_set, set_warnings
-from femgear.trains.static.results import StaticResult
+from femgear.trains.static.results import StaticResult, describe_set, set_warnings
 from femgear.trains.static.stages import STATIC, mesh_backlash, solve_static
 
 if TYPE_CHECKING:

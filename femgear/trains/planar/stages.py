@@ -53,8 +53,7 @@ from femgear.trains.protocol import (
     silent,
 )
 from femgear.trains.rigid import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
-from femgear.trains.static.description import describe_set, set_warnings
-from femgear.trains.static.results import StaticResult
+from femgear.trains.static.results import StaticResult, describe_set, set_warnings
 from femgear.trains.static.stages import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
 
 if TYPE_CHECKING:

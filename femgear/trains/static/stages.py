@@ -58,11 +58,8 @@ def solve_static(
     """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
 
     ``cache`` is the folder of generated grids, ``progress`` is called with (stage, done, total), and flank
-    compliances of other cases are taken from ``steps`` where they are those of this one.
-
-    Raises
-    ------
-    GeometryError, GridError, ContactError
+    compliances of other cases are taken from ``steps`` where they are those of this one. GeometryError,
+    GridError, ContactError.
     """
     gears, deviations = planetary_set(case), set_deviations(case)
     steps, known = steps or Steps(), compliance_entries(case)
@@ -146,10 +143,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
     The static solution of the case need not have pressures (`StaticResult.cycle.pressure`); where it has,
     they are part of the result. ``progress`` is called with (stage, done, total).
 
-    Raises
-    ------
-    GridError
-        When the root of a tooth is not one chain of edges or a body can move freely.
+    GridError: the root of a tooth is not one chain of edges, or a body can move freely.
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0

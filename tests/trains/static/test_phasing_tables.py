@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from femgear.trains.reading import read_case, with_value
-from femgear.trains.static.description import describe_set
+from femgear.trains.static.results import describe_set
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 
