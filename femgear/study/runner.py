@@ -19,6 +19,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, suppress
 from functools import cache
 from itertools import islice
+from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from typing import Any
 
@@ -170,6 +171,8 @@ class Processes(Runner):
         mine, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs,), daemon=True)
         mask = getattr(signal, "pthread_sigmask", lambda *_: ())  # Windows has none
+        if hasattr(signal, "pthread_sigmask"):
+            resource_tracker.ensure_running()  # its start would lift the block
         before = mask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             process.start()
