@@ -94,11 +94,10 @@ class Law(Section):
     def _possible(self, info: ValidationInfo):
         needed = "sigma" if self.distribution == "normal" else "limit"
         if getattr(self, needed) is None:
-            message, remedy = (
-                f"a {self.distribution} distribution needs its {needed}",
-                f'add {needed} = "3 um"',
-            )
-            raise CaseError(message, code="E-KEY-MISSING", remedy=remedy)
+            raise CaseError(
+                f"a {self.distribution} distribution needs its {needed}", code="E-KEY-MISSING",
+                remedy=f'add {needed} = "3 um"',
+            )  # fmt: skip
         if self.distribution == "uniform" and self.sigma is not None:
             message = "a uniform distribution has no sigma"
             raise CaseError(message, code="E-CHOICE", limit="mean and limit", remedy="leave sigma out")
@@ -164,8 +163,10 @@ class Tolerances(Section):
     @model_validator(mode="after")
     def _some(self):
         if not any(True for _ in self.laws()):
-            remedy = "give some, such as sun.pitch, pin_errors.tangential"
-            raise CaseError("no error has a tolerance", code="E-KEY-MISSING", remedy=remedy)
+            raise CaseError(
+                "no error has a tolerance", code="E-KEY-MISSING",
+                remedy="give some, such as sun.pitch, pin_errors.tangential",
+            )  # fmt: skip
         return self
 
     def laws(self) -> Iterator[tuple[str, Law]]:
@@ -425,7 +426,7 @@ def _solved(
     tilts = None if level.tilts is None else np.tensordot(errors, level.tilts, 1)
     separations = shifts[:, found.mesh, found.position[:, None], found.pair]
     force, motions, stiffness, ended = solve_laws(level.laws, model.load, separations, tilts)
-    unsolved = np.asarray(~ended.all(axis=1))
+    unsolved = ~ended.all(axis=1)
     if exact:
         force, motions, stiffness, unsolved = _contacts(model, level, separations, tilts, force)
     missed = np.zeros((n, 1), bool)
@@ -438,7 +439,11 @@ def _solved(
     stiffness = stiffness.reshape(n, P, 2, N).mean(axis=(1, 3))
     numbers = np.ptp(motions[..., N], axis=1), share.max(axis=(1, 2)), *stiffness.T
     planets = share.max(axis=1), (share <= 0.0).any(axis=1)
-    return dict(zip(_NUMBERS, (*numbers, *planets), strict=True)), unsolved, missed.any(axis=1)
+    return (
+        dict(zip(_NUMBERS, (*numbers, *planets), strict=True)),
+        np.asarray(unsolved),
+        np.asarray(missed.any(axis=1)),
+    )
 
 
 def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts, force):
