@@ -11,6 +11,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 _INTERRUPTED = 130
 _MEMORY = 600_000_000
@@ -341,6 +342,23 @@ def sweep(
     return 0
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Tasks:
+    """What computes the tasks of a command.
+
+    Parameters
+    ----------
+    workers
+        Processes of this machine that compute.
+    cluster
+        Dask scheduler whose workers compute: tcp://host:port or tls://host:port (docs/cluster.md).
+    """
+
+    workers: int = 1
+    cluster: str | None = None
+
+
 @app.command
 def samples(
     case: Path,
@@ -353,6 +371,7 @@ def samples(
     positions: int = 16,
     method: Literal["spring", "exact"] = "spring",
     index: int | None = None,
+    tasks: Tasks | None = None,
 ) -> int:
     """Compute as-built sets: transmission error, load sharing and mesh stiffness over tolerances.
 
@@ -377,20 +396,24 @@ def samples(
     """
     from femgear.run import grid_cache
     from femgear.storage.files import own_files, write_text
+    from femgear.study.runner import open_runner
     from femgear.study.samples import checked, prepared, sample_case, samples_into
     from femgear.trains.reading import read_case, to_toml
 
-    data, options = read_case(case), {"tolerances": tolerances, "positions": positions, "cache": grid_cache()}
-    if index is not None:
-        checked(index, "--index", 0)
-        model, _ = prepared(data, **options)
-        names = [f"sample_{index}.toml"]
-        own_files(output, names)
-        write_text(to_toml(sample_case(data, model, seed, index)), output / names[0])
-    else:
-        with Progress() as progress:
-            options |= {"count": number, "seed": seed, "exact": method == "exact", "progress": progress}
-            blocks, names = samples_into(data, output, **options)
+    checked(number, "--number", 1)
+    checked(seed, "--seed", 0, 2**32)
+    checked(index or 0, "--index", 0)
+    data = read_case(case)
+    with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
+        basis = prepared(data, tolerances, positions=positions, cache=grid_cache())
+        if index is None:
+            options = {"count": number, "seed": seed, "exact": method == "exact"}
+            blocks, names = samples_into(data, output, basis, **options, progress=progress, runner=runner)
+        else:
+            blocks, names = [], [f"sample_{index}.toml"]
+            own_files(output, names)
+            write_text(to_toml(sample_case(data, basis[0], seed, index)), output / names[0])
+    if blocks:
         _print(blocks)
     _say(f"files in {output}: {', '.join(names)}")
     return 0

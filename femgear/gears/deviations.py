@@ -46,6 +46,11 @@ class Runout:
     amplitude: float = 0.0
     phase: float = 0.0
 
+    def moved(self, x: float, y: float) -> Runout:
+        """Move the centre of the teeth by x and y in the body [m], x towards the centre of tooth 0."""
+        centre = self.amplitude * np.exp(1j * self.phase) + complex(x, y)
+        return Runout(float(abs(centre)), float(np.angle(centre))) if x or y else self
+
 
 @dataclass(frozen=True)
 class Ovality:
