@@ -34,7 +34,7 @@ from femgear.study.samples import (
 from femgear.trains.reading import read_case, with_value, with_values
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
-CASE, TOLERANCES = CASES / "planetary_27_40_108.toml", CASES / "tolerances_3um.toml"
+CASE, TOLERANCES = CASES / "planetary_27_40_108.toml", CASES / "tolerances/3um.toml"
 TORQUE = 100.0
 ALPHA = math.radians(24.6)
 """Lin and Parker, J. Vib. Acoust. 121 (1999): pressure angle, mesh stiffness 5e8 N/m, bearings."""
