@@ -294,54 +294,6 @@ def export(
     return 0
 
 
-@app.command
-def sweep(
-    case: Path,
-    /,
-    *,
-    over: Annotated[tuple[str, ...], Parameter(negative="")],
-    output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    of: Annotated[tuple[str, ...], Parameter(negative="")] = ("ste", "ste sun-planet", "ste planet-ring"),
-    speeds: tuple[str, str] | None = None,
-    workers: int = 1,
-    cluster: str | None = None,
-) -> int:
-    """Compute quantities over values of entries of a case; goes on where it was interrupted.
-
-    Parameters
-    ----------
-    case
-        TOML case file.
-    over
-        As "operation.torque=50 N m,100 N m" or "sun.modifications[0].amount=0 um..12 um/7"; may be repeated.
-    output
-        Folder of sweep.csv, sweep.png and the journal sweep.jsonl.
-    of
-        Quantities as in docs/optimise.md: ste, ste overall, mesh force, housing, ...; may be repeated.
-    speeds
-        First and last speed of the input, for mesh forces and the housing.
-    workers
-        Processes of this machine that compute.
-    cluster
-        Dask scheduler whose workers compute: tcp://host:port or tls://host:port (docs/cluster.md).
-    """
-    from femgear.case.gear_set import need_set
-    from femgear.run import grid_cache
-    from femgear.study.runner import open_runner
-    from femgear.study.sweep import sweep_into
-    from femgear.trains.reading import read_case
-
-    data = read_case(case)
-    need_set(data)
-    with open_runner(workers, cluster) as runner, Progress() as progress:
-        options = {"speeds": speeds, "cache": grid_cache(), "progress": progress, "runner": runner}
-        found, names = sweep_into(data, output, over=over, of=of, **options)
-    failed = sum(bool(error) for error in found.errors)
-    print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")
-    _say(f"files in {output}: {', '.join(names)}")
-    return 0
-
-
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Tasks:
@@ -357,6 +309,49 @@ class Tasks:
 
     workers: int = 1
     cluster: str | None = None
+
+
+@app.command
+def sweep(
+    case: Path,
+    /,
+    *,
+    over: Annotated[tuple[str, ...], Parameter(negative="")],
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    of: Annotated[tuple[str, ...], Parameter(negative="")] = ("ste", "ste sun-planet", "ste planet-ring"),
+    speeds: tuple[str, str] | None = None,
+    tasks: Tasks | None = None,
+) -> int:
+    """Compute quantities over values of entries of a case; goes on where it was interrupted.
+
+    Parameters
+    ----------
+    case
+        TOML case file.
+    over
+        As "operation.torque=50 N m,100 N m" or "sun.modifications[0].amount=0 um..12 um/7"; may be repeated.
+    output
+        Folder of sweep.csv, sweep.png and the journal sweep.jsonl.
+    of
+        Quantities as in docs/optimise.md: ste, ste overall, mesh force, housing, ...; may be repeated.
+    speeds
+        First and last speed of the input, for mesh forces and the housing.
+    """
+    from femgear.case.gear_set import need_set
+    from femgear.run import grid_cache
+    from femgear.study.runner import open_runner
+    from femgear.study.sweep import sweep_into
+    from femgear.trains.reading import read_case
+
+    data = read_case(case)
+    need_set(data)
+    with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
+        options = {"speeds": speeds, "cache": grid_cache(), "progress": progress, "runner": runner}
+        found, names = sweep_into(data, output, over=over, of=of, **options)
+    failed = sum(bool(error) for error in found.errors)
+    print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")
+    _say(f"files in {output}: {', '.join(names)}")
+    return 0
 
 
 @app.command

@@ -245,6 +245,7 @@ class SampleModel:
 
         Pitch errors are the places of the teeth along the reference circle, runouts are x and y.
         """
+        checked(seed, "--seed", 0, 2**32)
         generators = [np.random.default_rng([seed, first + i]) for i in range(count)]
         found = self._by_key(np.stack([generator.random(self.size) for generator in generators]))
         for key, law, _ in self.errors:
@@ -558,6 +559,7 @@ def samples_into(
     comes back with the names of the files; what keeps samples from being computed is raised (`Runner.map`).
     """
     model, text = basis
+    checked(count, "--number", 1)
     own_files(folder, FILES)
     items = [(first, min(_BLOCK, count - first)) for first in range(0, count, _BLOCK)]
     found = {}
@@ -580,7 +582,8 @@ def samples_into(
     write_dataset(data, folder / FILES[0])
     save_figure(figure(data), folder / FILES[1])
     write_text(to_toml(sample_case(case, model, seed, worst)), folder / FILES[2])
-    return [_described(data, ideal)], list(FILES)
+    tilted = model.level(*model.windows).tilts is not None
+    return [_described(data, ideal, tilted)], list(FILES)
 
 
 def _block(model: SampleModel, seed: int, exact: bool, item: tuple[int, int]) -> dict[str, np.ndarray]:
@@ -658,8 +661,8 @@ def figure(data: xr.Dataset):
     return found
 
 
-def _described(data: xr.Dataset, ideal: dict[str, np.ndarray]) -> Block:
-    """Quantiles of all numbers, and how far to trust them."""
+def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], tilted: bool) -> Block:
+    """Quantiles of all numbers, and how far to trust them; whether samples have profile slopes."""
     scales = {"m": (1e6, " [um]"), "N/m": (1e-6, " [N/um]"), "1": (1.0, "")}
     rows, errors, turns = [], [], []
     for name in _SHOWN:
@@ -679,6 +682,7 @@ def _described(data: xr.Dataset, ideal: dict[str, np.ndarray]) -> Block:
         f"the carrier these samples have {' and '.join(turns)}",
         f"a planet loses its load in {float(data.opens.any('planet').mean()):.2%} of the samples",
         f"worst.toml: sample {worst}, transmission error {exact:.6g} um exactly; largest share: sample {at}",
+        *(["profile slopes do not move the windows here (some tenths of a per cent)"] * tilted),
     )
     header = ("number", "ideal", *(f"{q:.0%}" for q in QUANTILES), "largest")
     return Block(f"{len(data.sample)} samples, seed {data.attrs['seed']}", header, tuple(rows), notes)
