@@ -101,11 +101,9 @@ def check_entries(result: Any, kind: type, case_entries: Entries, words: str) ->
     """
     if not isinstance(result, kind):
         raise CaseError(
-            f"a {words} is needed, not a {type(result).__name__}",
-            code="E-TYPE",
-            limit=f"a {kind.__name__}",
+            f"a {words} is needed, not a {type(result).__name__}", code="E-TYPE", limit=f"a {kind.__name__}",
             remedy="compute the stage: files of results hold numbers alone, from which no stage goes on",
-        )
+        )  # fmt: skip
     entries: Entries = result.entries
     keys = sorted(entries.keys() | case_entries.keys())
     differ = [key for key in keys if entries.get(key) != case_entries.get(key)]
@@ -114,13 +112,11 @@ def check_entries(result: Any, kind: type, case_entries: Entries, words: str) ->
     shown = ", ".join(f"{key} ({_show(entries.get(key))})" for key in differ[:4])
     more = f" and {len(differ) - 4} more" if len(differ) > 4 else ""
     raise CaseError(
-        f"the {words} is that of another case, which differs in {shown}{more}",
-        code="E-OTHER-CASE",
-        key=differ[0],
-        value=_show(case_entries.get(differ[0])),
+        f"the {words} is that of another case, which differs in {shown}{more}", code="E-OTHER-CASE",
+        key=differ[0], value=_show(case_entries.get(differ[0])),
         limit=f"{_show(entries.get(differ[0]))}, with which the {words} was computed",
         remedy=f"compute the {words} of this case, or take the case that it belongs to",
-    )
+    )  # fmt: skip
 
 
 class Steps:

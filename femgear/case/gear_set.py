@@ -65,13 +65,9 @@ def need_set(case: Any) -> None:
     """Refuse a case without a planetary set of its own (E-MODEL)."""
     if not isinstance(case, Case):
         raise CaseError(
-            f"a {case.model} has no planetary set of its own",
-            code="E-MODEL",
-            key="model",
-            value=case.model,
-            remedy="use femgear check and femgear run, or a case without model",
-            file=case.location("model"),
-        )
+            f"a {case.model} has no planetary set of its own", code="E-MODEL", key="model", value=case.model,
+            remedy="use femgear check and femgear run, or a case without model", file=case.location("model"),
+        )  # fmt: skip
 
 
 def planetary_set(case: Case) -> PlanetarySet:
@@ -338,13 +334,11 @@ def _check_reach(case: Case, profile: MeasuredProfile, gear: Gear, key: str) -> 
     source = case.profile_files.get(key)
     named = f"the measured profile {source}" if source else "the measured profile"
     raise GeometryError(
-        f"{gear.name}: no part of {named} lies on the flank",
-        code="E-MODIFICATION",
-        key=key,
+        f"{gear.name}: no part of {named} lies on the flank", code="E-MODIFICATION", key=key,
         value=_range(gear, *profile.roll[:: len(profile.roll) - 1]),
         limit=f"points within {_range(gear, low, high)}",
         remedy="check the unit of its first column and that it belongs to this gear",
-    )
+    )  # fmt: skip
 
 
 def _range(gear: Gear, low: float, high: float) -> str:

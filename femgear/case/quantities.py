@@ -149,12 +149,10 @@ def to_si(
         raise _too_small(value)
     if not low <= number <= high:
         raise CaseError(
-            f"{dimension.name} of {dimension.show(number)} is not plausible",
-            code="E-RANGE",
-            value=value,
+            f"{dimension.name} of {dimension.show(number)} is not plausible", code="E-RANGE", value=value,
             limit=dimension.window(low, high),
             remedy=_factor_hint(number, low, high, dimension, value) or remedy,
-        )
+        )  # fmt: skip
     return number
 
 
@@ -210,12 +208,9 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
     """SI value of one ``unit``, refused unless it has the dimension."""
     if len(unit) > 60 or not _UNIT.fullmatch(unit):
         raise CaseError(
-            f"{unit[:60]!a} is not a product of units",
-            code="E-UNIT",
-            value=text,
-            limit="unit names with * / ^ or blanks, without brackets",
-            remedy=example,
-        )
+            f"{unit[:60]!a} is not a product of units", code="E-UNIT", value=text,
+            limit="unit names with * / ^ or blanks, without brackets", remedy=example,
+        )  # fmt: skip
     usual = " ".join(unit.replace("**", "^").translate(_SPELLING).split())
     if (factor := _FACTORS.get(dimension.si, {}).get(usual)) is not None:
         return factor
@@ -224,12 +219,9 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
         raise CaseError(f"unknown unit {unit!a}", code="E-UNIT", value=text, remedy=example)
     if found[1] != expected[1]:
         raise CaseError(
-            f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}",
-            code="E-UNIT",
-            value=text,
-            limit=f"units convertible to {dimension.si}",
-            remedy=example,
-        )
+            f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}", code="E-UNIT", value=text,
+            limit=f"units convertible to {dimension.si}", remedy=example,
+        )  # fmt: skip
     return found[0] / expected[0]
 
 
@@ -307,11 +299,9 @@ def Number(
             raise _too_small(value)
         if not (above and below):
             raise CaseError(
-                f"the number is out of range{': ' + note if note else ''}",
-                code="E-RANGE",
-                value=found(value) if isinstance(value, int) else value,
-                limit=limit,
-            )
+                f"the number is out of range{': ' + note if note else ''}", code="E-RANGE",
+                value=found(value) if isinstance(value, int) else value, limit=limit,
+            )  # fmt: skip
         return float(value)
 
     schema = {"type": "number", "description": f"{limit}{'; ' + note if note else ''}"}
@@ -378,12 +368,9 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: 
         if not low <= number <= high:
             why = note if number > high else ""
             raise CaseError(
-                f"{shown(value)} is out of range{': ' + why if why else ''}",
-                code="E-RANGE",
-                value=found(value),
-                limit=f"{low} to {high}",
-                remedy=remedy,
-            )
+                f"{shown(value)} is out of range{': ' + why if why else ''}", code="E-RANGE",
+                value=found(value), limit=f"{low} to {high}", remedy=remedy,
+            )  # fmt: skip
         return number
 
     schema = {"type": "integer", "minimum": -high if signed else low, "maximum": high}

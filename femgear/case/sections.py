@@ -514,23 +514,16 @@ def check_published(case: Case) -> Iterator[CaseError]:
         key = f"housing.published[{i}]"
         if not np.isclose(speeds, entry.speed, rtol=1e-9, atol=0.0).any():
             yield CaseError(
-                "this speed is not computed",
-                code=_CODE,
-                key=f"{key}.speed",
-                value=SPEED.show(entry.speed),
-                limit=_speeds(case),
-                remedy="add it to operation.speeds, or leave the published lines out",
-            )
+                "this speed is not computed", code=_CODE, key=f"{key}.speed", value=SPEED.show(entry.speed),
+                limit=_speeds(case), remedy="add it to operation.speeds, or leave the published lines out",
+            )  # fmt: skip
         computed = case.response_harmonics
         if computed is not None and entry.harmonic > computed:
             yield CaseError(
-                "this mesh harmonic is not computed",
-                code=_CODE,
-                key=f"{key}.harmonic",
-                value=entry.harmonic,
+                "this mesh harmonic is not computed", code=_CODE, key=f"{key}.harmonic", value=entry.harmonic,
                 limit=f"1 to {computed}, the harmonics of the response",
                 remedy="raise dynamics.response_harmonics, or leave the published lines out",
-            )
+            )  # fmt: skip
 
 
 def _speeds(case: Case) -> str:

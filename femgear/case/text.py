@@ -52,11 +52,9 @@ def read_text(path: str | os.PathLike) -> str:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise CaseError(
-            f"cannot open the file: {reason}",
-            code="E-FILE",
-            file=name,
+            f"cannot open the file: {reason}", code="E-FILE", file=name,
             remedy="check its name and permissions",
-        ) from error
+        ) from error  # fmt: skip
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise CaseError("not a regular file", code="E-FILE", file=name, remedy="name a TOML file")
@@ -77,11 +75,9 @@ def read_text(path: str | os.PathLike) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise CaseError(
-            f"not UTF-8: byte 0x{data[error.start]:02x} at offset {error.start}",
-            code="E-FILE-ENC",
-            file=name,
-            remedy="save the file as UTF-8",
-        ) from error
+            f"not UTF-8: byte 0x{data[error.start]:02x} at offset {error.start}", code="E-FILE-ENC",
+            file=name, remedy="save the file as UTF-8",
+        ) from error  # fmt: skip
 
 
 def parse(text: str, name: str) -> dict:
@@ -101,12 +97,9 @@ def parse(text: str, name: str) -> dict:
         raise _syntax_error(text, str(error), name) from error
     except ValueError as error:
         raise CaseError(
-            "an integer has thousands of digits",
-            code="E-TOML",
-            file=name,
-            limit="4300 digits",
+            "an integer has thousands of digits", code="E-TOML", file=name, limit="4300 digits",
             remedy="write it as a decimal number such as 1e9",
-        ) from error
+        ) from error  # fmt: skip
     except RecursionError:
         raise _too_deep(name) from None
     infinite = check_tree(data, name)
@@ -116,13 +109,10 @@ def parse(text: str, name: str) -> dict:
         also = "".join(f", nor is {other} (line {line_of(text, other)})" for other, _ in others)
         also += f", nor are {len(infinite) - MOST_SHOWN} others" if len(infinite) > MOST_SHOWN else ""
         raise CaseError(
-            f"not a finite number{also}",
-            code="E-FINITE",
-            key=key,
-            value=value,
+            f"not a finite number{also}", code="E-FINITE", key=key, value=value,
             file=f"{name}:{line}" if name and line else name,
             limit="finite numbers (no nan, no inf, nothing beyond 1.8e308)",
-        )
+        )  # fmt: skip
     return data
 
 
@@ -281,13 +271,10 @@ def text_with_points(data: dict, name: str) -> str:
     text = write(data)
     if len(text.encode()) > _MAX_BYTES:
         raise CaseError(
-            "the case is too long with the points of the files that it names",
-            code="E-FILE",
-            value=f"{len(text.encode())} bytes",
-            limit=f"{_MAX_BYTES} bytes",
-            remedy="give them at fewer points",
-            file=name or None,
-        )
+            "the case is too long with the points of the files that it names", code="E-FILE",
+            value=f"{len(text.encode())} bytes", limit=f"{_MAX_BYTES} bytes",
+            remedy="give them at fewer points", file=name or None,
+        )  # fmt: skip
     return text
 
 
@@ -318,11 +305,9 @@ def _value(value: object) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
     raise CaseError(
-        f"no TOML form for a {type(value).__name__}",
-        code="E-TYPE",
-        value=value,
+        f"no TOML form for a {type(value).__name__}", code="E-TYPE", value=value,
         limit="texts, numbers, true or false, lists and tables",
-    )
+    )  # fmt: skip
 
 
 class ReadCase(BaseModel):

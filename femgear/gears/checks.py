@@ -70,12 +70,10 @@ def _planets(s: PlanetarySet):
     """Warn of sets with one or two planets."""
     if s.n_planets < 3:
         yield GeometryWarning(
-            "W-PLANETS",
-            "set.planets",
+            "W-PLANETS", "set.planets",
             f"{s.n_planets} planet{'s' * (s.n_planets > 1)} leave{'s' * (s.n_planets == 1)} the radial mesh "
-            "forces on sun and ring to their bearings; a floating member cannot balance the load",
-            ">= 3",
-        )
+            "forces on sun and ring to their bearings; a floating member cannot balance the load", ">= 3",
+        )  # fmt: skip
 
 
 def _neighbours(s: PlanetarySet):
@@ -92,19 +90,15 @@ def _neighbours(s: PlanetarySet):
         raise GeometryError(
             f"neighbouring planets {math.degrees(closest):.4f} deg apart overlap by {-room * 1e3:.4f} mm "
             f"(tip radius {s.planet.tip_radius * 1e3:.4f} mm at {s.centre_distance * 1e3:.4f} mm)",
-            code="E-NEIGHBOURS",
-            key="set.planets",
-            value=s.n_planets,
+            code="E-NEIGHBOURS", key="set.planets", value=s.n_planets,
             limit=f"at most {most} equally spaced planets",
             remedy="use fewer planets, or fewer teeth on the planets",
-        )
+        )  # fmt: skip
     if room < s.planet.module:
         yield GeometryWarning(
-            "W-NEIGHBOURS",
-            "set.planets",
-            f"only {room * 1e3:.4f} mm are left between the tips of neighbouring planets",
-            ">= one module",
-        )
+            "W-NEIGHBOURS", "set.planets",
+            f"only {room * 1e3:.4f} mm are left between the tips of neighbouring planets", ">= one module",
+        )  # fmt: skip
 
 
 def _backlash(s: PlanetarySet):
@@ -117,20 +111,16 @@ def _backlash(s: PlanetarySet):
         if value < -BACKLASH_TOLERANCE * module:
             raise GeometryError(
                 f"{mesh}: the flanks overlap by {-value * 1e6:.3f} um along the line of action at the centre "
-                f"distance of {s.centre_distance * 1e3:.5f} mm (negative backlash)",
-                code="E-BACKLASH",
-                key=f"{gear.name}.profile_shift",
-                value=gear.profile_shift,
+                f"distance of {s.centre_distance * 1e3:.5f} mm (negative backlash)", code="E-BACKLASH",
+                key=f"{gear.name}.profile_shift", value=gear.profile_shift,
                 limit=f"normal backlash >= -{BACKLASH_TOLERANCE * module * 1e6:.3g} um",
                 remedy=f"let the {gear.name}'s profile shift be found, or give a thickness allowance",
-            )
+            )  # fmt: skip
         if value > 0.3 * module:
             yield GeometryWarning(
-                "W-BACKLASH",
-                f"{gear.name}.profile_shift",
-                f"{mesh}: normal backlash of {value * 1e3:.4f} mm",
-                "< 0.3 modules",
-            )
+                "W-BACKLASH", f"{gear.name}.profile_shift",
+                f"{mesh}: normal backlash of {value * 1e3:.4f} mm", "< 0.3 modules",
+            )  # fmt: skip
 
 
 def _clearances(s: PlanetarySet):
@@ -139,20 +129,15 @@ def _clearances(s: PlanetarySet):
         gear = name.split()[0]
         if value < 0.0:
             raise GeometryError(
-                f"negative tip clearance, {name}: {value * 1e3:.4f} mm",
-                code="E-CLEARANCE",
-                key=f"{gear}.tip_diameter",
-                value=2.0 * getattr(s, gear).tip_radius,
-                limit="clearance >= 0",
+                f"negative tip clearance, {name}: {value * 1e3:.4f} mm", code="E-CLEARANCE",
+                key=f"{gear}.tip_diameter", value=2.0 * getattr(s, gear).tip_radius, limit="clearance >= 0",
                 remedy=f"shorten the tips of the {gear} (tip_diameter) or deepen the rack's dedendum",
-            )
+            )  # fmt: skip
         if value < 0.1 * s.sun.module:
             yield GeometryWarning(
-                "W-CLEARANCE",
-                f"{gear}.tip_diameter",
-                f"tip clearance, {name}, of {value * 1e3:.4f} mm",
+                "W-CLEARANCE", f"{gear}.tip_diameter", f"tip clearance, {name}, of {value * 1e3:.4f} mm",
                 ">= 0.1 modules",
-            )
+            )  # fmt: skip
 
 
 def _contact_ratios(s: PlanetarySet):
@@ -164,19 +149,14 @@ def _contact_ratios(s: PlanetarySet):
         if value < 1.0:
             raise GeometryError(
                 f"{mesh}: contact ratio {value:.4f}, so contact is lost between teeth",
-                code="E-CONTACT-RATIO",
-                key="set.centre_distance",
-                value=f"contact ratio {value:.4f}",
+                code="E-CONTACT-RATIO", key="set.centre_distance", value=f"contact ratio {value:.4f}",
                 limit="contact ratio >= 1",
                 remedy="lengthen the tips, reduce the working pressure angle or avoid undercut",
-            )
+            )  # fmt: skip
         if value < 1.2:
             yield GeometryWarning(
-                "W-CONTACT-RATIO",
-                "set.centre_distance",
-                f"{mesh}: contact ratio {value:.4f}",
-                ">= 1.2",
-            )
+                "W-CONTACT-RATIO", "set.centre_distance", f"{mesh}: contact ratio {value:.4f}", ">= 1.2",
+            )  # fmt: skip
 
 
 def _single_gears(s: PlanetarySet):
@@ -184,21 +164,17 @@ def _single_gears(s: PlanetarySet):
     for gear in (s.sun, s.planet, s.ring):
         if gear.undercut:
             yield GeometryWarning(
-                "W-UNDERCUT",
-                f"{gear.name}.profile_shift",
+                "W-UNDERCUT", f"{gear.name}.profile_shift",
                 f"{gear.teeth} teeth are undercut: the involute ends at {gear.form_radius * 1e3:.4f} mm; "
                 f"this tool needs x >= {gear.undercut_shift:.4f} (a tool flank one module deep: "
-                f"{undercut_shift(gear.teeth, gear.pressure_angle):.4f})",
-                f">= {gear.undercut_shift:.4f}",
-            )
+                f"{undercut_shift(gear.teeth, gear.pressure_angle):.4f})", f">= {gear.undercut_shift:.4f}",
+            )  # fmt: skip
         land = float(tooth_thickness(gear, gear.tip_radius))
         if land < 0.2 * gear.module:
             yield GeometryWarning(
-                "W-TIP-THIN",
-                f"{gear.name}.profile_shift",
-                f"the teeth of the {gear.name} are {land * 1e3:.4f} mm thick at the tip",
-                ">= 0.2 modules",
-            )
+                "W-TIP-THIN", f"{gear.name}.profile_shift",
+                f"the teeth of the {gear.name} are {land * 1e3:.4f} mm thick at the tip", ">= 0.2 modules",
+            )  # fmt: skip
         rim = abs(gear.root_radius - gear.rim_radius)
         height = abs(gear.tip_radius - gear.root_radius)
         if rim < 1.2 * height:
@@ -232,13 +208,10 @@ def _interference(s: PlanetarySet):
             raise GeometryError(
                 f"involute interference: the {partner.name}'s tip meets the {gear.name} "
                 f"{-reach * 1e3:.4f} mm beyond the end of the line of action, inside the {gear.name}'s base "
-                "circle",
-                code="E-INTERFERENCE",
-                key=f"{partner.name}.tip_diameter",
-                value=2.0 * partner.tip_radius,
-                limit=f"tip diameter {_tip_limit(partner, allowed)} mm",
+                "circle", code="E-INTERFERENCE", key=f"{partner.name}.tip_diameter",
+                value=2.0 * partner.tip_radius, limit=f"tip diameter {_tip_limit(partner, allowed)} mm",
                 remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
-            )
+            )  # fmt: skip
         excess = reach - gear.form_roll if gear.internal else gear.form_roll - reach
         # undercut has removed the flank that a partner's tip would reach: the path of contact is shorter
         if excess > 0.0 and not gear.undercut:
@@ -275,13 +248,11 @@ def _fillet_contact(gear: Gear, partner: Gear, reach: float, centre_distance: fl
     limit = _tip_limit(partner, math.hypot(partner.base_radius, partner.tip_roll + missing))
     if overlap > FILLET_TOLERANCE * gear.module:
         raise GeometryError(
-            message,
-            code="E-FILLET",
-            key="rack.root_radius",
+            message, code="E-FILLET", key="rack.root_radius",
             value=round(gear.tool.rounding / gear.module, 9),
             limit=f"active profile {'up' if gear.internal else 'down'} to {gear.form_radius * 1e3:.4f} mm",
             remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter {limit} mm",
-        )
+        )  # fmt: skip
     yield GeometryWarning("W-FILLET", f"{partner.name}.tip_diameter", message, f"{limit} mm")
 
 
@@ -354,9 +325,7 @@ def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None
         raise GeometryError(
             f"the tips of planet ({planet.teeth} teeth) and ring ({ring.teeth}) strike each other outside "
             f"the path of contact: the corners overlap by {-margin * ring.tip_radius * 1e3:.4f} mm",
-            code="E-INTERFERENCE",
-            key="ring.teeth",
-            value=ring.teeth,
+            code="E-INTERFERENCE", key="ring.teeth", value=ring.teeth,
             limit="corners of the tips pass each other",
             remedy="increase the difference of the tooth numbers, or shorten the tips (tip_diameter)",
-        )
+        )  # fmt: skip

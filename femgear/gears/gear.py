@@ -329,33 +329,27 @@ def _check_circles(gear: Gear) -> None:
     sign = -1.0 if gear.internal else 1.0
     if not (sign * (tip - root) > 0.0 and tip > 0.0):
         _refuse(
-            gear,
-            "tip_diameter",
-            f"tip radius {tip * 1e3:.4f} mm and root radius {root * 1e3:.4f} mm leave no tooth",
-            code="E-TIP",
+            gear, "tip_diameter",
+            f"tip radius {tip * 1e3:.4f} mm and root radius {root * 1e3:.4f} mm leave no tooth", code="E-TIP",
             limit=f"tip diameter {'<' if gear.internal else '>'} {2e3 * root:.4f} mm",
             remedy="correct the tip or root diameter",
-        )
+        )  # fmt: skip
     if not sign * (root - rim) > 0.0:
         _refuse(
-            gear,
-            "outer_radius" if gear.internal else "bore_radius",
+            gear, "outer_radius" if gear.internal else "bore_radius",
             f"the rim is {sign * (root - rim) * 1e3:.4f} mm thick: root radius {root * 1e3:.4f} mm, "
-            f"{'outer' if gear.internal else 'bore'} radius {rim * 1e3:.4f} mm",
-            code="E-RIM",
+            f"{'outer' if gear.internal else 'bore'} radius {rim * 1e3:.4f} mm", code="E-RIM",
             limit=f"{'>' if gear.internal else '<'} {root * 1e3:.4f} mm",
             remedy="enlarge the outer radius" if gear.internal else "reduce the bore radius",
-        )
+        )  # fmt: skip
     if not tip > gear.base_radius:
         _refuse(
-            gear,
-            "tip_diameter",
+            gear, "tip_diameter",
             f"the tip circle (radius {tip * 1e3:.4f} mm) lies inside the base circle "
-            f"({gear.base_radius * 1e3:.4f} mm), where there is no involute",
-            code="E-TIP",
+            f"({gear.base_radius * 1e3:.4f} mm), where there is no involute", code="E-TIP",
             limit=f"tip diameter > {2e3 * gear.base_radius:.4f} mm",
             remedy="give a larger tip_diameter, more teeth or a larger profile shift",
-        )
+        )  # fmt: skip
 
 
 def _check_tool(gear: Gear) -> None:
@@ -366,62 +360,51 @@ def _check_tool(gear: Gear) -> None:
     if gear.tool.room / (1.0 if gear.internal else gear.module) < -1e-12:
         largest, rounding = _largest_rounding(gear), round(gear.tool.rounding / gear.module, 9)
         _refuse(
-            gear,
-            "rack.root_radius",
+            gear, "rack.root_radius",
             f"a tool tip rounding of {rounding:.4f} modules does not fit between the flanks of the tool"
-            + ("" if largest > 0.0 else ", nor does any other"),
-            code="E-ROOT-RADIUS",
-            value=rounding,
+            + ("" if largest > 0.0 else ", nor does any other"), code="E-ROOT-RADIUS", value=rounding,
             limit=f"<= {largest:.4f} modules" if largest > 0.0 else None,
             remedy="reduce root_radius" if largest > 0.0 else "reduce the dedendum",
-        )
+        )  # fmt: skip
 
 
 def _check_cutter(gear: Gear) -> None:
     cutter = cutter_of(gear)
     if not (is_whole(cutter.teeth) and 5 <= cutter.teeth <= gear.teeth - 5):
         _refuse(
-            gear,
-            "cutter_teeth",
+            gear, "cutter_teeth",
             f"a cutter of {cutter.teeth!r} teeth cannot generate an internal gear of {gear.teeth} teeth",
-            code="E-CUTTER",
-            limit=f"whole number 5 .. {gear.teeth - 5}",
+            code="E-CUTTER", limit=f"whole number 5 .. {gear.teeth - 5}",
             remedy="choose a smaller cutter; 30 teeth, or 12 fewer than the gear, is the default",
-        )
+        )  # fmt: skip
     try:
         tool = _cutter_tip(gear)
     except GeometryError:
         _refuse(
-            gear,
-            "profile_shift",
+            gear, "profile_shift",
             f"a cutter of {cutter.teeth} teeth with shift {cutter.profile_shift:.4f} finds no working "
-            f"pressure angle for a flank shifted by {gear.profile_shift:.4f}",
-            code="E-CUTTER",
+            f"pressure angle for a flank shifted by {gear.profile_shift:.4f}", code="E-CUTTER",
             limit="inv(alpha_w0) >= 0 between cutter and gear",
             remedy="increase the profile shift, or take a cutter with fewer teeth or a smaller shift",
-        )
+        )  # fmt: skip
     if not tool.centre_radius > tool.cutter_base_radius:
         _refuse(
-            gear,
-            "cutter_teeth",
+            gear, "cutter_teeth",
             f"the rounding of the cutter's tip is centred at {tool.centre_radius * 1e3:.4f} mm, inside the "
-            f"cutter's base circle of {tool.cutter_base_radius * 1e3:.4f} mm",
-            code="E-CUTTER",
+            f"cutter's base circle of {tool.cutter_base_radius * 1e3:.4f} mm", code="E-CUTTER",
             limit="tip radius - rounding > base radius of the cutter",
             remedy="choose a cutter with more teeth, or a smaller root_radius",
-        )
+        )  # fmt: skip
     start = tool.centre_distance * math.cos(tool.end_angle)  # gear roll at the cutter's base tangent point
     if gear.tip_roll < start:
         least = math.hypot(gear.base_radius, start)
         _refuse(
-            gear,
-            "cutter_teeth",
+            gear, "cutter_teeth",
             f"a cutter of {cutter.teeth} teeth has no involute for the flank below {least * 1e3:.4f} mm; the "
-            f"tip circle is at {gear.tip_radius * 1e3:.4f} mm",
-            code="E-CUTTER",
+            f"tip circle is at {gear.tip_radius * 1e3:.4f} mm", code="E-CUTTER",
             limit=f"tip radius >= {least * 1e3:.4f} mm",
             remedy="choose a cutter with more teeth or enlarge the tip diameter",
-        )
+        )  # fmt: skip
 
 
 def _largest_rounding(gear: Gear) -> float:
@@ -435,25 +418,20 @@ def _check_flank(gear: Gear) -> None:
     half = half_thickness_angle(gear, gear.tip_radius)
     if half <= 0.0:
         _refuse(
-            gear,
-            "profile_shift",
+            gear, "profile_shift",
             f"the tooth is pointed below its tip circle: thickness {2e3 * half * gear.tip_radius:.4f} mm at "
-            f"the tip radius {gear.tip_radius * 1e3:.4f} mm",
-            code="E-POINTED",
-            limit="tip thickness > 0",
+            f"the tip radius {gear.tip_radius * 1e3:.4f} mm", code="E-POINTED", limit="tip thickness > 0",
             remedy="change the profile shift or give a tip_diameter that cuts the point off",
-        )
+        )  # fmt: skip
     sign = -1.0 if gear.internal else 1.0
     if not sign * (gear.tip_roll - gear.form_roll) > 0.0:
         _refuse(
-            gear,
-            "tip_diameter",
+            gear, "tip_diameter",
             f"no involute is left between the fillet (radius {gear.form_radius * 1e3:.4f} mm) and the tip "
-            f"(radius {gear.tip_radius * 1e3:.4f} mm)",
-            code="E-TIP",
+            f"(radius {gear.tip_radius * 1e3:.4f} mm)", code="E-TIP",
             limit=f"tip radius {'<' if gear.internal else '>'} {gear.form_radius * 1e3:.4f} mm",
             remedy="correct the tip or root diameter, the dedendum or the profile shift",
-        )
+        )  # fmt: skip
 
 
 def _refuse(gear: Gear, entry: str, message: str, *, code: str, value=None, limit: str | None, remedy: str):

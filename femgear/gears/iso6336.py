@@ -137,11 +137,9 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
     if not (chord > 0.0 and arm > 0.0 and fillet > 0.0):
         raise GeometryError(
             "the tooth has no critical section: "
-            f"chord {chord:.4g}, arm {arm:.4g}, fillet radius {fillet:.4g} modules",
-            code="E-ISO6336",
-            limit="all > 0",
-            remedy="the root of this tooth is outside the range of method B",
-        )
+            f"chord {chord:.4g}, arm {arm:.4g}, fillet radius {fillet:.4g} modules", code="E-ISO6336",
+            limit="all > 0", remedy="the root of this tooth is outside the range of method B",
+        )  # fmt: skip
     form = 6.0 * arm * math.cos(angle) / (chord**2 * math.cos(gear.pressure_angle))
     correction = stress_correction(chord / arm, 0.5 * chord / fillet)
     m = gear.module
@@ -233,11 +231,9 @@ def _check_contact_ratio(contact_ratio: float) -> None:
     """Refuse a transverse contact ratio outside the range of the method (E-ISO6336)."""
     if not 1.0 <= contact_ratio < 2.5:
         raise GeometryError(
-            f"nominal stresses for a contact ratio of {contact_ratio:.4g}",
-            code="E-ISO6336",
-            limit="1 .. 2.5",
-            remedy="change tip diameters or profile shifts",
-        )
+            f"nominal stresses for a contact ratio of {contact_ratio:.4g}", code="E-ISO6336",
+            limit="1 .. 2.5", remedy="change tip diameters or profile shifts",
+        )  # fmt: skip
 
 
 def theoretical_single_stiffness(
@@ -269,11 +265,9 @@ def theoretical_single_stiffness(
     flexibility = sum(c * t for c, t in zip(_C, terms, strict=True))
     if not flexibility > 0.0:
         raise GeometryError(
-            f"ISO 6336-1 method B gives the flexibility {flexibility:.4g} mm um/N",
-            code="E-ISO6336",
-            limit="> 0",
-            remedy="the profile shifts are outside the range of method B (-0.5 <= x1 + x2 <= 2)",
-        )
+            f"ISO 6336-1 method B gives the flexibility {flexibility:.4g} mm um/N", code="E-ISO6336",
+            limit="> 0", remedy="the profile shifts are outside the range of method B (-0.5 <= x1 + x2 <= 2)",
+        )  # fmt: skip
     return 1e9 / flexibility
 
 

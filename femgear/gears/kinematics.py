@@ -79,13 +79,11 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
     """
     if input == fixed:
         raise GeometryError(
-            f"the {input} is both driven and held, which leaves two members free",
-            code="E-MECHANISM",
-            key="operation.fixed",
-            value=input,
+            f"the {input} is both driven and held, which leaves two members free", code="E-MECHANISM",
+            key="operation.fixed", value=input,
             limit="one driven, one held and one output member out of sun, carrier and ring",
             remedy='for example input = "sun", fixed = "ring"',
-        )
+        )  # fmt: skip
     zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
     known = {input: speed, fixed: 0.0}
     # z_s w_s + z_r w_r - (z_s + z_r) w_c = 0

@@ -176,13 +176,10 @@ def check_form(form: FlankForm, gear: Gear) -> None:
         if problem is not None:
             message, value, limit = problem
             raise GeometryError(
-                f"{gear.name}: {message}",
-                code="E-MODIFICATION",
-                key=f"{gear.name}.modifications[{number}]",
-                value=value,
-                limit=limit,
+                f"{gear.name}: {message}", code="E-MODIFICATION", key=f"{gear.name}.modifications[{number}]",
+                value=value, limit=limit,
                 remedy="diameters, roll angles and roll lengths are those of the involute of this gear",
-            )
+            )  # fmt: skip
 
 
 def _problem(modification: Modification, gear: Gear):
@@ -259,10 +256,8 @@ def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
         message = f"the modification goes on beyond its end and reaches {found}"
         remedy = "let it end nearer to the end of the flank"
     raise GeometryError(
-        f"{flank}: {message}",
-        code="E-MODIFICATION",
-        key=f"{gear.name}.modifications",
+        f"{flank}: {message}", code="E-MODIFICATION", key=f"{gear.name}.modifications",
         value=f"{removed[i] * 1e6:.6g} um",
         limit=f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um, at every place of the flank",
         remedy=remedy,
-    )
+    )  # fmt: skip

@@ -307,12 +307,10 @@ def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> floa
         raise GeometryError(
             f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {one.teeth} and "
             f"{two.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
-            code="E-CENTRE-DISTANCE",
-            key="set.centre_distance",
-            value=centre_distance,
+            code="E-CENTRE-DISTANCE", key="set.centre_distance", value=centre_distance,
             limit=f">= {math.ceil(base * 1e7) / 1e4:.4f} mm",
             remedy="increase the centre distance or reduce the tooth numbers or the module",
-        )
+        )  # fmt: skip
     return pressure_angle_at(centre_distance, base)
 
 
@@ -335,13 +333,9 @@ def zero_backlash_distance(one: Gear, two: Gear) -> float:
     except GeometryError as error:
         raise GeometryError(
             f"no centre distance suits profile shifts {x_1:.4f} ({one.name}) and {x_2:.4f} "
-            f"({two.name}): {error.message}",
-            code=error.code,
-            key=f"{two.name}.profile_shift",
-            value=x_2,
-            limit=error.limit,
-            remedy=error.remedy,
-        ) from None
+            f"({two.name}): {error.message}", code=error.code, key=f"{two.name}.profile_shift", value=x_2,
+            limit=error.limit, remedy=error.remedy,
+        ) from None  # fmt: skip
     return 0.5 * one.module * total * math.cos(alpha) / math.cos(angle)
 
 
@@ -365,13 +359,9 @@ def check_planets(planets: int) -> None:
     """Refuse what is no whole number of at least one planet (E-RANGE)."""
     if not is_whole(planets) or not 1 <= planets <= 1000:
         raise GeometryError(
-            f"a planetary set with {planets!r} planets",
-            code="E-RANGE",
-            key="set.planets",
-            value=planets,
-            limit="a whole number, 1 to 1000",
-            remedy="three planets share the load of a set best",
-        )
+            f"a planetary set with {planets!r} planets", code="E-RANGE", key="set.planets", value=planets,
+            limit="a whole number, 1 to 1000", remedy="three planets share the load of a set best",
+        )  # fmt: skip
 
 
 def check_angles(angles: tuple[float, ...]) -> None:
@@ -387,13 +377,10 @@ def check_angles(angles: tuple[float, ...]) -> None:
     if problem:
         listing = ", ".join(f"{a:.6g}" for a in angles[:12])
         raise GeometryError(
-            f"the planet angles [{listing}] rad {problem}",
-            code="E-RANGE",
-            key="set.planet_angles",
-            value=listing,
-            limit="ascending, different, within one turn",
+            f"the planet angles [{listing}] rad {problem}", code="E-RANGE", key="set.planet_angles",
+            value=listing, limit="ascending, different, within one turn",
             remedy="sort the angles; the case file takes them with a unit, such as '120 deg'",
-        )
+        )  # fmt: skip
 
 
 def feasible_angles(teeth_sum: int, angles: tuple[float, ...]) -> tuple[float, ...]:
@@ -423,13 +410,11 @@ def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...
         raise GeometryError(
             f"{len(angles)} planets do not assemble at these angles: {sun_teeth} + {ring_teeth} teeth times "
             f"the angle over one turn must be whole, one planet misses by {worst:.3g} teeth "
-            f"((z_s + z_r)/N = {each})",
-            code="E-ASSEMBLY",
-            key="set.planet_angles",
+            f"((z_s + z_r)/N = {each})", code="E-ASSEMBLY", key="set.planet_angles",
             value=f"{each} teeth a planet",
             limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
             remedy=f"nearest planet_angles that assemble: {listing} deg",
-        )
+        )  # fmt: skip
     return tuple(round(t) for t in turns)
 
 
@@ -471,10 +456,8 @@ def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -
         raise GeometryError(
             f"sun and planet run at a centre distance of {first * 1e3:.5f} mm, planet and ring at "
             f"{second * 1e3:.5f} mm (tooth numbers {sun.teeth} + 2 x {planet.teeth} = "
-            f"{sun.teeth + 2 * planet.teeth}, ring {ring.teeth})",
-            code="E-COAXIAL",
-            key="set.centre_distance",
-            limit="one centre distance for both meshes",
+            f"{sun.teeth + 2 * planet.teeth}, ring {ring.teeth})", code="E-COAXIAL",
+            key="set.centre_distance", limit="one centre distance for both meshes",
             remedy="give centre_distance and let the profile shifts of sun or ring be found",
-        )
+        )  # fmt: skip
     return first

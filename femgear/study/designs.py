@@ -169,24 +169,18 @@ def _check_header(path: Path, line: bytes, header: dict) -> None:
     for name, expected in header.items():
         if found and found.get(name) != expected:
             raise StorageError(
-                f"the journal was written {_WRITTEN[name]}",
-                code="E-JOURNAL",
-                file=str(path),
-                value=found.get(name),
-                limit=str(expected),
-                remedy="name a new place, or move this file away",
-            )
+                f"the journal was written {_WRITTEN[name]}", code="E-JOURNAL", file=str(path),
+                value=found.get(name), limit=str(expected), remedy="name a new place, or move this file away",
+            )  # fmt: skip
     raise _broken(path, "its first line is not what this version of femgear writes there")
 
 
 def _broken(path: Path, why: str) -> StorageError:
     """Make the refusal of a file that is no journal."""
     return StorageError(
-        f"not usable as a journal: {why}",
-        code="E-JOURNAL",
-        file=str(path),
+        f"not usable as a journal: {why}", code="E-JOURNAL", file=str(path),
         remedy="name a new place, or move this file away; it is not changed",
-    )
+    )  # fmt: skip
 
 
 def _is_entry(line: dict, count: int) -> bool:

@@ -71,13 +71,10 @@ def check_second(problem: Problem, second: Quantity) -> None:
     """Refuse (E-OBJECTIVE) the objective of a problem as the second one of its front."""
     if second.name == problem.objective.name:
         raise CaseError(
-            "a front has two objectives",
-            code="E-OBJECTIVE",
-            key="second",
-            value=second.name,
+            "a front has two objectives", code="E-OBJECTIVE", key="second", value=second.name,
             limit=f"another objective than {problem.objective.name}",
             remedy="name another second objective, or search without one",
-        )
+        )  # fmt: skip
 
 
 @one_blas_thread()

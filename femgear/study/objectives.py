@@ -138,11 +138,9 @@ def need_elastic_ring(case: Case, subject: str) -> None:
     other = [name for name in ("planar", "helical") if getattr(case, name, None) is not None]
     if other:
         raise CaseError(
-            f"{subject} a case with an elastic ring",
-            code="E-STAGE",
-            key=other[0],
+            f"{subject} a case with an elastic ring", code="E-STAGE", key=other[0],
             limit="transmission error, contact ratio, tip thickness, contact pressure, root stress",
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -328,13 +326,10 @@ def _range(first: str, last: str, count: int) -> Range:
         raise
     if not (0 < low < high and 2 <= count <= 10000):
         raise CaseError(
-            "not a range of speeds",
-            code="E-OBJECTIVE",
-            key="speeds",
-            value=f"{count} from {first} to {last}",
-            limit="2 to 10000 speeds, from over 0 upwards",
+            "not a range of speeds", code="E-OBJECTIVE", key="speeds",
+            value=f"{count} from {first} to {last}", limit="2 to 10000 speeds, from over 0 upwards",
             remedy='give the lower speed first, as in "1000 rpm" and "3500 rpm"',
-        )
+        )  # fmt: skip
     return low, high, int(count)
 
 

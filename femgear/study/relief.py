@@ -89,12 +89,9 @@ class DesignBasis:
         if clearance := self.supports.planet_clearance:
             raise CaseError(
                 "derivatives and the load sharing of samples know no clearance of the planet bearings",
-                code="E-SUPPORT",
-                key="planet.bearing_clearance",
-                value=f"{clearance * 1e6:.6g} um",
-                limit="0 um",
-                remedy='set it to zero, or solve single cases with static.members = "elastic"',
-            )
+                code="E-SUPPORT", key="planet.bearing_clearance", value=f"{clearance * 1e6:.6g} um",
+                limit="0 um", remedy='set it to zero, or solve single cases with static.members = "elastic"',
+            )  # fmt: skip
         gears, order, deviations = loaded_image(self.gears, sun_torque, self.deviations)
         return replace(self, gears=gears, deviations=deviations), order
 
@@ -133,11 +130,9 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
     """
     if not 0.05 <= length <= _LARGEST_LENGTH:
         raise CaseError(
-            f"a relief of {length} lengths of two-pair contact is not plausible",
-            code="E-RANGE",
-            value=length,
-            limit=f"0.05 to {_LARGEST_LENGTH}",
-        )
+            f"a relief of {length} lengths of two-pair contact is not plausible", code="E-RANGE",
+            value=length, limit=f"0.05 to {_LARGEST_LENGTH}",
+        )  # fmt: skip
     pair = mesh_pairs(planetary_set)[0]
     begin, end = pair.path
     along = length * (end - begin - planetary_set.sun.base_pitch)

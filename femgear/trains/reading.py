@@ -215,12 +215,9 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
     if not isinstance(found, (dict, list)) or not isinstance(found, wanted):
         kind = "table" if wanted is dict else "list"
         raise CaseError(
-            f"{part} is not a {kind}",
-            code="E-TYPE",
-            key=key,
-            file=name or None,
+            f"{part} is not a {kind}", code="E-TYPE", key=key, file=name or None,
             limit='keys such as "operation.torque" or "sun.modifications[0].amount"',
-        )
+        )  # fmt: skip
     return found
 
 
@@ -266,13 +263,9 @@ def _train_of_file(data: dict) -> registry.Known:
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
         raise CaseError(
-            "the file is written for a newer femgear",
-            code="E-FORMAT",
-            key="format",
-            value=case_text.found(version),
-            limit=f"up to {FORMAT}",
-            remedy="update femgear",
-        )
+            "the file is written for a newer femgear", code="E-FORMAT", key="format",
+            value=case_text.found(version), limit=f"up to {FORMAT}", remedy="update femgear",
+        )  # fmt: skip
     own = _own_files()
     if "model" in data:
         model = data["model"]
@@ -283,11 +276,9 @@ def _train_of_file(data: dict) -> registry.Known:
     for train in own.values() if foreign else ():
         if what := train.file.claims(data):
             raise CaseError(
-                f"a file with {what} needs its model",
-                code="E-KEY-MISSING",
-                key="model",
+                f"a file with {what} needs its model", code="E-KEY-MISSING", key="model",
                 remedy=f'write model = "{train.name}" before the first table',
-            )
+            )  # fmt: skip
     return _train_of_set(data)
 
 
@@ -308,13 +299,10 @@ def _unknown_model(value: object) -> CaseError:
         return CaseError(message, code="E-TYPE", key="model", value=value, limit=limit)
     near = difflib.get_close_matches(value.lower(), known, n=1, cutoff=0.6)
     return CaseError(
-        "there is no such model",
-        code="E-CHOICE",
-        key="model",
-        value=value,
+        "there is no such model", code="E-CHOICE", key="model", value=value,
         limit=f"{', '.join(known)}; planetary sets have no entry model",
         remedy=f"did you mean {near[0]}?" if near else "leave it out",
-    )
+    )  # fmt: skip
 
 
 def _train_of_set(data: dict) -> registry.Known:
@@ -323,11 +311,7 @@ def _train_of_set(data: dict) -> registry.Known:
     if len(given) > 1:
         sections = [one.key for one in given]
         raise CaseError(
-            f"a set is {' or '.join(sections)}",
-            code="E-CHOICE",
-            key=sections[-1],
-            value=" and ".join(sections),
-            limit="one of the sections",
-            remedy="leave one of them out",
-        )
+            f"a set is {' or '.join(sections)}", code="E-CHOICE", key=sections[-1],
+            value=" and ".join(sections), limit="one of the sections", remedy="leave one of them out",
+        )  # fmt: skip
     return given[0] if given else next(one for one in registry.TRAINS if not one.key)

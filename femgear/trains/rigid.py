@@ -78,31 +78,22 @@ def rigid_refusals(case: RigidCase, kind: str, *, without_torque: str) -> Iterat
     if case.static.members == "elastic":
         yield CaseError(
             f"the supports belong to the {kind} model: the static solution is that of the gears alone",
-            code="E-CHOICE",
-            key="static.members",
-            value="elastic",
-            limit=f'"fixed" in a {kind} case',
+            code="E-CHOICE", key="static.members", value="elastic", limit=f'"fixed" in a {kind} case',
             remedy="leave static.members out",
-        )
+        )  # fmt: skip
     if case.operation.torque == 0.0:
         yield CaseError(
-            f"without torque no tooth carries load{without_torque}",
-            code="E-NO-LOAD",
-            key="operation.torque",
+            f"without torque no tooth carries load{without_torque}", code="E-NO-LOAD", key="operation.torque",
             limit=f"not zero in a {kind} case",
-        )
+        )  # fmt: skip
 
 
 def unheld_member(case: RigidCase, key: str, remedy: str) -> CaseError:
     """Make the refusal of a fixed member whose torsional support, the entry ``key``, is zero."""
     return CaseError(
         f"the {case.operation.fixed} is the fixed member but nothing keeps it from turning",
-        code="E-MECHANISM",
-        key=key,
-        value="0 N m/rad",
-        limit="above 0 N m/rad",
-        remedy=remedy,
-    )
+        code="E-MECHANISM", key=key, value="0 N m/rad", limit="above 0 N m/rad", remedy=remedy,
+    )  # fmt: skip
 
 
 def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
@@ -114,12 +105,10 @@ def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
     periods, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
     if periods > 1:
         raise CaseError(
-            f"the errors of this set span {periods} mesh periods; {takes} one",
-            code="E-PERIODS",
-            key="operation.speeds",
-            limit="errors that repeat with every tooth",
+            f"the errors of this set span {periods} mesh periods; {takes} one", code="E-PERIODS",
+            key="operation.speeds", limit="errors that repeat with every tooth",
             remedy="run with --only static, or leave pitch errors and runouts out",
-        )
+        )  # fmt: skip
 
 
 def needed(entry: Entry | None, name: str) -> Entry:

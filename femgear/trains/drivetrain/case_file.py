@@ -203,13 +203,9 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
         if name not in names:
             near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
             yield CaseError(
-                "there is no such body",
-                code="E-CHOICE",
-                key=key,
-                value=name,
-                limit=", ".join(names[:20]),
+                "there is no such body", code="E-CHOICE", key=key, value=name, limit=", ".join(names[:20]),
                 remedy=f"did you mean {near[0]}?" if near else "name a body of a [[body]] table",
-            )
+            )  # fmt: skip
     for key, first, second in _joints(case):
         if first == second:
             yield CaseError(
@@ -224,12 +220,10 @@ def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
         if groups[first] is groups[second]:
             if key.startswith("shaft"):
                 yield CaseError(
-                    f"the shaft closes a loop: {first} and {second} are joined already",
-                    code="E-DRIVETRAIN",
-                    key=key,
-                    limit="one way by shafts from body to body",
+                    f"the shaft closes a loop: {first} and {second} are joined already", code="E-DRIVETRAIN",
+                    key=key, limit="one way by shafts from body to body",
                     remedy="leave one of the shafts out",
-                )
+                )  # fmt: skip
             continue
         groups[first] |= groups[second]
         groups |= dict.fromkeys(groups[second], groups[first])
@@ -238,12 +232,9 @@ def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
     if apart:
         i, name = apart[0]
         yield CaseError(
-            f"nothing joins {', '.join(name for _, name in apart)} to {start}",
-            code="E-DRIVETRAIN",
-            key=f"body[{i}].name",
-            value=name,
-            remedy="add a [[shaft]], a [[parallel]] or a [[planetary]]",
-        )
+            f"nothing joins {', '.join(name for _, name in apart)} to {start}", code="E-DRIVETRAIN",
+            key=f"body[{i}].name", value=name, remedy="add a [[shaft]], a [[parallel]] or a [[planetary]]",
+        )  # fmt: skip
 
 
 def _bodies(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -263,22 +254,17 @@ def _bearings(case: DrivetrainCase) -> Iterator[CaseError]:
         inside = (one.shaft is not None, one.station is not None)
         if inside != (one.body is None,) * 2:
             yield CaseError(
-                "a bearing sits on one body, or on one station inside a shaft",
-                code="E-CHOICE",
-                key=f"bearing[{i}].{'body' if one.body else 'shaft'}",
-                limit="body, or shaft with station",
-            )
+                "a bearing sits on one body, or on one station inside a shaft", code="E-CHOICE",
+                key=f"bearing[{i}].{'body' if one.body else 'shaft'}", limit="body, or shaft with station",
+            )  # fmt: skip
         elif one.shaft and one.station and not one.station < elements.get(one.shaft, 0):
             stations = elements.get(one.shaft, 0) - 1
             yield CaseError(
-                "there is no such station",
-                code="E-CHOICE",
-                key=f"bearing[{i}].station",
-                value=one.station,
+                "there is no such station", code="E-CHOICE", key=f"bearing[{i}].station", value=one.station,
                 limit=f"1 to {stations}"
                 if stations > 0
                 else "a [[shaft]] with this between and 2 elements or more",
-            )
+            )  # fmt: skip
         if one.radial == one.tilt == 0.0:
             yield CaseError(
                 "a bearing without stiffness", code="E-RANGE", key=f"bearing[{i}].radial", value="0 N/m",
@@ -297,19 +283,14 @@ def _shafts(case: DrivetrainCase) -> Iterator[CaseError]:
         springs = [name for name in ("bending", "torsion", "shear") if getattr(shaft, name) is not None]
         if message := _shaft_problem(shaft, springs):
             yield CaseError(
-                message,
-                code="E-CHOICE",
-                key=f"shaft[{i}].{springs[0] if springs else 'outer_diameter'}",
+                message, code="E-CHOICE", key=f"shaft[{i}].{springs[0] if springs else 'outer_diameter'}",
                 limit="bending and torsion, or outer_diameter with what else the section needs",
-            )
+            )  # fmt: skip
         if shaft.outer_diameter is not None and not shaft.inner_diameter < shaft.outer_diameter:
             yield CaseError(
-                "the bore is as large as the shaft",
-                code="E-RANGE",
-                key=f"shaft[{i}].inner_diameter",
-                value=LENGTH.show(shaft.inner_diameter),
-                limit=f"below {LENGTH.show(shaft.outer_diameter)}",
-            )
+                "the bore is as large as the shaft", code="E-RANGE", key=f"shaft[{i}].inner_diameter",
+                value=LENGTH.show(shaft.inner_diameter), limit=f"below {LENGTH.show(shaft.outer_diameter)}",
+            )  # fmt: skip
         if shaft.torsion is not None and math.isinf(shaft.torsion):
             yield CaseError(
                 "a shaft that is rigid in torsion makes one body of two", code="E-CHOICE",
@@ -348,12 +329,10 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
         elif one.times is not None and one.torques is not None:
             if len(one.times) != len(one.torques) or any(b <= a for a, b in pairwise(one.times)):
                 yield CaseError(
-                    "the series needs ascending times, and as many torques",
-                    code="E-TORQUE",
-                    key=f"{key}.times",
-                    value=f"{len(one.times)} times, {len(one.torques)} torques",
+                    "the series needs ascending times, and as many torques", code="E-TORQUE",
+                    key=f"{key}.times", value=f"{len(one.times)} times, {len(one.torques)} torques",
                     remedy="sort the points by time, and keep one of every instant",
-                )
+                )  # fmt: skip
         if one.body in bodies:
             yield CaseError(
                 "a second torque on one body", code="E-DUPLICATE", key=f"{key}.body", value=one.body,
@@ -363,11 +342,9 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
         shares += [key] if one.share is not None else []
     if len(shares) > 1 or (shares and len(bodies) == 1):
         yield CaseError(
-            "a share needs other torques that it balances, none of them a share",
-            code="E-TORQUE",
-            key=f"{shares[-1]}.share",
-            limit="one share, beside torques that are given",
-        )
+            "a share needs other torques that it balances, none of them a share", code="E-TORQUE",
+            key=f"{shares[-1]}.share", limit="one share, beside torques that are given",
+        )  # fmt: skip
 
 
 def _simulation(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -434,12 +411,9 @@ def _sizes(case: DrivetrainCase) -> Iterator[CaseError]:
         yield from _gear_sizes(stage, "planetary", key)
         if not stage.sun_teeth < stage.ring_teeth:
             yield CaseError(
-                "the ring has no more teeth than the sun",
-                code="E-TEETH",
-                key=f"{key}.ring_teeth",
-                value=stage.ring_teeth,
-                limit=f"more than {stage.sun_teeth}",
-            )
+                "the ring has no more teeth than the sun", code="E-TEETH", key=f"{key}.ring_teeth",
+                value=stage.ring_teeth, limit=f"more than {stage.sun_teeth}",
+            )  # fmt: skip
         yield from _assembly(stage, key)
 
 
@@ -449,31 +423,25 @@ def _gear_sizes(stage: ParallelSection | PlanetarySection, kind: str, key: str) 
     given = [name for way in ways for name in _given(stage, way)]
     if tuple(given) not in ways:
         yield CaseError(
-            "the sizes of the gears are needed once",
-            code="E-CHOICE",
-            key=f"{key}.{given[0] if given else ways[0][0]}",
-            limit=words,
-        )
+            "the sizes of the gears are needed once", code="E-CHOICE",
+            key=f"{key}.{given[0] if given else ways[0][0]}", limit=words,
+        )  # fmt: skip
         return
     for name, radii, teeth in _ratios(stage):
         if abs(teeth / radii - 1.0) > _RATIO_TOLERANCE:
             yield CaseError(
-                f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}",
-                code="E-TEETH",
-                key=f"{key}.{name}",
-                limit=f"ratios within {_RATIO_TOLERANCE:.0%} of one another",
+                f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}", code="E-TEETH",
+                key=f"{key}.{name}", limit=f"ratios within {_RATIO_TOLERANCE:.0%} of one another",
                 remedy="correct the teeth or the radii, or give module in place of the radii",
-            )
+            )  # fmt: skip
     if isinstance(stage, PlanetarySection) and stage.module is not None and stage.planet_teeth is not None:
         between = 0.5 * (stage.ring_teeth - stage.sun_teeth)
         if abs(stage.planet_teeth - between) > _SHIFTED:
             yield CaseError(
-                "the planet has other teeth than fit between sun and ring",
-                code="E-TEETH",
-                key=f"{key}.planet_teeth",
-                value=stage.planet_teeth,
+                "the planet has other teeth than fit between sun and ring", code="E-TEETH",
+                key=f"{key}.planet_teeth", value=stage.planet_teeth,
                 limit=f"{between:g}, or up to {_SHIFTED} more or less with profile shift",
-            )
+            )  # fmt: skip
 
 
 def _ratios(stage: ParallelSection | PlanetarySection) -> list[tuple[str, float, float]]:
@@ -506,26 +474,22 @@ def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
     apart = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
     if share > 0.0 and math.sin(0.5 * min(apart, math.pi)) <= share:
         yield CaseError(
-            "neighbouring planets overlap",
-            code="E-NEIGHBOURS",
-            key=key,
+            "neighbouring planets overlap", code="E-NEIGHBOURS", key=key,
             value=f"{math.degrees(apart):.4g} deg from one to the next",
             limit=f"more than {math.degrees(2.0 * math.asin(share)):.4g} deg",
             remedy="take fewer planets, or smaller ones",
-        )
+        )  # fmt: skip
     steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
     if any(abs(step - round(step)) > 1e-3 for step in steps):
         yield CaseError(
             f"{len(angles)} equally spaced planets do not assemble"
             if equal
             else "the planets do not assemble at these angles",
-            code="E-ASSEMBLY",
-            key=key,
-            value=stage.planets if equal else None,
+            code="E-ASSEMBLY", key=key, value=stage.planets if equal else None,
             limit=f"a divisor of ring_teeth + sun_teeth = {both}"
             if equal
             else f"whole multiples of 360 deg / {both} from one another",
-        )
+        )  # fmt: skip
 
 
 def _given(section, names) -> list[str]:

@@ -221,21 +221,17 @@ def _check_records(case: DrivetrainCase, record: float) -> None:
     late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
     if late * record < _LEAST_RECORDS:
         raise CaseError(
-            f"{late * record:.3g} records are too few for the spectra",
-            code="E-RANGE",
-            key=f"simulation.{key}",
-            value=TIME.show(getattr(s, key)),
+            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
+            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
             limit=f"{_LEAST_RECORDS} records or more after simulation.settle",
             remedy="take a longer duration, a shorter settle or more records, or write --only transient",
-        )
+        )  # fmt: skip
     if s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
         raise CaseError(
-            "the record has no such resolution",
-            code="E-RANGE",
-            key="simulation.resolution",
+            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
             value=FREQUENCY.show(s.resolution),
             limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
-        )
+        )  # fmt: skip
 
 
 def check_turning(lowest: float, mean: float) -> None:
@@ -326,12 +322,10 @@ def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[Finding]:
     )
     turns = " and turn it back" if speeds.lowest < 0.0 else ""
     yield Finding(
-        "W-SPEED",
-        "operation.torque",
+        "W-SPEED", "operation.torque",
         f"the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
-        f"{case.simulation.duration:g} s{between}{turns}",
-        remedy="share = 1.0 on another body balances them",
-    )
+        f"{case.simulation.duration:g} s{between}{turns}", remedy="share = 1.0 on another body balances them",
+    )  # fmt: skip
 
 
 def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[Finding]:
@@ -446,13 +440,9 @@ def _check_spread(train: Drivetrain, *, turning: bool) -> None:
         remedy += second.split(":")[0]
     raise CaseError(
         "natural frequencies are too far apart for double precision: "
-        f"{fast} by itself has {own.max():.3g} Hz, and {slow} by more than {factor}",
-        code="E-STIFFNESS",
-        key=key,
-        value=value,
-        limit=f"frequencies within {factor}",
-        remedy=remedy,
-    )
+        f"{fast} by itself has {own.max():.3g} Hz, and {slow} by more than {factor}", code="E-STIFFNESS",
+        key=key, value=value, limit=f"frequencies within {factor}", remedy=remedy,
+    )  # fmt: skip
 
 
 def _slowest(model: DrivetrainModel, stiffness) -> str:

@@ -432,10 +432,8 @@ class _Balances:
         raise ConvergenceError(
             f"the motion has outgrown the numbers by t = {self.spin.step * (first + last):.4g} s ({missed})"
             f"{self._mesh(states[last], block, last)}; the free motion {_rate(free.growth())}",
-            code="E-DIVERGED",
-            limit=f"balances of energy and momentum to {BALANCE:g}",
-            remedy=remedy,
-        )
+            code="E-DIVERGED", limit=f"balances of energy and momentum to {BALANCE:g}", remedy=remedy,
+        )  # fmt: skip
 
     def _mesh(self, state, block: Block, last: int) -> str:
         """The mesh with the most strain energy."""

@@ -332,14 +332,11 @@ def _virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
         return virtual_set(gears, case.helical.helix_angle)
     except GeometryError as error:
         raise CaseError(
-            f"the virtual gears of the normal section cannot be made: {error.message}",
-            code="E-GEOMETRY",
-            key="helical.section",
-            value=case.helical.section,
-            limit='"transverse" for these teeth',
+            f"the virtual gears of the normal section cannot be made: {error.message}", code="E-GEOMETRY",
+            key="helical.section", value=case.helical.section, limit='"transverse" for these teeth',
             remedy='write section = "transverse": teeth then are those of the transverse section, too stiff',
             file=case.location("helical.section"),
-        ) from None
+        ) from None  # fmt: skip
 
 
 def normal_record(
@@ -445,14 +442,12 @@ def _check_torque(case: HelicalCase, gears: PlanetarySet) -> None:
     share = _line_load(case, gears) / (stiffness * gears.sun.module)
     if share > _MOST:
         raise CaseError(
-            f"a tooth pair would give way by {share:.3g} modules under this torque",
-            code="E-RANGE",
-            key="operation.torque",
-            value=f"{case.operation.torque:.6g} N m",
+            f"a tooth pair would give way by {share:.3g} modules under this torque", code="E-RANGE",
+            key="operation.torque", value=f"{case.operation.torque:.6g} N m",
             limit=f"{abs(case.operation.torque) * _MOST / share:.3g} N m, by {_MOST} modules, for this set",
             remedy="check the unit of the torque, or give the teeth a wider face or a larger module",
             file=case.location("operation.torque"),
-        )
+        )  # fmt: skip
 
 
 def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
@@ -498,14 +493,12 @@ def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
     names = [f"helical.{body}.{entry}" for body, entry in cures]
     lost = " or the ".join(dict.fromkeys(_AXES[entry][1] for _, entry in cures)) or "torque"
     raise CaseError(
-        f"nothing takes up the {lost} of the helical teeth",
-        code="E-MECHANISM",
-        key=names[0] if names else "helical",
-        value="0" if names else None,
+        f"nothing takes up the {lost} of the helical teeth", code="E-MECHANISM",
+        key=names[0] if names else "helical", value="0" if names else None,
         limit=f"above 0: {' or '.join(names)}" if names else "supports of sun, ring and carrier above 0",
         remedy="give axial_stiffness, tilt_stiffness and support_stiffness",
         file=case.location(names[0] if names else "helical"),
-    )
+    )  # fmt: skip
 
 
 def _supported(data: HelicalSet, body: str, entry: str) -> HelicalSet:

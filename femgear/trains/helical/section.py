@@ -129,13 +129,10 @@ def check_helical(case: HelicalCase) -> Iterator[CaseError]:
     helical = case.helical
     if helical.helix_angle == 0.0:
         yield CaseError(
-            "without a helix the teeth are spur teeth",
-            code="E-RANGE",
-            key="helical.helix_angle",
-            value="0 deg",
-            limit=f"above 0 deg up to {ANGLE.show(_LARGEST_HELIX)}",
+            "without a helix the teeth are spur teeth", code="E-RANGE", key="helical.helix_angle",
+            value="0 deg", limit=f"above 0 deg up to {ANGLE.show(_LARGEST_HELIX)}",
             remedy="leave the section helical out",
-        )
+        )  # fmt: skip
     yield from rigid_refusals(case, "helical", without_torque=", so there is no mesh stiffness")
     fixed = case.operation.fixed
     if getattr(helical, fixed).torsional_stiffness == 0.0:

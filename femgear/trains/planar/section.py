@@ -211,13 +211,9 @@ def check_planar(case: PlanarCase) -> Iterator[CaseError]:
     yield from rigid_refusals(case, "planar", without_torque=": the planar set would rattle in its play")
     if planar.back_flanks and planar.line_backlash == 0.0:
         yield CaseError(
-            "back flanks need play",
-            code="E-BACKLASH",
-            key="planar.line_backlash",
-            value="0 mm",
-            limit="above 0 mm",
-            remedy="give the play, or write planar.back_flanks = false",
-        )
+            "back flanks need play", code="E-BACKLASH", key="planar.line_backlash", value="0 mm",
+            limit="above 0 mm", remedy="give the play, or write planar.back_flanks = false",
+        )  # fmt: skip
     yield from _check_torsion(case)
     yield from _check_branch(case)
 
@@ -247,37 +243,25 @@ def _check_branch(case: PlanarCase) -> Iterator[CaseError]:
         return
     if not branch.start < branch.to:
         yield CaseError(
-            "the range of frequencies ends before it begins",
-            code="E-RANGE",
-            key="planar.branch.to",
-            value=FREQUENCY.show(branch.to),
-            limit=f"above {FREQUENCY.show(branch.start)}, where it begins",
-        )
+            "the range of frequencies ends before it begins", code="E-RANGE", key="planar.branch.to",
+            value=FREQUENCY.show(branch.to), limit=f"above {FREQUENCY.show(branch.start)}, where it begins",
+        )  # fmt: skip
     if planar.gravity is None:
         yield CaseError(
-            "the branch follows the response to the weight, and there is none",
-            code="E-KEY-MISSING",
-            key="planar.gravity",
-            remedy="add the section planar.gravity, or leave planar.branch out",
-        )
+            "the branch follows the response to the weight, and there is none", code="E-KEY-MISSING",
+            key="planar.gravity", remedy="add the section planar.gravity, or leave planar.branch out",
+        )  # fmt: skip
     if case.operation.fixed == "carrier":
         yield CaseError(
-            "the weight does not turn against a carrier that stands",
-            code="E-MECHANISM",
-            key="planar.branch",
-            value="operation.fixed = carrier",
-            limit="a carrier that turns",
-            remedy="leave planar.branch out",
-        )
+            "the weight does not turn against a carrier that stands", code="E-MECHANISM", key="planar.branch",
+            value="operation.fixed = carrier", limit="a carrier that turns", remedy="leave planar.branch out",
+        )  # fmt: skip
     if planar.gyroscopic:
         yield CaseError(
-            "the gyroscopic terms would change along the branch, which is not computed",
-            code="E-CHOICE",
-            key="planar.gyroscopic",
-            value="true",
-            limit="false with planar.branch",
+            "the gyroscopic terms would change along the branch, which is not computed", code="E-CHOICE",
+            key="planar.gyroscopic", value="true", limit="false with planar.branch",
             remedy="leave one of them out",
-        )
+        )  # fmt: skip
 
 
 FILE = CaseFile(PlanarCase, check_planar, lambda tables, case: planar_notices(tables))

@@ -82,14 +82,11 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
     planar, play = case.planar, _least_play(case, gears)
     if planar.back_flanks and planar.line_backlash is None and not play > _NO_PLAY:
         raise CaseError(
-            f"back flanks need play, and the gears have {max(play, 0.0) * 1e6:.3g} um",
-            code="E-BACKLASH",
-            key="planar.back_flanks",
-            value="true",
-            limit="play above 0 in every mesh",
+            f"back flanks need play, and the gears have {max(play, 0.0) * 1e6:.3g} um", code="E-BACKLASH",
+            key="planar.back_flanks", value="true", limit="play above 0 in every mesh",
             remedy="give planar.line_backlash or set.backlash, or write planar.back_flanks = false",
             file=case.location("planar.back_flanks"),
-        )
+        )  # fmt: skip
     if planar.mesh_stiffness is None:
         check_one_period(case, gears, "the planar model takes")
 
@@ -120,14 +117,10 @@ def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -
         if smoothing > limit:
             raise CaseError(
                 f"contact sets in over {smoothing * 1e6:.4g} um, more than {words}: teeth would carry across "
-                "their play",
-                code="E-RANGE",
-                key="planar.smoothing",
-                value=f"{smoothing * 1e6:.6g} um",
-                limit=f"{limit * 1e6:.4g} um or less",
-                remedy="leave it out: 0.3 um",
+                "their play", code="E-RANGE", key="planar.smoothing", value=f"{smoothing * 1e6:.6g} um",
+                limit=f"{limit * 1e6:.4g} um or less", remedy="leave it out: 0.3 um",
                 file=case.location("planar.smoothing"),
-            )
+            )  # fmt: skip
 
 
 def mean_compression(model: PlanarModel) -> float:
@@ -154,14 +147,10 @@ def _check_damping(case: PlanarCase, model: PlanarModel, spans: Iterable[tuple[f
         if len(met):
             raise CaseError(
                 f"the natural frequency {met[0]:.6g} Hz has no damping and {words}: "
-                "the response has no bound there",
-                code="E-RESONANCE",
-                key=key,
-                value="0",
+                "the response has no bound there", code="E-RESONANCE", key=key, value="0",
                 limit="above 0 at a resonance",
-                remedy="give the mode some damping, or move the range or the speed",
-                file=case.location(key),
-            )
+                remedy="give the mode some damping, or move the range or the speed", file=case.location(key),
+            )  # fmt: skip
 
 
 def _excited_spans(frequency: np.ndarray, orders: np.ndarray) -> Iterator[tuple[float, float, str]]:
@@ -246,11 +235,9 @@ def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
 
 def _moved_too_far(key: str, where: str, words: str) -> ConvergenceError:
     return ConvergenceError(
-        f"{where} {words}: the model is one of small displacements",
-        code="E-MOTION",
-        key=key,
+        f"{where} {words}: the model is one of small displacements", code="E-MOTION", key=key,
         remedy="raise the damping, stiffen the supports, or leave the resonance out",
-    )
+    )  # fmt: skip
 
 
 def _end_of_branch(branch: Branch, wanted: BranchSection) -> str:
