@@ -339,16 +339,16 @@ def _stage(stage: StageSection) -> PlanetaryStage:
 
 
 def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, Any]:
-    """Mean stiffness of both meshes after ISO 6336-1, method B."""
+    """Mean stiffness of both meshes after ISO 6336-1, method B, with C_B of the stage's own rack."""
     (sun, planet, _), (x_sun, x_planet, x_ring) = given.teeth, given.profile_shifts
     # the standard's sign of the ring's shift
     meshes = {
         "stiffness_sun_planet": (sun, planet, x_sun, x_planet, gears.contact_ratio_sun_planet),
         "stiffness_planet_ring": (planet, math.inf, x_planet, -x_ring, gears.contact_ratio_planet_ring),
     }
+    rack = {"dedendum": gears.sun.rack.dedendum, "pressure_angle": given.pressure_angle}
     return {
-        name: given.face_width * mesh_stiffness_method_b(*mesh, pressure_angle=given.pressure_angle)[1]
-        for name, mesh in meshes.items()
+        name: given.face_width * mesh_stiffness_method_b(*mesh, **rack)[1] for name, mesh in meshes.items()
     }
 
 

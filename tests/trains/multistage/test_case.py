@@ -40,6 +40,22 @@ def test_gears_phases_and_stiffness_follow_from_the_module(case):
     assert multistage_of(given).stages[0].data.mesh_stiffness.tolist() == [3e8] * 3 + [5e8] * 3
 
 
+def test_stiffness_of_method_b_has_the_factor_of_the_own_rack(case):
+    """c' and c_gamma of ISO 6336-1 written out; C_B = 1 + (1.2 - 1.25) / 2 of a dedendum of 1.25 modules."""
+    section, data = case.stage[0], multistage_of(case).stages[0].data
+    gears, given = stage_gears(section), section.gears
+    (sun, planet, _), (x_s, x_p, x_r) = given.teeth, given.profile_shifts
+    assert gears.sun.rack.dedendum == gears.planet.rack.dedendum == gears.ring.rack.dedendum == 1.25
+    outer = 0.04723 + 0.15551 / sun + 0.25791 / planet - 0.00635 * x_s - 0.11654 * x_s / sun
+    outer += -0.00193 * x_p - 0.24188 * x_p / planet + 0.00529 * x_s**2 + 0.00182 * x_p**2
+    inner = 0.04723 + 0.15551 / planet - 0.00635 * x_p - 0.11654 * x_p / planet + 0.00193 * x_r
+    inner += 0.00529 * x_p**2 + 0.00182 * x_r**2
+    ratios = gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring
+    for k, flexibility, ratio in zip(data.mesh_stiffness[[0, -1]], (outer, inner), ratios, strict=True):
+        single = 0.8 * 0.975 * 1e9 / flexibility
+        assert k == pytest.approx(given.face_width * single * (0.75 * ratio + 0.25), rel=1e-12)
+
+
 def test_shafts_are_beams_whose_ends_do_not_tilt(case):
     train = multistage_of(case)
     for one, size in zip(train.couplings, ((0.045, 0.12), (0.08, 0.18), (0.13, 0.26))):
