@@ -251,6 +251,10 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    def given(self, *names: str) -> list[str]:
+        """List those of some entries that are given."""
+        return [name for name in names if getattr(self, name) is not None]
+
 
 @dataclass(frozen=True, eq=False)
 class _Reader:

@@ -105,10 +105,9 @@ class ModificationSection(Section):
     def _belongs_together(self):
         measured = self.kind == "measured profile"
         relief = self.kind.endswith("relief")
-        unused = [name for name in _MEASURED if not measured and getattr(self, name) is not None]
-        laws = ("amount", *(f"{end}_{place}" for end in ("start", "end") for place in _PLACES))
-        unused += [name for name in laws if measured and getattr(self, name) is not None]
-        unused += [name for name in ("shape", "power") if not relief and getattr(self, name) is not None]
+        starts, ends = ([f"{end}_{place}" for place in _PLACES] for end in ("start", "end"))
+        unused = self.given("amount", *starts, *ends) if measured else self.given(*_MEASURED)
+        unused += [] if relief else self.given("shape", "power")
         if unused:
             message = f"a {self.kind} has no {' and no '.join(unused)}"
             raise CaseError(message, code="E-MODIFICATION", remedy=f"leave out {', '.join(unused)}")
@@ -118,15 +117,12 @@ class ModificationSection(Section):
             raise CaseError(
                 f"a {self.kind} needs its amount", code="E-KEY-MISSING", remedy='amount = "10 um"'
             )
-        elif relief and not any(getattr(self, f"start_{place}") is not None for place in _PLACES):
-            starts = "start_diameter, start_roll_angle or start_roll_length"
-            raise CaseError(f"a {self.kind} needs its start", code="E-KEY-MISSING", remedy=f"give {starts}")
-        for end in ("start", "end"):
-            given = [f"{end}_{place}" for place in _PLACES if getattr(self, f"{end}_{place}") is not None]
-            if len(given) > 1:
+        elif relief and not self.given(*starts):
+            remedy = "give start_diameter, start_roll_angle or start_roll_length"
+            raise CaseError(f"a {self.kind} needs its start", code="E-KEY-MISSING", remedy=remedy)
+        for names in (starts, ends, ("shape", "power")):
+            if len(given := self.given(*names)) > 1:
                 raise CaseError(f"{' and '.join(given)} say the same", code="E-DUPLICATE", remedy="keep one")
-        if self.shape is not None and self.power is not None:
-            raise CaseError("shape and power say the same", code="E-DUPLICATE", remedy="keep one of them")
         return self
 
     @property
@@ -143,7 +139,7 @@ class PlanetModificationSection(ModificationSection):
 
 def _check_points(section: ModificationSection) -> None:
     """Refuse a measured profile without its columns; a file has been read into them before."""
-    columns = [name for name in ("roll_angles", "diameters") if getattr(section, name) is not None]
+    columns = section.given("roll_angles", "diameters")
     if len(columns) != 1 or section.deviations is None or section.file is not None:
         raise CaseError(
             "a measured profile is a file, or deviations over either roll_angles or diameters",

@@ -268,10 +268,6 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
     Des. 116, 1994, 713-720, Table 1) has the case of four equal planets, R. G. Parker (J. Sound Vib. 236,
     2000, 561-573) the sums for equal spacing.
 
-    Parameters
-    ----------
-    harmonics : (H,) sequence of int
-
     Raises
     ------
     GeometryError

@@ -280,10 +280,7 @@ def _inside(gear: Gear, split: np.ndarray) -> tuple[tuple[str, tuple[float, floa
     middle, below = 0.5 * (gear.tip_radius + base), 0.5 * (gear.rim_radius + base)
     angle = 0.5 * math.pi / gear.teeth
     lateral = 0.25 * min(middle * angle, float(gear.tip_radius * half_thickness_angle(gear, gear.tip_radius)))
-    return (
-        ("tooth", (middle, lateral)),
-        ("body", (below * math.cos(angle), below * math.sin(angle))),
-    )
+    return (("tooth", (middle, lateral)), ("body", (below * math.cos(angle), below * math.sin(angle))))
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

@@ -209,11 +209,7 @@ def _peak_to_peak(signal: Callable, torque: float | None, variant: Variant) -> f
 
 
 def mesh_force(
-    first: str,
-    last: str,
-    *,
-    speeds: int = 51,
-    part: Literal["dynamic", "peak"] = "dynamic",
+    first: str, last: str, *, speeds: int = 51, part: Literal["dynamic", "peak"] = "dynamic"
 ) -> Quantity:
     """Define the largest mesh force over equidistant input speeds, of all times and meshes [N].
 

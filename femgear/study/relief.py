@@ -278,13 +278,7 @@ class ReliefGrid:
 
 @one_blas_thread()
 def relief_grid(
-    basis: DesignBasis,
-    *,
-    amounts,
-    lengths,
-    torques,
-    power: float = 1.0,
-    progress: Progress | None = None,
+    basis: DesignBasis, *, amounts, lengths, torques, power: float = 1.0, progress: Progress | None = None
 ) -> ReliefGrid:
     """Compute the transmission error [m] of the sun-planet meshes over amount and length of their relief.
 
@@ -358,12 +352,7 @@ class ReliefOptimum:
 
 @one_blas_thread()
 def optimise_relief(
-    basis: DesignBasis,
-    grid: ReliefGrid,
-    *,
-    torque: float,
-    power: float = 1.0,
-    max_evaluations: int = 240,
+    basis: DesignBasis, grid: ReliefGrid, *, torque: float, power: float = 1.0, max_evaluations: int = 240
 ) -> ReliefOptimum:
     """Find the best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
 

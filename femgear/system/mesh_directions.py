@@ -51,7 +51,7 @@ def assemble(
     dofs: Sequence[str],
     gyroscopic: np.ndarray | None = None,
 ) -> MechanicalSystem:
-    """Reduce the matrices of bodies, springs and meshes to the motions that are free.
+    """Reduce the matrices of bodies, springs and meshes to the motions that are free; ``C`` is zero.
 
     Parameters
     ----------
@@ -69,11 +69,6 @@ def assemble(
         Names of the free coordinates.
     gyroscopic : (n, n) array, optional
         [kg]
-
-    Returns
-    -------
-    MechanicalSystem
-        ``C`` is zero.
     """
     T = motions
     return MechanicalSystem(
@@ -242,17 +237,13 @@ def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
     that the flanks of gears 1 and 2 approach by ``n . (v_1 + phi_1 x c_1) - n . (v_2 + phi_2 x c_2)`` with
     the normal n into gear 2. Seen from the planet's centre n is ``(sin alpha cos beta_b, +- cos alpha cos
     beta_b, - sin beta_b)`` radially, tangentially and axially for the flanks of a sun that drives
-    counter-clockwise (`flank` = 1). The rotation about the own axis gives ``+- u cos beta_b``. Forces on base
-    circles give a sun and one planet the mesh deflection of the helical pair of M. Kubur et al., J. Mech.
-    Des. 126, 2004, 398-406. In the plane these are Lin and Parker's mesh deflections, psi_sn = psi_n -
-    alpha_s and psi_rn = psi_n + alpha_r:
+    counter-clockwise (`flank` = 1, else -1). The rotation about the own axis gives ``+- u cos beta_b``.
+    Forces on base circles give a sun and one planet the mesh deflection of the helical pair of M. Kubur et
+    al., J. Mech. Des. 126, 2004, 398-406. In the plane these are Lin and Parker's mesh deflections, psi_sn =
+    psi_n - alpha_s and psi_rn = psi_n + alpha_r:
 
     ``delta_sn = y_s cos psi_sn - x_s sin psi_sn - zeta_n sin alpha_s - eta_n cos alpha_s + u_s + u_n``
     ``delta_rn = y_r cos psi_rn - x_r sin psi_rn + zeta_n sin alpha_r - eta_n cos alpha_r + u_r - u_n``
-
-    Parameters
-    ----------
-    flank : {1, -1}
     """
     N, S = data.n_planets, len(data.contact_lines.heights)
     W = np.zeros((N + 3, 6, 2 * N, S))

@@ -128,9 +128,8 @@ def torsional_support(case: RigidCase, member: str, given: float | None) -> floa
 
 def torsion_text(case: RigidCase, member: str, given: float | None) -> str:
     """Write the torsional support of a member [N m/rad] in a table."""
-    if given is not None:
-        return f"{given:.6g}"
-    return "held" if member == case.operation.fixed else "0"
+    value = torsional_support(case, member, given)
+    return "held" if math.isinf(value) else f"{value:.6g}"
 
 
 def mesh_stiffnesses(given: MeshStiffnessSection | None, mean: np.ndarray | None) -> dict[str, Any]:

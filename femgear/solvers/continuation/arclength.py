@@ -116,10 +116,6 @@ def continue_curve(
     describe : callable
         The parameter as text with its name and unit, for messages.
 
-    Returns
-    -------
-    Curve
-
     Raises
     ------
     CaseError

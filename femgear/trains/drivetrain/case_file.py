@@ -280,7 +280,7 @@ def _bearings(case: DrivetrainCase) -> Iterator[CaseError]:
 
 def _shafts(case: DrivetrainCase) -> Iterator[CaseError]:
     for i, shaft in enumerate(case.shaft):
-        springs = [name for name in ("bending", "torsion", "shear") if getattr(shaft, name) is not None]
+        springs = shaft.given("bending", "torsion", "shear")
         if message := _shaft_problem(shaft, springs):
             yield CaseError(
                 message, code="E-CHOICE", key=f"shaft[{i}].{springs[0] if springs else 'outer_diameter'}",
@@ -317,8 +317,8 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
     shares, bodies = [], []
     for i, one in enumerate(case.operation.torque):
         key = f"operation.torque[{i}]"
-        series = len(_given(one, ("times", "torques")))
-        given = _given(one, ("torque", "file", "share")) + ["times"] * bool(series)
+        series = len(one.given("times", "torques"))
+        given = one.given("torque", "file", "share") + ["times"] * bool(series)
         if len(given) != 1 or series == 1:
             yield CaseError(
                 "the torque on a body is given in one way",
@@ -420,7 +420,7 @@ def _sizes(case: DrivetrainCase) -> Iterator[CaseError]:
 def _gear_sizes(stage: ParallelSection | PlanetarySection, kind: str, key: str) -> Iterator[CaseError]:
     """One way of giving the sizes of the gears, and teeth that fit it."""
     ways, words = _WAYS[kind]
-    given = [name for way in ways for name in _given(stage, way)]
+    given = [name for way in ways for name in stage.given(*way)]
     if tuple(given) not in ways:
         yield CaseError(
             "the sizes of the gears are needed once", code="E-CHOICE",
@@ -490,11 +490,6 @@ def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
             if equal
             else f"whole multiples of 360 deg / {both} from one another",
         )  # fmt: skip
-
-
-def _given(section, names) -> list[str]:
-    """Those of the names that a section gives."""
-    return [name for name in names if getattr(section, name) is not None]
 
 
 def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:

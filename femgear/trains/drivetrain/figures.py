@@ -369,56 +369,40 @@ def _write_modes(drawn: Drawn, folder: Path) -> list[str]:
 FIGURES = {
     "modes": Figures(
         {
-            "stiffness_series": (
-                "Mesh stiffness over the mesh period as the model takes it: a Fourier series, and the "
-                "rectangular wave of the number of tooth pairs in contact that it stands for."
-            ),
-            "campbell": (
-                "Natural frequencies over the speed of the first body, with gyroscopic terms and mean mesh "
-                "stiffness, and the mesh frequencies."
-            ),
-            "drivetrain_mode": (
-                "Mode shape of the drivetrain ({}), by the number in the table, where the free spin is the "
-                "first; magnified, at rest in grey. The rays show how far each wheel turns. Shafts are "
-                "drawn as bent beams between the places that the model knows. The drawing is a scheme: "
-                "bodies without gears have a radius that is not theirs."
-            ),
+            "stiffness_series": "Mesh stiffness over the mesh period as the model takes it: a Fourier "
+            "series, and the rectangular wave of the number of tooth pairs in contact that it stands for.",
+            "campbell": "Natural frequencies over the speed of the first body, with gyroscopic terms and "
+            "mean mesh stiffness, and the mesh frequencies.",
+            "drivetrain_mode": "Mode shape of the drivetrain ({}), by the number in the table, where the "
+            "free spin is the first; magnified, at rest in grey. The rays show how far each wheel turns. "
+            "Shafts are drawn as bent beams between the places that the model knows. The drawing is a "
+            "scheme: bodies without gears have a radius that is not theirs.",
         },
         draw=_modes_figures,
         write=(_write_modes,),
     ),
     "transient": Figures(
         {
-            "transient_speeds": (
-                "Speed of the first and of the last body, low-passed to the rate of the records. Where the "
-                "records are denser than the pixels, the band of their values is drawn."
-            ),
-            "transient_deviations": (
-                "Rotation of the bodies less that of the free spin, which is the motion of the rigid chain "
-                "under the same torques; low-passed to the rate of the records. Bands: least to largest "
-                "record."
-            ),
-            "transient_forces": (
-                "Mesh forces along the lines of action, low-passed to the rate of the records: peaks that "
-                "are shorter are higher than here, the least and the largest force of all steps stand in "
-                "the table. Bands: least to largest record."
-            ),
+            "transient_speeds": "Speed of the first and of the last body, low-passed to the rate of the "
+            "records. Where the records are denser than the pixels, the band of their values is drawn.",
+            "transient_deviations": "Rotation of the bodies less that of the free spin, which is the motion "
+            "of the rigid chain under the same torques; low-passed to the rate of the records. Bands: least "
+            "to largest record.",
+            "transient_forces": "Mesh forces along the lines of action, low-passed to the rate of the "
+            "records: peaks that are shorter are higher than here, the least and the largest force of all "
+            "steps stand in the table. Bands: least to largest record.",
         },
         draw=lambda drawn: transient_figures(drawn.data["transient"]),
     ),
     "spectrum": Figures(
         {
-            "mesh_force_spectrum": (
-                "Amplitude spectra of mesh forces after the start: segments under Hann's window that "
-                "overlap by half, root of the mean square, peak values. Dotted: mesh frequencies and their "
-                "second and third harmonics at the mean speed. Where the speed changes, which the title "
-                "tells, lines smear over frequency; over orders they do not."
-            ),
-            "side_bands": (
-                "Mesh force around a mesh line over orders of the first body, in one segment ({}); a change "
-                "of the speed does not smear them. Dotted: distances of the carrier's turn, or of the mesh "
-                "line of the planetary stage."
-            ),
+            "mesh_force_spectrum": "Amplitude spectra of mesh forces after the start: segments under Hann's "
+            "window that overlap by half, root of the mean square, peak values. Dotted: mesh frequencies "
+            "and their second and third harmonics at the mean speed. Where the speed changes, which the "
+            "title tells, lines smear over frequency; over orders they do not.",
+            "side_bands": "Mesh force around a mesh line over orders of the first body, in one segment "
+            "({}); a change of the speed does not smear them. Dotted: distances of the carrier's turn, or "
+            "of the mesh line of the planetary stage.",
         },
         draw=lambda drawn: spectrum_figures(drawn.data["spectrum"], drawn.data.get("transient")),
     ),

@@ -116,30 +116,20 @@ class TransientResult:
         time, mesh, moving = ("time",), ("mesh",), ("time", "body")
         of_runs = (
             ("spin", time, lambda r: r.spin, "rad", "angle of the first body without its deviation"),
-            (
-                "speed", moving, lambda r: r.spin_speed[:, None] * ratio + r.velocity, "rad/s",
-                "speed of rotation",
-            ),
-            (
-                "deviation", moving, lambda r: r.motion, "rad",
-                "rotation less that of the free spin, ratio times spin",
-            ),
-            (
-                "mesh_force", ("time", "mesh"), lambda r: r.force, "N",
-                f"mesh force along the line of action; negative {negative}",
-            ),
+            ("speed", moving, lambda r: r.spin_speed[:, None] * ratio + r.velocity, "rad/s",
+             "speed of rotation"),
+            ("deviation", moving, lambda r: r.motion, "rad",
+             "rotation less that of the free spin, ratio times spin"),
+            ("mesh_force", ("time", "mesh"), lambda r: r.force, "N",
+             f"mesh force along the line of action; negative {negative}"),
             ("least_force", mesh, lambda r: r.extremes[0], "N", "least mesh force at any step"),
             ("largest_force", mesh, lambda r: r.extremes[1], "N", "largest mesh force at any step"),
             ("pulling", mesh, lambda r: r.pulling, "1", "share of steps with a negative force"),
             ("lost", mesh, lambda r: r.lost, "1", "share of steps in which no flank touches"),
-            (
-                "growth", (), lambda r: r.growth, "1/s",
-                "mean rate of the logarithm of the free motion: above zero it grows",
-            ),
-            (
-                "gain", (), lambda r: r.gain, "1",
-                "largest growth of the free motion between two instants of the run, as a factor",
-            ),
+            ("growth", (), lambda r: r.growth, "1/s",
+             "mean rate of the logarithm of the free motion: above zero it grows"),
+            ("gain", (), lambda r: r.gain, "1",
+             "largest growth of the free motion between two instants of the run, as a factor"),
         )  # fmt: skip
         variables = {
             name: (("variant", *dims), [value(run) for run in runs], unit, text)

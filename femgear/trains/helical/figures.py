@@ -298,37 +298,29 @@ FIGURES = {
     "static": Figures(
         dict(STATIC["static"].captions)
         | {
-            "helical_mesh_stiffness": (
-                "Stiffness and static transmission error of the meshes of planet 1 along the transverse "
-                "line of action, centres fixed: of the helical meshes (solid), and of the spur gears of the "
-                "transverse section (dotted) that the slices come from."
-            ),
+            "helical_mesh_stiffness": "Stiffness and static transmission error of the meshes of planet 1 "
+            "along the transverse line of action, centres fixed: of the helical meshes (solid), and of the "
+            "spur gears of the transverse section (dotted) that the slices come from.",
         },
         draw=STATIC["static"].draw,
     ),
     "modes": Figures(
         {
-            "spatial_mode_shapes": (
-                "Mode shapes of the helical set with mean mesh stiffness, from the front and, below, from "
-                "the side, where bodies tilt and move along the axis. Motions of the side view are drawn at "
-                "the scale of the front view times the factor given. At rest in grey."
-            ),
-            "mesh_phasing": (
-                "Phases of sun and ring meshes at every planet for the first harmonics of the mesh "
-                "frequency, and what is left of equal mesh forces on sun and ring: what cancels excites no "
-                "mode of that kind."
-            ),
+            "spatial_mode_shapes": "Mode shapes of the helical set with mean mesh stiffness, from the front "
+            "and, below, from the side, where bodies tilt and move along the axis. Motions of the side view "
+            "are drawn at the scale of the front view times the factor given. At rest in grey.",
+            "mesh_phasing": "Phases of sun and ring meshes at every planet for the first harmonics of the "
+            "mesh frequency, and what is left of equal mesh forces on sun and ring: what cancels excites no "
+            "mode of that kind.",
         },
         draw=_modes_figures,
     ),
     "dynamics": Figures(
         RESPONSE_CAPTIONS
         | {
-            "mesh_force_spectra": (
-                "Mesh forces of planet 1 along the tooth normals over the frequency of each harmonic, h "
-                "times the mesh frequency. Marks along the axis are natural frequencies by the phasing of "
-                "the mode: a harmonic meets modes of its own phasing."
-            ),
+            "mesh_force_spectra": "Mesh forces of planet 1 along the tooth normals over the frequency of "
+            "each harmonic, h times the mesh frequency. Marks along the axis are natural frequencies by the "
+            "phasing of the mode: a harmonic meets modes of its own phasing.",
         },
         draw=_dynamics_figures,
     ),

@@ -362,11 +362,7 @@ def normal_record(
     scale = np.repeat(np.asarray(factor, float), len(record.stiffness) // 2)[:, None]
     along = math.cos(base_helix_angle)
     softer = record.force / record.stiffness * (1.0 / scale - 1.0)
-    values = [
-        record.stiffness * scale / along**2,
-        (record.deflection + softer) * along,
-        record.force / along,
-    ]
+    values = [record.stiffness * scale / along**2, (record.deflection + softer) * along, record.force / along]
     if reversed_time:
         values = [np.roll(one[:, ::-1], 1, axis=1) for one in values]
     return MeshExcitation(*values, backlash=record.backlash * along, periods=record.periods)

@@ -72,14 +72,10 @@ class HelicalModesResult:
         along, where = np.cos(self.data.base_helix_angle), ("mesh", "position")
         position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
         curves = {
-            "helical_stiffness": (
-                where, whole.stiffness * along**2, "N/m",
-                "mesh stiffness along the transverse line of action",
-            ),
-            "helical_ste": (
-                where, whole.deflection / along, "m",
-                "static transmission error along the transverse line of action, centres fixed",
-            ),
+            "helical_stiffness": (where, whole.stiffness * along**2, "N/m",
+                                  "mesh stiffness along the transverse line of action"),
+            "helical_ste": (where, whole.deflection / along, "m",
+                            "static transmission error along the transverse line of action, centres fixed"),
         }  # fmt: skip
         return found.merge(dataset(curves, coords=coordinates(position=position), attrs={}))
 
@@ -110,19 +106,13 @@ class HelicalDynamicsResult:
         on_planet = ("speed", "planet", "direction", "harmonic")
         on_member = ("speed", "member", "axis", "harmonic")
         entries = (
-            (
-                "dte", lines, deflection.mean(axis=2) / along, "m",
-                "dynamic transmission error along the transverse line of action at mid-face",
-            ),
+            ("dte", lines, deflection.mean(axis=2) / along, "m",
+             "dynamic transmission error along the transverse line of action at mid-face"),
             ("mesh_force", lines, force.sum(axis=2), "N", "dynamic mesh force along the tooth normals"),
-            (
-                "mesh_deflection", lines, deflection.mean(axis=2), "m",
-                "deflection of the mesh spring along the tooth normals at mid-face",
-            ),
-            (
-                "slice_force", ("speed", "mesh", "slice", "harmonic"), force, "N",
-                "dynamic force of a slice along the tooth normals",
-            ),
+            ("mesh_deflection", lines, deflection.mean(axis=2), "m",
+             "deflection of the mesh spring along the tooth normals at mid-face"),
+            ("slice_force", ("speed", "mesh", "slice", "harmonic"), force, "N",
+             "dynamic force of a slice along the tooth normals"),
             ("pin_force", on_planet, pin[:, :, :3], "N", "force of the pin on the planet"),
             ("pin_moment", on_planet, pin[:, :, 3:], "N m", "moment of the pin on the planet"),
             ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),

@@ -228,8 +228,8 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
                 limit=f"stage 1 to stage {len(case.stage)}",
             )  # fmt: skip
     for n, one in enumerate(case.coupling):
-        round_section = (one.diameter is not None, one.length is not None)
-        if round_section[0] != round_section[1] or not (round_section[0] or one.torsional is not None):
+        sizes = len(one.given("diameter", "length"))
+        if sizes == 1 or (not sizes and one.torsional is None):
             yield CaseError(
                 "the shaft has neither a torsional stiffness nor a whole section", code="E-CHOICE",
                 key=f"coupling[{n}].between", limit="torsional, or diameter and length",
@@ -279,7 +279,7 @@ def _member_of(text: str) -> Member:
 
 
 def _coupling(one: CouplingSection) -> StageCoupling:
-    given = {name: getattr(one, name) for name in ("torsional", "lateral") if getattr(one, name) is not None}
+    given = {name: getattr(one, name) for name in one.given("torsional", "lateral")}
     springs = {}
     if one.diameter is not None and one.length is not None:
         # ends that do not tilt: Timoshenko's beam (Przemieniecki, Theory of Matrix Structural Analysis, 5.6)

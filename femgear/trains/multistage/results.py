@@ -174,10 +174,7 @@ def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
     names = [
         f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in mesh_names(one.data.n_planets)
     ]
-    found = {
-        **coordinates(mesh=names),
-        "stage": ("stage", range(1, len(data.stages) + 1), "1", "stage"),
-    }
+    found = {**coordinates(mesh=names), "stage": ("stage", range(1, len(data.stages) + 1), "1", "stage")}
     return found if speed is None else found | coordinates(speed=speed / RPM)
 
 

@@ -348,53 +348,34 @@ FIGURES = STATIC | {
     ),
     "branch": Figures(
         {
-            "weight_response": (
-                "Displacement of carrier, ring and sun over the frequency of the weight in the carrier "
-                "frame, r.m.s. about the mean. Circles: limit points, those that corners of the tooth "
-                "contact split drawn as one."
-            ),
-            "carrier_orbit": (
-                "Path of the carrier's centre in the carrier frame during one turn of the weight against "
-                "it, at the responses that the legend names."
-            ),
-            "planet_bearing_forces": (
-                "Force between every planet and its pin during one turn of the weight against the carrier, "
-                "at the response that the title names."
-            ),
-            "wedged_teeth": (
-                "Forces of both flanks of the meshes of planet 1 during one turn of the weight, at the "
-                "response that the title names. Where both flanks of a mesh carry at once its teeth are "
-                "wedged."
-            ),
-            "tooth_contact": (
-                "State of both flanks of the meshes of planet 1 over the frequency of the weight: 1 in "
-                "contact all the time, 0 never."
-            ),
+            "weight_response": "Displacement of carrier, ring and sun over the frequency of the weight in "
+            "the carrier frame, r.m.s. about the mean. Circles: limit points, those that corners of the "
+            "tooth contact split drawn as one.",
+            "carrier_orbit": "Path of the carrier's centre in the carrier frame during one turn of the "
+            "weight against it, at the responses that the legend names.",
+            "planet_bearing_forces": "Force between every planet and its pin during one turn of the weight "
+            "against the carrier, at the response that the title names.",
+            "wedged_teeth": "Forces of both flanks of the meshes of planet 1 during one turn of the weight, "
+            "at the response that the title names. Where both flanks of a mesh carry at once its teeth are "
+            "wedged.",
+            "tooth_contact": "State of both flanks of the meshes of planet 1 over the frequency of the "
+            "weight: 1 in contact all the time, 0 never.",
         },
         draw=lambda drawn: branch_figures(drawn.data["branch"]),
     ),
     "response": Figures(
         {
-            "response_orbit": (
-                "Paths of the centres of carrier, ring and sun in the carrier frame during one turn of the "
-                "carrier ({})."
-            ),
-            "response_bearing_forces": (
-                "Force between every planet and its pin during one turn of the carrier ({})."
-            ),
-            "response_mesh_forces": (
-                "Mesh forces of planet 1 during one turn of the carrier ({}), and during six mesh periods "
-                "where the mesh stiffness varies. They are drawn from their lines."
-            ),
-            "response_spectrum": (
-                "Lines of a mesh force and of the carrier's displacement ({}): multiples of the weight's "
-                "frequency, and of the mesh frequency with their side bands where the mesh stiffness "
-                "varies."
-            ),
-            "contact_over_speed": (
-                "State of both flanks of the meshes of planet 1 over the speed: 1 in contact all the time, "
-                "0 never."
-            ),
+            "response_orbit": "Paths of the centres of carrier, ring and sun in the carrier frame during "
+            "one turn of the carrier ({}).",
+            "response_bearing_forces": "Force between every planet and its pin during one turn of the "
+            "carrier ({}).",
+            "response_mesh_forces": "Mesh forces of planet 1 during one turn of the carrier ({}), and "
+            "during six mesh periods where the mesh stiffness varies. They are drawn from their lines.",
+            "response_spectrum": "Lines of a mesh force and of the carrier's displacement ({}): multiples "
+            "of the weight's frequency, and of the mesh frequency with their side bands where the mesh "
+            "stiffness varies.",
+            "contact_over_speed": "State of both flanks of the meshes of planet 1 over the speed: 1 in "
+            "contact all the time, 0 never.",
         },
         draw=_response_figures,
     ),

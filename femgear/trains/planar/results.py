@@ -134,11 +134,9 @@ class BranchResult:
             "stable": (point, stable, "1", "stability: 1 stable, 0 not stable, -1 not known"),
             "stability_note": (point, notes, "1", "why stability is not known"),
             "largest_multiplier": (point, largest, "1", "largest Floquet multiplier"),
-            "multiplier_distance": (
-                point, [_nearest(one) for one in verdicts] or nothing, "1",
-                "distance of the nearest Floquet multiplier from 1, "
-                "which is zero at a limit point of the motion",
-            ),
+            "multiplier_distance": (point, [_nearest(one) for one in verdicts] or nothing, "1",
+                                    "distance of the nearest Floquet multiplier from 1, "
+                                    "which is zero at a limit point of the motion"),
             "loss": (point, loss, "1", "how stability is lost"),
         }  # fmt: skip
         variables |= _flank_forces(self, stable) | _motions(self.lines, "point", "harmonic")
@@ -177,15 +175,11 @@ class PlanarResponseResult:
         found, speed = self.solutions, ("speed",)
         mesh = [one.mesh_frequency for one in self.speeds]
         variables = {
-            "carrier_speed": (
-                speed, [one.carrier for one in self.speeds], "rad/s",
-                "speed of the carrier, counter-clockwise positive",
-            ),
+            "carrier_speed": (speed, [one.carrier for one in self.speeds], "rad/s",
+                              "speed of the carrier, counter-clockwise positive"),
             "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
-            "frequency": (
-                ("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
-                "frequency of the line in the carrier frame",
-            ),
+            "frequency": (("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
+                          "frequency of the line in the carrier frame"),
         }  # fmt: skip
         variables |= {
             name: (speed, [getattr(one, name) for one in found], "1", text)

@@ -126,10 +126,8 @@ class PlanarPublished(Section):
 
     @model_validator(mode="after")
     def _one_of_two(self):
-        given = {
-            name for name in ("kind", "frequency", "figure", "comparison") if getattr(self, name) is not None
-        }
-        if given not in ({"kind", "frequency"}, {"figure", "comparison"}):
+        given = self.given("kind", "frequency", "figure", "comparison")
+        if given not in (["kind", "frequency"], ["figure", "comparison"]):
             raise CaseError(
                 "a published entry is a frequency with its kind, or a figure with a comparison",
                 code="E-CHOICE",
