@@ -71,6 +71,21 @@ def test_page_has_no_dates_paths_or_machine():
     assert not re.search(r"20\d\d-\d\d-\d\d|/home|/tmp|/work", text)
 
 
+def test_no_time_that_a_machine_took_is_on_the_page():
+    """The modules of the rows have no clock; test modules may."""
+    clock = re.compile(
+        r"^\s*(?:import|from) (?:time|timeit|datetime)\b|process_time|perf_counter", re.MULTILINE
+    )
+    folder = Path(__file__).parent
+    modules = [path for path in folder.rglob("*.py") if not path.name.startswith("test_")]
+    assert len(modules) > 30 and clock.search(
+        Path(__file__).with_name("test_three_routes.py").read_text("utf-8")
+    )
+    assert [path.name for path in modules if clock.search(path.read_text("utf-8"))] == []
+    page = (folder.parents[1] / "docs" / "validation.md").read_text("utf-8")
+    assert not re.search(r"\d (?:ms|s|min|seconds) (?:of (?:one|a) processor|CPU|wall)", page)
+
+
 def test_quick_page_says_so_and_leaves_slow_parts_out():
     def never():
         raise AssertionError

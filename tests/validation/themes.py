@@ -183,7 +183,7 @@ THEMES = (
     Theme(
         "moving",
         "A ring under moving mesh forces",
-        "Errors relative to the motion; processor times are those of one run.",
+        "Errors relative to the motion.",
         (),
         (moving_force.table,),
     ),

@@ -134,11 +134,10 @@ def test_wedging_begins_at_the_same_clearance_at_any_speed():
 
 
 def test_weight_and_mesh_stiffness_together_agree_with_integration():
-    coarse, _ = nrel.extended_errors(((3, 8, 3),), speed=36.0, steps=100)
-    fine, seconds = nrel.extended_errors(((3, 8, 3), (3, 3, 3)), speed=36.0, steps=200)
+    coarse = nrel.extended_errors(((3, 8, 3),), speed=36.0, steps=100)
+    fine = nrel.extended_errors(((3, 8, 3), (3, 3, 3)), speed=36.0, steps=200)
     # what is left is the integration's, of second order; three mesh harmonics cannot show load over k(t)
     assert fine[0] < 0.3 * coarse[0] and fine[0] < 0.012 < 0.03 < fine[1]
-    assert len(seconds) == 3
 
 
 def test_small_plays_fold_below_the_resonance_too_and_keep_the_drive_flanks_closed():
