@@ -69,6 +69,16 @@ def gmsh_is_loaded_once():
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def figures_are_drawn_here():
+    """Workers of pytest take all cores, and what a copy of the process draws is not seen to have run."""
+    from femgear.report import page
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "second_core", lambda: False)
+        yield
+
+
 @pytest.fixture(scope="module")
 def coarse_states():
     """Loaded states of few positions, for files whose tests compare runs, whatever the numbers."""

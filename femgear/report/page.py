@@ -6,16 +6,25 @@ Figures are PNG, grids VTU, the turning carrier is a GIF; the page is one HTML f
 from __future__ import annotations
 
 import base64
+import ctypes
+import multiprocessing
+import os
 import re
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from femgear.errors import printable
-from femgear.report.style import save_figure
+from femgear.errors import FemgearError, printable
+from femgear.report.style import png_bytes
 from femgear.report.tables import Block
-from femgear.storage.files import checksum, storage_errors
+from femgear.storage.files import checksum, storage_errors, write_bytes
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -24,6 +33,7 @@ if TYPE_CHECKING:
 
 _LARGEST_PICTURE = 8_000_000
 """Bytes of a picture on the page."""
+_PARENT_DEATH_SIGNAL = 1  # of prctl, Linux
 _OTHER = "Other pictures"
 """Section of those that no stage describes."""
 # what HTML and UTF-8 do not hold, and what reverses the order of the text around it
@@ -54,14 +64,23 @@ pre { font-size: 0.8rem; background: #f5f5f5; padding: 0.8rem; overflow-x: auto;
 """
 
 
-def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
-    """Write the figures of the stages whose data are there, and of the case; returns the file names."""
-    figures = {}
-    for stage in _drawn(train, drawn):
-        figures |= stage.draw(drawn)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in figures]
+def write_figures(
+    folder: Path, train: Train, drawn: Drawn, beside: Callable[[], object] = lambda: None
+) -> list[str]:
+    """Write the figures of the stages whose data are there, and of the case; returns the file names.
+
+    They are drawn in two processes where there are two cores, and in this one ``beside()`` comes first.
+    """
+    import matplotlib.backends.backend_agg  # noqa: F401  before the process is copied
+
+    def pictures(stage: Figures) -> dict[str, bytes]:
+        return {f"{name}.png": png_bytes(figure) for name, figure in stage.draw(drawn).items()}
+
+    tasks = [partial(pictures, stage) for stage in _drawn(train, drawn)]
+    found = {name: data for part in _shared(tasks, beside) for name, data in part.items()}
+    for name, data in found.items():
+        write_bytes(data, folder / name)
+    return [*found]
 
 
 def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
@@ -70,20 +89,100 @@ def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
     return [figures[name] for name in names if name in figures]
 
 
+def _shared(tasks: Sequence[Callable[[], Any]], beside: Callable[[], object]) -> list[Any]:
+    """Values of up to 256 tasks; a second process begins with the last one, this one after ``beside()``."""
+    waiting, numbers = os.pipe()
+    with open(waiting, "rb", buffering=0) as queue:
+        with open(numbers, "wb", buffering=0) as stream:
+            stream.write(bytes(reversed(range(len(tasks)))))
+
+        def take() -> dict[int, Any]:
+            return {number[0]: tasks[number[0]]() for number in iter(partial(queue.read, 1), b"")}
+
+        with _second_process(take) as others:
+            beside()
+            found = take() | others()
+    return [found[number] for number in range(len(tasks))]
+
+
+@contextmanager
+def _second_process(work: Callable[[], dict]) -> Iterator[Callable[[], dict]]:
+    """Do some work in a copy of this process during a block of code, which is given what waits for the value.
+
+    The copy ends with the block, or with this process. Without a second core the value is empty.
+    """
+    if not second_core():
+        yield dict
+        return
+    context: Any = multiprocessing.get_context("fork")
+    mine, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(work, theirs, os.getpid()), daemon=True)
+    # an interrupt is meant for this process, and waits until the other one can be ended
+    before, value = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGTERM]), dict
+    try:
+        with suppress(OSError), warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+            process.start()
+            value = partial(_received, mine)
+        theirs.close()
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        yield value
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if process.pid is not None:
+            process.kill()
+            process.join()
+        mine.close()
+
+
+def second_core() -> bool:
+    """Tell whether a copy of this process would have a core of its own."""
+    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
+
+
+def _send(work: Callable[[], Any], connection: Any, parent: int) -> None:
+    """Send the value of some work, or its error, and warnings; end with the parent, whose locks it has."""
+    ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:
+        return
+    with warnings.catch_warnings(record=True) as said:
+        try:
+            found = work()
+        except Exception as error:
+            found = error
+    connection.send((found, [(str(one.message), one.category, one.filename, one.lineno) for one in said]))
+
+
+def _received(connection: Any) -> dict:
+    """Receive what `_send` sends: value or error, and warnings."""
+    try:
+        found, said = connection.recv()
+    except EOFError:
+        remedy = "give it more memory, or run with --no-pictures"
+        raise FemgearError("the process that draws was ended", code="E-WORKER", remedy=remedy) from None
+    for one in said:
+        warnings.warn_explicit(*one)
+    if isinstance(found, BaseException):
+        raise found
+    return found
+
+
 def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progress) -> list[str]:
     """Write everything that a run shows; returns the names of the files.
 
     ``train`` is that of the case, ``progress`` is called with (stage, done, total).
     """
-    others = [write for stage in _drawn(train, drawn) for write in stage.write]
-    names, steps = [], 1 + len(others)
-    progress("pictures", 0, steps)
-    names += write_figures(folder, train, drawn)
-    for done, write in enumerate(others, 1):
-        progress("pictures", done, steps)
-        names += write(drawn, folder)
+    others, names = [write for stage in _drawn(train, drawn) for write in stage.write], []
+    steps = 1 + len(others)
+
+    def write_others() -> None:
+        for done, write in enumerate(others):
+            progress("pictures", done, steps)
+            names.extend(write(drawn, folder))
+        progress("pictures", len(others), steps)
+
+    figures = write_figures(folder, train, drawn, write_others)
     progress("pictures", steps, steps)
-    return names
+    return figures + names
 
 
 @dataclass(frozen=True)

@@ -281,6 +281,7 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
         if largest > 0.0:
             ax.set_yscale("log")
             ax.set_ylim(floor, 2.0 * largest)
+            ax.minorticks_off()
         # speeds may reach different harmonics: axes end with the last line
         last = h[(amplitude[s] > floor).any(axis=0)].max(initial=1)
         ax.set_xlim(0.4, last + 0.6)

@@ -239,6 +239,7 @@ def order_spectrum(housing: xr.Dataset) -> Figure:
     top.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
     label(axes[0], "carrier order [1]", _ACCELERATION)
     axes[0].set_ylim(floor, 2.5 * largest)
+    axes[0].minorticks_off()
     for ax, harmonic in zip(axes[1:], bands):
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
     speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
@@ -257,7 +258,10 @@ def _strongest_bands(order, amplitude, ring_teeth, count: int) -> list[int]:
 
 def _stems(ax, order, amplitude, floor, *, text, width=1.0):
     shown = _highest(order, amplitude, amplitude > floor)
-    ax.vlines(order[shown], floor, amplitude[shown], color=BLUE, linewidth=width, label=text)
+    # one line with gaps takes a tenth of the time of `vlines`
+    height = np.stack(np.broadcast_arrays(floor, amplitude[shown], np.nan), axis=1)
+    line = {"color": BLUE, "linewidth": width, "solid_capstyle": "butt"}
+    ax.plot(np.repeat(order[shown], 3), height.ravel(), label=text, **line)
     ax.set_yscale("log")
 
 
