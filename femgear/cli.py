@@ -91,6 +91,19 @@ class Progress:
         self._bars.update(self._tasks[stage], completed=done, total=total)
 
 
+def _load_xarray() -> None:
+    """Load xarray, which finds no Dask and no Pint: nothing has their arrays, and to load them takes long."""
+    hidden = {"dask", "pint"} - sys.modules.keys()
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
+    try:
+        import xarray as xr
+
+        xr.Dataset({"x": ("x", [0.0])})  # now it asks what kinds of arrays there are, and never again
+    finally:
+        for name in hidden:
+            del sys.modules[name]
+
+
 def _print(blocks) -> None:
     """Print blocks of `femgear.report.page` as tables on standard output."""
     from rich import box
@@ -224,6 +237,7 @@ def run(
     _warn(train.case_warnings(data))
     place = run_folder(output, case=data.source, force=force)
     with resumable(output, completed_since_now(output)):
+        _load_xarray()
         with place as folder, Progress() as progress:
             written = run_case(data, folder, only=only, pictures=pictures, progress=progress)
         results = open_results(output, known=written)
@@ -432,36 +446,15 @@ def schema(*, model: str | None = None) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Run the command line, by default with the arguments of the process.
 
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Without the program's name; those of the process when left out.
-
-    Returns
-    -------
-    int
-        Exit code: 0, 2 (bad input), 3 (numerical failure), 4 (storage), 130 (interrupted).
+    Returns the exit code: 0, 2 (bad input), 3 (numerical failure), 4 (storage), 130 (interrupted).
     """
     return call(app, arguments, program="femgear")
 
 
 def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> int:
-    """Call a program with its arguments, its warnings and errors as lines on standard error.
-
-    Parameters
-    ----------
-    arguments : sequence of str or None
-        As of `main`.
-    program : str
-        Its name, for remedies.
-
-    Returns
-    -------
-    int
-        Exit code as of `main`.
-    """
+    """Call a program as `main` does, its warnings and errors as lines on standard error; remedies name it."""
     for descriptor in range(3):  # a file that takes the number of a closed one would hold what is printed
         try:
             os.fstat(descriptor)

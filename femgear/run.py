@@ -73,24 +73,10 @@ class Solution(dict[str, Any]):
 def solve(case: Any, only: str | None = None, *, progress: Progress = silent) -> Solution:
     """Compute the stages of a case in memory: transmission error, modes, vibration, whatever its train has.
 
-    Parameters
-    ----------
-    case : case of any train
-        From `femgear.read_case`.
-    only : str, optional
-        Last stage to compute; it is computed with what it needs.
-    progress : callable, optional
-        Called with (stage, done, total).
-
-    Returns
-    -------
-    Solution
-        Results by the name of the stage, in order; ``dataset()`` of each has its numbers with units.
-
-    Raises
-    ------
-    CaseError, GeometryError
-        Before anything is computed: what the stages cannot represent; E-STAGE: no such stage.
+    Of a case from `femgear.read_case`, up to the stage ``only`` with what it needs; ``progress`` is called
+    with (stage, done, total). Returns results by the name of the stage, in order; ``dataset()`` of each has
+    its numbers with units. CaseError, GeometryError before anything is computed: what the stages cannot
+    represent; E-STAGE: no such stage.
     """
     case, stages = _asked(case, only)
     results = Solution()
@@ -148,21 +134,10 @@ def run_case(
 ) -> Mapping[str, xr.Dataset]:
     """Compute a case and write its results; goes on from the stages of an interrupted run of the same case.
 
-    Parameters
-    ----------
-    folder : path
-        From `femgear.storage.results.run_folder`; its manifest says after every stage what is there.
-    only : str, optional
-        Last stage to compute, whatever the case says of it.
-    pictures : bool
-        Draw figures, fields and report.
-    progress : callable, optional
-        Called with (stage, done, total).
-
-    Returns
-    -------
-    mapping of str to Dataset
-        Contents of those files that were written at once, by stage.
+    Into a folder from `femgear.storage.results.run_folder`, whose manifest says after every stage what is
+    there; up to the stage ``only``, whatever the case says of it; ``pictures`` are figures, fields and
+    report; ``progress`` is called with (stage, done, total). Returns the contents of those files that were
+    written at once, by stage.
     """
     asked, stages = _asked(case, only)
     run, results = _resumed(folder, asked, stages)

@@ -107,16 +107,9 @@ def _loads(library: str) -> bool:
 
 @dataclass(frozen=True)
 class Body:
-    """One body of a scene.
+    """One body of a scene: points (n, 2) [m] in the frame of the set, displacements (n, 2) [m] or None.
 
-    Parameters
-    ----------
-    points : (n, 2) array
-        [m], in the frame of the set.
-    triangles : (m, 6) int array
-        Corners counter-clockwise, then the nodes between 01, 12 and 20.
-    displacement : (n, 2) array, optional
-        [m]; zero when omitted.
+    Triangles (m, 6) have their corners counter-clockwise, then the nodes between 01, 12 and 20.
     """
 
     name: str
@@ -126,18 +119,9 @@ class Body:
 
 
 def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, displacement=None) -> Body:
-    """Place a grid in the set: turned about its origin, then moved.
+    """Place a grid in the set: turned about its origin by an angle [rad], then moved to a centre (2,) [m].
 
-    Parameters
-    ----------
-    grid : Grid
-        Centred on the origin.
-    centre : (2,) array
-        [m]
-    angle : float
-        [rad]
-    displacement : (n, 2) array, optional
-        In the frame of the grid [m]; turned along.
+    The displacement (n, 2) [m] in the frame of the grid is turned along.
     """
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, s], [-s, c]])
@@ -229,34 +213,11 @@ def deformed_picture(
     colour_factor: float = 1e6,
     size: int = 900,
 ) -> float:
-    """Draw a deformed grid seen from above, coloured by the size of the displacement.
+    """Draw a deformed grid seen from above as PNG, coloured by the size of a field of displacements.
 
-    Parameters
-    ----------
-    grid : pyvista.UnstructuredGrid
-        As `assemble_set` or `ring_modes_grid` makes it.
-    path : path-like
-        PNG file.
-    field : str
-        Point data of the displacement.
-    colour_label : str
-        What the colours mean, with the unit.
-    colour_factor : float
-        From the field to that unit.
-    size : int
-        Width and height in pixels.
-
-    Returns
-    -------
-    float
-        The magnification, with which the largest displacement takes 3 % of the largest radius.
-
-    Raises
-    ------
-    FemgearError
-        See `load_pyvista`.
-    StorageError
-        When the file cannot be written.
+    The grid is made by `assemble_set` or `ring_modes_grid`; ``colour_factor`` converts the field to the unit
+    of ``colour_label``, ``size`` is width and height in pixels. Returns the magnification, with which the
+    largest displacement takes 3 % of the largest radius. FemgearError: see `load_pyvista`; StorageError.
     """
     u = np.asarray(grid.point_data[field])
     length, radius = np.linalg.norm(u, axis=1), np.abs(grid.points).max()
@@ -294,14 +255,8 @@ def _linear_surface(grid: pv.UnstructuredGrid) -> pv.PolyData:
 def add_coloured(plotter: pv.Plotter, mesh: pv.PolyData, text: str, size: int, *, limits=None) -> None:
     """Add a mesh coloured by a field on its points, with a colour bar under the scene.
 
-    Parameters
-    ----------
-    text : str
-        Name of the field with its unit, also the title of the bar.
-    size : int
-        Width and height of the picture [pixels].
-    limits : (float, float), optional
-        Of the colours, in the unit of the field; its own range when left out.
+    ``text`` is the name of the field with its unit, also the title of the bar; ``size`` that of the picture
+    [pixels]; the limits (2,) of the colours are those of the field where none are given.
     """
     bar: Any = {"position_x": 0.2, "position_y": 0.045, "width": 0.6, "height": 0.07, "color": "black"}
     # the title of a horizontal bar runs into its labels: it is set apart below
@@ -373,37 +328,14 @@ def animate_operating_deflection(
     frames: int = 48,
     size: int = 480,
 ) -> int:
-    """Animate one revolution of the carrier, six seconds; every frame is a true instant of the motion.
+    """Animate one revolution of the carrier as GIF, six seconds; every frame is a true instant of the motion.
 
     The mean deflection, which turns with the carrier, is left out; the largest displacement takes 9 % of the
-    outer radius. The number of frames is adjusted so that the meshes, seen frame by frame, pass slowly
-    through a few cycles, as under a stroboscope (see `strobe_frames`).
-
-    Parameters
-    ----------
-    path : path-like
-        GIF file.
-    radial, tangential : (H + 1, 2 n_max + 1) complex arrays
-        Components of the outer surface's displacement [m]:
-        ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier.
-    sensor_angle : float
-        Place of the fixed sensor on the housing [rad].
-    clockwise : bool
-        Whether the carrier turns clockwise.
-    frames : int
-        Number of frames wished for.
-    size : int
-        Width and height in pixels.
-
-    Returns
-    -------
-    int
-        Number of frames written.
-
-    Raises
-    ------
-    StorageError
-        When the file cannot be written.
+    outer radius. The number of frames, which is returned, is near the wished one and such that the meshes
+    pass slowly through a few cycles, as under a stroboscope (see `strobe_frames`). ``radial`` and
+    ``tangential`` (H + 1, 2 n_max + 1), complex, are components of the outer surface's displacement [m]:
+    ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier, which turns
+    ``clockwise`` or not; the sensor stands at an angle [rad] on the housing, size is in pixels. StorageError.
     """
     field = _Field(radial, tangential, -1.0 if clockwise else 1.0, planetary_set.ring.teeth)
     count = strobe_frames(planetary_set.ring.teeth, frames)

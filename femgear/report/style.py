@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, cast
 
@@ -122,9 +120,13 @@ def png_bytes(figure: Figure) -> bytes:
     figure.dpi = _DPI
     if engine is not None:
         # `savefig` would draw everything once to find the layout
-        with _measured_once(figure):
-            engine.execute(figure)
+        axes = [ax for ax in figure.axes if ax.get_subplotspec() and ax.get_aspect() == "auto"]
+        for ax in axes:
+            _measured_once(ax)
+        engine.execute(figure)
         figure.set_layout_engine("none")
+        for ax in axes:
+            del ax.get_tightbbox
     try:
         canvas.print_png(stream, metadata={"Software": None}, pil_kwargs={"compress_level": PNG_LEVEL})
     finally:
@@ -133,26 +135,13 @@ def png_bytes(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
-@contextmanager
-def _measured_once(figure: Figure) -> Iterator[None]:
+def _measured_once(ax) -> None:
     """Let axes measure their texts once in a layout that asks twice: then as much is around them."""
-    free = (ax for ax in figure.axes if ax.get_subplotspec() and ax.name != "polar")
-    axes = [ax for ax in free if ax.get_aspect() == "auto"]
-    for ax in axes:
-        ax.get_tightbbox = _remembered(ax, ax.get_tightbbox)
-    try:
-        yield
-    finally:
-        for ax in axes:
-            del ax.get_tightbbox
-
-
-def _remembered(ax, measure):
-    """Make a function that measures axes with their texts when it is first called, and then adds as much."""
     from matplotlib.transforms import Bbox
 
+    measure = ax.get_tightbbox
     around = cache(lambda: measure(for_layout_only=True).extents - ax.bbox.extents)
-    return lambda *_, **__: Bbox.from_extents(ax.bbox.extents + around())
+    ax.get_tightbbox = lambda *_, **__: Bbox.from_extents(ax.bbox.extents + around())
 
 
 def family(name: str) -> str:

@@ -389,12 +389,7 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
         loads=load,
     )
     modes = cyclic_modes(
-        basis,
-        nodal_diameters=range(7),
-        loads=load,
-        outputs=load,
-        max_frequency=0.0,
-        static_correction=False,
+        basis, nodal_diameters=range(7), loads=load, outputs=load, max_frequency=0.0, static_correction=False
     )
     grid = ring_modes_grid(sector.grid, modes, range(len(modes.frequency)))
     write_vtu(grid, folder / "ring_modes.vtu")
