@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 _LARGEST_PICTURE = 8_000_000
 """Bytes of a picture on the page."""
-_PARENT_DEATH_SIGNAL = 1  # of prctl, Linux
 _OTHER = "Other pictures"
 """Section of those that no stage describes."""
 # what HTML and UTF-8 do not hold, and what reverses the order of the text around it
@@ -92,9 +91,9 @@ def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
 def _shared(tasks: Sequence[Callable[[], Any]], beside: Callable[[], object]) -> list[Any]:
     """Values of up to 256 tasks; a second process begins with the last one, this one after ``beside()``."""
     waiting, numbers = os.pipe()
+    os.write(numbers, bytes(reversed(range(len(tasks)))))
+    os.close(numbers)
     with open(waiting, "rb", buffering=0) as queue:
-        with open(numbers, "wb", buffering=0) as stream:
-            stream.write(bytes(reversed(range(len(tasks)))))
 
         def take() -> dict[int, Any]:
             return {number[0]: tasks[number[0]]() for number in iter(partial(queue.read, 1), b"")}
@@ -141,7 +140,7 @@ def second_core() -> bool:
 
 def _send(work: Callable[[], Any], connection: Any, parent: int) -> None:
     """Send the value of some work, or its error, and warnings; end with the parent, whose locks it has."""
-    ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     if os.getppid() != parent:
         return
     with warnings.catch_warnings(record=True) as said:

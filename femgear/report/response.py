@@ -76,17 +76,10 @@ def mode_shapes(
 ) -> Figure:
     """Draw bodies and outer ring surface in their undeformed (grey) and displaced positions.
 
-    Parameters
-    ----------
-    modes : xarray.Dataset
-        With ``shape`` (dof, mode), ``frequency`` [Hz], ``kind``, ``nodal_diameter`` and, where there is
-        an elastic ring, ``ring_shape_real`` and ``ring_shape_imag`` (mode, circumferential).
-    planetary_set : PlanetarySet
-        Radii, centre distance and planet angles.
-    shown : sequence of int, optional
-        Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
-    scale : float
-        Largest displacement as a share of the ring's outer radius.
+    The modes have ``shape`` (dof, mode), ``frequency`` [Hz], ``kind``, ``nodal_diameter`` and, where there is
+    an elastic ring, ``ring_shape_real`` and ``ring_shape_imag`` (mode, circumferential). Those ``shown`` are
+    numbers from 0, by default the first twelve that are no rigid-body motions; ``scale`` is the largest
+    displacement as a share of the ring's outer radius.
     """
     frequency = modes["frequency"].values
     elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
@@ -186,18 +179,8 @@ def _ring_radial(modes, mode):
 def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str) -> Figure:
     """Draw natural frequencies over the speed with lines of excitation: a Campbell diagram.
 
-    Parameters
-    ----------
-    speed : (p,) array
-        In `speed_unit`.
-    frequency : (p, m) array
-        [Hz]
-    orders : (k,) array
-        Slopes of the lines [Hz per unit of speed].
-    order_names : sequence of str
-    critical : sequence of (speed, frequency)
-        Intersections to mark, in `speed_unit` and [Hz].
-    speed_unit : str
+    Frequencies (p, m) [Hz] at speeds (p,) in ``speed_unit``; orders (k,) are slopes of the lines [Hz per unit
+    of speed]; ``critical`` are intersections to mark, pairs of speed and frequency [Hz].
     """
     figure, (ax,) = new_figure(height=5.4)
     for one in np.transpose(frequency):

@@ -67,13 +67,15 @@ def load_pyvista():
     if "pyvista" not in sys.modules:
         _refuse_little_memory()
     if sys.platform.startswith("linux"):
-        if not _loads("libEGL.so.1"):
+        try:
+            ctypes.CDLL("libEGL.so.1")
+        except OSError:
             raise FemgearError(
                 "pictures of grids need the system library libEGL.so.1, which is not installed",
                 code="E-SYSTEM-LIBRARY",
                 value="libEGL.so.1",
                 remedy="apt-get install -y --no-install-recommends libegl1 libgl1 (Debian, Ubuntu)",
-            )
+            ) from None
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     import pyvista
 
@@ -94,15 +96,6 @@ def _refuse_little_memory() -> None:
             limit=f"{(used + _MEMORY) / 1e9:.1f} GB or more",
             remedy="raise the limit (ulimit -v), or run with --no-pictures",
         )
-
-
-def _loads(library: str) -> bool:
-    """Tell whether the machine has a system library."""
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
 
 
 @dataclass(frozen=True)

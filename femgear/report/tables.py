@@ -50,16 +50,9 @@ def describe_modes(
 ) -> Block:
     """Tabulate natural frequencies and kinds of the first modes of modes.nc.
 
-    Parameters
-    ----------
-    data : xarray.Dataset
-        With ``frequency`` [Hz] and ``kind`` (mode,).
-    more : mapping of str to callable, optional
-        Further columns, the text of a mode from its part of the file; nodal diameters when not given.
-    digits : int
-        Of the frequencies [Hz] behind the point.
-    note : str
-        Behind the number of modes.
+    The file has ``frequency`` [Hz], written with so many digits behind the point, and ``kind`` (mode,). The
+    further columns, nodal diameters when not given, make the text of a mode from its part of the file; the
+    note stands behind the number of modes.
     """
     count, shown = data.sizes["mode"], min(data.sizes["mode"], _MODES)
     columns = {

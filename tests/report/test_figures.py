@@ -66,11 +66,30 @@ def drawn(figure):
     return canvas.renderer
 
 
-def test_every_figure_is_a_picture(figures):
-    for name, figure in figures.items():
-        data = style.png_bytes(figure)
+@pytest.fixture(scope="module")
+def pictures(figures):
+    """Bytes of the figures, which are laid out then as they are written."""
+    return {name: style.png_bytes(figure) for name, figure in figures.items()}
+
+
+def test_every_figure_is_a_picture(pictures):
+    for name, data in pictures.items():
         assert data.startswith(b"\x89PNG"), name
         assert 10_000 < len(data) < 600_000, name
+
+
+def test_nothing_is_cut_off(figures, pictures):
+    for name, figure in figures.items():
+        box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+        assert box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= width and box.y1 <= height, (name, box)
+
+
+def test_axes_do_not_reach_into_one_another(figures, pictures):
+    for name, figure in figures.items():
+        renderer = figure.canvas.get_renderer()
+        boxes = [ax.get_tightbbox(renderer) for ax in figure.axes]
+        for one, other in itertools.combinations([box for box in boxes if box is not None], 2):
+            assert not one.overlaps(other), (name, one, other)
 
 
 def test_every_axis_has_a_unit(figures):
@@ -88,9 +107,9 @@ def test_every_axis_has_a_unit(figures):
                     assert any("[" in getattr(one, text)() for one in siblings), (name, text)
 
 
-def test_legends_stand_outside_the_axes(figures):
+def test_legends_stand_outside_the_axes(figures, pictures):
     for name, figure in figures.items():
-        renderer = drawn(figure)
+        renderer = figure.canvas.get_renderer()
         for legend in figure.legends:
             box = legend.get_window_extent(renderer)
             assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 + 1, name
@@ -99,9 +118,9 @@ def test_legends_stand_outside_the_axes(figures):
         assert all(ax.get_legend() is None for ax in figure.axes), name
 
 
-def test_texts_of_the_order_spectrum_do_not_overlap(figures):
+def test_texts_of_the_order_spectrum_do_not_overlap(figures, pictures):
     figure = figures["orders"]
-    renderer = drawn(figure)
+    renderer = figure.canvas.get_renderer()
     for ax in figure.axes:
         boxes = [text.get_window_extent(renderer) for text in ax.texts]
         for i, box in enumerate(boxes):

@@ -110,7 +110,11 @@ def test_too_little_memory_is_said_before_vtk_ends_the_process(monkeypatch):
 
 def test_missing_opengl_library_is_named(monkeypatch):
     monkeypatch.setattr(scene.sys, "platform", "linux")
-    monkeypatch.setattr(scene, "_loads", lambda name: False)
+
+    def missing(name):
+        raise OSError(f"{name}: cannot open shared object file")
+
+    monkeypatch.setattr(scene.ctypes, "CDLL", missing)
     with pytest.raises(FemgearError, match=r"libEGL\.so\.1") as caught:
         scene.load_pyvista()
     assert caught.value.code == "E-SYSTEM-LIBRARY"

@@ -265,14 +265,14 @@ def turning_carrier() -> tuple[Row, ...]:
         i = members[0]
         kind, n = basis.modes.kind[below[i]], basis.modes.nodal_diameter[below[i]]
         name = f"mode {i + 1}, {kind}" + (f", n = {n}" if n >= 0 else "")
-        ends = ", ".join(f"{f:.2f}" for f in last[members])
+        ends = ", ".join(f"{f:.2f}" for f in np.sort(last[members]))
         note = f"{still[i]:.2f} Hz at rest, {ends} Hz at 120 rad/s"
         text = f"{name}, in the carrier frame: largest change"
         largest = change[members].max()
         rows.append(at_most("turning", SLIGHT, text, CLAIM, largest, note=note, explanation=why))
         if largest > CLAIM:
             away = np.abs(heard[members] / still[i] - 1.0).max()
-            ends = ", ".join(f"{f:.2f}" for f in heard[members])
+            ends = ", ".join(f"{f:.2f}" for f in np.sort(heard[members]))
             text = f"{name}, strongest wave as heard on the ring: largest change"
             rows.append(at_most("turning", SLIGHT, text, CLAIM, away, note=f"{ends} Hz at 120 rad/s"))
         elif len(members) == 1 and wave[i] and shares[:, i].sum() > 0.5:
