@@ -93,7 +93,7 @@ class Progress:
 
 def _load_xarray() -> None:
     """Load xarray, which finds no Dask and no Pint: nothing has their arrays, and to load them takes long."""
-    hidden = {"dask", "pint"} - sys.modules.keys()
+    hidden = set() if "xarray" in sys.modules else {"dask", "pint"} - sys.modules.keys()
     sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
     try:
         import xarray as xr

@@ -165,6 +165,17 @@ def test_heavy_libraries_are_imported_late(code):
     assert heavy_after(code) == set()
 
 
+def test_a_run_loads_xarray_without_dask_and_pint():
+    """Which come when somebody asks for them; xarray reads and computes as before."""
+    code = (
+        "import sys\nfrom femgear import cli\ncli._load_xarray()\ncli._load_xarray()\nimport xarray as xr\n"
+        "data = xr.Dataset({'a': (('t', 'u'), [[1.0, 2.0]])}, coords={'t': [1], 'u': ['v', 'w']})\n"
+        "assert data.isel(u=1)['a'].item() == data['a'].max() == 2.0\n"
+        "assert not {'dask', 'pint'} & sys.modules.keys()\nimport dask.base, pint\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
 def test_checking_a_case_loads_no_library_that_draws_or_solves():
     case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
     assert heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])") == set()

@@ -12,7 +12,9 @@ from femgear.storage.files import storage_errors, write_text
 from validation.rows import ROUNDING, Row
 from validation.run import Validation
 
-FAR_BELOW = 0.01  # of its gate: a relative error below is not shown in figures
+FAR_BELOW = 0.01  # of its gate: an error below is not shown in figures
+ROOM = 1e-6  # gates up to here leave room for rounding: nothing within is shown in figures
+UNCERTAIN = 1e-9  # without a gate
 
 INTRODUCTION = """\
 # Validation
@@ -20,8 +22,9 @@ INTRODUCTION = """\
 Every number in the column *femgear* is computed by the program when this page is written; every
 number in the column *reference* comes from the source named beside it: a closed form, a standard, a
 published table or an independent method. The error is relative, in percent of the reference, or absolute
-where it carries the mark "abs."; an error below {rounding:g} is rounding and is shown so, a relative one
-below a hundredth of its gate by that bound. The gate is the
+where it carries the mark "abs."; an absolute one below {rounding:g} is rounding and is shown so. What is
+below a hundredth of its gate is shown by that bound, what is within a gate of 1e-6 or less by the gate, so
+that this page is the same on every machine. The gate is the
 largest error that passes; references of which only printed digits are known are gated at half a unit
 of their last digit. *differs* marks a disagreement that is understood and explained in the last column;
 *information* has no gate. The cases are named as in `tests/validation`.
@@ -126,22 +129,23 @@ def _sentence(text: str) -> str:
     return text if text.endswith((".", "!", "?")) else text + "."
 
 
-def _number(value: float, decimals: int | None = None) -> str:
-    if decimals is not None:
-        return f"{value:.{decimals}f}"
-    return f"{value:.8g}"
-
-
 def _digits(row: Row) -> int:
-    """Significant digits of a computed number: more than six only where the gate is below 1e-4."""
-    relative = row.gate if row.relative else 0.0
-    if row.gate is None or relative >= 1e-4:
+    """Significant digits of a computed number: as many as its gate asks for, six to eight."""
+    if not row.gate or not row.reference:
         return 6
-    return 8
+    relative = row.gate if row.relative else row.gate / abs(row.reference)
+    return min(max(round(-math.log10(relative)), 6), 8)
+
+
+def _bound(gate: float | None) -> float:
+    """Size below which digits may be those of the machine, so that this bound stands for them."""
+    if gate is None:
+        return UNCERTAIN
+    return gate if gate <= ROOM else FAR_BELOW * gate
 
 
 def _size(value: float) -> str:
-    """A quantity that should vanish: rounding differs between machines, so small ones by a bound."""
+    """A quantity that should vanish: small ones by a bound."""
     if abs(value) >= 1e-3:
         return f"{value:.2g}"
     decade = math.floor(math.log10(abs(value)))
@@ -161,20 +165,21 @@ def _reference(row: Row) -> str:
     if row.reference is None:
         return "0"
     # sources leave the zero before the point away
-    return re.sub(r"^(-?)\.", r"\g<1>0.", row.shown) or _number(row.reference)
+    return re.sub(r"^(-?)\.", r"\g<1>0.", row.shown) or f"{row.reference:.{8 if row.gate else 6}g}"
 
 
 def _ours(row: Row) -> str:
     if not math.isfinite(row.ours):
         return "none"
-    if row.ours == 0:
+    bound = _bound(row.gate)
+    if row.ours == 0 and (row.reference or not bound or isinstance(row.ours, int)):
         return "0"
-    if row.reference is None and abs(row.ours) < ROUNDING:
-        return f"< {ROUNDING:g}"
+    if not row.reference and abs(row.ours) < bound:
+        return f"< {bound:g}"
     if row.reference is None:
         return _size(row.ours)
     decimals = _decimals(row)
-    return f"{row.ours:.{_digits(row)}g}" if decimals is None else _number(row.ours, decimals)
+    return f"{row.ours:.{_digits(row)}g}" if decimals is None else f"{row.ours:.{decimals}f}"
 
 
 def _error(row: Row) -> str:
@@ -185,14 +190,11 @@ def _error(row: Row) -> str:
     absolute = not row.relative or not row.reference
     if isinstance(row.reference, int):
         return "0" if row.error == 0 else f"{row.error:+g}"
-    scale = max(1.0, abs(row.reference)) if absolute else 1.0
-    if abs(row.error) < ROUNDING * scale:
-        return f"< {ROUNDING:g}"
     if absolute:
-        return f"{row.error:+.1e} abs."
-    if row.gate and abs(row.error) < FAR_BELOW * row.gate:
-        return f"< {100 * FAR_BELOW * row.gate:.2g} %"
-    return f"{100 * row.error:+.2g} %"
+        scale = max(1.0, abs(row.reference))
+        return f"< {ROUNDING:g}" if abs(row.error) < ROUNDING * scale else f"{row.error:+.1e} abs."
+    bound = _bound(row.gate)
+    return f"< {100 * bound:.2g} %" if abs(row.error) < bound else f"{100 * row.error:+.2g} %"
 
 
 def _gate(row: Row) -> str:

@@ -62,7 +62,7 @@ def test_page_shows_every_row_and_its_verdict():
     assert (
         "| B\\|1 | height [m] | 1 | 1.5 | +50 % | 10 % | differs | paper. the paper has a misprint. |" in text
     )
-    assert "| C | rest | 0 | < 1e-7 |  | <= 1e-06 | passes | s. |" in text
+    assert "| C | rest | 0 | < 1e-06 |  | <= 1e-06 | passes | s. |" in text
 
 
 def test_page_has_no_dates_paths_or_machine():
