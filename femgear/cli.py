@@ -446,10 +446,7 @@ def schema(*, model: str | None = None) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line, by default with the arguments of the process.
-
-    Returns the exit code: 0, 2 (bad input), 3 (numerical failure), 4 (storage), 130 (interrupted).
-    """
+    """Run the command line: exit code 0, 2 (bad input), 3 (numerics), 4 (storage) or 130 (interrupted)."""
     return call(app, arguments, program="femgear")
 
 
