@@ -16,7 +16,7 @@ from math import gcd
 import numpy as np
 
 from femgear.contact.bodies import Bodies
-from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, MeshCycle, planet_symmetry, walk_mesh_cycle
 from femgear.contact.supports import RIGID, Supports
 from femgear.gears.deviations import SetDeviations
 from femgear.gears.planetary import PlanetarySet
@@ -84,19 +84,6 @@ class LoadedPeriod:
             piece = np.arange(jump + 1, last + 1)
             if len(piece) > 2:
                 yield piece % P, tau[piece % P] + piece // P
-
-
-def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | None = None) -> int:
-    """Count the rotations that map the planets, with their errors, onto one another."""
-    symmetry, N = planetary_set.rotations, planetary_set.n_planets
-    if deviations is None:
-        return symmetry
-    runouts = [[r.amplitude, r.phase if r.amplitude else 0.0] for r in deviations.planet_runout]
-    pitches = (deviations.planet_pitch, deviations.planet_ring_side_pitch)
-    columns = (deviations.pin_errors, deviations.planet_thickness, *pitches, np.array(runouts))
-    errors = np.column_stack(columns)
-    same = (n for n in range(symmetry, 0, -1) if symmetry % n == 0)
-    return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
 
 
 def loaded_period(
