@@ -22,9 +22,11 @@ from femgear.contact.flank_pairs import LEFT, RIGHT, mesh_pairs
 from femgear.contact.local_compliance import TipCorner, depth_displacement, tip_corner
 from femgear.errors import CaseError
 from femgear.fe.compliance import (
+    FreeSector,
     SectorSchur,
     condense_sector,
     directional,
+    free_sector,
     interpolation,
     mirror_nodes,
     mirrored_columns,
@@ -97,12 +99,16 @@ class FlankCompliance:
         Depth under each station at which body and half plane are joined [m].
     corner : TipCorner
         What was taken out for the corner at the tip.
+    local : (n, n) array
+        What was taken out in all [m/N].
     unknowns : int
         Degrees of freedom of the whole body that the sector stands for.
     root : ObservedRoot, optional
         For the stresses in the roots, where they were observed too.
     surface : SectorSchur, optional
         Sector with unit loads at the stations, observed where they act; of the ring.
+    free : FreeSector, optional
+        The same, whatever holds the rim.
     """
 
     roll: np.ndarray
@@ -110,9 +116,11 @@ class FlankCompliance:
     regular: np.ndarray
     depth: np.ndarray
     corner: TipCorner
+    local: np.ndarray
     unknowns: int
     root: ObservedRoot | None = None
     surface: SectorSchur | None = None
+    free: FreeSector | None = None
 
 
 @dataclass(frozen=True)
@@ -170,13 +178,17 @@ def make_bodies(
         )
         for s in (sectors.sun, sectors.planet)
     )
-    ring = _ring_compliance(sectors.ring, material, depth, ring_foundation)
+    ring = ring_compliance(sectors.ring, material, depth=depth, foundation=ring_foundation)
     return Bodies(sun, planet, ring, material, face_width=sectors.sun.gear.face_width)
 
 
-def with_ring(bodies: Bodies, sectors: Sectors, *, depth: float | None, ring_foundation=None) -> Bodies:
-    """Exchange the ring: held at its outer surface, or on a foundation; arguments as for `make_bodies`."""
-    return replace(bodies, ring=_ring_compliance(sectors.ring, bodies.material, depth, ring_foundation))
+def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:
+    """Exchange the ring: held at its outer surface, or on a foundation (2n, 2n) [N/m]."""
+    ring, n = bodies.ring, len(bodies.ring.roll)
+    assert ring.free is not None
+    schur = ring.free.supported(ring_foundation)
+    regular = _regular(tooth_compliance(schur.observed(slice(n))), ring.local)
+    return replace(bodies, ring=replace(ring, regular=regular, surface=schur.observed(slice(n, None))))
 
 
 def flank_compliance(
@@ -202,8 +214,7 @@ def flank_compliance(
     depth : float, optional
         Largest joining depth [m]; see `joining_depth`.
     root_state : str, optional
-        Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks,
-        otherwise the displacements of the stations themselves.
+        Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks.
 
     Raises
     ------
@@ -212,14 +223,43 @@ def flank_compliance(
     """
     stations = flank_stations(grid, gear)
     along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
-    further = flank_load_columns(grid, stations) if along is None else along.columns
-    depths, schur = _condensed(grid, gear, stations, stiffness, held, depth, further)
-    inside, seen = 2 * len(stations.roll), schur.observed(slice(2 * len(stations.roll), None))
+    further = np.zeros((2 * len(grid.points), 0)) if along is None else along.columns
+    depths, loads, observations = _observed(grid, gear, stations, depth)
+    schur = condense_sector(
+        grid,
+        stiffness,
+        count=gear.teeth,
+        held=held,
+        loads=loads,
+        observations=np.hstack([observations, further]),
+    )
+    inside, seen = len(stations.roll), schur.observed(slice(len(stations.roll), None))
     compliance = tooth_compliance(schur.observed(slice(inside)))
     found = _without_half_plane(gear, material, stations, depths, compliance, len(grid.points))
-    if along is None:
-        return replace(found, surface=seen)
-    return replace(found, root=ObservedRoot(along, stations, seen))
+    return found if along is None else replace(found, root=ObservedRoot(along, stations, seen))
+
+
+def ring_compliance(
+    ring: Sector, material: Material, *, depth: float | None = None, foundation=None
+) -> FlankCompliance:
+    """Compute the flank compliance of the ring, held at its outer surface or on a foundation [N/m].
+
+    Arguments and errors as for `flank_compliance` and `make_bodies`.
+    """
+    grid, gear, stations = ring.grid, ring.gear, flank_stations(ring.grid, ring.gear)
+    depths, loads, inside = _observed(grid, gear, stations, depth)
+    sector = free_sector(
+        grid,
+        ring.stiffness,
+        count=gear.teeth,
+        rim="rim",
+        loads=loads,
+        observations=np.hstack([inside, loads]),
+    )
+    schur, n = sector.supported(foundation), len(stations.roll)
+    compliance = tooth_compliance(schur.observed(slice(n)))
+    found = _without_half_plane(gear, material, stations, depths, compliance, len(grid.points))
+    return replace(found, surface=schur.observed(slice(n, None)), free=sector)
 
 
 def flank_stations(grid: Grid, gear: Gear) -> _FlankStations:
@@ -304,64 +344,49 @@ def station_weights(roll, stations):
     return first[..., None] + np.arange(4), weight
 
 
-def _ring_compliance(ring: Sector, material: Material, depth, foundation) -> FlankCompliance:
-    """Flank compliance of the ring, held at its outer surface or on a foundation [N/m]."""
-    held, stiffness = ("rim", ring.stiffness) if foundation is None else (None, ring.stiffness + foundation)
-    return flank_compliance(ring.grid, ring.gear, material, stiffness, held=held, depth=depth)
-
-
-def _condensed(grid, gear, stations, stiffness, held, depth, further):
-    """Joining depths (n, 1), and the condensed sector that observes at both, and by `further` columns."""
+def _observed(grid, gear, stations, depth) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Joining depths (n, 1) [m], unit loads (2n, n) and what both depths tell of the surface, (2n, n)."""
     depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
     _check_depth(depth, stations)
-    inside = [
-        directional(
-            interpolation(grid, stations.points + factor * depths * stations.normals), stations.normals
-        )
-        for factor in (1.0, 2.0)
-    ]
-    schur = condense_sector(
-        grid,
-        stiffness,
-        count=gear.teeth,
-        held=held,
-        loads=flank_load_columns(grid, stations),
-        observations=np.hstack([*inside, further]),
+    once, twice = (
+        interpolation(grid, stations.points + factor * depths * stations.normals) for factor in (1.0, 2.0)
     )
-    return depths, schur
+    return depths, flank_load_columns(grid, stations), directional(2.0 * once - twice, stations.normals)
 
 
 def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:
-    """Take the local parts out of the compliance (teeth, 4n, 2n) at both depths and go on to the surface."""
-    n, teeth = len(stations.roll), len(compliance)
-    compliance = compliance.reshape(teeth, 2, 2, n, 2 * n)
+    """Take the local parts at both depths out of a compliance (teeth, 2n, 2n) that went on to the surface."""
     arc = stations.roll**2 / (2 * gear.base_radius)
     offset = arc[:, None] - arc[None, :]
     corner = tip_corner(gear, material)
     away = np.abs(arc - corner.arc)
     # a load on the corner itself stands a thousandth of the module beside it, far less than any depth
     loaded = np.maximum(away, 1e-3 * gear.module)
-    parts = []
-    for level, factor in enumerate((1.0, 2.0)):
-        # columns of the observations are mirrored as one block: (side, level, station)
-        at_depth = compliance[:, :, level].reshape(teeth, 2 * n, 2 * n).copy()
-        local = depth_displacement(offset, factor * depths, material.shear_modulus, material.poisson_ratio)
-        local += corner.depth(away[:, None], factor * depths, loaded[None, :])
-        for side in (LEFT, RIGHT):
-            block = slice(side * n, (side + 1) * n)
-            at_depth[0, block, block] -= local / gear.face_width
-        parts.append(at_depth)
-    regular = 2.0 * parts[0] - parts[1]
-    # reciprocity holds for the exact field; the two depths break it by the size of the discretisation error
-    regular = 0.5 * (regular + np.roll(regular[::-1], 1, axis=0).transpose(0, 2, 1))
+    once, twice = (
+        depth_displacement(offset, factor * depths, material.shear_modulus, material.poisson_ratio)
+        + corner.depth(away[:, None], factor * depths, loaded[None, :])
+        for factor in (1.0, 2.0)
+    )
+    local = (2.0 * once - twice) / gear.face_width
     return FlankCompliance(
         roll=stations.roll,
         base_radius=gear.base_radius,
-        regular=regular,
+        regular=_regular(compliance, local),
         depth=depths[:, 0],
         corner=corner,
-        unknowns=teeth * 2 * nodes,
+        local=local,
+        unknowns=2 * len(compliance) * nodes,
     )
+
+
+def _regular(compliance: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Compliance (teeth, 2n, 2n) without the local part (n, n) on the same flank, made reciprocal [m/N]."""
+    regular, n = compliance.copy(), len(local)
+    for side in (LEFT, RIGHT):
+        block = slice(side * n, (side + 1) * n)
+        regular[0, block, block] -= local
+    # reciprocity holds for the exact field; the two depths break it by the size of the discretisation error
+    return 0.5 * (regular + np.roll(regular[::-1], 1, axis=0).transpose(0, 2, 1))
 
 
 def _check_depth(depth: float | None, stations: _FlankStations) -> None:

@@ -70,6 +70,48 @@ class SectorSchur:
         return replace(self, compliance=compliance[:, None, None], load_cut=cut, observation_cut=cut)
 
 
+@dataclass(frozen=True)
+class FreeSector:
+    """A sector condensed on its cut and on its rim, which is free; symmetric fields first, then the others.
+
+    Parameters
+    ----------
+    count : int
+        Number of sectors in the body.
+    fields : two sparse (2n, m) matrices
+        Displacement per unknown of the rim and, behind them, of the cut.
+    on_rim : two (m,) bool arrays
+        Which of these move the rim, its corner on the cut included.
+    schur : two arrays
+        Schur complements on these unknowns, the loads and the observations.
+    cut : int
+        Number of those of the cut.
+    sizes : (int, int)
+        Number of loads and of observations.
+    """
+
+    count: int
+    fields: tuple[csc_array, ...]
+    on_rim: tuple[np.ndarray, ...]
+    schur: tuple[np.ndarray, ...]
+    cut: int
+    sizes: tuple[int, int]
+
+    def supported(self, foundation=None) -> SectorSchur:
+        """Hold the rim, or put the sector on a foundation, a sparse matrix (2n, 2n) on the rim [N/m]."""
+        found = []
+        for fields, on_rim, schur in zip(self.fields, self.on_rim, self.schur, strict=True):
+            size = len(on_rim)
+            if foundation is None:
+                keep = np.concatenate([np.flatnonzero(~on_rim), np.arange(size, len(schur))])
+                found.append(schur[np.ix_(keep, keep)])
+                continue
+            whole, r = schur.copy(), size - self.cut
+            whole[:size, :size] += (fields.T @ foundation @ fields).toarray()
+            found.append(whole[r:, r:] - whole[r:, :r] @ np.linalg.solve(whole[:r, :r], whole[:r, r:]))
+        return _sector_schur(self.count, found, *self.sizes)
+
+
 def symmetric_factor(matrix, *, ordering: str = "MMD_AT_PLUS_A") -> SuperLU:
     """Factor a sparse symmetric stiffness matrix [N/m] (SuperLU in symmetric mode).
 
@@ -215,13 +257,45 @@ def condense_sector(
     GridError
         A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
+    halves = _half_sector_fields(grid, held)
+    schurs = _schur_complements(grid, stiffness, halves, loads, observations)
+    return _sector_schur(count, schurs, loads.shape[1], observations.shape[1])
+
+
+def free_sector(
+    grid: Grid, stiffness, *, count: int, rim: str, loads: np.ndarray, observations: np.ndarray
+) -> FreeSector:
+    """Condense a sector on its cut and its boundary ``rim``, which may then be held or supported.
+
+    Other arguments and errors as for `condense_sector`.
+    """
+    halves, nodes = _half_sector_fields(grid, None, rim), dof_pairs(boundary_nodes(grid, rim))
+    edges = tuple(fields[:, inner:] for fields, inner in halves)
+    return FreeSector(
+        count,
+        edges,
+        tuple(abs(csr_array(fields)[nodes]).sum(axis=0) > 0 for fields in edges),
+        _schur_complements(grid, stiffness, halves, loads, observations),
+        2 * len(boundary_nodes(grid, "cut_left")),
+        (loads.shape[1], observations.shape[1]),
+    )
+
+
+def _schur_complements(grid: Grid, stiffness, halves, loads, observations) -> tuple[np.ndarray, ...]:
+    """Schur complements on the last unknowns, loads and observations, of symmetric fields and the others."""
     cut = np.concatenate([boundary_nodes(grid, name) for name in ("cut_right", "cut_left")])
     check_loads(loads, dof_pairs(cut))
     columns = csc_array(np.hstack([loads, observations]))
-    f, d = np.split(np.arange(loads.shape[1] + observations.shape[1]), [loads.shape[1]])
+    return tuple(
+        _schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner)
+        for fields, inner in halves
+    )
+
+
+def _sector_schur(count: int, schurs, loads: int, observations: int) -> SectorSchur:
+    f, d = np.split(np.arange(loads + observations), [loads])
     parts = []
-    for fields, inner in _half_sector_fields(grid, held):
-        schur = _schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner)
+    for schur in schurs:
         size = len(schur) - len(f) - len(d)
         K, P, C = schur[:size, :size], schur[:size, size:], -schur[size:, size:]
         parts.append((0.5 * (K + K.T), C[np.ix_(d, f)], P[:, f], P[:, d]))
@@ -246,11 +320,12 @@ def _check_residual(residual: float) -> None:
         )
 
 
-def _half_sector_fields(grid: Grid, held: str | None) -> list[tuple[csc_array, int]]:
+def _half_sector_fields(grid: Grid, held: str | None, last: str | None = None) -> list[tuple[csc_array, int]]:
     """Symmetric and antisymmetric displacements of a sector from those of its left half.
 
     Matrices (2n, m) from the unknowns of the half sector, in an order that keeps their factor sparse and the
-    radial and tangential displacements of the cut last, and the number of those before the cut.
+    radial and tangential displacements of the cut last, and the number of those before the cut; before the
+    boundary ``last``, where there is one, whose unknowns are the next to the last.
     """
     image, points = mirror_nodes(grid), np.asarray(grid.points)
     fixed = boundary_nodes(grid, held) if held else np.zeros(0, int)
@@ -259,8 +334,11 @@ def _half_sector_fields(grid: Grid, held: str | None) -> list[tuple[csc_array, i
     on_axis = image == np.arange(len(points))
     left = on_axis | (points[:, 1] > 0)
     left[np.concatenate([fixed, cut])] = False
+    rim = np.zeros(0, int) if last is None else boundary_nodes(grid, last)
+    rim = rim[left[rim]]
+    left[rim] = False
     inner = np.flatnonzero(left)
-    inner = inner[_sparse_order(grid.triangles, inner, len(points))]
+    inner = np.concatenate([inner[_sparse_order(grid.triangles, inner, len(points))], rim])
     cos, sin = points[cut].T / np.hypot(*points[cut].T)
     # unknowns of the inner nodes, then radial and tangential ones of the cut
     rows = [dof_pairs(inner), *(np.repeat(2 * cut + c, 2) for c in (0, 1))]
@@ -275,7 +353,7 @@ def _half_sector_fields(grid: Grid, held: str | None) -> list[tuple[csc_array, i
         reflected = diags_array(np.tile([sign, -sign], len(points))) @ half[dof_pairs(image)]
         fields = csc_array(once @ (half + reflected))
         moved = np.flatnonzero(abs(fields).sum(axis=0))
-        found.append((fields[:, moved], len(moved) - len(on_cut)))
+        found.append((fields[:, moved], int((moved < len(at) - 2 * len(rim)).sum())))
     return found
 
 
