@@ -99,17 +99,21 @@ class FreeSector:
 
     def supported(self, foundation=None) -> SectorSchur:
         """Hold the rim, or put the sector on a foundation, a sparse matrix (2n, 2n) on the rim [N/m]."""
-        found = []
+        f, d = np.split(np.arange(sum(self.sizes)), self.sizes[:1])
+        parts = []
         for fields, on_rim, schur in zip(self.fields, self.on_rim, self.schur, strict=True):
-            size = len(on_rim)
+            size, r = len(on_rim), len(on_rim) - self.cut
             if foundation is None:
                 keep = np.concatenate([np.flatnonzero(~on_rim), np.arange(size, len(schur))])
-                found.append(schur[np.ix_(keep, keep)])
-                continue
-            whole, r = schur.copy(), size - self.cut
-            whole[:size, :size] += (fields.T @ foundation @ fields).toarray()
-            found.append(whole[r:, r:] - whole[r:, :r] @ np.linalg.solve(whole[:r, :r], whole[:r, r:]))
-        return _sector_schur(self.count, found, *self.sizes)
+                schur = schur[np.ix_(keep, keep)]
+            else:
+                schur = schur.copy()
+                schur[:size, :size] += (fields.T @ foundation @ fields).toarray()
+                schur = schur[r:, r:] - schur[r:, :r] @ np.linalg.solve(schur[:r, :r], schur[:r, r:])
+            nb = len(schur) - len(f) - len(d)
+            K, P, C = schur[:nb, :nb], schur[:nb, nb:], -schur[nb:, nb:]
+            parts.append((0.5 * (K + K.T), C[np.ix_(d, f)], P[:, f], P[:, d]))
+        return SectorSchur(self.count, *(np.stack(part) for part in zip(*parts, strict=True)))
 
 
 def symmetric_factor(matrix, *, ordering: str = "MMD_AT_PLUS_A") -> SuperLU:
@@ -257,49 +261,29 @@ def condense_sector(
     GridError
         A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
-    halves = _half_sector_fields(grid, held)
-    schurs = _schur_complements(grid, stiffness, halves, loads, observations)
-    return _sector_schur(count, schurs, loads.shape[1], observations.shape[1])
+    sector = free_sector(grid, stiffness, count=count, rim=held, loads=loads, observations=observations)
+    return sector.supported()
 
 
 def free_sector(
-    grid: Grid, stiffness, *, count: int, rim: str, loads: np.ndarray, observations: np.ndarray
+    grid: Grid, stiffness, *, count: int, rim: str | None, loads: np.ndarray, observations: np.ndarray
 ) -> FreeSector:
     """Condense a sector on its cut and its boundary ``rim``, which may then be held or supported.
 
     Other arguments and errors as for `condense_sector`.
     """
-    halves, nodes = _half_sector_fields(grid, None, rim), dof_pairs(boundary_nodes(grid, rim))
-    edges = tuple(fields[:, inner:] for fields, inner in halves)
-    return FreeSector(
-        count,
-        edges,
-        tuple(abs(csr_array(fields)[nodes]).sum(axis=0) > 0 for fields in edges),
-        _schur_complements(grid, stiffness, halves, loads, observations),
-        2 * len(boundary_nodes(grid, "cut_left")),
-        (loads.shape[1], observations.shape[1]),
+    check_loads(
+        loads, dof_pairs(np.concatenate([boundary_nodes(grid, f"cut_{s}") for s in ("right", "left")]))
     )
-
-
-def _schur_complements(grid: Grid, stiffness, halves, loads, observations) -> tuple[np.ndarray, ...]:
-    """Schur complements on the last unknowns, loads and observations, of symmetric fields and the others."""
-    cut = np.concatenate([boundary_nodes(grid, name) for name in ("cut_right", "cut_left")])
-    check_loads(loads, dof_pairs(cut))
     columns = csc_array(np.hstack([loads, observations]))
-    return tuple(
-        _schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner)
-        for fields, inner in halves
-    )
-
-
-def _sector_schur(count: int, schurs, loads: int, observations: int) -> SectorSchur:
-    f, d = np.split(np.arange(loads + observations), [loads])
-    parts = []
-    for schur in schurs:
-        size = len(schur) - len(f) - len(d)
-        K, P, C = schur[:size, :size], schur[:size, size:], -schur[size:, size:]
-        parts.append((0.5 * (K + K.T), C[np.ix_(d, f)], P[:, f], P[:, d]))
-    return SectorSchur(count, *(np.stack(part) for part in zip(*parts, strict=True)))
+    nodes = dof_pairs(boundary_nodes(grid, rim)) if rim else []
+    edges, on_rim, schurs = [], [], []
+    for fields, inner in _half_sector_fields(grid, None, rim):
+        schurs.append(_schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner))
+        edges.append(fields[:, inner:])
+        on_rim.append(abs(csr_array(edges[-1])[nodes]).sum(axis=0) > 0)
+    nb, sizes = 2 * len(boundary_nodes(grid, "cut_left")), (loads.shape[1], observations.shape[1])
+    return FreeSector(count, tuple(edges), tuple(on_rim), tuple(schurs), nb, sizes)
 
 
 def check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
