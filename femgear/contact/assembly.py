@@ -259,8 +259,13 @@ class Candidates:
         return np.moveaxis(found, 0, -1)
 
     def images_of(self, bodies: Bodies) -> np.ndarray:
-        """`images` of other bodies with the same flanks."""
-        return _smooth_part(self.setup, bodies, self.position, self.mesh, self.pair)
+        """`images` of other bodies with the same flanks: what differs, of which little is computed anew."""
+        parts = {}
+        for name in ("sun", "planet", "ring"):
+            own, other = getattr(self.bodies, name), getattr(bodies, name)
+            parts[name] = None if own is other else replace(other, regular=other.regular - own.regular)
+        differing = replace(bodies, **parts)
+        return self.images + _smooth_part(self.setup, differing, self.position, self.mesh, self.pair)
 
     def touches_window_end(self, active: np.ndarray) -> bool:
         """Whether a contact (P, W, C) ends where its window ends, other than at an end of a flank."""
@@ -555,6 +560,8 @@ def _smooth_part(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> n
     on_bodies += [(bodies.planet, everything[mesh % N == planet], gear, side) for planet in range(N)]
     on_bodies.append((bodies.ring, everything[~sun_side], ones, left))
     for body, members, gear, side in on_bodies:
+        if body is None:
+            continue
         own, j, i = gear[members], mesh[members], pair[:, members]
         roll = setup.roll[own, j, positions[:, None], i]
         sectors = smooth[:1] if body is bodies.planet else smooth

@@ -8,7 +8,7 @@ import pytest
 from gyroscopic import ring_wave_shares, turning_system
 from scipy.sparse.linalg import splu
 
-from femgear.contact.bodies import active_flank_load, flank_compliance, make_sectors
+from femgear.contact.bodies import active_flank_load, make_sectors, ring_compliance
 from femgear.contact.flank_pairs import mesh_pairs, separation
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
@@ -62,17 +62,13 @@ def make_ring(sector, gears, side=1.0, foundation_stiffness=1e10, max_diameter=2
     width = gears.ring.face_width
     k = foundation_stiffness
     springs = foundation(sector.grid, "rim", k, k, thickness=width)
-    matrices = (sector.stiffness + springs, None), (sector.stiffness, "rim")
-    on_foundation, held = (
-        flank_compliance(sector.grid, gears.ring, STEEL, matrix, held=boundary)
-        for matrix, boundary in matrices
-    )
+    flanks = ring_compliance(sector, STEEL, foundation=springs), ring_compliance(sector, STEEL)
     return ring_model(
         gears,
         sector,
         mass(sector.grid, STEEL, width),
         springs,
-        (on_foundation, held),
+        flanks,
         max_diameter=max_diameter,
         max_frequency=15e3,
         side=side,
