@@ -26,7 +26,6 @@ from femgear.fe.compliance import (
     SectorSchur,
     condense_sector,
     directional,
-    free_sector,
     interpolation,
     mirror_nodes,
     mirrored_columns,
@@ -173,22 +172,20 @@ def make_bodies(
     """
     # the ring's roots need a solution of their own: its sector is not of one plane state, see `root_stress`
     sun, planet = (
-        flank_compliance(
-            s.grid, s.gear, material, s.stiffness, held="rim", depth=depth, root_state=TEETH_STATE
-        )
+        flank_compliance(s.grid, s.gear, material, s.stiffness, depth=depth, root_state=TEETH_STATE)
         for s in (sectors.sun, sectors.planet)
     )
-    ring = ring_compliance(sectors.ring, material, depth=depth, foundation=ring_foundation)
+    s = sectors.ring
+    ring = flank_compliance(s.grid, s.gear, material, s.stiffness, depth=depth, foundation=ring_foundation)
     return Bodies(sun, planet, ring, material, face_width=sectors.sun.gear.face_width)
 
 
 def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:
     """Exchange the ring: held at its outer surface, or on a foundation (2n, 2n) [N/m]."""
-    ring, n = bodies.ring, len(bodies.ring.roll)
+    ring = bodies.ring
     assert ring.free is not None
-    schur = ring.free.supported(ring_foundation)
-    regular = _regular(tooth_compliance(schur.observed(slice(n))), ring.local)
-    return replace(bodies, ring=replace(ring, regular=regular, surface=schur.observed(slice(n, None))))
+    compliance, surface = _seen(ring.free.supported(ring_foundation), len(ring.roll))
+    return replace(bodies, ring=replace(ring, regular=_regular(compliance, ring.local), surface=surface))
 
 
 def flank_compliance(
@@ -197,24 +194,25 @@ def flank_compliance(
     material: Material,
     stiffness,
     *,
-    held: str | None,
     depth: float | None = None,
     root_state: str | None = None,
+    foundation=None,
 ) -> FlankCompliance:
     """Compute the regular flank compliance of a whole gear from the grid of one sector.
 
     Parameters
     ----------
     grid : Grid
-        Mirror-symmetric sector with boundaries ``flank_left``, ``cut_left``, ``cut_right`` and `held`.
+        Mirror-symmetric sector with boundaries ``flank_left``, ``cut_left``, ``cut_right`` and ``rim``.
     stiffness : (2n, 2n) sparse matrix
         Stiffness of the sector [N/m].
-    held : str
-        Boundary that is held: ``"rim"`` is the bore of an external gear and the outer surface of a ring.
     depth : float, optional
         Largest joining depth [m]; see `joining_depth`.
     root_state : str, optional
-        Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks.
+        Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks,
+        otherwise the displacements of the stations themselves.
+    foundation : (2n, 2n) sparse matrix, optional
+        Stiffness that supports the rim [N/m], the bore or the outer surface of a ring; held without it.
 
     Raises
     ------
@@ -222,44 +220,22 @@ def flank_compliance(
         When the depth reaches out of the tooth or the sector can move freely.
     """
     stations = flank_stations(grid, gear)
-    along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
-    further = np.zeros((2 * len(grid.points), 0)) if along is None else along.columns
     depths, loads, observations = _observed(grid, gear, stations, depth)
-    schur = condense_sector(
-        grid,
-        stiffness,
-        count=gear.teeth,
-        held=held,
-        loads=loads,
-        observations=np.hstack([observations, further]),
+    along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
+    observations = np.hstack([observations, loads if along is None else along.columns])
+    free = condense_sector(
+        grid, stiffness, count=gear.teeth, rim="rim", loads=loads, observations=observations
     )
-    inside, seen = len(stations.roll), schur.observed(slice(len(stations.roll), None))
-    compliance = tooth_compliance(schur.observed(slice(inside)))
+    compliance, further = _seen(free.supported(foundation), len(stations.roll))
     found = _without_half_plane(gear, material, stations, depths, compliance, len(grid.points))
-    return found if along is None else replace(found, root=ObservedRoot(along, stations, seen))
+    if along is None:
+        return replace(found, surface=further, free=free)
+    return replace(found, root=ObservedRoot(along, stations, further))
 
 
-def ring_compliance(
-    ring: Sector, material: Material, *, depth: float | None = None, foundation=None
-) -> FlankCompliance:
-    """Compute the flank compliance of the ring, held at its outer surface or on a foundation [N/m].
-
-    Arguments and errors as for `flank_compliance` and `make_bodies`.
-    """
-    grid, gear, stations = ring.grid, ring.gear, flank_stations(ring.grid, ring.gear)
-    depths, loads, inside = _observed(grid, gear, stations, depth)
-    sector = free_sector(
-        grid,
-        ring.stiffness,
-        count=gear.teeth,
-        rim="rim",
-        loads=loads,
-        observations=np.hstack([inside, loads]),
-    )
-    schur, n = sector.supported(foundation), len(stations.roll)
-    compliance = tooth_compliance(schur.observed(slice(n)))
-    found = _without_half_plane(gear, material, stations, depths, compliance, len(grid.points))
-    return replace(found, surface=schur.observed(slice(n, None)), free=sector)
+def _seen(schur: SectorSchur, stations: int) -> tuple[np.ndarray, SectorSchur]:
+    """Compliance between the flanks of all teeth [m/N], and the sector with what else it observes."""
+    return tooth_compliance(schur.observed(slice(stations))), schur.observed(slice(stations, None))
 
 
 def flank_stations(grid: Grid, gear: Gear) -> _FlankStations:

@@ -233,9 +233,9 @@ def directional(weights, directions: np.ndarray) -> np.ndarray:
 
 
 def condense_sector(
-    grid: Grid, stiffness, *, count: int, held: str | None, loads: np.ndarray, observations: np.ndarray
-) -> SectorSchur:
-    """Condense a mirror-symmetric sector on its cut.
+    grid: Grid, stiffness, *, count: int, rim: str | None, loads: np.ndarray, observations: np.ndarray
+) -> FreeSector:
+    """Condense a mirror-symmetric sector on its cut and its rim, which is held or supported afterwards.
 
     Loads and observations are unknowns behind those of the cut: one factor holds the Schur complement of all.
     The signs on its diagonal make it quasidefinite, which needs no pivoting (Vanderbei, SIAM J. Optim. 5,
@@ -244,13 +244,13 @@ def condense_sector(
     Parameters
     ----------
     grid : Grid
-        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
+        Sector with boundaries ``cut_left``, ``cut_right`` and `rim`.
     stiffness : (2n, 2n) sparse matrix
         [N/m].
     count : int
         Number of sectors.
-    held : str or None
-        Boundary that cannot move; None when a foundation is part of `stiffness`.
+    rim : str or None
+        Boundary that will be held or supported; None when a foundation is part of `stiffness`.
     loads : (2n, m) array
         Nodal forces, none on the cuts; the images of these loads are understood.
     observations : (2n, mo) array
@@ -260,17 +260,6 @@ def condense_sector(
     ------
     GridError
         A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
-    """
-    sector = free_sector(grid, stiffness, count=count, rim=held, loads=loads, observations=observations)
-    return sector.supported()
-
-
-def free_sector(
-    grid: Grid, stiffness, *, count: int, rim: str | None, loads: np.ndarray, observations: np.ndarray
-) -> FreeSector:
-    """Condense a sector on its cut and its boundary ``rim``, which may then be held or supported.
-
-    Other arguments and errors as for `condense_sector`.
     """
     check_loads(
         loads, dof_pairs(np.concatenate([boundary_nodes(grid, f"cut_{s}") for s in ("right", "left")]))

@@ -8,7 +8,7 @@ import pytest
 from gyroscopic import ring_wave_shares, turning_system
 from scipy.sparse.linalg import splu
 
-from femgear.contact.bodies import active_flank_load, make_sectors, ring_compliance
+from femgear.contact.bodies import active_flank_load, flank_compliance, make_sectors
 from femgear.contact.flank_pairs import mesh_pairs, separation
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
@@ -62,7 +62,10 @@ def make_ring(sector, gears, side=1.0, foundation_stiffness=1e10, max_diameter=2
     width = gears.ring.face_width
     k = foundation_stiffness
     springs = foundation(sector.grid, "rim", k, k, thickness=width)
-    flanks = ring_compliance(sector, STEEL, foundation=springs), ring_compliance(sector, STEEL)
+    flanks = tuple(
+        flank_compliance(sector.grid, gears.ring, STEEL, sector.stiffness, foundation=support)
+        for support in (springs, None)
+    )
     return ring_model(
         gears,
         sector,
