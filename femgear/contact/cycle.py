@@ -351,13 +351,12 @@ def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | Non
     symmetry, N, d = planetary_set.rotations, planetary_set.n_planets, deviations
     if d is None:
         return symmetry
-    if d.sun_pitch.any() or d.ring_pitch.any():
+    turning = (d.sun_runout, d.ring_runout, d.carrier_runout, d.ovality)
+    if d.sun_pitch.any() or d.ring_pitch.any() or any(one.amplitude for one in turning):
         return 1
-    if any(turning.amplitude for turning in (d.sun_runout, d.ring_runout, d.carrier_runout, d.ovality)):
-        return 1
-    runouts = [[r.amplitude, r.phase if r.amplitude else 0.0] for r in d.planet_runout]
-    pitches = (d.planet_pitch, d.planet_ring_side_pitch)
-    errors = np.column_stack((d.pin_errors, d.planet_thickness, *pitches, np.array(runouts)))
+    runouts = np.array([[r.amplitude, r.phase if r.amplitude else 0.0] for r in d.planet_runout])
+    pitches = d.planet_pitch, d.planet_ring_side_pitch
+    errors = np.column_stack((d.pin_errors, d.planet_thickness, *pitches, runouts))
     same = (n for n in range(symmetry, 0, -1) if symmetry % n == 0)
     return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
 

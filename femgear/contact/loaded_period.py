@@ -180,8 +180,6 @@ def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> Loa
     N = planetary_set.n_planets
     ahead = N // symmetry
     common = gcd(symmetry, planetary_set.sun.teeth)
-    # planets that are in the same state at all times take that of the first of them
-    first = np.arange(N) % (ahead * parts)
     step = pow(planetary_set.sun.teeth // common, -1, parts) if parts > 1 else 0
     shown = record["position"] < (1.0 - 1e-12) / parts
     tau = record["position"][shown]
@@ -190,9 +188,9 @@ def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> Loa
     values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
         moved = (np.arange(N) - ahead * (step * part % parts)) % N
-        for name in names:
-            values[name].append(record[name][np.concatenate([first[moved], first[moved] + N])][:, shown])
         meshes = np.concatenate([moved, moved + N])
+        for name in names:
+            values[name].append(record[name][meshes][:, shown])
         mean += compliance[np.ix_(meshes, meshes)] / parts
     return LoadedPeriod(
         position=np.concatenate([tau + part / parts for part in range(parts)]),

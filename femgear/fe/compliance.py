@@ -261,9 +261,8 @@ def condense_sector(
     GridError
         A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
-    check_loads(
-        loads, dof_pairs(np.concatenate([boundary_nodes(grid, f"cut_{s}") for s in ("right", "left")]))
-    )
+    cut = np.concatenate([boundary_nodes(grid, f"cut_{side}") for side in ("right", "left")])
+    check_loads(loads, dof_pairs(cut))
     columns = csc_array(np.hstack([loads, observations]))
     nodes = dof_pairs(boundary_nodes(grid, rim)) if rim else []
     edges, on_rim, schurs = [], [], []

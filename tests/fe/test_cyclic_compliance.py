@@ -331,3 +331,21 @@ def test_displacement_field_of_the_whole_gear(gear, sector, whole):
         a = t * gear.pitch_angle
         turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
         assert np.abs(field[t] @ turn.T - u.reshape(-1, 2)[nodes[t]]).max() < 1e-10 * np.abs(u).max()
+
+
+def test_a_rim_supported_afterwards_is_one_that_was_supported_before():
+    """Held, and on foundations stiff and soft: as condensed with the foundation in the stiffness."""
+    gear = GEAR
+    sector, K = sector_and_stiffness(gear)
+    loads = flank_load_columns(sector, flank_stations(sector, gear))
+    options = dict(count=gear.teeth, loads=loads, observations=loads)
+    free = condense_sector(sector, K, rim="rim", **options)
+    for modulus in (1e9, 1e13):
+        springs = foundation(sector, "rim", modulus, 0.5 * modulus, thickness=THICKNESS)
+        before = tooth_compliance(condense_sector(sector, K + springs, rim=None, **options).supported())
+        after = tooth_compliance(free.supported(springs))
+        assert np.abs(after - before).max() < 1e-9 * np.abs(before).max()
+    # an all but rigid foundation holds
+    springs = foundation(sector, "rim", 1e18, 1e18, thickness=THICKNESS)
+    held, rigid = (tooth_compliance(free.supported(support)) for support in (None, springs))
+    assert np.abs(held - rigid).max() < 1e-4 * np.abs(held).max()
