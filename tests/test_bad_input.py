@@ -243,7 +243,7 @@ def test_loads_and_points_outside_the_flank(sun):
     loads = flank_load_columns(grid, flank_stations(grid, gear))
     loads[dof_pairs(np.unique(grid.boundaries["cut_left"]))] = 1.0
     with pytest.raises(GridError) as caught:
-        condense_sector(grid, matrix, count=27, held="rim", loads=loads, observations=loads)
+        condense_sector(grid, matrix, count=27, rim="rim", loads=loads, observations=loads).supported()
     assert caught.value.code == "E-GRID"
 
 

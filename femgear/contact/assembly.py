@@ -45,9 +45,6 @@ HELD = 2.56
 ROUGH_STIFFNESS = 10e9
 """Stiffness of a mesh per face width, to size windows [N/m^2]."""
 
-_ALIKE = 1e-11
-"""Share of the largest value by which planets in the same state may differ."""
-
 Found = TypeVar("Found")
 
 
@@ -93,6 +90,7 @@ class MeshWindows(Windows):
     Parameters
     ----------
     n_planets : int
+        N: the planets that have windows.
     tooth : (2, meshes, pairs) int array
         Tooth numbers on gear 1 and gear 2 in the first mesh period.
     turns : (P,) int array
@@ -101,6 +99,8 @@ class MeshWindows(Windows):
         Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh and all layouts.
     cell_area : (meshes, 4, cells) array
         Areas of the pressure cells in all layouts [m^2].
+    images : int
+        Sectors of the set that are all in the same state: the planets are those of the first.
     """
 
     n_planets: int
@@ -108,6 +108,7 @@ class MeshWindows(Windows):
     turns: np.ndarray
     local: np.ndarray
     cell_area: np.ndarray
+    images: int = 1
 
     @property
     def cells(self) -> int:
@@ -195,7 +196,9 @@ class Candidates:
 
     The compliance is ``H = L + Pi S Pi^T`` and that of the supports: ``L`` is block-diagonal, half plane and
     tip corners within a window, and ``S`` what the bodies yield between the three nodes of every window,
-    smooth along the flanks. Every mesh has the same number of windows, some of which may be empty.
+    smooth along the flanks. Every mesh has the same number of windows, some of which may be empty. Of sets
+    that rotations map onto themselves in the same state there are the planets of the first sector alone, with
+    what they and their images yield together; free members stay where they are.
 
     Parameters
     ----------
@@ -213,8 +216,8 @@ class Candidates:
         ``Pi``: values of the windows' quadratic polynomials in the cells; they add up to one.
     local : (P, W, C, C) array
         ``L`` [m/N].
-    smooth : (P, W, 3, W, 3) array
-        ``S`` [m/N].
+    images : (I, P, W, 3, W, 3) array
+        Yielding under loads on the windows in every one of the sectors, their own first [m/N].
     approach, supports : (meshes, m) and (meshes, meshes) arrays
         Approach of the flanks of every mesh per unit motion, and compliance of sprung members between the
         meshes [m/N].
@@ -229,9 +232,14 @@ class Candidates:
     candidate: np.ndarray
     polynomials: np.ndarray
     local: np.ndarray
-    smooth: np.ndarray
+    images: np.ndarray
     approach: np.ndarray
     supports: np.ndarray
+
+    @cached_property
+    def smooth(self) -> np.ndarray:
+        """``S``, (P, W, 3, W, 3) [m/N]."""
+        return self.images.sum(axis=0)
 
     @property
     def layout(self) -> np.ndarray:
@@ -250,9 +258,14 @@ class Candidates:
         found[np.arange(P)[:, None], self.mesh, self.pair] = values
         return np.moveaxis(found, 0, -1)
 
-    def smooth_of(self, bodies: Bodies) -> np.ndarray:
-        """``S`` of other bodies with the same flanks, (P, W, 3, W, 3) [m/N]."""
-        return _smooth_part(self.setup, bodies, self.position, self.mesh, self.pair)
+    def images_of(self, bodies: Bodies) -> np.ndarray:
+        """`images` of other bodies with the same flanks: what differs, of which little is computed anew."""
+        parts = {}
+        for name in ("sun", "planet", "ring"):
+            own, other = getattr(self.bodies, name), getattr(bodies, name)
+            parts[name] = None if own is other else replace(other, regular=other.regular - own.regular)
+        differing = replace(bodies, **parts)
+        return self.images + _smooth_part(self.setup, differing, self.position, self.mesh, self.pair)
 
     def touches_window_end(self, active: np.ndarray) -> bool:
         """Whether a contact (P, W, C) ends where its window ends, other than at an end of a flank."""
@@ -263,48 +276,6 @@ class Candidates:
         last = self.candidate.shape[-1] - 1 - self.candidate[..., ::-1].argmax(axis=-1)
         at_last = np.take_along_axis(active, last[..., None], axis=-1)[..., 0]
         return (active[..., 0] & self.at_edge[0]) | (at_last & self.at_edge[1])
-
-    def of_one_planet(self) -> Candidates | None:
-        """Candidates of planet 1 under equal loads on all planets; None where the planets are not alike.
-
-        Alike are planets with the same separations, whose windows feel the same of equal loads on all
-        planets. The motions left are those of planet 1 and of the sun; free members stay where they are.
-        """
-        N, meshes, (P, W, C) = self.setup.n_planets, len(self.approach), self.gap.shape
-        if N == 1 or meshes > 2 * N:
-            return None
-        every = (P, 2, N, W // meshes)
-
-        def apart(values: np.ndarray, planets: int) -> bool:
-            """Whether planets differ by more than they owe to rounding."""
-            differ = np.abs(values - values.take([0], axis=planets)).max()
-            return bool(differ > _ALIKE * np.abs(values).max())
-
-        cells, gap = (values.reshape(*every, C) for values in (self.candidate, self.gap))
-        pushed = np.abs(self.approach[:, N + 1 :].reshape(2, N, -1).sum(axis=1)).max(initial=0.0)
-        if pushed > _ALIKE or (cells != cells[:, :, :1]).any() or apart(gap, 2):
-            return None
-        smooth = self.smooth.reshape(*every, 3, *every[1:], 3).sum(axis=6)
-        supports = self.supports.reshape(2, N, 2, N).sum(axis=3)
-        if apart(smooth, 2) or apart(supports, 1):
-            return None
-        own = np.arange(W).reshape(every[1:])[:, 0].ravel()
-        setup = replace(self.setup, n_planets=1, **{
-            name: getattr(self.setup, name)[::N] for name in ("near", "gap", "layout", "cell", "cell_area")
-        })  # fmt: skip
-        return replace(
-            self,
-            setup=setup,
-            mesh=self.mesh[own] // N,
-            pair=self.pair[:, own],
-            gap=self.gap[:, own],
-            candidate=self.candidate[:, own],
-            polynomials=self.polynomials[:, own],
-            local=self.local[:, own],
-            smooth=smooth[:, :, 0].reshape(P, len(own), 3, len(own), 3),
-            approach=self.approach[::N, [0, N]],
-            supports=supports[:, 0],
-        )
 
     def problem(self, at: int) -> ContactProblem:
         """The contact problem at one of the positions."""
@@ -547,8 +518,10 @@ def contact_candidates(
     approach = np.vstack([rotation_approach(N), -rotation_approach(N)])[:meshes]
     supports = np.zeros((meshes, meshes))
     if members is not None:
-        approach = np.hstack([approach, members.approach[:, members.free]])
-        supports = members.compliance
+        if setup.images == 1:
+            approach = np.hstack([approach, members.approach[:, members.free]])
+        every = meshes // N, setup.images, N
+        supports = members.compliance.reshape(*every, *every)[:, 0].sum(axis=3).reshape(meshes, meshes)
     return Candidates(
         setup=setup,
         bodies=bodies,
@@ -559,7 +532,7 @@ def contact_candidates(
         candidate=candidate,
         polynomials=polynomials,
         local=local,
-        smooth=_smooth_part(setup, bodies, positions, mesh, pair),
+        images=_smooth_part(setup, bodies, positions, mesh, pair),
         approach=approach,
         supports=supports,
     )
@@ -573,9 +546,9 @@ def assemble_contact(
 
 
 def _smooth_part(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> np.ndarray:
-    """Regular compliance between the nodes of all windows of `Candidates`, (P, W, 3, W, 3) [m/N]."""
+    """Regular compliance between the nodes of all windows, as `Candidates.images` has it."""
     N, (P, W) = setup.n_planets, pair.shape
-    smooth = np.zeros((P, W, 3, W, 3))
+    smooth = np.zeros((setup.images, P, W, 3, W, 3))
     # on the back side every gear carries on its other flank
     back = mesh >= 2 * N
     sun_side = mesh % (2 * N) < N
@@ -587,9 +560,12 @@ def _smooth_part(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> n
     on_bodies += [(bodies.planet, everything[mesh % N == planet], gear, side) for planet in range(N)]
     on_bodies.append((bodies.ring, everything[~sun_side], ones, left))
     for body, members, gear, side in on_bodies:
+        if body is None:
+            continue
         own, j, i = gear[members], mesh[members], pair[:, members]
         roll = setup.roll[own, j, positions[:, None], i]
-        _add_body(smooth, body, members, roll, setup.tooth[own, j, i], side[members])
+        sectors = smooth[:1] if body is bodies.planet else smooth
+        _add_body(sectors, body, members, roll, setup.tooth[own, j, i], side[members])
     return smooth
 
 
@@ -656,22 +632,26 @@ def _gathered(found: list[Windows], tooth, turns, bodies: Bodies, cells: int) ->
 
 
 def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):
-    """Add the compliance of one body between its windows `members` (w,).
+    """Add the compliance of one body between its windows `members` (w,) and their images.
 
     From roll lengths of their nodes (P, w, 3) [m], tooth numbers (P, w) and flanks (w,).
     """
     count, stations = body.regular.shape[:2]
     index, weight = station_weights(roll, body.roll)
     index = index + side[:, None, None] * len(body.roll)
-    one, two = np.triu_indices(len(members))
-    lag = (tooth[:, one] - tooth[:, two]) % count
-    row = (lag[..., None, None] * stations + index[:, one]) * stations
-    values = body.regular.reshape(-1)[row[..., None, None] + index[:, two][:, :, None, None]]
-    half = (weight[:, one][..., None, :] @ values.reshape(*row.shape, 12)).reshape(*row.shape[:3], 3, 4)
-    block = np.einsum("pwabq,pwbq->pwab", half, weight[:, two])
-    smooth[:, members[one], :, members[two]] += np.moveaxis(block, 1, 0)
-    other = one != two
-    smooth[:, members[two[other]], :, members[one[other]]] += block[:, other].transpose(1, 0, 3, 2)
+    for image, sector in enumerate(smooth[: len(smooth) // 2 + 1]):
+        # what an image does to its original, the original does to the image on the other side
+        alone = 2 * image % len(smooth) == 0
+        one, two = np.triu_indices(len(members)) if alone else np.indices((len(members),) * 2).reshape(2, -1)
+        lag = (tooth[:, one] - tooth[:, two] - image * count // len(smooth)) % count
+        row = (lag[..., None, None] * stations + index[:, one]) * stations
+        values = body.regular.reshape(-1)[row[..., None, None] + index[:, two][:, :, None, None]]
+        half = (weight[:, one][..., None, :] @ values.reshape(*row.shape, 12)).reshape(*row.shape[:3], 3, 4)
+        block = np.einsum("pwabq,pwbq->pwab", half, weight[:, two])
+        sector[:, members[one], :, members[two]] += np.moveaxis(block, 1, 0)
+        other = one != two if alone else one >= 0
+        images = members[two[other]], slice(None), members[one[other]]
+        smooth[-image][:, *images] += block[:, other].transpose(1, 0, 3, 2)
 
 
 def _corner_part(setup: MeshWindows, bodies: Bodies, mesh, position, pair, polynomials) -> np.ndarray:

@@ -14,7 +14,7 @@ there are none. Positions where that does not end, and loads that may be roundin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -82,19 +82,12 @@ def solve_batch(
     ContactError
         As `femgear.contact.solve.solve_contact`.
     """
-    load, N = np.asarray(load, float), found.setup.n_planets
-    unlike = start is not None or springs is not None or np.delete(load, N).any()
-    one = None if unlike else found.of_one_planet()
-    if one is None:
-        return _solved(found, load, springs, start)
-    state = _solved(one, np.array([0.0, load[N] / N]), None, None)
-    kinds, cells = len(one.approach), {}
-    for name in ("loads", "gaps", "active"):
-        of_one = getattr(state, name).reshape(len(one.gap), kinds, 1, -1, one.gap.shape[-1])
-        cells[name] = np.repeat(of_one, N, axis=2).reshape(found.gap.shape)
-    motions = np.zeros((len(state.motions), len(load)))
-    motions[:, :N], motions[:, N] = state.motions[:, :1], state.motions[:, 1]
-    return replace(state, **cells, motions=motions)
+    batch = _ActiveSets(found, np.asarray(load, float), springs)
+    if start is not None:
+        batch.active = start & found.candidate
+    batch.solve()
+    state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
+    return BatchState(*state)
 
 
 def check_definite(found: Candidates) -> None:
@@ -114,18 +107,16 @@ def check_definite(found: Candidates) -> None:
     values = found.polynomials[0, filled] * some[..., None]
     size, axes = np.linalg.eigh(values.swapaxes(1, 2) @ _local_solution(local, some, values))
     root = axes * np.sqrt(np.maximum(size, 0.0))[:, None] @ axes.swapaxes(1, 2)
-    smooth, size = found.smooth[0, filled][:, :, filled], 3 * len(filled)
-    coupled = np.einsum("wab,wbvc,vcd->wavd", root, smooth, root, optimize=True).reshape(size, size)
-    factor(np.eye(size) + coupled)
+    size = 3 * len(filled)
+    for smooth in _cyclic(found.images[:, 0, filled][:, :, :, filled]):
+        coupled = np.einsum("wab,wbvc,vcd->wavd", root, smooth, root, optimize=True).reshape(size, size)
+        whole = np.block([[coupled.real, -coupled.imag], [coupled.imag, coupled.real]])
+        factor(np.eye(2 * size) + whole)
 
 
-def _solved(found: Candidates, load: np.ndarray, springs: BearingSprings | None, start) -> BatchState:
-    batch = _ActiveSets(found, load, springs)
-    if start is not None:
-        batch.active = start & found.candidate
-    batch.solve()
-    state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
-    return BatchState(*state)
+def _cyclic(images: np.ndarray) -> np.ndarray:
+    """Harmonics over the images of a sector, (I // 2 + 1, ...); the images (I, ...) of a single one."""
+    return np.fft.rfft(images, axis=0) if len(images) > 1 else images
 
 
 class ContactTangents:
@@ -173,7 +164,8 @@ class ContactTangents:
         ``K_A-a`` and ``K_A`` to the mean of ``K_A`` and ``K_A+b``, in proportion to how far the load has
         come. The first cell of a tooth pair comes all at once.
 
-        ``smooth`` (P, W, 3, W, 3) [m/N] is that of the candidates or of other bodies with the same flanks.
+        ``smooth`` (P, W, 3, W, 3) [m/N] is that of the candidates or of other bodies with the same flanks, of
+        the planets alone where they have images.
         """
         P, meshes = len(self.Q), int(self.mesh[-1] + 1)
         pairs, every = len(self.mesh) // meshes, np.arange(meshes)
@@ -213,17 +205,17 @@ class ContactTangents:
         change = 0.5 * (share * gained - (1.0 - share) * lost)
         return product(total, one)[..., 0] + change.sum(axis=-1)
 
-    def between_meshes(self, smooth: np.ndarray, meshes: int) -> np.ndarray:
-        """Tangent stiffness of the first meshes together, (P, meshes, meshes) [N/m].
+    def between_meshes(self, images: np.ndarray, meshes: int) -> np.ndarray:
+        """Tangent stiffness of the first meshes together, (I // 2 + 1, P, meshes, meshes) [N/m].
 
-        The increments of the mesh forces per unit approach of each mesh while the others hold theirs; the
-        argument is that of `of_meshes`.
+        The increments of the mesh forces per unit approach of each mesh while the others hold theirs, in
+        every harmonic over the ``images`` (I, P, W, 3, W, 3) of the candidates or of other bodies [m/N].
         """
         W = int((self.mesh < meshes).sum())
-        Q, S = self.Q[:, :W], smooth[:, :W, :, :W].reshape(-1, W, 3, 3 * W)
+        Q, S = self.Q[:, :W], _cyclic(images[:, :, :W, :, :W]).reshape(-1, len(self.Q), W, 3, 3 * W)
         of_mesh = (self.mesh[:W, None] == np.arange(meshes)).astype(float)
         right = Q.sum(axis=-1)[..., None] * of_mesh[:, None]
-        matrix = (Q @ S).reshape(-1, 3 * W, 3 * W) + np.eye(3 * W)
+        matrix = (Q @ S).reshape(*S.shape[:2], 3 * W, 3 * W) + np.eye(3 * W)
         return np.repeat(of_mesh, 3, axis=0).T @ np.linalg.solve(matrix, right.reshape(-1, 3 * W, meshes))
 
 

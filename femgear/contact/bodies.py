@@ -22,6 +22,7 @@ from femgear.contact.flank_pairs import LEFT, RIGHT, mesh_pairs
 from femgear.contact.local_compliance import TipCorner, depth_displacement, tip_corner
 from femgear.errors import CaseError
 from femgear.fe.compliance import (
+    FreeSector,
     SectorSchur,
     condense_sector,
     directional,
@@ -97,12 +98,16 @@ class FlankCompliance:
         Depth under each station at which body and half plane are joined [m].
     corner : TipCorner
         What was taken out for the corner at the tip.
+    local : (n, n) array
+        What was taken out in all [m/N].
     unknowns : int
         Degrees of freedom of the whole body that the sector stands for.
     root : ObservedRoot, optional
         For the stresses in the roots, where they were observed too.
     surface : SectorSchur, optional
         Sector with unit loads at the stations, observed where they act; of the ring.
+    free : FreeSector, optional
+        The same, whatever holds the rim.
     """
 
     roll: np.ndarray
@@ -110,9 +115,11 @@ class FlankCompliance:
     regular: np.ndarray
     depth: np.ndarray
     corner: TipCorner
+    local: np.ndarray
     unknowns: int
     root: ObservedRoot | None = None
     surface: SectorSchur | None = None
+    free: FreeSector | None = None
 
 
 @dataclass(frozen=True)
@@ -165,18 +172,20 @@ def make_bodies(
     """
     # the ring's roots need a solution of their own: its sector is not of one plane state, see `root_stress`
     sun, planet = (
-        flank_compliance(
-            s.grid, s.gear, material, s.stiffness, held="rim", depth=depth, root_state=TEETH_STATE
-        )
+        flank_compliance(s.grid, s.gear, material, s.stiffness, depth=depth, root_state=TEETH_STATE)
         for s in (sectors.sun, sectors.planet)
     )
-    ring = _ring_compliance(sectors.ring, material, depth, ring_foundation)
+    s = sectors.ring
+    ring = flank_compliance(s.grid, s.gear, material, s.stiffness, depth=depth, foundation=ring_foundation)
     return Bodies(sun, planet, ring, material, face_width=sectors.sun.gear.face_width)
 
 
-def with_ring(bodies: Bodies, sectors: Sectors, *, depth: float | None, ring_foundation=None) -> Bodies:
-    """Exchange the ring: held at its outer surface, or on a foundation; arguments as for `make_bodies`."""
-    return replace(bodies, ring=_ring_compliance(sectors.ring, bodies.material, depth, ring_foundation))
+def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:
+    """Exchange the ring: held at its outer surface, or on a foundation (2n, 2n) [N/m]."""
+    ring = bodies.ring
+    assert ring.free is not None
+    compliance, surface = _seen(ring.free.supported(ring_foundation), len(ring.roll))
+    return replace(bodies, ring=replace(ring, regular=_regular(compliance, ring.local), surface=surface))
 
 
 def flank_compliance(
@@ -185,25 +194,25 @@ def flank_compliance(
     material: Material,
     stiffness,
     *,
-    held: str | None,
     depth: float | None = None,
     root_state: str | None = None,
+    foundation=None,
 ) -> FlankCompliance:
     """Compute the regular flank compliance of a whole gear from the grid of one sector.
 
     Parameters
     ----------
     grid : Grid
-        Mirror-symmetric sector with boundaries ``flank_left``, ``cut_left``, ``cut_right`` and `held`.
+        Mirror-symmetric sector with boundaries ``flank_left``, ``cut_left``, ``cut_right`` and ``rim``.
     stiffness : (2n, 2n) sparse matrix
         Stiffness of the sector [N/m].
-    held : str
-        Boundary that is held: ``"rim"`` is the bore of an external gear and the outer surface of a ring.
     depth : float, optional
         Largest joining depth [m]; see `joining_depth`.
     root_state : str, optional
         Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks,
         otherwise the displacements of the stations themselves.
+    foundation : (2n, 2n) sparse matrix, optional
+        Stiffness that supports the rim [N/m], the bore or the outer surface of a ring; held without it.
 
     Raises
     ------
@@ -211,15 +220,22 @@ def flank_compliance(
         When the depth reaches out of the tooth or the sector can move freely.
     """
     stations = flank_stations(grid, gear)
+    depths, loads, observations = _observed(grid, gear, stations, depth)
     along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
-    further = flank_load_columns(grid, stations) if along is None else along.columns
-    depths, schur = _condensed(grid, gear, stations, stiffness, held, depth, further)
-    inside, seen = 2 * len(stations.roll), schur.observed(slice(2 * len(stations.roll), None))
-    compliance = tooth_compliance(schur.observed(slice(inside)))
+    observations = np.hstack([observations, loads if along is None else along.columns])
+    free = condense_sector(
+        grid, stiffness, count=gear.teeth, rim="rim", loads=loads, observations=observations
+    )
+    compliance, further = _seen(free.supported(foundation), len(stations.roll))
     found = _without_half_plane(gear, material, stations, depths, compliance, len(grid.points))
     if along is None:
-        return replace(found, surface=seen)
-    return replace(found, root=ObservedRoot(along, stations, seen))
+        return replace(found, surface=further, free=free)
+    return replace(found, root=ObservedRoot(along, stations, further))
+
+
+def _seen(schur: SectorSchur, stations: int) -> tuple[np.ndarray, SectorSchur]:
+    """Compliance between the flanks of all teeth [m/N], and the sector with what else it observes."""
+    return tooth_compliance(schur.observed(slice(stations))), schur.observed(slice(stations, None))
 
 
 def flank_stations(grid: Grid, gear: Gear) -> _FlankStations:
@@ -304,64 +320,49 @@ def station_weights(roll, stations):
     return first[..., None] + np.arange(4), weight
 
 
-def _ring_compliance(ring: Sector, material: Material, depth, foundation) -> FlankCompliance:
-    """Flank compliance of the ring, held at its outer surface or on a foundation [N/m]."""
-    held, stiffness = ("rim", ring.stiffness) if foundation is None else (None, ring.stiffness + foundation)
-    return flank_compliance(ring.grid, ring.gear, material, stiffness, held=held, depth=depth)
-
-
-def _condensed(grid, gear, stations, stiffness, held, depth, further):
-    """Joining depths (n, 1), and the condensed sector that observes at both, and by `further` columns."""
+def _observed(grid, gear, stations, depth) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Joining depths (n, 1) [m], unit loads (2n, n) and what both depths tell of the surface, (2n, n)."""
     depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
     _check_depth(depth, stations)
-    inside = [
-        directional(
-            interpolation(grid, stations.points + factor * depths * stations.normals), stations.normals
-        )
-        for factor in (1.0, 2.0)
-    ]
-    schur = condense_sector(
-        grid,
-        stiffness,
-        count=gear.teeth,
-        held=held,
-        loads=flank_load_columns(grid, stations),
-        observations=np.hstack([*inside, further]),
+    once, twice = (
+        interpolation(grid, stations.points + factor * depths * stations.normals) for factor in (1.0, 2.0)
     )
-    return depths, schur
+    return depths, flank_load_columns(grid, stations), directional(2.0 * once - twice, stations.normals)
 
 
 def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:
-    """Take the local parts out of the compliance (teeth, 4n, 2n) at both depths and go on to the surface."""
-    n, teeth = len(stations.roll), len(compliance)
-    compliance = compliance.reshape(teeth, 2, 2, n, 2 * n)
+    """Take the local parts at both depths out of a compliance (teeth, 2n, 2n) that went on to the surface."""
     arc = stations.roll**2 / (2 * gear.base_radius)
     offset = arc[:, None] - arc[None, :]
     corner = tip_corner(gear, material)
     away = np.abs(arc - corner.arc)
     # a load on the corner itself stands a thousandth of the module beside it, far less than any depth
     loaded = np.maximum(away, 1e-3 * gear.module)
-    parts = []
-    for level, factor in enumerate((1.0, 2.0)):
-        # columns of the observations are mirrored as one block: (side, level, station)
-        at_depth = compliance[:, :, level].reshape(teeth, 2 * n, 2 * n).copy()
-        local = depth_displacement(offset, factor * depths, material.shear_modulus, material.poisson_ratio)
-        local += corner.depth(away[:, None], factor * depths, loaded[None, :])
-        for side in (LEFT, RIGHT):
-            block = slice(side * n, (side + 1) * n)
-            at_depth[0, block, block] -= local / gear.face_width
-        parts.append(at_depth)
-    regular = 2.0 * parts[0] - parts[1]
-    # reciprocity holds for the exact field; the two depths break it by the size of the discretisation error
-    regular = 0.5 * (regular + np.roll(regular[::-1], 1, axis=0).transpose(0, 2, 1))
+    once, twice = (
+        depth_displacement(offset, factor * depths, material.shear_modulus, material.poisson_ratio)
+        + corner.depth(away[:, None], factor * depths, loaded[None, :])
+        for factor in (1.0, 2.0)
+    )
+    local = (2.0 * once - twice) / gear.face_width
     return FlankCompliance(
         roll=stations.roll,
         base_radius=gear.base_radius,
-        regular=regular,
+        regular=_regular(compliance, local),
         depth=depths[:, 0],
         corner=corner,
-        unknowns=teeth * 2 * nodes,
+        local=local,
+        unknowns=2 * len(compliance) * nodes,
     )
+
+
+def _regular(compliance: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Compliance (teeth, 2n, 2n) without the local part (n, n) on the same flank, made reciprocal [m/N]."""
+    regular, n = compliance.copy(), len(local)
+    for side in (LEFT, RIGHT):
+        block = slice(side * n, (side + 1) * n)
+        regular[0, block, block] -= local
+    # reciprocity holds for the exact field; the two depths break it by the size of the discretisation error
+    return 0.5 * (regular + np.roll(regular[::-1], 1, axis=0).transpose(0, 2, 1))
 
 
 def _check_depth(depth: float | None, stations: _FlankStations) -> None:

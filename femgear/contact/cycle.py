@@ -6,6 +6,7 @@ it is the mirror image of a set under a positive one (`femgear.contact.flank_pai
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -299,8 +300,11 @@ def walk_mesh_cycle(
     record = cycle_without_load(solved.n_planets, position, periods=periods, contact=contact, options=options)
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
-        springs = bearing_springs(solved, supports, members)
-        walk = _Walk(solved, bodies, abs(sun_torque), deviations, members, springs, record, options)
+        springs, images = bearing_springs(solved, supports, members), 1
+        if springs is None and options.planet_gaps is None and not options.both_flanks:
+            images = math.gcd(planet_symmetry(solved, deviations), solved.sun.teeth)
+        sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
+        walk = _Walk(solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options)
         found = in_windows(walk.attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
     return _seen_from_front(record, planetary_set, order) if mirrored else record
@@ -342,6 +346,31 @@ def cycle_without_load(
     )
 
 
+def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | None = None) -> int:
+    """Count the rotations that map the planets, with their errors, onto one another."""
+    symmetry, N, d = planetary_set.rotations, planetary_set.n_planets, deviations
+    if d is None:
+        return symmetry
+    turning = (d.sun_runout, d.ring_runout, d.carrier_runout, d.ovality)
+    if d.sun_pitch.any() or d.ring_pitch.any() or any(one.amplitude for one in turning):
+        return 1
+    runouts = np.array([[r.amplitude, r.phase if r.amplitude else 0.0] for r in d.planet_runout])
+    pitches = d.planet_pitch, d.planet_ring_side_pitch
+    errors = np.column_stack((d.pin_errors, d.planet_thickness, *pitches, runouts))
+    same = (n for n in range(symmetry, 0, -1) if symmetry % n == 0)
+    return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
+
+
+def _first_planets(
+    planetary_set: PlanetarySet, count: int, deviations: SetDeviations | None
+) -> tuple[PlanetarySet, SetDeviations | None]:
+    """Take the first planets of a set, and their deviations."""
+    names = ("planet_pitch", "planet_ring_side_pitch", "planet_runout", "pin_errors", "planet_thickness")
+    if deviations is not None:
+        deviations = replace(deviations, **{name: getattr(deviations, name)[:count] for name in names})
+    return replace(planetary_set, planet_angles=planetary_set.planet_angles[:count]), deviations
+
+
 def first_windows(planetary_set: PlanetarySet, bodies: Bodies, sun_torque: float) -> tuple[float, float]:
     """Share [N] and nearest [m] of the first windows under a torque [N m], as `mesh_windows` takes them."""
     s, width = planetary_set, bodies.face_width
@@ -368,9 +397,13 @@ def check_residual(found: Candidates, state: BatchState) -> None:
 
 @dataclass(frozen=True)
 class _Walk:
-    """A set under a torque that is not negative, and the record without load at the positions to solve."""
+    """A set under a torque that is not negative, and the record without load at the positions to solve.
+
+    Where planets are in the same state at all times, those of the first ``sector`` are solved for all.
+    """
 
     planetary_set: PlanetarySet
+    sector: PlanetarySet
     bodies: Bodies
     sun_torque: float
     deviations: SetDeviations | None
@@ -379,11 +412,24 @@ class _Walk:
     empty: MeshCycle
     options: CycleOptions
 
+    @property
+    def images(self) -> int:
+        """Sectors that are in the same state."""
+        return self.planetary_set.n_planets // self.sector.n_planets
+
+    @property
+    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of all meshes the one that is solved, (2N,), and the image of it that they are, (2N,)."""
+        n, N = self.sector.n_planets, self.planetary_set.n_planets
+        kind, planet = np.divmod(np.arange(2 * N), N)
+        image, first = np.divmod(planet, n)
+        return kind * n + first, image
+
     def attempt(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
         """Solve all positions in windows of one size, or up to one that needs more, see `in_windows`."""
-        options, empty, N = self.options, self.empty, self.planetary_set.n_planets
+        options, empty = self.options, self.empty
         setup = mesh_windows(
-            self.planetary_set,
+            self.sector,
             self.bodies,
             share=share,
             nearest=nearest,
@@ -393,10 +439,9 @@ class _Walk:
             deviations=self.deviations,
             both_flanks=options.both_flanks,
         )
+        setup = replace(setup, images=self.images)
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
-        load = np.zeros(N + 1 + int(self.members.free.sum()))
-        load[N] = self.sun_torque / self.planetary_set.sun.base_radius
         found, overflow, unknowns, P = [], False, 0, len(empty.position)
         for first in range(0, P, _TOGETHER):
             some = np.arange(first, min(first + _TOGETHER, P))
@@ -404,12 +449,14 @@ class _Walk:
             if first == 0:
                 # bodies that are no elastic bodies are refused before anything rests on them
                 check_definite(candidates)
+            load = np.zeros(candidates.approach.shape[1])
+            load[setup.n_planets] = self.sun_torque / self.planetary_set.sun.base_radius / self.images
             state = solve_batch(candidates, load, self.springs)
             found.append(self._at_positions(candidates, state))
             missed = setup.missed(some, found[-1]["deflection"])
             if empty.contact == "profile" and (missed > nearest).any():
                 return None, share, 1.2 * missed[missed > nearest][0]
-            unknowns = max(unknowns, int(candidates.candidate.sum(axis=(1, 2)).max()))
+            unknowns = max(unknowns, self.images * int(candidates.candidate.sum(axis=(1, 2)).max()))
             overflow |= candidates.touches_window_end(state.active)
             if options.progress is not None:
                 options.progress(int(some[-1]) + 1, P)
@@ -419,7 +466,7 @@ class _Walk:
         return record, share, nearest
 
     def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
-        """What `MeshCycle` keeps of some positions, by the names of its fields."""
+        """What `MeshCycle` keeps of some positions, by the names of its fields; of the planets solved."""
         check_residual(found, state)
         N, P, members, options = found.setup.n_planets, len(found.position), self.members, self.options
         tooth_load = found.by_pairs(state.loads.sum(axis=-1))
@@ -427,8 +474,9 @@ class _Walk:
         force[: len(tooth_load)] = tooth_load.sum(axis=1)
         # sprung members yield under the mesh forces, free ones are unknowns of the problem
         motion, sprung = np.zeros((len(members.names), P)), ~members.free
-        motion[members.free] = state.motions.T[N + 1 :]
-        pulled = members.approach[:, sprung].T @ force[: len(members.approach)]
+        motion[members.free] = state.motions.T[N + 1 :] if self.images == 1 else 0.0
+        whole = force if self.images == 1 else force[self._places[0]]
+        pulled = members.approach[:, sprung].T @ whole[: len(members.approach)]
         motion[sprung] = -pulled / members.stiffness[sprung, None]
         at_edge = found.at_flank_end(state.active)
         pressure = _equal_cell_pressure(found, state.loads)
@@ -436,11 +484,11 @@ class _Walk:
         tangents = ContactTangents(found, state)
         values = {
             "deflection": rotation_approach(N) @ state.motions.T[: N + 1]
-            + members.approach[: 2 * N] @ motion,
+            + members.approach[: 2 * N * self.images][self._places[1] == 0] @ motion,
             "sun_arc": state.motions[:, N],
             "force": force[: 2 * N],
             "back_force": force[2 * N :],
-            "stiffness": _both_flanks(tangents, found.smooth, N),
+            "stiffness": _both_flanks(tangents, found.images, N),
             "tooth_load": tooth_load[: 2 * N],
             "member_motion": motion,
             "edge_contact": found.by_pairs(at_edge)[: 2 * N].any(axis=1),
@@ -453,20 +501,29 @@ class _Walk:
         if options.pressures:
             values["pressure"] = found.by_pairs(pressure)[: 2 * N]
         if options.held_bodies is not None:
-            held = found.smooth_of(options.held_bodies)
+            held = found.images_of(options.held_bodies)
             values["held_stiffness"] = _both_flanks(tangents, held, N)
             loaded = (values["force"] > 0).all(axis=0)
-            coupling = np.zeros((P, 2 * N, 2 * N))
-            coupling[loaded] = np.linalg.inv(tangents.between_meshes(held, 2 * N)[loaded])
-            values["held_compliance"] = np.moveaxis(coupling, 0, -1)
+            coupling = tangents.between_meshes(held, 2 * N)
+            coupling[:, loaded] = np.linalg.inv(coupling[:, loaded])
+            coupling[:, ~loaded] = 0.0
+            between, (every, sector) = np.fft.irfft(coupling, n=self.images, axis=0), self._places
+            away = (sector - sector[:, None]) % self.images
+            values["held_compliance"] = between[away, :, every[:, None], every]
         return values
 
     def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
         """The record from what was found at its positions: with places of the tooth pairs, pins, message."""
-        N, cells = setup.n_planets, setup.cells
+        N, cells, every = self.planetary_set.n_planets, setup.cells, self._places[0]
         drive, back = slice(0, 2 * N), slice(2 * N, 4 * N)
         values = {name: np.concatenate([some[name] for some in found], axis=-1) for name in found[0]}
         path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
+        if self.images > 1:
+            s, turned = self.planetary_set, np.zeros((2, 2 * N), int)
+            turned[0, :N], turned[1, N:] = (
+                self._places[1][:N] * (g.teeth // self.images) for g in (s.sun, s.ring)
+            )
+            tooth = tooth[:, every] + turned[..., None]
         values |= {"path": path[drive], "tooth": tooth[:, drive]}
         looked = self.options.both_flanks
         values["back_path"] = path[back] if looked else np.zeros_like(path)
@@ -474,6 +531,9 @@ class _Walk:
         if self.options.pressures:
             values["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
             values["pressure_centre"] = np.moveaxis(setup.centre[drive], 2, 1)
+        for axes, names in _AXES.items():
+            if axes[0] == "m" and axes[1] != "m":
+                values |= {name: values[name][every] for name in names if name in values}
         record = replace(self.empty, **values)
         unloaded = record.force[:N] + record.back_force[:N] <= 0.0
         message = "all positions by the active set"
@@ -505,9 +565,9 @@ def _equal_cell_pressure(found: Candidates, loads) -> np.ndarray:
     return pressure / area[:, None]
 
 
-def _both_flanks(tangents: ContactTangents, smooth, n_planets: int) -> np.ndarray:
+def _both_flanks(tangents: ContactTangents, images, n_planets: int) -> np.ndarray:
     """Tangent stiffness of every mesh (2N, P), both flanks together [N/m]."""
-    found = tangents.of_meshes(smooth)
+    found = tangents.of_meshes(images[0])
     return found.reshape(len(found), -1, 2 * n_planets).sum(axis=1).T
 
 

@@ -16,7 +16,7 @@ from math import gcd
 import numpy as np
 
 from femgear.contact.bodies import Bodies
-from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, MeshCycle, planet_symmetry, walk_mesh_cycle
 from femgear.contact.supports import RIGID, Supports
 from femgear.gears.deviations import SetDeviations
 from femgear.gears.planetary import PlanetarySet
@@ -84,19 +84,6 @@ class LoadedPeriod:
             piece = np.arange(jump + 1, last + 1)
             if len(piece) > 2:
                 yield piece % P, tau[piece % P] + piece // P
-
-
-def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | None = None) -> int:
-    """Count the rotations that map the planets, with their errors, onto one another."""
-    symmetry, N = planetary_set.rotations, planetary_set.n_planets
-    if deviations is None:
-        return symmetry
-    runouts = [[r.amplitude, r.phase if r.amplitude else 0.0] for r in deviations.planet_runout]
-    pitches = (deviations.planet_pitch, deviations.planet_ring_side_pitch)
-    columns = (deviations.pin_errors, deviations.planet_thickness, *pitches, np.array(runouts))
-    errors = np.column_stack(columns)
-    same = (n for n in range(symmetry, 0, -1) if symmetry % n == 0)
-    return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
 
 
 def loaded_period(
@@ -193,8 +180,6 @@ def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> Loa
     N = planetary_set.n_planets
     ahead = N // symmetry
     common = gcd(symmetry, planetary_set.sun.teeth)
-    # planets that are in the same state at all times take that of the first of them
-    first = np.arange(N) % (ahead * parts)
     step = pow(planetary_set.sun.teeth // common, -1, parts) if parts > 1 else 0
     shown = record["position"] < (1.0 - 1e-12) / parts
     tau = record["position"][shown]
@@ -203,9 +188,9 @@ def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> Loa
     values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
         moved = (np.arange(N) - ahead * (step * part % parts)) % N
-        for name in names:
-            values[name].append(record[name][np.concatenate([first[moved], first[moved] + N])][:, shown])
         meshes = np.concatenate([moved, moved + N])
+        for name in names:
+            values[name].append(record[name][meshes][:, shown])
         mean += compliance[np.ix_(meshes, meshes)] / parts
     return LoadedPeriod(
         position=np.concatenate([tau + part / parts for part in range(parts)]),

@@ -185,8 +185,7 @@ def root_stress(
     gear: Gear,
     material: Material,
     *,
-    held: str | None = "rim",
-    support=None,
+    foundation=None,
     state: str = "plane strain",
 ) -> _RootStress:
     """Compute the root stress influence of a whole gear from the grid of one sector.
@@ -199,11 +198,9 @@ def root_stress(
     ----------
     grid : Grid
         Mirror-symmetric sector with boundaries ``flank_left``, ``fillet_left``, ``cut_left``, ``cut_right``
-        and `held`.
-    held : str, optional
-        Boundary that cannot move; None when `support` holds the body.
-    support : (2n, 2n) sparse matrix, optional
-        Stiffness between the sector and the ground [N/m], as of `fe.elasticity.foundation`.
+        and ``rim``.
+    foundation : (2n, 2n) sparse matrix, optional
+        Stiffness that supports the rim [N/m], as of `fe.elasticity.foundation`; held without it.
     state : str
         ``"plane strain"`` or ``"plane stress"``.
 
@@ -215,15 +212,15 @@ def root_stress(
     along = root_functionals(grid, gear, material, state=state)
     matrix = stiffness(grid, material, state=state, thickness=gear.face_width)
     stations = flank_stations(grid, gear)
-    schur = condense_sector(
+    sector = condense_sector(
         grid,
-        matrix if support is None else matrix + support,
+        matrix,
         count=gear.teeth,
-        held=held,
+        rim="rim",
         loads=flank_load_columns(grid, stations),
         observations=along.columns,
     )
-    return observed_root_stress(gear, ObservedRoot(along, stations, schur))
+    return observed_root_stress(gear, ObservedRoot(along, stations, sector.supported(foundation)))
 
 
 def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:

@@ -70,6 +70,52 @@ class SectorSchur:
         return replace(self, compliance=compliance[:, None, None], load_cut=cut, observation_cut=cut)
 
 
+@dataclass(frozen=True)
+class FreeSector:
+    """A sector condensed on its cut and on its rim, which is free; symmetric fields first, then the others.
+
+    Parameters
+    ----------
+    count : int
+        Number of sectors in the body.
+    fields : two sparse (2n, m) matrices
+        Displacement per unknown of the rim and, behind them, of the cut.
+    on_rim : two (m,) bool arrays
+        Which of these move the rim, its corner on the cut included.
+    schur : two arrays
+        Schur complements on these unknowns, the loads and the observations.
+    cut : int
+        Number of those of the cut.
+    sizes : (int, int)
+        Number of loads and of observations.
+    """
+
+    count: int
+    fields: tuple[csc_array, ...]
+    on_rim: tuple[np.ndarray, ...]
+    schur: tuple[np.ndarray, ...]
+    cut: int
+    sizes: tuple[int, int]
+
+    def supported(self, foundation=None) -> SectorSchur:
+        """Hold the rim, or put the sector on a foundation, a sparse matrix (2n, 2n) on the rim [N/m]."""
+        f, d = np.split(np.arange(sum(self.sizes)), self.sizes[:1])
+        parts = []
+        for fields, on_rim, schur in zip(self.fields, self.on_rim, self.schur, strict=True):
+            size, r = len(on_rim), len(on_rim) - self.cut
+            if foundation is None:
+                keep = np.concatenate([np.flatnonzero(~on_rim), np.arange(size, len(schur))])
+                schur = schur[np.ix_(keep, keep)]
+            else:
+                schur = schur.copy()
+                schur[:size, :size] += (fields.T @ foundation @ fields).toarray()
+                schur = schur[r:, r:] - schur[r:, :r] @ np.linalg.solve(schur[:r, :r], schur[:r, r:])
+            nb = len(schur) - len(f) - len(d)
+            K, P, C = schur[:nb, :nb], schur[:nb, nb:], -schur[nb:, nb:]
+            parts.append((0.5 * (K + K.T), C[np.ix_(d, f)], P[:, f], P[:, d]))
+        return SectorSchur(self.count, *(np.stack(part) for part in zip(*parts, strict=True)))
+
+
 def symmetric_factor(matrix, *, ordering: str = "MMD_AT_PLUS_A") -> SuperLU:
     """Factor a sparse symmetric stiffness matrix [N/m] (SuperLU in symmetric mode).
 
@@ -187,9 +233,9 @@ def directional(weights, directions: np.ndarray) -> np.ndarray:
 
 
 def condense_sector(
-    grid: Grid, stiffness, *, count: int, held: str | None, loads: np.ndarray, observations: np.ndarray
-) -> SectorSchur:
-    """Condense a mirror-symmetric sector on its cut.
+    grid: Grid, stiffness, *, count: int, rim: str | None, loads: np.ndarray, observations: np.ndarray
+) -> FreeSector:
+    """Condense a mirror-symmetric sector on its cut and its rim, which is held or supported afterwards.
 
     Loads and observations are unknowns behind those of the cut: one factor holds the Schur complement of all.
     The signs on its diagonal make it quasidefinite, which needs no pivoting (Vanderbei, SIAM J. Optim. 5,
@@ -198,13 +244,13 @@ def condense_sector(
     Parameters
     ----------
     grid : Grid
-        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
+        Sector with boundaries ``cut_left``, ``cut_right`` and `rim`.
     stiffness : (2n, 2n) sparse matrix
         [N/m].
     count : int
         Number of sectors.
-    held : str or None
-        Boundary that cannot move; None when a foundation is part of `stiffness`.
+    rim : str or None
+        Boundary that will be held or supported; None when a foundation is part of `stiffness`.
     loads : (2n, m) array
         Nodal forces, none on the cuts; the images of these loads are understood.
     observations : (2n, mo) array
@@ -215,17 +261,17 @@ def condense_sector(
     GridError
         A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
-    cut = np.concatenate([boundary_nodes(grid, name) for name in ("cut_right", "cut_left")])
+    cut = np.concatenate([boundary_nodes(grid, f"cut_{side}") for side in ("right", "left")])
     check_loads(loads, dof_pairs(cut))
     columns = csc_array(np.hstack([loads, observations]))
-    f, d = np.split(np.arange(loads.shape[1] + observations.shape[1]), [loads.shape[1]])
-    parts = []
-    for fields, inner in _half_sector_fields(grid, held):
-        schur = _schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner)
-        size = len(schur) - len(f) - len(d)
-        K, P, C = schur[:size, :size], schur[:size, size:], -schur[size:, size:]
-        parts.append((0.5 * (K + K.T), C[np.ix_(d, f)], P[:, f], P[:, d]))
-    return SectorSchur(count, *(np.stack(part) for part in zip(*parts, strict=True)))
+    nodes = dof_pairs(boundary_nodes(grid, rim)) if rim else []
+    edges, on_rim, schurs = [], [], []
+    for fields, inner in _half_sector_fields(grid, None, rim):
+        schurs.append(_schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner))
+        edges.append(fields[:, inner:])
+        on_rim.append(abs(csr_array(edges[-1])[nodes]).sum(axis=0) > 0)
+    nb, sizes = 2 * len(boundary_nodes(grid, "cut_left")), (loads.shape[1], observations.shape[1])
+    return FreeSector(count, tuple(edges), tuple(on_rim), tuple(schurs), nb, sizes)
 
 
 def check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
@@ -246,11 +292,12 @@ def _check_residual(residual: float) -> None:
         )
 
 
-def _half_sector_fields(grid: Grid, held: str | None) -> list[tuple[csc_array, int]]:
+def _half_sector_fields(grid: Grid, held: str | None, last: str | None = None) -> list[tuple[csc_array, int]]:
     """Symmetric and antisymmetric displacements of a sector from those of its left half.
 
     Matrices (2n, m) from the unknowns of the half sector, in an order that keeps their factor sparse and the
-    radial and tangential displacements of the cut last, and the number of those before the cut.
+    radial and tangential displacements of the cut last, and the number of those before the cut; before the
+    boundary ``last``, where there is one, whose unknowns are the next to the last.
     """
     image, points = mirror_nodes(grid), np.asarray(grid.points)
     fixed = boundary_nodes(grid, held) if held else np.zeros(0, int)
@@ -259,8 +306,11 @@ def _half_sector_fields(grid: Grid, held: str | None) -> list[tuple[csc_array, i
     on_axis = image == np.arange(len(points))
     left = on_axis | (points[:, 1] > 0)
     left[np.concatenate([fixed, cut])] = False
+    rim = np.zeros(0, int) if last is None else boundary_nodes(grid, last)
+    rim = rim[left[rim]]
+    left[rim] = False
     inner = np.flatnonzero(left)
-    inner = inner[_sparse_order(grid.triangles, inner, len(points))]
+    inner = np.concatenate([inner[_sparse_order(grid.triangles, inner, len(points))], rim])
     cos, sin = points[cut].T / np.hypot(*points[cut].T)
     # unknowns of the inner nodes, then radial and tangential ones of the cut
     rows = [dof_pairs(inner), *(np.repeat(2 * cut + c, 2) for c in (0, 1))]
@@ -275,7 +325,7 @@ def _half_sector_fields(grid: Grid, held: str | None) -> list[tuple[csc_array, i
         reflected = diags_array(np.tile([sign, -sign], len(points))) @ half[dof_pairs(image)]
         fields = csc_array(once @ (half + reflected))
         moved = np.flatnonzero(abs(fields).sum(axis=0))
-        found.append((fields[:, moved], len(moved) - len(on_cut)))
+        found.append((fields[:, moved], int((moved < len(at) - 2 * len(rim)).sum())))
     return found
 
 

@@ -11,6 +11,7 @@ eigenproblem for each `n`, whose nodal diameter is known by construction.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, eigh
@@ -167,7 +168,9 @@ def _reduced(sector: HalfSector, mass, loads: np.ndarray, shapes: np.ndarray, co
     # the types that scipy's constructor shows are those of a subclass
     inverse = LinearOperator(K_ii.shape, matvec=sector.factor.solve, dtype=float)  # type: ignore[call-arg]
     start = np.cos(np.arange(inner) + 1.0)
-    _, modes = eigsh(K_ii, k=count, M=M_ii, sigma=0.0, OPinv=inverse, v0=start)
+    # the fewest solutions; omega^2 still has all its digits
+    options: Any = {"sigma": 0.0, "OPinv": inverse, "v0": start, "ncv": 3 * count, "tol": 1e-8}
+    _, modes = eigsh(K_ii, k=count, M=M_ii, **options)
     rest = static - modes @ (modes.T @ (M_ii @ static))
     whole, left = (np.sqrt(np.einsum("ij,ij->j", field, M_ii @ field)) for field in (static, rest))
     # a load may have no part of this kind

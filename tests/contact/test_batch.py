@@ -1,6 +1,6 @@
 """All positions at once against one position at a time: loads, motions and stiffness of random sets."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,15 +11,16 @@ from validation.planetary import reference_set
 from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
 from femgear.case.gear_set import material_of, planetary_set
-from femgear.contact import batch
+from femgear.contact import batch, cycle
 from femgear.contact.assembly import contact_candidates, mesh_windows
 from femgear.contact.batch import ContactTangents, solve_batch
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import loaded_image
+from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, bearing_springs, moving_members
 from femgear.fe.elasticity import Material
-from femgear.gears.deviations import no_deviations
+from femgear.gears.deviations import FlankForm, Runout, no_deviations
+from femgear.gears.modifications import ProfileSlope
 
 STEEL = Material(206e9, 0.3, 7850.0)
 SPRUNG = Supports(sun=5e7, carrier=2e8, planet=3e8)
@@ -72,7 +73,7 @@ def both_ways(gears, bodies, torque, *, supports, pins=0.0, both_flanks=False, g
         [],
         state.motions,
         tangents.of_meshes(found.smooth),
-        tangents.between_meshes(found.smooth, meshes),
+        tangents.between_meshes(found.images, meshes)[0],
     )
     single = [], [], [], []
     for at in range(5):
@@ -195,31 +196,65 @@ def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
     assert len(counted) > 0 and sorted(steps.tolist()) == sorted([2 + count for count in counted] + rest)
 
 
-def test_planets_in_the_same_state_are_solved_as_one(monkeypatch):
-    """Three, four and five planets in phase, on springs or free: as all of them, to rounding."""
-    solutions, whole = [], batch.Candidates.of_one_planet
+# three, four (two pairs) and five planets in the same state, on springs or free
+@pytest.mark.parametrize(
+    "seed, images, supports",
+    [(3, 3, SPRUNG), (6, 4, Supports(sun=0.0)), (7, 2, SPRUNG), (9, 5, Supports()), (4, 1, SPRUNG)],
+)
+def test_planets_in_the_same_state_are_solved_as_one(seed, images, supports, monkeypatch):
+    gears, bodies, torque = random_bodies(seed)
+    sizes, together = [], cycle.solve_batch
 
-    def noting(found):
-        solutions.append(whole(found))
-        return solutions[-1]
+    def noting(found, *others):
+        sizes.append(found.setup.n_planets)
+        return together(found, *others)
 
-    for seed, supports in ((3, SPRUNG), (6, Supports(sun=0.0)), (9, Supports())):
-        gears, bodies, torque = random_bodies(seed)
-        monkeypatch.setattr(batch.Candidates, "of_one_planet", noting)
-        one = list(both_ways(gears, bodies, torque, supports=supports))
-        assert solutions[-1] is not None and len(solutions[-1].approach) == 2
-        monkeypatch.setattr(batch.Candidates, "of_one_planet", lambda _: None)
-        every = list(both_ways(gears, bodies, torque, supports=supports))
-        # cells at a corner are a thousandth of a window wide: their loads show the rounding of separations
-        for tolerance, (found, _), (expected, _) in zip((1e-9, 1e-12, 1e-12, 1e-12), one, every, strict=True):
-            for a, b in zip(found, expected, strict=True):
-                assert np.abs(a - b).max() <= tolerance * np.abs(b).max()
-    # unequal places, an error of one pin: all are solved
-    for seed, pins in ((5, 0.0), (3, 0.3)):
-        monkeypatch.setattr(batch.Candidates, "of_one_planet", noting)
-        gears, bodies, torque = random_bodies(seed)
-        list(both_ways(gears, bodies, torque, supports=Supports(), pins=pins))
-        assert solutions[-1] is None
+    monkeypatch.setattr(cycle, "solve_batch", noting)
+    # a modification is the same on all planets, and so is a pin that is off its place
+    same = replace(
+        no_deviations(gears),
+        sun=FlankForm((ProfileSlope(2e-6),)),
+        pin_errors=np.full((gears.n_planets, 2), 3e-6),
+    )
+    for sign, errors in ((1.0, None), (-1.0, same)):
+        options = dict(sun_torque=sign * torque, positions=6, deviations=errors, supports=supports)
+        kept = CycleOptions(held_bodies=bodies, pressures=True)
+        one = walk_mesh_cycle(gears, bodies, options=kept, **options)
+        assert set(sizes) == {gears.n_planets // images}
+        sizes.clear()
+        with monkeypatch.context() as patch:
+            patch.setattr(cycle, "planet_symmetry", lambda *_: 1)
+            every = walk_mesh_cycle(gears, bodies, options=kept, **options)
+        assert set(sizes) == {gears.n_planets}
+        sizes.clear()
+        for name in (field.name for field in fields(MeshCycle)):
+            a, b = getattr(one, name), getattr(every, name)
+            if not isinstance(b, np.ndarray) or b.dtype.kind != "f":
+                assert np.array_equal(a, b), name
+            elif name != "residual":
+                # cells at a corner are a thousandth of a window wide: they show the rounding of separations
+                scale = 1e-9 if "pressure" in name else 1e-11
+                size = np.abs(every.deflection if name == "member_motion" else b).max(initial=0.0)
+                assert np.abs(a - b).max(initial=0.0) <= scale * size, name
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"pin_errors": [[0.0, 3e-6]] + [[0.0, 0.0]] * 2},
+        {"sun_pitch": [3e-6] + [0.0] * 32},
+        {"ring_runout": Runout(3e-6, 0.2)},
+    ],
+)
+def test_planets_with_different_errors_or_errors_that_pass_them_are_solved_each(changed, monkeypatch):
+    gears, bodies, torque = random_bodies(3)
+    sizes, together = [], cycle.solve_batch
+    monkeypatch.setattr(
+        cycle, "solve_batch", lambda found, *other: sizes.append(found.approach) or together(found, *other)
+    )
+    errors = replace(no_deviations(gears), **changed)
+    walk_mesh_cycle(gears, bodies, sun_torque=torque, positions=2, deviations=errors)
+    assert len(sizes[0]) == 2 * gears.n_planets == 6
 
 
 def test_first_cells_and_springs_are_those_that_equal_forces_would_press():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.loaded_period import SHORTEST, LoadedPeriod, loaded_period, planet_symmetry
+from femgear.contact.cycle import CycleOptions, planet_symmetry, walk_mesh_cycle
+from femgear.contact.loaded_period import SHORTEST, LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations

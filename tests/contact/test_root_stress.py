@@ -97,12 +97,12 @@ def test_roots_observed_with_the_flanks_are_those_of_a_solution_of_their_own(wid
     """What `root_stress` assembles and factors for itself, to rounding; the flanks are left as they are."""
     grid = sector(EXTERNAL, flank_elements=24 if wide else 8, refine=1.0 if wide else 0.5)
     matrix = stiffness(grid, STEEL, state="plane strain", thickness=EXTERNAL.face_width)
-    body = flank_compliance(grid, EXTERNAL, STEEL, matrix, held="rim", root_state="plane strain")
+    body = flank_compliance(grid, EXTERNAL, STEEL, matrix, root_state="plane strain")
     found, alone = observed_root_stress(EXTERNAL, body.root), root_stress(grid, EXTERNAL, STEEL)
     for name in ("roll", "arc", "points", "slope", "influence"):
         expected = getattr(alone, name)
         assert np.abs(getattr(found, name) - expected).max() <= 1e-12 * np.abs(expected).max(), name
-    plain = flank_compliance(grid, EXTERNAL, STEEL, matrix, held="rim")
+    plain = flank_compliance(grid, EXTERNAL, STEEL, matrix)
     assert plain.root is None
     assert np.abs(body.regular - plain.regular).max() <= 1e-12 * np.abs(plain.regular).max()
 
@@ -196,7 +196,7 @@ def test_an_elastic_support_bends_the_rim():
     grid = sector(thin, flank_elements=12)
     held = root_stress(grid, thin, STEEL).influence
     springs = foundation(grid, "rim", 1e12, 1e12, thickness=thin.face_width)
-    rested = root_stress(grid, thin, STEEL, held=None, support=springs).influence
+    rested = root_stress(grid, thin, STEEL, foundation=springs).influence
     assert rested.max() > 1.01 * held.max()
 
 

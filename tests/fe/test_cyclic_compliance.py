@@ -61,7 +61,7 @@ def test_sector_compliance_is_that_of_the_whole_gear(gear, sector, whole):
     stations = flank_stations(sector, gear)
     loads = flank_load_columns(sector, stations)
     cyclic = tooth_compliance(
-        condense_sector(sector, K, count=gear.teeth, held="rim", loads=loads, observations=loads)
+        condense_sector(sector, K, count=gear.teeth, rim="rim", loads=loads, observations=loads).supported()
     )
     K_whole = stiffness(whole, STEEL, state="plane strain", thickness=THICKNESS)
     free = np.setdiff1d(np.arange(K_whole.shape[0]), dof_pairs(np.unique(whole.boundaries["rim"])))
@@ -90,7 +90,7 @@ def test_compliance_is_reciprocal_and_positive(gear, sector):
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))
     H = tooth_compliance(
-        condense_sector(sector, K, count=gear.teeth, held="rim", loads=loads, observations=loads)
+        condense_sector(sector, K, count=gear.teeth, rim="rim", loads=loads, observations=loads).supported()
     )
     assert np.abs(H - np.roll(H[::-1], 1, axis=0).transpose(0, 2, 1)).max() < 1e-12 * H.max()
     z, n = gear.teeth, H.shape[1]
@@ -114,7 +114,7 @@ def test_compliance_does_not_depend_on_the_scale(gear):
         grid = mirror(mesh_outline(half_sector(big, flank_elements=8)))
         K = stiffness(grid, STEEL, state="plane strain", thickness=THICKNESS)
         loads = flank_load_columns(grid, flank_stations(grid, big))
-        schur = condense_sector(grid, K, count=18, held="rim", loads=loads, observations=loads)
+        schur = condense_sector(grid, K, count=18, rim="rim", loads=loads, observations=loads).supported()
         values.append(tooth_compliance(schur)[0])
     assert np.abs(values[1] - values[0]).max() < 1e-9 * values[0].max()
 
@@ -122,7 +122,7 @@ def test_compliance_does_not_depend_on_the_scale(gear):
 def test_free_body_is_refused(gear, sector):
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))
-    free = condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads)
+    free = condense_sector(sector, K, count=gear.teeth, rim=None, loads=loads, observations=loads).supported()
     with pytest.raises(GridError, match="nothing holds it"):
         tooth_compliance(free)
     # translation is the last harmonic as well as the first
@@ -142,7 +142,9 @@ def test_a_body_held_against_the_other_motion_only_is_refused(gear, sector, axis
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     K = K + 1e9 * csc_array(spring) @ csc_array(spring).T
     loads = flank_load_columns(sector, flank_stations(sector, gear))
-    schur = condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads)
+    schur = condense_sector(
+        sector, K, count=gear.teeth, rim=None, loads=loads, observations=loads
+    ).supported()
     for harmonic in (0, 1, 2, 16, 17):
         if harmonic in free:
             with pytest.raises(GridError, match="E-GRID-FREE"):
@@ -169,7 +171,9 @@ def test_a_solution_that_misses_its_equations_is_refused(gear, sector):
     for size in (1.0, unit):
         loads[[2 * node, 2 * node + 1], 0] = size, 0.3 * size
         with pytest.raises(GridError, match="E-RESIDUAL"):
-            condense_sector(sector, csc_array(K), count=18, held="rim", loads=loads, observations=loads)
+            condense_sector(
+                sector, csc_array(K), count=18, rim="rim", loads=loads, observations=loads
+            ).supported()
         with pytest.raises(GridError, match="E-RESIDUAL"):
             for half in half_sectors(sector, csc_array(K), "rim"):
                 half.held((half.fields.T @ loads)[: half.inner])
@@ -212,7 +216,7 @@ def test_load_on_a_cut_is_refused(gear, sector):
     loads = flank_load_columns(sector, flank_stations(sector, gear))
     loads[dof_pairs(np.unique(sector.boundaries["cut_left"]))] = 1.0
     with pytest.raises(GridError, match="cut"):
-        condense_sector(sector, K, count=18, held="rim", loads=loads, observations=loads)
+        condense_sector(sector, K, count=18, rim="rim", loads=loads, observations=loads).supported()
 
 
 def test_interpolation_is_exact_for_quadratics(sector, gear):
@@ -280,7 +284,9 @@ def test_reduced_ring_is_statically_complete(gear, sector, smooth):
     K = stiffness(sector, STEEL, state="plane stress", thickness=THICKNESS)
     K = K + foundation(sector, "rim", 1e11, 1e11, thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))[:, 3:4]
-    schur = condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads)
+    schur = condense_sector(
+        sector, K, count=gear.teeth, rim=None, loads=loads, observations=loads
+    ).supported()
     exact = cyclic_harmonics(schur, np.arange(10))[:, 0, 0].real
     shapes = smooth_cut_shapes(sector, static_cut_shapes(schur, np.arange(10)))
     whole, basis = (
@@ -325,3 +331,20 @@ def test_displacement_field_of_the_whole_gear(gear, sector, whole):
         a = t * gear.pitch_angle
         turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
         assert np.abs(field[t] @ turn.T - u.reshape(-1, 2)[nodes[t]]).max() < 1e-10 * np.abs(u).max()
+
+
+def test_a_rim_supported_afterwards_is_one_that_was_supported_before(gear, sector):
+    """Held, and on foundations stiff and soft: as condensed with the foundation in the stiffness."""
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
+    loads = flank_load_columns(sector, flank_stations(sector, gear))
+    options = dict(count=gear.teeth, loads=loads, observations=loads)
+    free = condense_sector(sector, K, rim="rim", **options)
+    for modulus in (1e10, 1e13):
+        springs = foundation(sector, "rim", modulus, 0.5 * modulus, thickness=THICKNESS)
+        before = tooth_compliance(condense_sector(sector, K + springs, rim=None, **options).supported())
+        after = tooth_compliance(free.supported(springs))
+        assert np.abs(after - before).max() < 1e-9 * np.abs(before).max()
+    # an all but rigid foundation holds
+    springs = foundation(sector, "rim", 1e18, 1e18, thickness=THICKNESS)
+    held, rigid = (tooth_compliance(free.supported(support)) for support in (None, springs))
+    assert np.abs(held - rigid).max() < 1e-4 * np.abs(held).max()

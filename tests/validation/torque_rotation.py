@@ -298,7 +298,7 @@ def depth_compliance() -> float:
     loaded = condensed_sector(grid, K, np.hstack([loads, seen]), **options)
     plain = condensed_sector(grid, K, np.zeros((2 * grid.n_nodes, 0)), **options)
     whole = closed_compliance([loaded, loaded, chain(plain, gear.teeth - 2)])
-    schur = condense_sector(grid, K, count=gear.teeth, held="rim", loads=loads, observations=seen)
+    schur = condense_sector(grid, K, count=gear.teeth, rim="rim", loads=loads, observations=seen).supported()
     cyclic = tooth_compliance(schur)
     own, next_tooth = whole[n : 2 * n, :n], whole[3 * n : 4 * n, :n]
     size = np.abs(cyclic[0, :n, :n]).max()

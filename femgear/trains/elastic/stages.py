@@ -295,12 +295,7 @@ def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies
     other = steps.kept("ring compliances", known) or steps.keep(
         "ring compliances",
         known,
-        with_ring(
-            static.bodies,
-            static.sectors,
-            depth=case.static.depth,
-            ring_foundation=ring_foundation(case, static.sectors.ring) if fixed else None,
-        ),
+        with_ring(static.bodies, ring_foundation(case, static.sectors.ring) if fixed else None),
     )
     return (other, static.bodies) if fixed else (static.bodies, other)
 

@@ -238,10 +238,10 @@ def _influences(case: Case, static: StaticResult) -> RootStresses:
     assert bodies.sun.root is not None and bodies.planet.root is not None
     sun = observed_root_stress(sectors.sun.gear, bodies.sun.root)
     planet = observed_root_stress(sectors.planet.gear, bodies.planet.root)
-    elastic, ring = case.static.members == "elastic", sectors.ring
-    held, support = (None, ring_foundation(case, ring)) if elastic else ("rim", None)
-    material = material_of(case)
-    return RootStresses(sun, planet, root_stress(ring.grid, ring.gear, material, held=held, support=support))
+    ring = sectors.ring
+    support = ring_foundation(case, ring) if case.static.members == "elastic" else None
+    root = root_stress(ring.grid, ring.gear, material_of(case), foundation=support)
+    return RootStresses(sun, planet, root)
 
 
 def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):

@@ -62,17 +62,16 @@ def make_ring(sector, gears, side=1.0, foundation_stiffness=1e10, max_diameter=2
     width = gears.ring.face_width
     k = foundation_stiffness
     springs = foundation(sector.grid, "rim", k, k, thickness=width)
-    matrices = (sector.stiffness + springs, None), (sector.stiffness, "rim")
-    on_foundation, held = (
-        flank_compliance(sector.grid, gears.ring, STEEL, matrix, held=boundary)
-        for matrix, boundary in matrices
+    flanks = tuple(
+        flank_compliance(sector.grid, gears.ring, STEEL, sector.stiffness, foundation=support)
+        for support in (springs, None)
     )
     return ring_model(
         gears,
         sector,
         mass(sector.grid, STEEL, width),
         springs,
-        (on_foundation, held),
+        flanks,
         max_diameter=max_diameter,
         max_frequency=15e3,
         side=side,

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from femgear.contact.bodies import FlankCompliance, _condensed, _without_half_plane, flank_stations
+from femgear.contact.bodies import FlankCompliance, _observed, _without_half_plane, flank_stations
+from femgear.fe.compliance import condense_sector
 from femgear.fe.elasticity import Material
 from femgear.fe.grid import Grid
 from femgear.gears.gear import Gear
@@ -15,8 +16,9 @@ def held_sector_compliance(
 
     Parameters and errors are those of `femgear.contact.bodies.flank_compliance`; the result counts one tooth.
     """
-    stations, nothing = flank_stations(grid, gear), np.empty((2 * grid.n_nodes, 0))
-    depths, schur = _condensed(grid, gear, stations, stiffness, held, depth, nothing)
-    even, odd = schur.compliance
+    stations = flank_stations(grid, gear)
+    depths, loads, seen = _observed(grid, gear, stations, depth)
+    sector = condense_sector(grid, stiffness, count=gear.teeth, rim=held, loads=loads, observations=seen)
+    even, odd = sector.supported().compliance
     held_compliance = np.block([[even + odd, even - odd], [even - odd, even + odd]])[None]
     return _without_half_plane(gear, material, stations, depths, held_compliance, len(grid.points))
