@@ -41,6 +41,17 @@ def test_multipliers_equal_time_integration(geared_chain, chain_excitation, damp
         assert stability(modes, excitation, frequency).modulus[0] == pytest.approx(exact, rel=1e-4)
 
 
+@pytest.mark.parametrize("ratio", [0.998, 1.0, 1.7])
+def test_modes_that_creep_back_equal_time_integration(geared_chain, chain_excitation, ratio):
+    """Beyond critical damping a mode does not turn; just below it is followed as the others."""
+    excitation, damping = chain_excitation(0.4), np.array([0.0, 0.02, ratio, 0.02])
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=damping)
+    frequency = 2.0 * modes.frequency[1]
+    exact = np.abs(reference_multipliers(modes, excitation, frequency)).max()
+    found = stability(modes, excitation, frequency, frequency_ratio=1e3, steps=400).modulus[0]
+    assert found == pytest.approx(exact, rel=1e-7)
+
+
 def test_splitting_is_of_fourth_order(geared_chain, chain_excitation):
     excitation = chain_excitation(0.4)
     modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03)
