@@ -174,6 +174,22 @@ def component_lines(
     return SensorLines(order, lines, speed, float(sensor_angle), int(z_ring), "exact")
 
 
+def rounded_lines(lines: SensorLines, share: float) -> np.ndarray:
+    """Round the lines (..., n_orders) [m] to single precision and fewer digits, so that files are smaller.
+
+    Their accelerations change by at most a share of the largest one of their speed, smaller ones to zero. A
+    sum with a number of 24 bits has no room for more digits, and keeps the others when that is taken away.
+    """
+    largest = np.abs(lines.acceleration).max(axis=-1, keepdims=True)
+    weight = (lines.order * lines.base_speed[..., None]) ** 2
+    big = np.divide(2.0**23 * share * largest, weight, out=np.zeros_like(weight), where=weight > 0.0)
+    single, big = lines.displacement.astype(np.complex64), big.astype(np.float32)
+    for part in (single.real, single.imag):
+        part += big
+        part -= big
+    return single
+
+
 def stored_lines(housing: Any, *, form: str | None = None) -> SensorLines:
     """Read the lines of a fixed sensor from housing.nc, to the highest that is heard.
 

@@ -23,6 +23,7 @@ from femgear.housing.sensor import (
     component_lines,
     hanning_model,
     lines_in_form,
+    rounded_lines,
     stored_lines,
 )
 from femgear.report.response import harmonics_of
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
     from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
 
+# what lines of many speeds are rounded to, over the largest acceleration of their speed, and from how many on
+_ROUNDED, _MANY = 1e-5, 40
 # speeds, and bands at each of them, that are listed
 _FEW = 4
 _FIRST, _STRONGEST = 6, 4
@@ -214,8 +217,14 @@ class HousingResult:
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of housing.nc; `femgear.housing.sensor.stored_lines` reads the lines."""
-        exact, words = self.exact, "radial displacement at the sensor"
-        lines = ("lines", "speed order", exact.displacement, "m", words)
+        exact, words, rounding = self.exact, "radial displacement at the sensor", "none"
+        values = exact.displacement
+        if len(values) > _MANY:
+            values = rounded_lines(exact, _ROUNDED)
+            rounding = (
+                f"less than {_ROUNDED:g} of the largest acceleration of a speed; smaller lines are zero"
+            )
+        lines = ("lines", "speed order", values, "m", words)
         variables = complex_entries((lines,), single=True) | {
             "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
@@ -232,6 +241,7 @@ class HousingResult:
                 "points": self.points,
                 "ring_teeth": exact.z_ring,
                 "symmetry": self.symmetry,
+                "rounding": rounding,
             },
         )
 
