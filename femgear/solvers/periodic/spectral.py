@@ -223,7 +223,7 @@ def _cycle(problem: HarmonicProblem, rest: np.ndarray, limit: np.ndarray) -> np.
     In the precision of the receptances.
     """
     speeds, n, most = len(rest), len(problem.source), min(_KRYLOV, rest.shape[1])
-    rest = rest.astype(problem.receptance.real.dtype, copy=False)
+    rest = rest.astype(np.real(problem.receptance).dtype, copy=False)
     ways, images = (np.empty((speeds, most, rest.shape[1]), rest.dtype) for _ in range(2))
     shares, steps, before = np.zeros((speeds, most, most)), np.zeros((speeds, most, 1)), limit
     for k in range(most + 1):

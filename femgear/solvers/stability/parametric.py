@@ -8,6 +8,7 @@ depth of the stiffness shows the resonances (`stability_chart`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -343,7 +344,7 @@ def _multipliers(natural, damping_ratio, rows, kicks, period) -> np.ndarray:
     corrected = np.concatenate([middle / 1.5, middle @ (rows @ rows.T) @ middle / -36.0], axis=-1)
     turn = np.exp((-damping_ratio * natural + 1j * damped)[:, None, None] * (0.5 * dt))
     # one column for each unknown, speeds last
-    state = np.zeros((m, 2 * m, speeds), complex)
+    state: Any = np.zeros((m, 2 * m, speeds), complex)
     state[range(m), range(m)], state[range(m), range(m, 2 * m)] = 1.0, 1.0j
     motion, forces = np.empty((m, 2 * m * speeds)), np.empty((2, len(rows), 2 * m, speeds))
     for pair in zip(back @ first / 3.0, back @ corrected):
