@@ -107,8 +107,7 @@ def _create(dataset: xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> N
             kind = stored.get(one.dtype.kind, one.dtype)
             options = {"maxshape": [longest[dim] for dim in one.dims], "fletcher32": kind.kind != "O"}
             if free and one.dtype.kind not in "OUS":
-                options |= {"chunks": _chunk(one, free), "compression": "gzip", "compression_opts": 1}
-                options |= {"shuffle": True}
+                options |= {"chunks": _chunk(one, free), "compression": 1, "shuffle": True}
             values = one.values.astype(kind, copy=False)
             made[name] = file.create_dataset(str(name), data=values, **(options if one.dims else {}))
             made[name].attrs.update(one.attrs, **({"dtype": "bool"} if one.dtype.kind == "b" else {}))

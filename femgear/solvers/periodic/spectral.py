@@ -18,8 +18,6 @@ from femgear.system.system import MeshExcitation, Modes, Response, mesh_harmonic
 
 # Two signals or receptances closer than this (relative) are equal: identical planets.
 _EQUAL = 1e-9
-# Shift of twins that is none.
-_AGAIN = 1e-6
 # Share of the energy in the upper half of the harmonics above which the message warns. Halving or doubling
 # the harmonics of planetary sets shows a truncation error of the size of this share: 0.1 % of the amplitude.
 _TAIL_ENERGY = 1e-3
@@ -29,8 +27,7 @@ _STILL = 1e-12
 _UNDAMPED = 1e-10
 # Harmonics of speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 4000
-# Krylov steps of a cycle at most, cycles, and the residual that they must reach; from which single precision
-# leads there.
+# Krylov steps of a cycle at most, cycles, their residual, and that which single precision reaches.
 _KRYLOV, _CYCLES, _ROUNDING, _SINGLE = 250, 4, 1e-13, 1e-7
 # Unknowns of one speed up to which the spectral radius is exact.
 _FEW = 60
@@ -144,7 +141,7 @@ class Twins:
     @property
     def period(self) -> int:
         """Distance of harmonics at which all shifts are the same; their number where there are none."""
-        again = np.all(np.abs(self.shift[:, 1:] - 1.0) < _AGAIN, axis=0)
+        again = np.all(np.abs(self.shift[:, 1:] - 1.0) < 1e3 * _EQUAL, axis=0)
         return int(again.argmax()) + 1 if again.any() else self.shift.shape[1]
 
 

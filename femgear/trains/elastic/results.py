@@ -121,12 +121,10 @@ class ModesResult:
                 **coordinates(circumferential=diameters),
             },
             attrs={
-                "title": "modal basis with mean mesh stiffnesses",
-                "unknowns": len(model.system.M),
-                "planet_angles": model.planet_angles,
-                "excitation_reach": self.reach,
+                "title": "modal basis with mean mesh stiffnesses", "unknowns": len(model.system.M),
+                "planet_angles": model.planet_angles, "excitation_reach": self.reach,
             },
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -177,20 +175,15 @@ class DynamicsResult:
         return dataset(
             response_entries(self) | reach | complex_entries(entries, single=True),
             coords=coordinates(
-                speed=self.input_speed / RPM,
-                mesh=mesh_names(self.dte.shape[1] // 2),
-                harmonic=np.arange(response.force.shape[-1]),
-                circumferential=np.arange(-n_max, n_max + 1),
+                speed=self.input_speed / RPM, mesh=mesh_names(self.dte.shape[1] // 2),
+                harmonic=np.arange(response.force.shape[-1]), circumferential=np.arange(-n_max, n_max + 1),
             ),
             attrs={
-                "title": "periodic response by the spectral method",
-                "message": response.message,
-                "compared_to": self.compared_to,
-                "warnings": " ".join(map(str, self.warnings)),
-                "ring_teeth": self.ring_teeth,
-                "fourier_convention": FOURIER,
+                "title": "periodic response by the spectral method", "message": response.message,
+                "compared_to": self.compared_to, "warnings": " ".join(map(str, self.warnings)),
+                "ring_teeth": self.ring_teeth, "fourier_convention": FOURIER,
             },
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -230,20 +223,15 @@ class HousingResult:
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
         }
+        order = {"order": ("order", exact.order, "1", "carrier order")}
         return dataset(
-            variables,
-            coords=coordinates(speed=self.input_speed / RPM)
-            | {"order": ("order", exact.order, "1", "carrier order")},
+            variables, coords=coordinates(speed=self.input_speed / RPM) | order,
             attrs={
-                "title": "what a sensor fixed on the housing hears",
-                "sensor_angle": exact.sensor_angle,
-                "form": self.form,
-                "points": self.points,
-                "ring_teeth": exact.z_ring,
-                "symmetry": self.symmetry,
-                "rounding": rounding,
+                "title": "what a sensor fixed on the housing hears", "sensor_angle": exact.sensor_angle,
+                "form": self.form, "points": self.points, "ring_teeth": exact.z_ring,
+                "symmetry": self.symmetry, "rounding": rounding,
             },
-        )
+        )  # fmt: skip
 
 
 def describe_housing(data: xr.Dataset) -> Block:
@@ -288,16 +276,9 @@ def mesh_bands(results: Results) -> Block:
             published = _published(case, rpm, h)
             rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *two[:2], third, lobes, hanning, published))
     header = (
-        "speed [rpm]",
-        "harmonic",
-        "order",
-        "strongest line [m/s²]",
-        "second line [m/s²]",
-        "third [dB]",
-        "lobes",
-        "Hanning lobes",
-        "published",
-    )
+        "speed [rpm]", "harmonic", "order", "strongest line [m/s²]", "second line [m/s²]", "third [dB]",
+        "lobes", "Hanning lobes", "published",
+    )  # fmt: skip
     notes = [
         f"lobes of the envelope a carrier revolution that stand out by {threshold:.0%} of its largest value; "
         "third: level of the third line below the strongest; Hanning lobes: of the classical model, in which "
@@ -329,11 +310,9 @@ def _hanning_spectrum(results: Results, speed: int):
     teeth = int(results.housing.attrs["ring_teeth"])
     field = hanning_model(force, planetary_set(results.case).planet_angles)
     lines = component_lines(
-        field,
-        teeth,
-        2 * np.pi * float(data["mesh_frequency"][speed]) / teeth,
+        field, teeth, 2 * np.pi * float(data["mesh_frequency"][speed]) / teeth,
         float(results.housing.attrs["sensor_angle"]),
-    )
+    )  # fmt: skip
     return OrderSpectrum(lines.order, lines.acceleration)
 
 
