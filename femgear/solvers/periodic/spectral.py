@@ -91,8 +91,7 @@ def solve_spectral(
     frequency = _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations)
     kept = np.stack(np.broadcast_arrays(frequency, excitation_harmonics, response_harmonics)[1:]).astype(int)
     _check_harmonics(*kept)
-    kept = kept * excitation.periods
-    excited, own = kept.max(axis=1)
+    excited, own = (kept := kept * excitation.periods).max(axis=1)
     data = _Data.build(modes, excitation, excited, own, frequency.max() / excitation.periods)
     n, speeds = len(data.stiffness), len(frequency)
     lines: Any = [np.zeros((speeds, size, own + 1), complex) for size in (n, n, len(modes.frequency))]
@@ -268,7 +267,7 @@ def spectral_radius(problem: HarmonicProblem) -> np.ndarray:
     for k in range(steps):
         image = _rows(_apply(rough, _lines(basis[:, k], n)))[..., None]
         known = basis[:, : k + 1]
-        for _ in range(2):
+        for _ in range(2 if few else 1):
             share = np.matmul(known, image)
             image -= np.matmul(known.transpose(0, 2, 1), share)
             hessenberg[:, : k + 1, k] += share[..., 0]
