@@ -12,6 +12,8 @@ pytestmark = pytest.mark.benchmark(timer=process_time)
 
 SETTLED = "Settled motion of the 18-dof set with contact loss, damping {:.0%}"
 GROWTH = "One harmonic balance after one reduction, over the degrees of freedom"
+SPEEDS = "Dynamics and housing of the reference set, over the number of speeds from 100 to 3000 rpm"
+DIAMETERS = "Modal stage of the reference set, over the nodal diameters of the ring"
 QUESTIONS = "Questions to the 18-dof set"
 FASTER = 30.0
 """By how much harmonic balance must be faster than integration in time of the same accuracy."""
@@ -143,6 +145,53 @@ def test_growth_over_degrees_of_freedom(benchmark, medians, links):
         assert times < 2.0, f"{dofs} degrees of freedom: {grown}"
     note = f"{unknowns} unknowns, {found.iterations} iterations; all modes, reduction {spent:.2g} s{grown}"
     record(benchmark, f"{dofs} degrees of freedom", note)
+
+
+def grown(benchmark, medians, group: str, size: int) -> str:
+    """Note of a row of growing work: exponent of the time over the size, from the row before."""
+    if benchmark.stats is None:
+        return ""
+    median, before = benchmark.stats.stats.median, medians.get(group)
+    medians[group] = size, median
+    return f"; growth {np.log(median / before[1]) / np.log(size / before[0]):.2f}" if before else ""
+
+
+@pytest.mark.benchmark(group=SPEEDS, timer=process_time)
+@pytest.mark.parametrize("count", [250, 1000, 4000])
+def test_growth_over_speeds(benchmark, reference, medians, count):
+    from dataclasses import replace
+
+    from femgear.case.dependencies import modal_entries, static_entries
+    from femgear.case.quantities import RPM
+    from femgear.trains.elastic.stages import dynamics_parts, solve_housing
+
+    speeds = tuple((np.linspace(100.0, 3000.0, count) * RPM).tolist())
+    operation = reference.case.operation.model_copy(update={"speeds": speeds})
+    case = reference.case.model_copy(update={"operation": operation})
+    modes = replace(reference.modes, entries=modal_entries(case))
+    static = replace(reference.static, entries=static_entries(case))
+
+    def heard():
+        parts = dynamics_parts(case, static, modes)
+        return [solve_housing(part, found).dataset() for part, found in parts]
+
+    found = benchmark.pedantic(heard, rounds=3 if count < 4000 else 1, warmup_rounds=1 if count < 4000 else 0)
+    assert sum(one.sizes["speed"] for one in found) == count
+    parts = f"in {len(found)} parts, with Floquet verdicts, without files"
+    record(benchmark, f"{count} speeds", parts + grown(benchmark, medians, SPEEDS, count))
+
+
+@pytest.mark.benchmark(group=DIAMETERS, timer=process_time)
+@pytest.mark.parametrize("most", [13, 26, 52])
+def test_growth_over_nodal_diameters(benchmark, reference, medians, most, monkeypatch):
+    from femgear.trains.elastic import stages
+
+    monkeypatch.setattr(stages, "max_nodal_diameter", lambda case: most)
+    args = (reference.case, reference.static)
+    found = benchmark.pedantic(stages.solve_modes, args=args, rounds=5, warmup_rounds=1)
+    assert found.max_diameter == most
+    note = f"{len(found.model.system.M)} degrees of freedom" + grown(benchmark, medians, DIAMETERS, most)
+    record(benchmark, f"up to {most} nodal diameters", note)
 
 
 def ask(benchmark, title, question, note, *, rounds=3, limit=None):

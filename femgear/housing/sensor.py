@@ -174,6 +174,22 @@ def component_lines(
     return SensorLines(order, lines, speed, float(sensor_angle), int(z_ring), "exact")
 
 
+def rounded_lines(lines: SensorLines, share: float) -> np.ndarray:
+    """Round the lines (..., n_orders) [m] to single precision and fewer digits, so that files are smaller.
+
+    Their accelerations change by at most a share of the largest one of their speed, smaller ones to zero: the
+    sum with a large number has no room for more digits.
+    """
+    largest = np.abs(lines.acceleration).max(axis=-1, keepdims=True)
+    weight = (lines.order * lines.base_speed[..., None]) ** 2
+    big = np.divide(2.0**23 * share * largest, weight, out=np.zeros_like(weight), where=weight > 0.0)
+    single, big = lines.displacement.astype(np.complex64), big.astype(np.float32)
+    for part in (single.real, single.imag):
+        part += big
+        part -= big
+    return single
+
+
 def stored_lines(housing: Any, *, form: str | None = None) -> SensorLines:
     """Read the lines of a fixed sensor from housing.nc, to the highest that is heard.
 
@@ -250,11 +266,10 @@ def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
     count = lines.z_ring * -(-4 * int(lines.order[-1]) // lines.z_ring)
     revolution = np.arange(count) / count
     return HousingSignal(
-        revolution,
-        2 * np.pi * revolution / lines.base_speed[..., None],
+        revolution, 2 * np.pi * revolution / lines.base_speed[..., None],
         _synthesised(lines.displacement, lines.order, count),
         _synthesised(lines.acceleration, lines.order, count),
-    )
+    )  # fmt: skip
 
 
 def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max: int = 24) -> np.ndarray:
@@ -281,21 +296,17 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
     harmonics, psi = np.asarray(harmonics, dtype=complex), np.asarray(planet_angles, dtype=float)
     if harmonics.ndim < 2 or psi.shape != harmonics.shape[-2:-1] or not np.all(np.isfinite(harmonics)):
         raise CaseError(
-            f"mesh harmonics of shape {harmonics.shape} do not fit {psi.size} planets",
-            code="E-SHAPE",
+            f"mesh harmonics of shape {harmonics.shape} do not fit {psi.size} planets", code="E-SHAPE",
             limit="finite values of shape (..., planets, H + 1)",
             remedy="give the harmonics of the planet-ring meshes alone",
-        )
+        )  # fmt: skip
     width = 2 * np.pi / psi.size if width is None else width
     # a width rounded from degrees may exceed the circle by one bit
     if not 0 < width <= 2 * np.pi * (1 + 1e-12):
         raise CaseError(
-            f"a window of {width} rad does not fit on the ring",
-            code="E-RANGE",
-            value=width,
-            limit="0 < width <= 2 pi",
-            remedy="leave it out for 2 pi divided by the number of planets",
-        )
+            f"a window of {width} rad does not fit on the ring", code="E-RANGE", value=width,
+            limit="0 < width <= 2 pi", remedy="leave it out for 2 pi divided by the number of planets",
+        )  # fmt: skip
     n = np.arange(-n_max, n_max + 1)
     riding = _window_components(n, width)[:, None] * np.exp(-1j * np.outer(n, psi))
     return np.swapaxes(riding @ harmonics, -1, -2)
@@ -310,11 +321,10 @@ def _motion(field: np.ndarray, z_ring: int, carrier_speed) -> tuple[int, np.ndar
     if not usable or direction.size != 1 or direction[0] == 0:
         raise CaseError(
             f"carrier speeds of shape {speed.shape}, directions {direction.tolist()}, do not fit the field",
-            code="E-SPEED",
-            value=carrier_speed,
+            code="E-SPEED", value=carrier_speed,
             limit=f"finite speeds of shape {field.shape[:-2]}, all of one direction, none zero",
             remedy="one speed for every field; split a sweep where the carrier changes direction",
-        )
+        )  # fmt: skip
     return int(direction[0]), speed
 
 
@@ -331,11 +341,10 @@ def _checked_field(field) -> tuple[np.ndarray, np.ndarray]:
     field = np.asarray(field, dtype=complex)
     if field.ndim < 2 or field.size == 0 or field.shape[-1] % 2 == 0 or not np.all(np.isfinite(field)):
         raise CaseError(
-            f"the carrier-frame field of shape {field.shape} is not usable",
-            code="E-SHAPE",
+            f"the carrier-frame field of shape {field.shape} is not usable", code="E-SHAPE",
             limit="finite values of shape (..., H + 1, 2 n_max + 1)",
             remedy="give one column for every n = -n_max..n_max",
-        )
+        )  # fmt: skip
     n_max = field.shape[-1] // 2
     return field, np.arange(-n_max, n_max + 1)
 
@@ -344,12 +353,9 @@ def _checked_angle(angle: float) -> float:
     """Refuse an angle [rad] that is not finite."""
     if not np.isfinite(angle):
         raise CaseError(
-            f"the angle {angle} is not a number of radians",
-            code="E-RANGE",
-            value=angle,
-            limit="a finite angle",
-            remedy="give an angle such as 0.5",
-        )
+            f"the angle {angle} is not a number of radians", code="E-RANGE", value=angle,
+            limit="a finite angle", remedy="give an angle such as 0.5",
+        )  # fmt: skip
     return float(angle)
 
 

@@ -131,11 +131,9 @@ def pulls_of(forces: np.ndarray) -> np.ndarray:
 
     Of harmonics (n_speeds, n_meshes, H + 1) of mesh forces [N], whose springs know no contact loss.
     """
-    found = np.empty((2, *forces.shape[:2]))
-    for s, harmonics in enumerate(forces):
-        record, nothing = sample(harmonics, 4 * harmonics.shape[-1]), _NOTHING * np.abs(harmonics[:, 0]).max()
-        found[:, s] = record.min(axis=-1), (record < -nothing).mean(axis=-1)
-    return found
+    record = sample(forces, 4 * forces.shape[-1])
+    nothing = _NOTHING * np.abs(forces[..., 0]).max(axis=1)[:, None, None]
+    return np.stack([record.min(axis=-1), (record < -nothing).mean(axis=-1)])
 
 
 def pulling_meshes(rpm, names, pulls: Sequence[np.ndarray]) -> Iterator[Finding]:

@@ -64,8 +64,8 @@ WRITTEN, _LINE = ".written", re.compile(rb"[0-9a-f]{64}  .+|[0-9a-f]{0,64} ?")
 _LISTED: set[Path] = set()
 # bytes that a file may declare for each of its own, compressed and with pieces that are not there, and beyond
 _SPARSE, _MARGIN = 100, 1_000_000
-# numbers in a piece of a variable that grows
-_CHUNK = 2**16
+# numbers in a piece of a variable that grows, and in one step along the first dimension of it
+_CHUNK, _INNER = 2**14, 512
 # bytes of numbers of a file from which they are read when they are asked for
 _LARGE = 200_000_000
 
@@ -107,7 +107,7 @@ def _create(dataset: xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> N
             kind = stored.get(one.dtype.kind, one.dtype)
             options = {"maxshape": [longest[dim] for dim in one.dims], "fletcher32": kind.kind != "O"}
             if free and one.dtype.kind not in "OUS":
-                options |= {"chunks": _chunk(one, free), "compression": "gzip", "compression_opts": 1}
+                options |= {"chunks": _chunk(one, free), "compression": 1, "shuffle": True}
             values = one.values.astype(kind, copy=False)
             made[name] = file.create_dataset(str(name), data=values, **(options if one.dims else {}))
             made[name].attrs.update(one.attrs, **({"dtype": "bool"} if one.dtype.kind == "b" else {}))
@@ -124,8 +124,10 @@ def _create(dataset: xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> N
 
 
 def _chunk(variable: xr.Variable, free: Sequence[Any]) -> tuple[int, ...]:
-    """Shape of the pieces in which a variable is stored that grows along some dimensions: 64 000 numbers."""
-    inner = [512 if name in free else size for name, size in list(variable.sizes.items())[1:]]
+    """Shape of the pieces in which a variable is stored that grows along some dimensions: 16 000 numbers."""
+    sizes = dict(list(variable.sizes.items())[1:])
+    fixed = math.prod(size for name, size in sizes.items() if name not in free)
+    inner = [max(_INNER // fixed, 64) if name in free else size for name, size in sizes.items()]
     first = max(_CHUNK // math.prod(inner), 16)
     return (first if variable.dims[0] in free else variable.shape[0], *inner)
 
@@ -154,7 +156,7 @@ def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
             if along not in variable.dims:
                 if name in dataset.coords and variable.shape <= stored.shape:
                     continue
-                stored[...] = 0
+                stored[...] = np.zeros(stored.shape, stored.dtype)
             start = [size if one == along else 0 for one, size in zip(variable.dims, stored.shape)]
             end = [first + size for first, size in zip(start, variable.shape)]
             stored.resize(np.maximum(stored.shape, end))

@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -501,10 +501,13 @@ def record(
     return manifest
 
 
+_version = cache(version)
+
+
 def versions() -> dict[str, str]:
     """List the versions of femgear and of the libraries that compute."""
     found = {"femgear": __version__, "python": platform.python_version()}
-    return found | {name: version(name) for name in _LIBRARIES}
+    return found | {name: _version(name) for name in _LIBRARIES}
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:

@@ -100,6 +100,14 @@ class Product:
         out[..., 0] *= 0.5
         return out
 
+    def take(self, speeds: Any = slice(None), kind: Any = complex) -> Product:
+        """Take the factors at some of the speeds, indices or a mask, complex or np.complex64."""
+        every = self.factor.ndim == 2
+        found = Product((self.factor if every else self.factor[:, speeds]).astype(kind, copy=False))
+        samples = self._samples if every else self._samples[:, speeds]
+        vars(found)["_samples"] = samples.astype(np.float32 if kind is np.complex64 else float, copy=False)
+        return found
+
     @cached_property
     def _samples(self) -> np.ndarray:
         """Factors at so many instants that no harmonic of a product is another one's alias."""

@@ -28,7 +28,9 @@ def freeze(obj):
         value = getattr(obj, one.name)
         # the annotations np.ndarray and NDArray[...]
         if value is not None and "ndarray" in str(one.type).lower():
-            array = np.array(value)
+            # one that nobody can write to is as good as a copy
+            shared = isinstance(value, np.ndarray) and value.flags.owndata and not value.flags.writeable
+            array = np.array(value, copy=None if shared else True)
             array.setflags(write=False)
             object.__setattr__(obj, one.name, array)
 

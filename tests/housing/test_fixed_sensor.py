@@ -6,7 +6,13 @@ from validation.reference.sensor_in_time import mean_square, symmetry_leakage
 
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, order_spectrum
-from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, heaviside_linear_lines
+from femgear.housing.sensor import (
+    SensorLines,
+    fixed_sensor_lines,
+    fixed_sensor_signal,
+    heaviside_linear_lines,
+    rounded_lines,
+)
 
 Z_RING, SENSOR, SPEED = 108, 0.7, 5.2
 
@@ -156,3 +162,22 @@ def test_unusable_data_are_refused(name, lines_of):
         lines_of(**(GOOD | change))
     assert caught.value.code == code
     assert caught.value.remedy and caught.value.limit
+
+
+@pytest.mark.parametrize("share", [1e-6, 1e-3])
+def test_rounded_lines_err_by_less_than_their_share_of_the_acceleration(share):
+    """Lines over eleven decades at three speeds: every bound is that of its own speed, and it is used."""
+    order = np.arange(0, 900, 3)
+    size = 10.0 ** np.random.default_rng(2).uniform(-15, -4, (3, 300))
+    waves = random_field(harmonics=2, n_max=149, seed=3)[:, 1:] / 10.0
+    lines = SensorLines(
+        order, size * np.pad(waves, ((0, 0), (0, 2))), np.array([1.0, 7.0, 40.0]), 0.0, 9, "exact"
+    )
+    rounded = rounded_lines(lines, share)
+    assert rounded.dtype == np.complex64
+    error = np.abs((rounded - lines.displacement) * (order * lines.base_speed[:, None]) ** 2)
+    error /= np.abs(lines.acceleration).max(axis=1, keepdims=True)
+    assert np.all(error.max(axis=1) < share) and np.all(error.max(axis=1) > 0.1 * share)
+    small = np.abs(lines.acceleration) < 0.1 * share * np.abs(lines.acceleration).max(axis=1, keepdims=True)
+    assert small[:, 1:].sum() > 30 and not rounded[small & (order > 0)].any()
+    assert np.array_equal(rounded[:, 0], lines.displacement[:, 0].astype(np.complex64))

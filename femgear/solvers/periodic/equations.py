@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -184,14 +185,17 @@ class HarmonicBalance:
         mean[:, 0] = static[:, 0]
         return self.unknowns(-self._respond(value, self.forces(mean)[0]))
 
-    def solution(self, y, frequency, *, radius: bool = False, **what_happened) -> PeriodicSolution:
+    def solution(
+        self, y, frequency, *, radius: bool = False, forces: Any = None, **what_happened
+    ) -> PeriodicSolution:
         """Make a solution of unknowns (n_y,) [m]; keywords are fields of `PeriodicSolution` on how it came.
 
-        With ``radius`` the spectral radius of the fixed point is among them, where the lines are finite.
+        With ``radius`` the spectral radius of the fixed point is among them, where the lines are finite;
+        ``forces`` are those of `forces` at the lines where they are known.
         """
         frequency = np.atleast_1d(np.asarray(frequency, float))
         lines = self.lines(y)
-        beyond, products = self.forces(lines)
+        beyond, products = self.forces(lines) if forces is None else forces
 
         def residual() -> np.ndarray:
             return self.residual(lines, beyond, self.receptance(frequency)[0])
@@ -251,7 +255,8 @@ def harmonic_balance(
         harmonics = checked_count(harmonics, "harmonics", code="E-HARMONICS", least=0)
         _check_harmonics(problem, harmonics)
         orders = harmonic_lines(harmonics, problem.bases)
-    orders = checked_lines(orders)
+    else:
+        orders = checked_lines(orders)
     bases = orders.shape[1]
     if bases < problem.bases:
         raise CaseError(

@@ -178,9 +178,10 @@ def _newton(
         y, error = y + share * step, trial
         history.append(relative_residual(balance, error, y))
     converged, steps = bool(history[-1] <= tolerance), len(history) - 1 + bool(trouble)
+    forces = tangent if evaluate is _with_matrix and not trouble else None
     return balance.solution(
-        y, frequency, radius=radius, converged=converged, residual=history[-1], iterations=steps,
-        factorisations=steps,
+        y, frequency, radius=radius, forces=forces, converged=converged, residual=history[-1],
+        iterations=steps, factorisations=steps,
         message=_message(converged, steps, history[-1], trouble, tolerance), history=tuple(history),
     )  # fmt: skip
 
@@ -197,7 +198,7 @@ def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **want
     linear = -balance.unknowns(balance.residual(nothing, nothing, receptance))
 
     def evaluate(y, t):
-        full, products = _with_matrix(balance, receptance, y)
+        full, (_, products) = _with_matrix(balance, receptance, y)
         change = full - (y - linear)
         jacobian = t * balance.jacobian(products, receptance)
         jacobian[np.diag_indices(len(y))] += 1.0 - t
@@ -223,11 +224,11 @@ def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **want
     )  # fmt: skip
 
 
-def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, np.ndarray]:
-    """Residual (n_y,) [m] at the unknowns y, and the products of which its derivative is made."""
+def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Residual (n_y,) [m] at the unknowns y, and its forces with the products that make its derivative."""
     lines = balance.lines(y)
-    force, products = balance.forces(lines)
-    return balance.unknowns(balance.residual(lines, force, receptance)), products
+    forces = balance.forces(lines)
+    return balance.unknowns(balance.residual(lines, forces[0], receptance)), forces
 
 
 def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.ndarray:
@@ -236,8 +237,8 @@ def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.
         step = tangent.solve(error)
         if step is not None:
             return step
-        tangent = balance.forces(balance.lines(y))[1]
-    return np.linalg.solve(balance.jacobian(tangent, receptance), error)
+        tangent = balance.forces(balance.lines(y))
+    return np.linalg.solve(balance.jacobian(tangent[1], receptance), error)
 
 
 def _message(converged: bool, steps: int, residual: float, trouble: str, tolerance: float) -> str:

@@ -27,8 +27,8 @@ _STILL = 1e-12
 _UNDAMPED = 1e-10
 # Harmonics of speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 4000
-# Krylov steps of a cycle at most, cycles, and the residual that they must reach.
-_KRYLOV, _CYCLES, _ROUNDING = 250, 4, 1e-13
+# Krylov steps of a cycle at most, cycles, their residual, and that which single precision reaches.
+_KRYLOV, _CYCLES, _ROUNDING, _SINGLE = 250, 4, 1e-13, 1e-7
 # Unknowns of one speed up to which the spectral radius is exact.
 _FEW = 60
 # Iterations of the fixed point after which it may be given up.
@@ -91,8 +91,7 @@ def solve_spectral(
     frequency = _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations)
     kept = np.stack(np.broadcast_arrays(frequency, excitation_harmonics, response_harmonics)[1:]).astype(int)
     _check_harmonics(*kept)
-    kept = kept * excitation.periods
-    excited, own = kept.max(axis=1)
+    excited, own = (kept := kept * excitation.periods).max(axis=1)
     data = _Data.build(modes, excitation, excited, own, frequency.max() / excitation.periods)
     n, speeds = len(data.stiffness), len(frequency)
     lines: Any = [np.zeros((speeds, size, own + 1), complex) for size in (n, n, len(modes.frequency))]
@@ -120,11 +119,10 @@ class HarmonicProblem:
     product: Product
     source: np.ndarray
 
-    def take(self, speeds) -> HarmonicProblem:
-        """Take the problem at some of the speeds, indices or a mask."""
-        factor = self.product.factor
-        product = self.product if factor.ndim == 2 else Product(factor[:, speeds])
-        return HarmonicProblem(self.receptance[:, :, speeds], product, self.source[:, speeds])
+    def take(self, speeds: Any = slice(None), kind: Any = complex) -> HarmonicProblem:
+        """Take the problem at some of the speeds, indices or a mask, complex or np.complex64."""
+        receptance = self.receptance[:, :, speeds].astype(kind, copy=False)
+        return HarmonicProblem(receptance, self.product.take(speeds, kind), self.source[:, speeds])
 
 
 @dataclass(frozen=True)
@@ -138,6 +136,12 @@ class Twins:
     leaders: np.ndarray
     group: np.ndarray
     shift: np.ndarray
+
+    @property
+    def period(self) -> int:
+        """Distance of harmonics at which all shifts are the same; their number where there are none."""
+        again = np.all(np.abs(self.shift[:, 1:] - 1.0) < 1e3 * _EQUAL, axis=0)
+        return int(again.argmax()) + 1 if again.any() else self.shift.shape[1]
 
 
 def compliance(modes: Modes, omega: np.ndarray, chosen: Any = slice(None)) -> np.ndarray:
@@ -170,7 +174,14 @@ def compliance(modes: Modes, omega: np.ndarray, chosen: Any = slice(None)) -> np
 
 def transfer(receptances: np.ndarray, force: np.ndarray) -> np.ndarray:
     """Compute ``T_h f_h`` (n, n_speeds, H + 1) [m] of receptances (n, n, n_speeds, H + 1) and forces [N]."""
-    return np.stack([sum(part * one for part, one in zip(row, force)) for row in receptances])
+    n, speeds, size = force.shape
+    # in memory as `_rows` has it
+    out = np.empty((speeds, n, size), np.result_type(receptances, force)).transpose(1, 0, 2)
+    for one, row in zip(out, receptances):
+        np.multiply(row[0], force[0], out=one)
+        for part, other in zip(row[1:], force[1:]):
+            one += part * other
+    return out
 
 
 def _apply(problem: HarmonicProblem, deflection: np.ndarray) -> np.ndarray:
@@ -190,21 +201,27 @@ def solve_direct(problem: HarmonicProblem, accuracy: float = _ROUNDING) -> np.nd
     GMRES (P. Jiranek and M. Rozloznik, Numer. Algorithms 53, 2010, pp. 93-112), all speeds together; but for
     rounding none depends on the others.
     """
-    found = np.zeros_like(problem.source)
+    found = problem.source.copy()
     limit = accuracy * _norm(problem.source)
     for _ in range(_CYCLES):
         rest = problem.source - found - _apply(problem, found)
-        if np.all(_norm(rest) <= limit):
+        todo = np.flatnonzero(_norm(rest) > limit)
+        if not len(todo):
             break
-        found = found + _cycle(problem, _rows(rest), limit)
+        part = problem.take(todo, np.complex64 if accuracy >= _SINGLE else complex)
+        found[:, todo] += _cycle(part, _rows(rest[:, todo]), limit[todo])
     return found
 
 
 def _cycle(problem: HarmonicProblem, rest: np.ndarray, limit: np.ndarray) -> np.ndarray:
-    """Correction (n, n_speeds, H + 1) [m] that brings residuals, as rows, below limits (n_speeds,) [m]."""
+    """Correction (n, n_speeds, H + 1) [m] that brings residuals, as rows, below limits (n_speeds,) [m].
+
+    In the precision of the receptances.
+    """
     speeds, n, most = len(rest), len(problem.source), min(_KRYLOV, rest.shape[1])
-    ways, images = (np.empty((speeds, most, rest.shape[1])) for _ in range(2))
-    shares, steps, before = np.tile(np.eye(most), (speeds, 1, 1)), np.zeros((speeds, most, 1)), limit
+    rest = rest.astype(np.real(problem.receptance).dtype, copy=False)
+    ways, images = (np.empty((speeds, most, rest.shape[1]), rest.dtype) for _ in range(2))
+    shares, steps, before = np.zeros((speeds, most, most)), np.zeros((speeds, most, 1)), limit
     for k in range(most + 1):
         size = np.linalg.norm(rest, axis=1)
         # a speed that is done takes no further part
@@ -221,11 +238,11 @@ def _cycle(problem: HarmonicProblem, rest: np.ndarray, limit: np.ndarray) -> np.
         share = np.matmul(images[:, :k], image[..., None])
         image -= np.matmul(images[:, :k].transpose(0, 2, 1), share)[..., 0]
         length = np.where(todo, np.linalg.norm(image, axis=1), 1.0)
-        images[:, k] = image / np.maximum(length, np.finfo(float).tiny)[:, None]
+        np.divide(image, np.maximum(length, np.finfo(float).tiny)[:, None], out=images[:, k])
         shares[:, :k, k], shares[:, k, k] = share[..., 0], length
         steps[:, k, 0] = np.einsum("sd,sd->s", images[:, k], rest)
-        rest = rest - steps[:, k] * images[:, k]
-    share = np.linalg.solve(shares[:, :k, :k], steps[:, :k])
+        rest -= steps[:, k].astype(rest.dtype) * images[:, k]
+    share = np.linalg.solve(shares[:, :k, :k], steps[:, :k]).astype(rest.dtype)
     return _lines(np.matmul(ways[:, :k].transpose(0, 2, 1), share)[..., 0], n)
 
 
@@ -241,8 +258,7 @@ def spectral_radius(problem: HarmonicProblem) -> np.ndarray:
     steps, kind, real = (n * (2 * size - 1), complex, float) if few else (20, np.complex64, np.float32)
     start = np.random.default_rng(0).standard_normal((n, 1, size, 2)).view(complex)[..., 0]
     start[..., 0] = np.real(start[..., 0])
-    factor = Product(problem.product.factor.astype(kind))
-    rough = HarmonicProblem(problem.receptance.astype(kind), factor, problem.source)
+    rough = problem.take(kind=kind)
     basis, hessenberg = (
         np.empty((speeds, steps + 1, 2 * n * size), real),
         np.zeros((speeds, steps + 1, steps), real),
@@ -251,7 +267,7 @@ def spectral_radius(problem: HarmonicProblem) -> np.ndarray:
     for k in range(steps):
         image = _rows(_apply(rough, _lines(basis[:, k], n)))[..., None]
         known = basis[:, : k + 1]
-        for _ in range(2):
+        for _ in range(2 if few else 1):
             share = np.matmul(known, image)
             image -= np.matmul(known.transpose(0, 2, 1), share)
             hessenberg[:, : k + 1, k] += share[..., 0]
@@ -288,7 +304,7 @@ class _Class:
     the receptance between the leaders of modal receptances.
     """
 
-    h: np.ndarray
+    h: slice
     used: np.ndarray
     rows: np.ndarray
     pairs: np.ndarray
@@ -298,19 +314,14 @@ class _Class:
 def _classes(modes: Modes, twins: Twins) -> list[_Class]:
     """Harmonics in classes of one shift; of meshes without twins all are in one."""
     member = twins.group == np.arange(len(twins.leaders))[:, None]
-    shifts, of = np.unique(np.round(twins.shift, 6), axis=1, return_inverse=True)
-    found = []
-    for i in range(shifts.shape[1]):
-        shift = member * twins.shift[:, np.flatnonzero(of == i)[0]]
+    found, period = [], twins.period
+    for i in range(period):
+        shift = member * twins.shift[:, i]
         rows = shift @ modes.mesh_deflection
         used = np.flatnonzero(np.abs(rows).max(axis=0) > _EQUAL * np.abs(modes.mesh_deflection).max())
         pairs = modes.mesh_deflection[twins.leaders][:, None, used] * rows[:, used]
-        residual = modes.residual[twins.leaders] @ shift.T
-        found.append(
-            _Class(
-                np.flatnonzero(of == i), used, rows[:, used], pairs.reshape(-1, len(used)).T, residual.ravel()
-            )
-        )
+        pairs, residual = pairs.reshape(-1, len(used)).T, modes.residual[twins.leaders] @ shift.T
+        found.append(_Class(slice(i, None, period), used, rows[:, used], pairs, residual.ravel()))
     return found
 
 
@@ -352,6 +363,7 @@ def _response(frequency, found: _Solved, method: str, tolerance: float, periods:
         )  # fmt: skip
     for array in (found.deflection, found.force, found.modal, found.tail, found.lowest):
         array[~converged] = np.nan
+        array.setflags(write=False)
     response = Response(
         mesh_frequency=frequency, deflection=found.deflection, force=found.force, modal=found.modal,
         converged=converged, residual=residual, iterations=found.iterations, spectral_radius=found.radius,
@@ -418,8 +430,7 @@ class _Data:
         stiffness, deflection, force = (pad(one, count) for one in mesh_harmonics(excitation, excited))
         load = pad(modes.load_deflection[:, None], count)
         twins = find_twins((stiffness, deflection, force, load))
-        few = len(np.unique(np.round(twins.shift, 6), axis=1).T) <= len(twins.group)
-        if not few or not _alike(modes, twins, 2.0 * np.pi * fastest):
+        if twins.period > len(twins.group) or not _alike(modes, twins, 2.0 * np.pi * fastest):
             twins = _alone(len(twins.group), count)
         return cls(stiffness, deflection, force, twins, _classes(modes, twins))
 
@@ -445,10 +456,9 @@ def _solve_batch(
     stiffness[..., 0] -= modes.mesh_stiffness[leaders, None]
     receptance, modal = np.empty((groups, groups, len(part), size), complex), []
     for one in data.classes:
-        h = one.h[one.h < size]
-        modal.append(compliance(modes, 2.0 * np.pi * fundamental[part, None] * h, one.used))
+        modal.append(compliance(modes, 2.0 * np.pi * fundamental[part, None] * lines[one.h], one.used))
         between = np.moveaxis(modal[-1] @ one.pairs + one.residual, -1, 0)
-        receptance[..., h] = between.reshape(groups, groups, len(part), -1)
+        receptance[..., one.h] = between.reshape(groups, groups, len(part), -1)
     receptance *= heard
     source = -transfer(receptance, forcing)
     source[..., 0] += modes.load_deflection[leaders, None]
@@ -461,10 +471,9 @@ def _solve_batch(
     force = every + modes.mesh_stiffness[:, None, None] * deflection
     predicted = -np.tensordot(modes.residual, every, axes=1) * heard
     for one, response in zip(data.classes, modal):
-        h = one.h[one.h < size]
-        moved = -(np.moveaxis(total[:, :, h], 0, -1) @ one.rows) * response
-        predicted[:, :, h] += np.moveaxis(moved @ modes.mesh_deflection[:, one.used].T, -1, 0)
-        found.modal[part[:, None, None], one.used[:, None], h] = moved.transpose(0, 2, 1)
+        moved = -(np.moveaxis(total[:, :, one.h], 0, -1) @ one.rows) * response
+        predicted[:, :, one.h] += np.moveaxis(moved @ modes.mesh_deflection[:, one.used].T, -1, 0)
+        found.modal[..., :size][part[:, None], one.used, one.h] = moved.transpose(0, 2, 1)
     predicted[..., 0] += modes.load_deflection[:, None]
     if modes.modal_load is not None:
         found.modal[part, :, 0] += modes.modal_load * compliance(modes, np.zeros(()))
@@ -595,5 +604,5 @@ def _rows(harmonics: Any) -> np.ndarray:
 
 def _lines(rows: np.ndarray, n: int) -> np.ndarray:
     """(n, n_speeds, H + 1) harmonics of rows as `_rows` makes them."""
-    parts = np.ascontiguousarray(rows.reshape(len(rows), n, -1).transpose(1, 0, 2))
-    return parts.view(np.result_type(rows, np.complex64))
+    parts = np.ascontiguousarray(rows).view(np.result_type(rows, np.complex64))
+    return parts.reshape(len(rows), n, -1).transpose(1, 0, 2)

@@ -8,6 +8,7 @@ depth of the stiffness shows the resonances (`stability_chart`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -23,6 +24,10 @@ from femgear.system.system import MeshExcitation, Modes, NonlinearSystem, mesh_h
 _STEP_ANGLE, _STEPS_PER_HARMONIC = 1.0, 8
 # Modes that exchange less than this share of their stiffness move independently.
 _UNCOUPLED = 1e-9
+# Combinations of meshes that move a group of modes less than this, relative to the largest, do not.
+_RANK = 1e-10
+# Damping ratio up to which modes are followed as turning ones, and the error of the others.
+_TURNING, _CREEPING = 0.999, 1e-9
 # Speeds, and cells of a chart, treated together.
 _SPEEDS_TOGETHER, _CELLS_TOGETHER = 64, 64
 
@@ -293,7 +298,14 @@ def _largest_at_speeds(modes: Modes, stiffness, number: int, period: np.ndarray,
     best = np.zeros(len(period), dtype=complex)
     for group in _coupled(rows[:, moving] / natural[moving], kicks):
         index = moving[group]
-        found = _multipliers(natural[index], modes.damping_ratio[index], rows[:, index], kicks, period)
+        ratio = modes.damping_ratio[index]
+        if ratio.max() < _TURNING:
+            found = _multipliers(natural[index], ratio, rows[:, index], kicks, period)
+        else:
+            damping = np.diag(2.0 * ratio * natural[index])
+            frame = Frame(natural[index] ** 2, damping, rows[:, index], np.zeros(len(rows)), flexibility)
+            cells = 2.0 * np.pi / period, np.ones(len(period))
+            found, _ = _largest_of_cells(frame, FourierSeries(stiffness), np.zeros(0), *cells, _CREEPING)
         best = np.where(np.abs(found) > np.abs(best), found, best)
     if np.any(static):
         slowest = np.exp(-np.min(modes.damping_ratio[static] * natural[static]) * period)
@@ -317,29 +329,32 @@ def _coupled(rows: np.ndarray, kicks: np.ndarray) -> list[np.ndarray]:
 
 
 def _multipliers(natural, damping_ratio, rows, kicks, period) -> np.ndarray:
-    """Largest multiplier (n_speeds,) of one group of modes, followed through one period."""
+    """Largest multiplier (n_speeds,) of one group of modes, followed through one period.
+
+    Of every mode ``z = (q' + zeta w q) / w_d + i q``, which turns freely by ``exp((-zeta w + i w_d) t)``.
+    """
     speeds, m, steps = len(period), len(natural), len(kicks) // 2
-    dt = (period / steps)[:, None, None]
-    stay, turn, back, keep = _half_step(natural, damping_ratio, 0.5 * dt)
-    gyration = rows @ rows.T
-    velocity_rows = (rows / natural).T
-    q = np.zeros((speeds, m, 2 * m))
-    q[:, range(m), range(m)] = 1.0
-    u = np.roll(q, m, axis=-1)
-    for step in range(steps):
-        first, middle = kicks[2 * step], kicks[2 * step + 1]
-        corrected = middle - dt**2 / 24.0 * (middle @ gyration @ middle)
-        for kick in (first * (dt / 3.0), corrected * (2.0 * dt / 3.0)):
-            u -= velocity_rows @ (kick @ (rows @ q))
-            q, u = stay * q + turn * u, back * q + keep * u
-    values = np.linalg.eigvals(np.concatenate([q, u], axis=1))
+    dt, damped = period / steps, natural * np.sqrt(1.0 - damping_ratio**2)
+    # the forces of fewer combinations of meshes than there are: equal meshes in phase move the group as one
+    left, size, _ = np.linalg.svd(rows, full_matrices=False)
+    joint = left[:, size > _RANK * size.max()]
+    rows, kicks = joint.T @ rows, joint.T @ kicks @ joint
+    back = -(rows / damped).T
+    first, middle = kicks[::2], kicks[1::2]
+    corrected = np.concatenate([middle / 1.5, middle @ (rows @ rows.T) @ middle / -36.0], axis=-1)
+    turn = np.exp((-damping_ratio * natural + 1j * damped)[:, None, None] * (0.5 * dt))
+    # one column for each unknown, speeds last
+    state: Any = np.zeros((m, 2 * m, speeds), complex)
+    state[range(m), range(m)], state[range(m), range(m, 2 * m)] = 1.0, 1.0j
+    motion, forces = np.empty((m, 2 * m * speeds)), np.empty((2, len(rows), 2 * m, speeds))
+    for pair in zip(back @ first / 3.0, back @ corrected):
+        for kick in pair:
+            motion.reshape(state.shape)[...] = state.imag
+            np.matmul(rows, motion, out=forces[0].reshape(len(rows), -1))
+            forces[0] *= dt
+            np.multiply(forces[0], dt * dt, out=forces[1])
+            np.matmul(kick, forces.reshape(2 * len(rows), -1)[: kick.shape[1]], out=motion)
+            state.real += motion.reshape(state.shape)
+            state *= turn
+    values = np.linalg.eigvals(np.concatenate([state.real, state.imag]).transpose(2, 0, 1))
     return values[np.arange(speeds), np.abs(values).argmax(axis=1)]
-
-
-def _half_step(natural, damping_ratio, duration):
-    """Exact motion of damped modes, ``u = q' / w``: ``q <- stay q + turn u``, ``u <- back q + keep u``."""
-    w, zeta = natural[:, None], damping_ratio[:, None]
-    angle = np.sqrt((1.0 - zeta**2).astype(complex)) * w * duration
-    sine = (np.sinc(angle / np.pi) * (w * duration)).real
-    cosine, decay = np.cos(angle).real, np.exp(-zeta * w * duration)
-    return decay * (cosine + zeta * sine), decay * sine, -decay * sine, decay * (cosine - zeta * sine)

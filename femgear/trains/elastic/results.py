@@ -23,6 +23,7 @@ from femgear.housing.sensor import (
     component_lines,
     hanning_model,
     lines_in_form,
+    rounded_lines,
     stored_lines,
 )
 from femgear.report.response import harmonics_of
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
     from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
 
+# what lines of many speeds are rounded to, over the largest acceleration of their speed, and from how many on
+_ROUNDED, _MANY = 1e-5, 40
 # speeds, and bands at each of them, that are listed
 _FEW = 4
 _FIRST, _STRONGEST = 6, 4
@@ -118,12 +121,10 @@ class ModesResult:
                 **coordinates(circumferential=diameters),
             },
             attrs={
-                "title": "modal basis with mean mesh stiffnesses",
-                "unknowns": len(model.system.M),
-                "planet_angles": model.planet_angles,
-                "excitation_reach": self.reach,
+                "title": "modal basis with mean mesh stiffnesses", "unknowns": len(model.system.M),
+                "planet_angles": model.planet_angles, "excitation_reach": self.reach,
             },
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -174,20 +175,15 @@ class DynamicsResult:
         return dataset(
             response_entries(self) | reach | complex_entries(entries, single=True),
             coords=coordinates(
-                speed=self.input_speed / RPM,
-                mesh=mesh_names(self.dte.shape[1] // 2),
-                harmonic=np.arange(response.force.shape[-1]),
-                circumferential=np.arange(-n_max, n_max + 1),
+                speed=self.input_speed / RPM, mesh=mesh_names(self.dte.shape[1] // 2),
+                harmonic=np.arange(response.force.shape[-1]), circumferential=np.arange(-n_max, n_max + 1),
             ),
             attrs={
-                "title": "periodic response by the spectral method",
-                "message": response.message,
-                "compared_to": self.compared_to,
-                "warnings": " ".join(map(str, self.warnings)),
-                "ring_teeth": self.ring_teeth,
-                "fourier_convention": FOURIER,
+                "title": "periodic response by the spectral method", "message": response.message,
+                "compared_to": self.compared_to, "warnings": " ".join(map(str, self.warnings)),
+                "ring_teeth": self.ring_teeth, "fourier_convention": FOURIER,
             },
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -214,26 +210,28 @@ class HousingResult:
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of housing.nc; `femgear.housing.sensor.stored_lines` reads the lines."""
-        exact, words = self.exact, "radial displacement at the sensor"
-        lines = ("lines", "speed order", exact.displacement, "m", words)
+        exact, words, rounding = self.exact, "radial displacement at the sensor", "none"
+        values = exact.displacement
+        if len(values) > _MANY:
+            values = rounded_lines(exact, _ROUNDED)
+            rounding = (
+                f"less than {_ROUNDED:g} of the largest acceleration of a speed; smaller lines are zero"
+            )
+        lines = ("lines", "speed order", values, "m", words)
         variables = complex_entries((lines,), single=True) | {
             "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
         }
+        order = {"order": ("order", exact.order, "1", "carrier order")}
         return dataset(
-            variables,
-            coords=coordinates(speed=self.input_speed / RPM)
-            | {"order": ("order", exact.order, "1", "carrier order")},
+            variables, coords=coordinates(speed=self.input_speed / RPM) | order,
             attrs={
-                "title": "what a sensor fixed on the housing hears",
-                "sensor_angle": exact.sensor_angle,
-                "form": self.form,
-                "points": self.points,
-                "ring_teeth": exact.z_ring,
-                "symmetry": self.symmetry,
+                "title": "what a sensor fixed on the housing hears", "sensor_angle": exact.sensor_angle,
+                "form": self.form, "points": self.points, "ring_teeth": exact.z_ring,
+                "symmetry": self.symmetry, "rounding": rounding,
             },
-        )
+        )  # fmt: skip
 
 
 def describe_housing(data: xr.Dataset) -> Block:
@@ -278,16 +276,9 @@ def mesh_bands(results: Results) -> Block:
             published = _published(case, rpm, h)
             rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *two[:2], third, lobes, hanning, published))
     header = (
-        "speed [rpm]",
-        "harmonic",
-        "order",
-        "strongest line [m/s²]",
-        "second line [m/s²]",
-        "third [dB]",
-        "lobes",
-        "Hanning lobes",
-        "published",
-    )
+        "speed [rpm]", "harmonic", "order", "strongest line [m/s²]", "second line [m/s²]", "third [dB]",
+        "lobes", "Hanning lobes", "published",
+    )  # fmt: skip
     notes = [
         f"lobes of the envelope a carrier revolution that stand out by {threshold:.0%} of its largest value; "
         "third: level of the third line below the strongest; Hanning lobes: of the classical model, in which "
@@ -319,11 +310,9 @@ def _hanning_spectrum(results: Results, speed: int):
     teeth = int(results.housing.attrs["ring_teeth"])
     field = hanning_model(force, planetary_set(results.case).planet_angles)
     lines = component_lines(
-        field,
-        teeth,
-        2 * np.pi * float(data["mesh_frequency"][speed]) / teeth,
+        field, teeth, 2 * np.pi * float(data["mesh_frequency"][speed]) / teeth,
         float(results.housing.attrs["sensor_angle"]),
-    )
+    )  # fmt: skip
     return OrderSpectrum(lines.order, lines.acceleration)
 
 

@@ -106,8 +106,9 @@ HARMONICS = 512
 speeds are excited less far, and `_lost_level` tells what they lose."""
 _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
-_NOTICED, _SECONDS = 2e9, 1.5e-4
-"""Size of files that is said before [bytes], and what a harmonic of one speed takes (2 GHz, one core) [s]."""
+_NOTICED, _PACKED, _SECONDS = 2e9, 2.5, 1.5e-5
+"""Size of files that is said before, and that of a number in compressed ones [bytes]; what a harmonic of one
+speed takes (2 GHz, one core) [s]."""
 
 
 @dataclass(frozen=True)
@@ -120,11 +121,8 @@ class _FrequencyLimit:
 
     def options(self, case: Case, some: Any = slice(None)) -> dict[str, Any]:
         """What `solve_spectral` takes at some of the speeds beside modes, excitation and frequencies."""
-        return {
-            "excitation_harmonics": self.excitation[some],
-            "response_harmonics": self.response[some],
-            "tolerance": case.dynamics.tolerance,
-        }
+        kept = {"excitation_harmonics": self.excitation[some], "response_harmonics": self.response[some]}
+        return {**kept, "tolerance": case.dynamics.tolerance}
 
 
 def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
@@ -212,12 +210,10 @@ def mesh_and_ring_outputs(
     rows: Any = linalg.block_diag(np.eye(n_meshes), field[heard])
     outputs = np.vstack([model.rigid_directions.T, ring_rows])
     values = output_response(
-        basis,
-        response,
-        rows @ (outputs @ basis.shape),
+        basis, response, rows @ (outputs @ basis.shape),
         residual=rows @ residual_output(model.system, basis, outputs),
         load=rows @ output_load(model.system, basis, outputs),
-    )
+    )  # fmt: skip
     found = np.zeros((len(values), values.shape[-1], len(heard)), complex)
     found[..., heard] = np.swapaxes(values[:, n_meshes:], 1, 2)
     return values[:, :n_meshes], found
@@ -409,26 +405,16 @@ def dynamics_parts(
             response = replace(response, message=joint_message(told))
         last = replace(response, **{name: getattr(response, name)[-1:] for name in _LINES})
         dte, radial = mesh_and_ring_outputs(modes, response)
-        yield (
-            part,
-            DynamicsResult(
-                input_speed=speeds[own],
-                speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
-                response=response,
-                stability=stability(basis, excitation, frequency[own], excitation_harmonics=decisive),
-                dte=dte,
-                ring_radial=radial,
-                ring_tangential=mesh_and_ring_outputs(modes, last, TANGENTIAL)[1][0],
-                ring_teeth=gears.ring.teeth,
-                symmetry=modes.symmetry,
-                harmonics=int(limit.response.max()),
-                excitation_limit=limit.frequency[own],
-                level_change=level_change[own],
-                compared_to=beyond,
-                warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
-                entries=dynamic_entries(part),
-            ),
-        )
+        yield part, DynamicsResult(
+            input_speed=speeds[own], response=response, dte=dte, ring_radial=radial,
+            speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
+            stability=stability(basis, excitation, frequency[own], excitation_harmonics=decisive),
+            ring_tangential=mesh_and_ring_outputs(modes, last, TANGENTIAL)[1][0],
+            ring_teeth=gears.ring.teeth, symmetry=modes.symmetry, harmonics=int(limit.response.max()),
+            excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
+            warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
+            entries=dynamic_entries(part),
+        )  # fmt: skip
         progress("dynamics", float(own[-1] + 1), float(len(speeds)))
 
 
@@ -458,12 +444,9 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     return HousingResult(
         input_speed=np.array(case.operation.speeds),
         exact=component_lines(dynamics.ring_radial, *place, symmetry=dynamics.symmetry),
-        form=case.housing.form,
-        points=case.housing.points,
-        harmonics=dynamics.harmonics,
-        symmetry=dynamics.symmetry,
-        excitation_limit=dynamics.excitation_limit,
-    )
+        form=case.housing.form, points=case.housing.points, harmonics=dynamics.harmonics,
+        symmetry=dynamics.symmetry, excitation_limit=dynamics.excitation_limit,
+    )  # fmt: skip
 
 
 def _warnings(case: Case) -> Iterator[Finding]:
@@ -474,58 +457,42 @@ def _warnings(case: Case) -> Iterator[Finding]:
     frequency = first * np.array(speeds) / speeds[0]
     # whether the excitation is doubled is known with the modes
     up_to = case.dynamics.up_to or 2.0 * highest_excitation(case, 0.0, float(frequency.max()))
-    harmonics = int(limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics).response.max())
-    symmetry = rotational_symmetry(set_deviations(case), planetary_set(case))
-    size = 8 * len(speeds) * harmonics * (2 * meshes + (2 * max_nodal_diameter(case) + 1) / symmetry)
+    kept = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics).response
+    most, symmetry = int(kept.max()), rotational_symmetry(set_deviations(case), planetary_set(case))
+    # files of speeds that are not in memory together are compressed, and zeros of slow ones with them
+    numbers = _PACKED * kept.sum() if _HARMONIC * most * len(kept) > _PART else 8.0 * most * len(kept)
+    size = numbers * (2 * meshes + (2 * max_nodal_diameter(case) + 1) / symmetry)
     if size > _NOTICED:
         yield Finding(
-            "W-SIZE",
-            "operation.speeds",
-            f"{len(speeds)} speeds with up to {harmonics} harmonics each fill about {size / 1e9:.2g} GB and "
-            f"take about {max(len(speeds) * harmonics * _SECONDS / 60.0, 1.0):.0f} min of one core",
+            "W-SIZE", "operation.speeds",
+            f"{len(speeds)} speeds with up to {most} harmonics each fill about {size / 1e9:.2g} GB and "
+            f"take about {max(kept.sum() * _SECONDS / 60.0, 1.0):.0f} min of one core",
             remedy="fewer speeds, or a lower dynamics.up_to, if that is too much",
-        )
+        )  # fmt: skip
 
 
 ELASTIC = Train(
-    name="elastic",
-    words="a case with an elastic ring",
+    name="elastic", words="a case with an elastic ring",
     stages=(
         STATIC,
         STRESS,
         Stage(
-            name="modes",
-            title="Modes",
-            solve=solve_modes,
-            takes=("static",),
-            options=("progress",),
-            verdict=modes_verdict,
-            describe=lambda results: describe_modes(results.modes),
+            name="modes", title="Modes", solve=solve_modes, takes=("static",), options=("progress",),
+            verdict=modes_verdict, describe=lambda results: describe_modes(results.modes),
             needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
             check=lambda case: check_dynamic_case(case, planetary_set(case)),
         ),
         Stage(
-            name="dynamics",
-            title="Dynamics",
-            solve=solve_dynamics,
-            parts=dynamics_parts,
-            takes=("static", "modes",),
-            options=("progress",),
-            verdict=response_verdict,
-            describe=lambda results: describe_response(results.dynamics),
-            warnings=dynamics_warnings,
+            name="dynamics", title="Dynamics", solve=solve_dynamics, parts=dynamics_parts,
+            takes=("static", "modes"), options=("progress",), verdict=response_verdict,
+            describe=lambda results: describe_response(results.dynamics), warnings=dynamics_warnings,
         ),
         Stage(
-            name="housing",
-            title="Housing",
-            solve=solve_housing,
-            takes=("dynamics",),
+            name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
             verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(results.housing),
             tables=lambda results: (mesh_bands(results),),
         ),
     ),
-    describe=describe_set,
-    warnings=_warnings,
-    figures=FIGURES,
+    describe=describe_set, warnings=_warnings, figures=FIGURES,
 )  # fmt: skip

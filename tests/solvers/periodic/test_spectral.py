@@ -269,6 +269,18 @@ def test_krylov_steps_give_what_elimination_gives(planet_set, planet_excitation,
     np.testing.assert_allclose(rough[:, [7]], alone, atol=1e-12 * np.abs(alone).max())
 
 
+@pytest.mark.parametrize("accuracy", [1e-4, 5e-7, 1e-7])
+def test_krylov_steps_in_single_precision_are_as_exact_as_asked(planet_set, planet_excitation, accuracy):
+    """The residual is that of the equations in double precision, near resonances too."""
+    excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
+    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
+    problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
+    found = spectral.solve_direct(problem, accuracy)
+    rest = spectral._norm(problem.source - found - spectral._apply(problem, found))
+    assert np.all(rest <= accuracy * spectral._norm(problem.source))
+    assert rest.max() > 1e-3 * accuracy * spectral._norm(problem.source).max()
+
+
 def test_nearly_identical_planets_meet_the_full_equations(planet_set, planet_excitation):
     """A difference too small to break the symmetry does not keep a tight tolerance from being met."""
     system = planet_set()

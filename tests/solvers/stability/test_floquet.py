@@ -41,6 +41,17 @@ def test_multipliers_equal_time_integration(geared_chain, chain_excitation, damp
         assert stability(modes, excitation, frequency).modulus[0] == pytest.approx(exact, rel=1e-4)
 
 
+@pytest.mark.parametrize("ratio", [0.998, 1.0, 1.7])
+def test_modes_that_creep_back_equal_time_integration(geared_chain, chain_excitation, ratio):
+    """Beyond critical damping a mode does not turn; just below it is followed as the others."""
+    excitation, damping = chain_excitation(0.4), np.array([0.0, 0.02, ratio, 0.02])
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=damping)
+    frequency = 2.0 * modes.frequency[1]
+    exact = np.abs(reference_multipliers(modes, excitation, frequency)).max()
+    found = stability(modes, excitation, frequency, frequency_ratio=1e3, steps=400).modulus[0]
+    assert found == pytest.approx(exact, rel=1e-7)
+
+
 def test_splitting_is_of_fourth_order(geared_chain, chain_excitation):
     excitation = chain_excitation(0.4)
     modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03)
@@ -84,6 +95,30 @@ def test_speeds_in_one_call_equal_single_calls(planet_set, planet_excitation):
         assert abs(together.multiplier[i]) == pytest.approx(exact, rel=1e-3)
         every_mode = stability(modes, excitation, frequency[i], frequency_ratio=20.0).modulus[0]
         assert every_mode == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize(("phase", "mass", "rank"), [(0.0, 1.0, 2), (1 / 3, 1.0, 6), (0.0, 1.3, 6)])
+def test_meshes_in_phase_sequential_and_uneven(planet_set, planet_excitation, phase, mass, rank, monkeypatch):
+    """Fewer combinations of the six meshes move the modes of equal planets in phase, not those of others."""
+    ranks, svd = [], np.linalg.svd
+    phases = phase * np.arange(3)
+    excitation = planet_excitation(np.concatenate([phases, phases + 0.1]), depth=0.3)
+    system = planet_set()
+    M = system.M.copy()
+    M[[6, 9], [6, 9]] *= mass, 1.0 / mass
+    modes = solve_modes(replace(system, M=M), excitation.stiffness.mean(axis=1), damping_ratio=0.01)
+
+    def counted(rows, **options):
+        found = svd(rows, **options)
+        ranks.append(int((found[1] > 1e-10 * found[1].max()).sum()))
+        return found
+
+    monkeypatch.setattr(np.linalg, "svd", counted)
+    for frequency in (0.11, 0.27):
+        found = stability(modes, excitation, frequency, frequency_ratio=1e3, steps=600).modulus[0]
+        exact = np.abs(reference_multipliers(modes, excitation, frequency)).max()
+        assert found == pytest.approx(exact, rel=1e-7)
+    assert min(ranks) <= rank <= max(ranks)
 
 
 def test_constant_stiffness_only_decays(geared_chain, chain_excitation):
