@@ -33,13 +33,11 @@ RATIO = "dynamics.damping_ratio"
 
 @pytest.fixture(scope="module")
 def cluster():
-    """A scheduler with two workers of this machine; a task is given up at the first death that it sees."""
-    import dask
+    """A scheduler with two workers of this machine, and with Dask's own count of allowed failures."""
     from distributed import LocalCluster
 
-    settings = {"distributed.scheduler.allowed-failures": 0}
     options = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": ":0"}
-    with dask.config.set(settings), LocalCluster(**options, silence_logs=50) as found:
+    with LocalCluster(**options, silence_logs=50) as found:
         yield found
 
 
