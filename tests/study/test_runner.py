@@ -4,8 +4,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 import warnings
 from pathlib import Path
@@ -290,42 +288,3 @@ def test_ten_thousand_tasks_of_a_millisecond(runner):
     found = [*runner.map(small_tasks.slow, [0.001] * 10_000)]
     assert sorted(index for index, _ in found) == [*range(10_000)]
     assert len({pid for _, pid in found}) == runner.workers
-
-
-CONFIGURATION = "DASK_DISTRIBUTED__COMM__TLS__"
-
-
-@pytest.mark.slow
-def test_a_cluster_with_certificates(words, tmp_path):
-    """Scheduler and workers of other processes, as a user starts them; without certificates none gets in."""
-    subject = ["-subj", "/CN=femgear", "-days", "2", "-nodes", "-newkey", "rsa:2048"]
-    request = ["openssl", "req", "-x509", *subject, "-keyout", "key.pem", "-out", "ca.pem"]
-    subprocess.run(request, cwd=tmp_path, check=True, capture_output=True)
-    files = {"CA_FILE": "ca.pem", "CLIENT__CERT": "ca.pem", "CLIENT__KEY": "key.pem"}
-    files |= {f"{who}__{what.upper()}": f"{'ca' if what == 'cert' else 'key'}.pem"
-              for who in ("SCHEDULER", "WORKER") for what in ("cert", "key")}  # fmt: skip
-    secret = {CONFIGURATION + name: str(tmp_path / file) for name, file in files.items()}
-    environment = os.environ | secret | {"PYTHONPATH": str(CASE.parents[1])}
-    dask = [sys.executable, "-m", "dask"]
-    options = {"env": environment, "cwd": tmp_path, "stderr": subprocess.PIPE, "text": True}
-    scheduler = subprocess.Popen(
-        [*dask, "scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"],
-        **options,
-    )
-    found = next(filter(None, (re.search(r"tls://127\.0\.0\.1:\d+", line) for line in scheduler.stderr)))
-    worker = subprocess.Popen(
-        [*dask, "worker", found[0], "--host", "127.0.0.1", "--nthreads", "1", "--no-dashboard"], **options
-    )
-    femgear = [sys.executable, "-m", "femgear.cli", *words, "--cluster"]
-    try:
-        done = subprocess.run([*femgear, found[0]], **options, stdout=subprocess.PIPE)
-        assert done.returncode == 0, done.stderr
-        assert "60 cases, 60 computed now, 0 cannot" in done.stdout
-        without = options | {"env": {k: v for k, v in environment.items() if k not in secret}}
-        for address in (found[0], found[0].replace("tls", "tcp")):
-            refused = subprocess.run([*femgear, address], **without, stdout=subprocess.PIPE)
-            assert refused.returncode == 3 and "E-CLUSTER" in refused.stderr
-    finally:
-        for process in (worker, scheduler):
-            process.terminate()
-            process.communicate(timeout=20)
