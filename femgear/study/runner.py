@@ -281,8 +281,10 @@ class Dask(Runner):
         self._given: dict[Any, int] = {}
         self._done: queue.Queue = queue.Queue()
         try:
-            from distributed import Client
+            from distributed import Client, Security
 
+            if address.startswith("tls") and not Security().get_connection_args("client").get("ssl_context"):
+                raise ValueError("no certificates are configured")  # it would wait for 40 s at its end
             # what it has to say of a lost connection is said by E-CLUSTER
             logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
             self._client: Any = Client(address, timeout=_TIMEOUT, set_as_default=False)

@@ -288,21 +288,15 @@ class SampleModel:
             if slope
         }
         return replace(
-            d,
-            **forms,
-            sun_pitch=d.sun_pitch - sun[0],
-            planet_pitch=d.planet_pitch - planet,
-            planet_ring_side_pitch=d.planet_ring_side_pitch + planet,
-            ring_pitch=d.ring_pitch - ring[0],
-            sun_runout=moved("sun", d.sun_runout)[0],
-            planet_runout=moved("planet", *d.planet_runout),
-            ring_runout=moved("ring", d.ring_runout)[0],
-            carrier_runout=moved("carrier", d.carrier_runout)[0],
+            d, **forms, sun_pitch=d.sun_pitch - sun[0], planet_pitch=d.planet_pitch - planet,
+            planet_ring_side_pitch=d.planet_ring_side_pitch + planet, ring_pitch=d.ring_pitch - ring[0],
+            sun_runout=moved("sun", d.sun_runout)[0], planet_runout=moved("planet", *d.planet_runout),
+            ring_runout=moved("ring", d.ring_runout)[0], carrier_runout=moved("carrier", d.carrier_runout)[0],
             pin_errors=d.pin_errors + of("pin_errors.radial") * [1, 0] + of("pin_errors.tangential") * [0, 1],
             sun_thickness=d.sun_thickness + float(of("sun.thickness_reduction")[0, 0]),
             planet_thickness=d.planet_thickness + of("planet.thickness_reduction")[:, 0],
             ring_thickness=d.ring_thickness + float(of("ring.thickness_reduction")[0, 0]),
-        )
+        )  # fmt: skip
 
     def image(self, deviations: SetDeviations) -> SetDeviations:
         """Find deviations as the solved set has them."""

@@ -245,13 +245,11 @@ def _method(problem: Problem, method: Method) -> Method:
     wrong = method not in METHODS
     if wrong or (method == "minimax" and not smooth):
         raise CaseError(
-            "no such method" if wrong else "this problem has no derivatives",
-            code="E-CHOICE",
-            key="method",
+            "no such method" if wrong else "this problem has no derivatives", code="E-CHOICE", key="method",
             value=method,
             limit=", ".join(METHODS) if wrong else "a transmission error over deviations of the drive flanks",
             remedy=None if wrong else 'take "global"',
-        )
+        )  # fmt: skip
     if method != "global" and any(variable.integer for variable in problem.variables):
         raise CaseError("whole numbers", code="E-CHOICE", key="method", value=method, limit='"global"')
     return method
@@ -319,10 +317,8 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimu
     except Failure as failure:
         raise ConvergenceError(
             f"the optimum has the objective but not all other quantities: {failure}",
-            code=failure.error["code"],
-            key=failure.error["key"],
-            value=problem.point(x),
-        ) from None
+            code=failure.error["code"], key=failure.error["key"], value=problem.point(x),
+        ) from None  # fmt: skip
     quantities = (problem.objective, *problem.also)
     off, all_off = tolerances(run, x, quantities) if sensitivity else ((), {})
     designs, (method, message, converged) = run.designs, ended
@@ -341,12 +337,9 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
     x, (low, high) = np.asarray(start, float), problem.bounds.T
     if x.shape != low.shape or not np.all((x >= low) & (x <= high)):
         raise CaseError(
-            "the start lies outside the bounds",
-            code="E-START",
-            key="start",
-            value=start,
+            "the start lies outside the bounds", code="E-START", key="start", value=start,
             limit=", ".join(f"{v.name} {v.low} to {v.high}" for v in problem.variables),
-        )
+        )  # fmt: skip
     return x
 
 
@@ -420,11 +413,9 @@ def numbers(problem: Problem, point: Point) -> np.ndarray:
 def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
     """Make the error that a search ends with that found no design."""
     return ConvergenceError(
-        f"none of {run.asked} designs can be computed and lies within the limits",
-        code="E-INFEASIBLE",
-        limit=limit,
-        remedy="widen limits or bounds, or ask for more samples",
-    )
+        f"none of {run.asked} designs can be computed and lies within the limits", code="E-INFEASIBLE",
+        limit=limit, remedy="widen limits or bounds, or ask for more samples",
+    )  # fmt: skip
 
 
 def has_derivatives(problem: Problem) -> bool:
@@ -525,13 +516,9 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     case, objective = variant.case, problem.objective
     static = variant.static(objective.torque)
     basis = DesignBasis(
-        static.planetary_set,
-        static.bodies,
-        static_supports(case),
-        set_deviations(case),
-        case.static.positions,
-        case.static.contact,
-    )
+        static.planetary_set, static.bodies, static_supports(case), set_deviations(case),
+        case.static.positions, case.static.contact,
+    )  # fmt: skip
     linear = linearise(basis, sun_torque=static.sun_torque, periods=static.cycle.periods)
     n, signal = static.planetary_set.n_planets, objective.signal
     assert signal is not None, "see has_derivatives"

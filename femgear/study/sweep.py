@@ -209,13 +209,10 @@ def _value(text: str) -> str | float | bool:
 
 def _not_over(text: str) -> CaseError:
     return CaseError(
-        "not a key with values",
-        code="E-VARIABLE",
-        key="--over",
-        value=text,
+        "not a key with values", code="E-VARIABLE", key="--over", value=text,
         limit=f"KEY=V1,V2,V3 or KEY=LOW..HIGH/COUNT with a count of 2 to {_LARGEST}",
         remedy='--over "operation.torque=50 N m, 100 N m" --over "sun.modifications[0].amount=0 um..12 um/7"',
-    )
+    )  # fmt: skip
 
 
 def sweep_into(
