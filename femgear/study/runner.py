@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, suppress
 from functools import cache, lru_cache
-from itertools import islice
+from itertools import count, islice
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from typing import Any
@@ -31,7 +31,7 @@ from femgear.trains.protocol import one_blas_thread
 _TIMEOUT, _PERIOD = 20.0, 5.0
 """How long a scheduler may take to answer, and how often its workers are counted [s]."""
 _TASK = "femgear-task-"
-"""With which the keys of tasks begin."""
+"""In the keys of all tasks."""
 _one_task = threading.Lock()
 
 
@@ -266,7 +266,7 @@ def _one_death() -> Any:
             self.scheduler = scheduler
 
         def transition(self, key, start, finish, *args, **kwargs):
-            if finish == "processing" and str(key).startswith(_TASK):
+            if finish == "processing" and _TASK in str(key):
                 self.scheduler.tasks[key].suspicious = self.scheduler.allowed_failures
 
     return OneDeath()  # of a class that is sent whole: schedulers need no femgear
@@ -278,6 +278,7 @@ class Dask(Runner):
     def __init__(self, address: str):
         super().__init__()
         self._address, self._counted, self._threads = address, -_PERIOD, 0
+        self._name, self._number = f"{_TASK}{uuid4()}", count()
         self._given: dict[Any, int] = {}
         self._done: queue.Queue = queue.Queue()
         try:
@@ -318,8 +319,9 @@ class Dask(Runner):
             self._function = self._client.submit(bytes, _packed(function), pure=False)
 
     def _give(self, index: int, item: Any) -> None:
-        words = {"key": f"{_TASK}{uuid4()}", "pure": False}
-        future = self._client.submit(_call_packed, __version__, self._function, _packed(item), **words)
+        # schedulers keep every group of tasks for good: all of a client are one
+        key, task = (self._name, next(self._number)), (__version__, self._function, _packed(item))
+        future = self._client.submit(_call_packed, *task, key=key, pure=False)
         self._given[future] = index
         future.add_done_callback(self._done.put)
 
@@ -347,12 +349,12 @@ def open_runner(workers: int = 1, cluster: str | None = None) -> Runner:
     FemgearError: E-ARGUMENTS (workers and a cluster), E-RANGE (workers of nothing), E-CLUSTER (no scheduler
     answers).
     """
-    count = checked_count(workers, "--workers", code="E-RANGE")
+    number = checked_count(workers, "--workers", code="E-RANGE")
     if cluster is None:
-        return Processes(count) if count > 1 else Runner()
-    if count > 1:
+        return Processes(number) if number > 1 else Runner()
+    if number > 1:
         message, remedy = "a cluster has workers of its own", "leave --workers out"
-        raise CaseError(message, code="E-ARGUMENTS", key="--workers", value=count, remedy=remedy)
+        raise CaseError(message, code="E-ARGUMENTS", key="--workers", value=number, remedy=remedy)
     return Dask(cluster)
 
 

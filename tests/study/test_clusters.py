@@ -96,7 +96,8 @@ def runners(secure):
     from distributed import LocalCluster
 
     options = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": ":0"}
-    settings = dask.config.collect_env(secure.environment)
+    names = (name.removeprefix("DASK_").lower() for name in secure.environment)
+    settings = dict(zip((name.replace("__", ".") for name in names), secure.environment.values()))
     with (
         LocalCluster(**options, silence_logs=50) as local,
         Processes(2) as processes,
