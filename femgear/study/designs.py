@@ -51,8 +51,7 @@ _WRITTEN = {
     "method": "for another method",
     "positions": "for other positions",
 }
-_Fits = Callable[[str, dict], bool]
-"""Tells whether a record is one that belongs to a key."""
+_Fits = Callable[[str, dict], bool]  # tells whether a record belongs to a key
 _Values = Callable[[Sequence[Quantity]], Mapping[str, float]]
 """Gives quantities by name [SI], and maybe others."""
 OUTSIDE, _REFUSED = 1e6, 1e9
@@ -240,15 +239,9 @@ class Designs:
     """
 
     def __init__(
-        self,
-        case: Case,
-        keys,
-        journal: Journal,
-        *,
-        cache: Path | None = None,
-        progress: Progress | None = None,
-        runner: Runner | None = None,
-    ):
+        self, case: Case, keys, journal: Journal, *, cache: Path | None = None,
+        progress: Progress | None = None, runner: Runner | None = None
+    ):  # fmt: skip
         self.case, self.journal, self.runner = case, journal, runner or Runner()
         self.seconds = 0.0
         self._computed: set[str] = set()
@@ -403,14 +396,9 @@ def _finite(quantity: Quantity, value: float) -> float:
 
 @contextmanager
 def open_designs(
-    case: Case,
-    keys: Sequence[tuple[str, ...]],
-    *,
-    journal: str | Path | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-    runner: Runner | None = None,
-) -> Iterator[Designs]:
+    case: Case, keys: Sequence[tuple[str, ...]], *, journal: str | Path | None = None,
+    cache: Path | None = None, progress: Progress | None = None, runner: Runner | None = None
+) -> Iterator[Designs]:  # fmt: skip
     """Open the designs of a case, with a journal on disk where one is named.
 
     Parameters

@@ -300,9 +300,8 @@ class SampleModel:
 
     def image(self, deviations: SetDeviations) -> SetDeviations:
         """Find deviations as the solved set has them."""
-        original, solved = self.basis.gears, self.solved.gears
-        same = solved is original
-        return deviations if same else mirrored_deviations(deviations, original, solved, self.order)
+        sets = self.basis.gears, self.solved.gears
+        return deviations if sets[0] is sets[1] else mirrored_deviations(deviations, *sets, self.order)
 
     def level(self, share: float, nearest: float) -> _Level:
         """Find what samples share in windows of a size, see `mesh_windows`; it is kept."""
@@ -438,11 +437,8 @@ def _solved(
     stiffness = stiffness.reshape(n, P, 2, N).mean(axis=(1, 3))
     numbers = np.ptp(motions[..., N], axis=1), share.max(axis=(1, 2)), *stiffness.T
     planets = share.max(axis=1), (share <= 0.0).any(axis=1)
-    return (
-        dict(zip(_NUMBERS, (*numbers, *planets), strict=True)),
-        np.asarray(unsolved),
-        np.asarray(missed.any(axis=1)),
-    )
+    all_numbers = dict(zip(_NUMBERS, (*numbers, *planets), strict=True))
+    return all_numbers, np.asarray(unsolved), np.asarray(missed.any(axis=1))
 
 
 def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts, force):
@@ -541,16 +537,9 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
 
 @one_blas_thread()
 def samples_into(
-    case: Case,
-    folder: Path,
-    basis: tuple[SampleModel, str],
-    *,
-    count: int = 1000,
-    seed: int = 1,
-    exact: bool = False,
-    progress: Progress = silent,
-    runner: Runner | None = None,
-) -> tuple[list[Block], list[str]]:
+    case: Case, folder: Path, basis: tuple[SampleModel, str], *, count: int = 1000, seed: int = 1,
+    exact: bool = False, progress: Progress = silent, runner: Runner | None = None
+) -> tuple[list[Block], list[str]]:  # fmt: skip
     """Compute samples 0 to ``count - 1``; write numbers, a figure and the worst of them as a case file.
 
     The worst has the largest transmission error. ``basis`` is what `prepared` gives. What there is to say
@@ -611,8 +600,8 @@ def _checked_again(case: Case, model: SampleModel, text: str, values, more) -> t
     return _dataset(model, values, chosen, again, turn, attrs | {"method": more["method"]}), ideal
 
 
-def _block(model: SampleModel, seed: int, exact: bool, item: tuple[int, int]) -> dict[str, np.ndarray]:
-    return sample_block(model, seed, item[0], item[1] - item[0], exact=exact)
+def _block(model: SampleModel, seed: int, exact: bool, ends: tuple[int, int]) -> dict[str, np.ndarray]:
+    return sample_block(model, seed, ends[0], ends[1] - ends[0], exact=exact)
 
 
 def prepared(

@@ -172,17 +172,10 @@ class Optimum:
 
 @one_blas_thread()
 def minimise(
-    problem: Problem,
-    *,
-    method: Method = "auto",
-    journal: str | Path | None = None,
-    start: Vector | None = None,
-    options: SearchOptions | None = None,
-    sensitivity: bool = True,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-    runner: Runner | None = None,
-) -> Optimum:
+    problem: Problem, *, method: Method = "auto", journal: str | Path | None = None,
+    start: Vector | None = None, options: SearchOptions | None = None, sensitivity: bool = True,
+    cache: Path | None = None, progress: Progress | None = None, runner: Runner | None = None
+) -> Optimum:  # fmt: skip
     """Find the best design within the bounds and limits of a problem.
 
     A search repeats itself exactly with the same arguments: with a journal one that was interrupted goes
@@ -383,8 +376,7 @@ def polish(
     from scipy.optimize import minimize
 
     low, high = run.problem.bounds.T
-    width, n = high - low, len(low)
-    unit = [(0.0, 1.0)] * n
+    width, n, unit = high - low, len(low), [(0.0, 1.0)] * len(low)
     # a point at a bound is one after scaling back and forth as well
     u = np.clip((x0 - low) / width, 0.0, 1.0)
 
@@ -398,9 +390,8 @@ def polish(
         steps = np.where(u + size > 1.0, -size, size)
         simplex = u + np.vstack([np.zeros(n), np.diag(steps)])
         options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "adaptive": n > 4}
-        found = minimize(
-            scaled, u, method="Nelder-Mead", bounds=unit, options=options | {"maxfev": 15 * (n + 1)}
-        )
+        options["maxfev"] = 15 * (n + 1)
+        found = minimize(scaled, u, method="Nelder-Mead", bounds=unit, options=options)
         u, size = found.x, 0.5 * size
     return bool(found.success), str(found.message)
 
@@ -451,8 +442,7 @@ def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) ->
             # the linearisation is that of the same contact problem: its value is the cost
             gain = float(np.ptp(value, axis=1).max()) / scale - promised
             if radius < _SMALLEST or gain < _LEAST:
-                ended = "no linearised descent" if gain < _LEAST else "the smallest steps gain nothing"
-                return True, ended
+                return True, "no linearised descent" if gain < _LEAST else "the smallest steps gain nothing"
             # a bound may be missed by rounding
             trial = np.clip(x + move, low, high)
             new = evaluations.cost(trial)
@@ -477,13 +467,8 @@ def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndar
     flat = np.moveaxis(slopes, 0, -1).reshape(K * P, n) * width
     owner = np.kron(np.eye(K), np.ones((P, 1)))
     none, zeros = np.zeros((K * P, K)), np.zeros((K * P, 1))
-    A = np.block(
-        [
-            [flat, -owner, none, zeros],
-            [-flat, none, owner, zeros],
-            [np.zeros((K, n)), np.eye(K), -np.eye(K), -np.ones((K, 1))],
-        ]
-    )
+    last = [np.zeros((K, n)), np.eye(K), -np.eye(K), -np.ones((K, 1))]
+    A = np.block([[flat, -owner, none, zeros], [-flat, none, owner, zeros], last])
     b = np.concatenate([-value.ravel(), value.ravel(), np.zeros(K)])
     limits = [(max(-radius, lo), min(radius, hi)) for lo, hi in zip((low - x) / width, (high - x) / width)]
     cost = np.zeros(n + 2 * K + 1)
@@ -512,9 +497,8 @@ def signals(evaluations: Evaluations, x: Vector) -> tuple[np.ndarray, np.ndarray
 def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     """As `signals`, from the contact problem at the point."""
     problem = evaluations.problem
-    variant = evaluations.designs.variant(problem.point(x))
-    case, objective = variant.case, problem.objective
-    static = variant.static(objective.torque)
+    variant, objective = evaluations.designs.variant(problem.point(x)), problem.objective
+    case, static = variant.case, variant.static(objective.torque)
     basis = DesignBasis(
         static.planetary_set, static.bodies, static_supports(case), set_deviations(case),
         case.static.positions, case.static.contact,

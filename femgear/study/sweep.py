@@ -75,15 +75,10 @@ class Sweep:
 
 @one_blas_thread()
 def sweep(
-    case: Case,
-    over: Mapping[str, Sequence[object]],
-    quantities: Sequence[Quantity],
-    *,
-    journal: str | Path | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-    runner: Runner | None = None,
-) -> Sweep:
+    case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity], *,
+    journal: str | Path | None = None, cache: Path | None = None, progress: Progress | None = None,
+    runner: Runner | None = None
+) -> Sweep:  # fmt: skip
     """Compute quantities of a case over values of entries of its file.
 
     Parameters
@@ -216,16 +211,10 @@ def _not_over(text: str) -> CaseError:
 
 
 def sweep_into(
-    case: Case,
-    folder: Path,
-    *,
-    over: Sequence[str],
-    of: Sequence[str] = ("ste",),
-    speeds: tuple[str, str] | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-    runner: Runner | None = None,
-) -> tuple[Sweep, list[str]]:
+    case: Case, folder: Path, *, over: Sequence[str], of: Sequence[str] = ("ste",),
+    speeds: tuple[str, str] | None = None, cache: Path | None = None, progress: Progress | None = None,
+    runner: Runner | None = None
+) -> tuple[Sweep, list[str]]:  # fmt: skip
     """Compute a sweep, or what is left of it, and write its table and figure.
 
     Parameters
