@@ -61,12 +61,10 @@ POSITIONS = 16
 """Of a mesh period."""
 _FORCES, _LEAST = 48, 1e-3
 """Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
-_TOGETHER, _EXACT_TOGETHER = 32, 64
-"""Samples as springs and positions of the whole contact problem solved at once."""
+_TOGETHER, _EXACT_TOGETHER, _CHECKED = 32, 64, 8
+"""Samples as springs and positions of the whole problem solved at once; samples solved again exactly."""
 _BLOCKS = {"spring": 256, "exact": 64}
 """Samples of a task."""
-_CHECKED = 8
-"""Samples that are solved again exactly."""
 _MOST = 10_000_000
 _REACH = 5.0
 """Standard deviations within which all values of a normal law count as lying."""

@@ -39,14 +39,10 @@ from femgear.trains.static.stages import static_supports
 
 Method = Literal["auto", "minimax", "global", "simplex", "powell"]
 METHODS = get_args(Method)
-_HOP = 0.1
-"""Standard deviation of a hop, over the range of every variable."""
-_STEP = 1e-4
-"""Half the difference of separations, over the range of the variable: their round-off is 1e-12 of that."""
-_SMALLEST, _LEAST = 1e-4, 1e-5
-"""Box, over the ranges, and gain, over the objective of the case, at which a descent ends."""
-_MOST_STEPS = 60
-"""Of a descent."""
+_HOP, _STEP = 0.1, 1e-4
+"""Standard deviation of a hop, and half the difference of separations (round-off: 1e-12), over the ranges."""
+_SMALLEST, _LEAST, _MOST_STEPS = 1e-4, 1e-5, 60
+"""Box, over the ranges, gain, over the objective of the case, and steps at which a descent ends."""
 
 
 @dataclass(frozen=True)

@@ -27,14 +27,10 @@ from femgear.study.runner import Runner
 from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_value
 
-_LARGEST = 100_000
-"""Combinations at most."""
-_MANY = 1000
-"""Combinations from which their time is estimated and said."""
+_LARGEST, _MANY, _TIMED = 100_000, 1000, 3
+"""Combinations at most, those from which their time is estimated and said, and those that it is made from."""
 _JOURNAL, _TABLE, _FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 """Files of a sweep."""
-_TIMED = 3
-"""Cases that the estimate is made from."""
 _WITHOUT_EFFECT = {"title", "format"}
 _RANGE = re.compile(r"(.+?)\.\.(.+?)/\s*(\d{1,18})\s*", re.DOTALL)
 
