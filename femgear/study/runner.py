@@ -267,7 +267,7 @@ def _one_death() -> Any:
 
         def transition(self, key, start, finish, *args, **kwargs):
             if finish == "processing" and _TASK in str(key):
-                self.scheduler.tasks[key].suspicious = self.scheduler.allowed_failures
+                self.scheduler.tasks[key].suspicious = self.scheduler.allowed_failures or 0
 
     return OneDeath()  # of a class that is sent whole: schedulers need no femgear
 
@@ -312,7 +312,7 @@ class Dask(Runner):
         return max(self._threads, 1)
 
     def _take(self, function: Callable) -> None:
-        import dask
+        import dask.config
 
         # a task of its own: where its value is lost with a worker, the scheduler makes it again
         with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 TB"}):
