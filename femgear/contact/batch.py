@@ -598,8 +598,8 @@ class _SpringNewton:
         (n, P, W), m = separations.shape, len(load)
         self.laws, self.load, self.sets, self.own = laws, load, n, np.arange(W)
         self.unit = float(laws.yields[np.isfinite(laws.separation)].mean())
-        self.position, self.S = np.tile(np.arange(P), n), laws.smooth.reshape(P, W, 3, 3 * W)
-        field = (self.S @ laws.loads.reshape(P, 1, -1, 1))[..., 0]
+        self.position, self.S = np.tile(np.arange(P), n), laws.smooth.swapaxes(3, 4).reshape(P, W, 3, -1)
+        field = (self.S @ laws.loads.swapaxes(1, 2).reshape(P, 1, -1, 1))[..., 0]
         field += (laws.loads.sum(axis=-1) @ laws.supports)[..., None]
         self.field = -field if tilts is None else tilts - field
         self.apart = laws.separation + separations
@@ -607,7 +607,7 @@ class _SpringNewton:
         self.force, self.motions = self.first.copy(), np.tile(laws.motions, (n, 1)) / self.unit
         self.solved, self.closed = np.zeros(n * P, bool), self.first > 0.0
         self.system = np.zeros((n * P, W + m, W + m))
-        self.system[:, W:, :W] = laws.approach.T
+        self.system[:, W:, :W], self.system[:, :W, W:] = laws.approach.T, -laws.approach
         self.system[:, range(W, W + m), range(W, W + m)] = _SOFTEST
         self.limit = _SETTLED * np.abs(load).max()
 
@@ -615,8 +615,9 @@ class _SpringNewton:
         """Take the moments of the pressures from the forces as they are."""
         P, W = self.field.shape[-3], len(self.own)
         mu = self.laws.moments_under(self.force.reshape(self.sets, P, W))
-        half = (mu.transpose(1, 2, 0, 3) @ self.S).reshape(P, W, self.sets, W, 3).transpose(2, 0, 1, 3, 4)
-        self.between = (half * mu[:, :, None]).sum(axis=-1).reshape(-1, W, W) / self.unit
+        half = (mu.transpose(1, 2, 0, 3) @ self.S).reshape(P, W, self.sets, 3, W)
+        between = (half * mu.transpose(1, 0, 3, 2)[:, None]).sum(axis=-2).transpose(2, 0, 1, 3)
+        self.between = (between.reshape(-1, W, W) + self.laws.supports) / self.unit
         self.bent = (self.apart + (mu * self.field).sum(axis=-1)).reshape(-1, W) / self.unit
 
     def solve(self) -> None:
@@ -642,16 +643,15 @@ class _SpringNewton:
         laws, W, F = self.laws, len(self.own), self.force[todo]
         matrix, G, own = self.system[: len(todo)], laws.approach, self.own
         value, slope = laws.approaches(F, self.position[todo])
-        matrix[:, :W, :W] = self.between[todo] + laws.supports / self.unit
+        matrix[:, :W, :W] = self.between[todo]
         gap = self.bent[todo] + value / self.unit - self.motions[todo] @ G.T
         gap += (matrix[:, :W, :W] @ F[..., None])[..., 0]
         on = self.closed[todo] if careful else (F > 0.0) | (gap < 0.0)
         matrix[:, own, own] += slope / self.unit
-        matrix[:, :W, :W], matrix[:, :W, W:] = matrix[:, :W, :W] * on[..., None], -G * on[..., None]
-        matrix[:, own, own] += ~on
         balance = self.load - F @ G - _SOFTEST * self.motions[todo]
-        right = np.concatenate([np.where(on, -gap, -F), balance], axis=1)
-        change = np.linalg.solve(matrix, right[..., None])[..., 0]
+        right, free = np.concatenate([-gap, balance], axis=1), np.ones(balance.shape, bool)
+        # what is open carries nothing before and after
+        change = _local_solution(matrix, np.concatenate([on, free], axis=1), right[..., None])[..., 0]
         length = np.ones(len(todo))
         if careful:
             falls = on & (change[:, :W] < 0.0)
@@ -676,10 +676,10 @@ class _SpringNewton:
 
     def stiffness(self, force: np.ndarray) -> np.ndarray:
         """Tangent stiffness (n P, meshes) of every mesh at constant loads of the others [N/m]."""
-        loaded, meshes = force > 0.0, int(self.laws.mesh[-1]) + 1
-        between, each, pairs = self.between.copy(), np.arange(meshes), len(self.own) // meshes
+        loaded, meshes, W = force > 0.0, int(self.laws.mesh[-1]) + 1, len(self.own)
+        between, each = self.between - self.laws.supports / self.unit, np.arange(meshes)
         between[:, self.own, self.own] = self.laws.approaches(force, self.position)[1] / self.unit
-        between = np.where(loaded[:, :, None] & loaded[:, None], between, np.eye(len(self.own)))
-        own_mesh = between.reshape(-1, meshes, pairs, meshes, pairs)[:, each, :, each].swapaxes(0, 1)
-        ones = loaded.reshape(-1, meshes, pairs, 1).astype(float)
+        between = np.where(loaded[:, :, None] & loaded[:, None], between, np.eye(W))
+        own_mesh = between.reshape(-1, meshes, W // meshes, meshes, W // meshes)[:, each, :, each]
+        ones, own_mesh = loaded.reshape(-1, meshes, W // meshes, 1).astype(float), own_mesh.swapaxes(0, 1)
         return (ones * np.linalg.solve(own_mesh, ones)).sum(axis=(2, 3)) / self.unit

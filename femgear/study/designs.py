@@ -46,7 +46,12 @@ _WRITTEN = {
     "femgear": "by another version of femgear",
     "case": "for another case",
     "keys": "for other design variables",
+    "tolerances": "for other tolerances",
+    "seed": "for another seed",
+    "method": "for another method",
+    "positions": "for other positions",
 }
+_Fits = Callable[[str, dict], bool]  # tells whether a record belongs to a key
 _Values = Callable[[Sequence[Quantity]], Mapping[str, float]]
 """Gives quantities by name [SI], and maybe others."""
 OUTSIDE, _REFUSED = 1e6, 1e9
@@ -69,7 +74,7 @@ class Journal(dict[str, dict]):
             line = {"number": self._number, "key": key, "record": self[key]}
             _append(self._path, self._stream, _sealed(line, self._header))
 
-    def _read(self, path: Path, stream: FileIO, header: dict) -> None:
+    def _read(self, path: Path, stream: FileIO, header: dict, fits: _Fits) -> None:
         """Take what the file holds; a line that a killed process left half written is cut off."""
         with storage_errors(path):
             stream.seek(0)
@@ -82,7 +87,7 @@ class Journal(dict[str, dict]):
         for place, line in enumerate(lines[1:], 2):
             found = _unsealed(line, self._header)
             # numbers rise, but where lines were copied or moved
-            if _is_entry(found, len(header["keys"])) and found["number"] > self._number:
+            if _is_entry(found, fits) and found["number"] > self._number:
                 self._number, self[found["key"]] = found["number"], found["record"]
             else:
                 bad.append(str(place))
@@ -116,12 +121,18 @@ def _append(path: Path, stream: FileIO, line: bytes) -> None:
             raise
 
 
+def fingerprint(text: str) -> str:
+    """Compute the SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 @contextmanager
-def _open_journal(path: str | Path | None, header: dict) -> Iterator[Journal]:
-    """Open the journal with a header; no other process writes into it."""
+def open_journal(path: str | Path | None, case: Case, more: dict, fits: _Fits) -> Iterator[Journal]:
+    """Open the journal of a case, with further entries of its header; no other process writes into it."""
     if path is None:
         yield Journal()
         return
+    header = {"format": _FORMAT, "femgear": __version__, "case": fingerprint(to_toml(case)), **more}
     path = Path(path)
     with storage_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -133,7 +144,7 @@ def _open_journal(path: str | Path | None, header: dict) -> Iterator[Journal]:
             stream = open(path, "a+b", buffering=0)
         with stream:
             journal = Journal(path, stream, header)
-            journal._read(path, stream, header)
+            journal._read(path, stream, header, fits)
             yield journal
 
 
@@ -183,21 +194,26 @@ def _broken(path: Path, why: str) -> StorageError:
     )  # fmt: skip
 
 
-def _is_entry(line: dict, count: int) -> bool:
-    """Tell whether a line has a number and what `Designs` or `search.signals` keep of so many variables."""
+def _is_entry(line: dict, fits: _Fits) -> bool:
+    """Tell whether a line has a number, a key and a record that belongs to it."""
     key, record = line.get("key"), line.get("record")
     if not (type(line.get("number")) is int and isinstance(key, str) and isinstance(record, dict)):
         return False
     try:
-        if not key.startswith("["):
-            value, slopes = (np.array(record[name]) for name in ("value", "slopes"))
-            fits = value.ndim == 2 and slopes.shape == (count, *value.shape)
-            return bool(fits and np.isfinite(value).all() and np.isfinite(slopes).all())
-        point, values = json.loads(key), record["values"].values()
-        error = record.get("error", {"code": "", "key": None, "message": ""})
-        texts = (error["code"], error["message"], "" if error["key"] is None else error["key"])
+        return fits(key, record)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
         return False
+
+
+def _is_design(count: int, key: str, record: dict) -> bool:
+    """Tell whether a record is what `Designs` or `search.signals` keep of so many variables."""
+    if not key.startswith("["):
+        value, slopes = (np.array(record[name]) for name in ("value", "slopes"))
+        fits = value.ndim == 2 and slopes.shape == (count, *value.shape)
+        return bool(fits and np.isfinite(value).all() and np.isfinite(slopes).all())
+    point, values = json.loads(key), record["values"].values()
+    error = record.get("error", {"code": "", "key": None, "message": ""})
+    texts = (error["code"], error["message"], "" if error["key"] is None else error["key"])
     return (
         len(point) in (0, count)
         and all(type(value) is float and math.isfinite(value) for value in values)
@@ -223,15 +239,9 @@ class Designs:
     """
 
     def __init__(
-        self,
-        case: Case,
-        keys,
-        journal: Journal,
-        *,
-        cache: Path | None = None,
-        progress: Progress | None = None,
-        runner: Runner | None = None,
-    ):
+        self, case: Case, keys, journal: Journal, *, cache: Path | None = None,
+        progress: Progress | None = None, runner: Runner | None = None
+    ):  # fmt: skip
         self.case, self.journal, self.runner = case, journal, runner or Runner()
         self.seconds = 0.0
         self._computed: set[str] = set()
@@ -386,14 +396,9 @@ def _finite(quantity: Quantity, value: float) -> float:
 
 @contextmanager
 def open_designs(
-    case: Case,
-    keys: Sequence[tuple[str, ...]],
-    *,
-    journal: str | Path | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-    runner: Runner | None = None,
-) -> Iterator[Designs]:
+    case: Case, keys: Sequence[tuple[str, ...]], *, journal: str | Path | None = None,
+    cache: Path | None = None, progress: Progress | None = None, runner: Runner | None = None
+) -> Iterator[Designs]:  # fmt: skip
     """Open the designs of a case, with a journal on disk where one is named.
 
     Parameters
@@ -409,10 +414,8 @@ def open_designs(
         E-JOURNAL: written for another case, other variables or by another version, or no journal;
         E-LOCKED: in use.
     """
-    fingerprint = hashlib.sha256(to_toml(case).encode()).hexdigest()
-    names = [" = ".join(entries) for entries in keys]
-    header = {"format": _FORMAT, "femgear": __version__, "case": fingerprint, "keys": names}
-    with _open_journal(journal, header) as records:
+    more = {"keys": [" = ".join(entries) for entries in keys]}
+    with open_journal(journal, case, more, partial(_is_design, len(keys))) as records:
         yield Designs(case, tuple(keys), records, cache=cache, progress=progress, runner=runner)
 
 

@@ -17,11 +17,12 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, suppress
-from functools import cache
-from itertools import islice
+from functools import cache, lru_cache
+from itertools import count, islice
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from typing import Any
+from uuid import uuid4
 
 from femgear import __version__
 from femgear.errors import CaseError, FemgearError, checked_count
@@ -29,6 +30,8 @@ from femgear.trains.protocol import one_blas_thread
 
 _TIMEOUT, _PERIOD = 20.0, 5.0
 """How long a scheduler may take to answer, and how often its workers are counted [s]."""
+_TASK = "femgear-task-"
+"""In the keys of all tasks."""
 _one_task = threading.Lock()
 
 
@@ -39,7 +42,7 @@ class Runner(AbstractContextManager):
     """Tasks that run at the same time."""
 
     def __init__(self):
-        self._waiting: deque[tuple[int, Callable, Any]] = deque()
+        self._waiting: deque[tuple[int, Any]] = deque()
         self._told: set[tuple] = set()
 
     def __exit__(self, *_):
@@ -50,22 +53,23 @@ class Runner(AbstractContextManager):
     ) -> Iterator[tuple[int, Any]]:
         """Call a function with every item; give number and outcome of each as they come, every warning once.
 
-        The function is that of an importable module, and sent with every task. The outcome is what it
+        The function is that of an importable module, and sent to every worker once. The outcome is what it
         returns, or a `FemgearError` (E-WORKER) where it ends two workers. At most ``window`` tasks, by
         default twice the workers, are given out and have not come back; items beyond are not taken yet.
 
         FemgearError: no worker starts, or takes the function (E-WORKER); E-CLUSTER; what the function raises.
         """
         source, pending, suspects, tried = enumerate(items), {}, deque(), set()
+        self._take(function)
         try:
             while True:
                 for index, item in islice(source, max((window or 2 * self.workers) - len(pending), 0)):
                     pending[index] = item
-                    self._give(index, function, item)
+                    self._give(index, item)
                 if suspects and not pending:
                     index, item = suspects.popleft()
                     pending[index] = item
-                    self._give(index, function, item)
+                    self._give(index, item)
                 if not pending:
                     return
                 index, reply = self._next()
@@ -83,14 +87,18 @@ class Runner(AbstractContextManager):
         finally:
             self._drop()
 
-    def _give(self, index: int, function: Callable, item: Any) -> None:
+    def _take(self, function: Callable) -> None:
+        """Take the function of the tasks that follow."""
+        self._function: Any = function
+
+    def _give(self, index: int, item: Any) -> None:
         """Give out a task."""
-        self._waiting.append((index, function, item))
+        self._waiting.append((index, item))
 
     def _next(self) -> tuple[int, Any]:
         """Number of a task that comes back, and what `_call` returned; None where it ended its worker."""
-        index, function, item = self._waiting.popleft()
-        return index, _call(function, item)
+        index, item = self._waiting.popleft()
+        return index, _call(self._function, item)
 
     def _drop(self) -> None:
         """Forget the tasks that have not come back."""
@@ -110,10 +118,10 @@ def _deadly() -> FemgearError:
     return FemgearError("it ends its worker, twice", code="E-WORKER", remedy=remedy)
 
 
-def _packed(function: Callable, item: Any) -> tuple[str, bytes]:
-    """A task as `_call_packed` takes it."""
+def _packed(value: Any) -> bytes:
+    """A function or an item as `_call_packed` takes it."""
     try:
-        return __version__, pickle.dumps((function, item))
+        return pickle.dumps(value)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise CaseError(
             f"a function cannot be sent to workers: {error}", code="E-WORKER",
@@ -121,14 +129,20 @@ def _packed(function: Callable, item: Any) -> tuple[str, bytes]:
         ) from None  # fmt: skip
 
 
-def _call_packed(version: str, task: bytes) -> tuple[Any, list[tuple]]:
+@lru_cache(maxsize=1)
+def _unpacked(function: bytes) -> Callable:
+    """The function of a worker, which keeps it, and what it has made, from task to task."""
+    return pickle.loads(function)
+
+
+def _call_packed(version: str, function: bytes, item: bytes) -> tuple[Any, list[tuple]]:
     """As `_call`, in a worker: one task at a time, whatever threads it has."""
     if version != __version__:
         message = "a worker has another version of femgear"
         raise FemgearError(message, code="E-CLUSTER", value=__version__, limit=version)
     with _one_task:
         _limited()
-        return _call(*pickle.loads(task))
+        return _call(_unpacked(function), pickle.loads(item))
 
 
 @cache
@@ -148,6 +162,7 @@ class Processes(Runner):
         # by the connections to them
         self._processes: dict[Any, Any] = {}
         self._busy: dict[Any, int] = {}
+        self._sent: dict[Any, bytes] = {}
 
     def __exit__(self, *_):
         self._drop()
@@ -157,13 +172,18 @@ class Processes(Runner):
     def _feed(self) -> None:
         """Send tasks that wait to processes that have none."""
         while self._waiting and len(self._busy) < self.workers:
-            index, function, item = self._waiting.popleft()
-            task = _packed(function, item)
+            index, item = self._waiting.popleft()
+            task = _packed(item)
             idle = self._processes.keys() - self._busy.keys()
             connection = idle.pop() if idle else self._start()
             self._busy[connection] = index
+            new = self._sent.get(connection) is not self._function
+            self._sent[connection] = self._function
             with suppress(OSError):  # of a dead one the end is read
-                connection.send(task)
+                connection.send((__version__, self._function if new else None, task))
+
+    def _take(self, function: Callable) -> None:
+        self._function = _packed(function)
 
     def _start(self) -> Any:
         """Start a process that Ctrl-C does not reach: it is meant for this one."""
@@ -210,7 +230,7 @@ class Processes(Runner):
 
     def _end(self, connection: Any) -> int:
         """End a process, whatever it is at; the number of its task, -1 for none."""
-        process = self._processes.pop(connection)
+        process, _ = self._processes.pop(connection), self._sent.pop(connection, None)
         connection.close()
         process.kill()
         process.join()
@@ -224,13 +244,32 @@ def _serve(connection: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, OSError):
         connection.send(None)
+        function = b""
         while True:
-            task = connection.recv()
+            version, new, item = connection.recv()
+            function = new or function
             try:
-                reply = _call_packed(*task)
+                reply = _call_packed(version, function, item)
             except Exception as error:
                 reply = error
             connection.send(reply)
+
+
+def _one_death() -> Any:
+    """Plugin of a scheduler: tasks of femgear are given up with their worker, whatever it allows others."""
+    from distributed import SchedulerPlugin
+
+    class OneDeath(SchedulerPlugin):
+        name = "femgear"
+
+        async def start(self, scheduler):
+            self.scheduler = scheduler
+
+        def transition(self, key, start, finish, *args, **kwargs):
+            if finish == "processing" and _TASK in str(key):
+                self.scheduler.tasks[key].suspicious = self.scheduler.allowed_failures or 0
+
+    return OneDeath()  # of a class that is sent whole: schedulers need no femgear
 
 
 class Dask(Runner):
@@ -239,14 +278,18 @@ class Dask(Runner):
     def __init__(self, address: str):
         super().__init__()
         self._address, self._counted, self._threads = address, -_PERIOD, 0
+        self._name, self._number = f"{_TASK}{uuid4()}", count()
         self._given: dict[Any, int] = {}
         self._done: queue.Queue = queue.Queue()
         try:
-            from distributed import Client
+            from distributed import Client, Security
 
+            if address.startswith("tls") and not Security().get_connection_args("client").get("ssl_context"):
+                raise ValueError("no certificates are configured")  # it would wait for 40 s at its end
             # what it has to say of a lost connection is said by E-CLUSTER
             logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
             self._client: Any = Client(address, timeout=_TIMEOUT, set_as_default=False)
+            self._client.register_plugin(_one_death())
         except (ImportError, OSError, RuntimeError, TypeError, ValueError) as error:
             raise self._lost(error) from None
 
@@ -268,8 +311,17 @@ class Dask(Runner):
             self._counted, self._threads = time.monotonic(), sum(self._client.nthreads().values())
         return max(self._threads, 1)
 
-    def _give(self, index: int, function: Callable, item: Any) -> None:
-        future = self._client.submit(_call_packed, *_packed(function, item), pure=False)
+    def _take(self, function: Callable) -> None:
+        import dask.config
+
+        # a task of its own: where its value is lost with a worker, the scheduler makes it again
+        with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 TB"}):
+            self._function = self._client.submit(bytes, _packed(function), pure=False)
+
+    def _give(self, index: int, item: Any) -> None:
+        # schedulers keep every group of tasks for good: all of a client are one
+        key, task = (self._name, next(self._number)), (__version__, self._function, _packed(item))
+        future = self._client.submit(_call_packed, *task, key=key, pure=False)
         self._given[future] = index
         future.add_done_callback(self._done.put)
 
@@ -288,6 +340,7 @@ class Dask(Runner):
     def _drop(self) -> None:
         self._client.cancel([*self._given])
         self._given.clear()
+        self._function = None
 
 
 def open_runner(workers: int = 1, cluster: str | None = None) -> Runner:
@@ -296,12 +349,12 @@ def open_runner(workers: int = 1, cluster: str | None = None) -> Runner:
     FemgearError: E-ARGUMENTS (workers and a cluster), E-RANGE (workers of nothing), E-CLUSTER (no scheduler
     answers).
     """
-    count = checked_count(workers, "--workers", code="E-RANGE")
+    number = checked_count(workers, "--workers", code="E-RANGE")
     if cluster is None:
-        return Processes(count) if count > 1 else Runner()
-    if count > 1:
+        return Processes(number) if number > 1 else Runner()
+    if number > 1:
         message, remedy = "a cluster has workers of its own", "leave --workers out"
-        raise CaseError(message, code="E-ARGUMENTS", key="--workers", value=count, remedy=remedy)
+        raise CaseError(message, code="E-ARGUMENTS", key="--workers", value=number, remedy=remedy)
     return Dask(cluster)
 
 

@@ -45,10 +45,11 @@ from femgear.gears.gear import Gear
 from femgear.gears.modifications import FlankForm, ProfileSlope
 from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figure, save_figure
 from femgear.report.tables import Block
-from femgear.storage.files import own_files, write_dataset, write_text
+from femgear.storage.files import own_files, resumable, write_dataset, write_text
 from femgear.storage.results import dataset
+from femgear.study.designs import Journal, fingerprint, open_journal
 from femgear.study.relief import DesignBasis, design_basis, sun_torque
-from femgear.study.runner import Runner
+from femgear.study.runner import Runner, check_complete
 from femgear.trains.protocol import Progress, one_blas_thread, silent
 from femgear.trains.reading import to_toml, with_values
 
@@ -60,10 +61,10 @@ POSITIONS = 16
 """Of a mesh period."""
 _FORCES, _LEAST = 48, 1e-3
 """Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
-_TOGETHER, _EXACT_TOGETHER, _BLOCK = 32, 64, 256
-"""Samples as springs and positions of the whole contact problem solved at once; samples of a task."""
-_CHECKED = 8
-"""Samples that are solved again exactly."""
+_TOGETHER, _EXACT_TOGETHER, _CHECKED = 32, 64, 8
+"""Samples as springs and positions of the whole problem solved at once; samples solved again exactly."""
+_BLOCKS = {"spring": 256, "exact": 64}
+"""Samples of a task."""
 _MOST = 10_000_000
 _REACH = 5.0
 """Standard deviations within which all values of a normal law count as lying."""
@@ -79,7 +80,8 @@ _NUMBERS = {
 }
 """What is computed of a sample: dimensions, unit and words."""
 _SHOWN = tuple(_NUMBERS)[:4]
-FILES = ("samples.nc", "samples.png", "worst.toml")
+FILES, _JOURNAL = ("samples.nc", "samples.png", "worst.toml"), "samples.jsonl"
+"""What a command writes, and what it goes on from."""
 
 
 class Law(Section):
@@ -284,27 +286,20 @@ class SampleModel:
             if slope
         }
         return replace(
-            d,
-            **forms,
-            sun_pitch=d.sun_pitch - sun[0],
-            planet_pitch=d.planet_pitch - planet,
-            planet_ring_side_pitch=d.planet_ring_side_pitch + planet,
-            ring_pitch=d.ring_pitch - ring[0],
-            sun_runout=moved("sun", d.sun_runout)[0],
-            planet_runout=moved("planet", *d.planet_runout),
-            ring_runout=moved("ring", d.ring_runout)[0],
-            carrier_runout=moved("carrier", d.carrier_runout)[0],
+            d, **forms, sun_pitch=d.sun_pitch - sun[0], planet_pitch=d.planet_pitch - planet,
+            planet_ring_side_pitch=d.planet_ring_side_pitch + planet, ring_pitch=d.ring_pitch - ring[0],
+            sun_runout=moved("sun", d.sun_runout)[0], planet_runout=moved("planet", *d.planet_runout),
+            ring_runout=moved("ring", d.ring_runout)[0], carrier_runout=moved("carrier", d.carrier_runout)[0],
             pin_errors=d.pin_errors + of("pin_errors.radial") * [1, 0] + of("pin_errors.tangential") * [0, 1],
             sun_thickness=d.sun_thickness + float(of("sun.thickness_reduction")[0, 0]),
             planet_thickness=d.planet_thickness + of("planet.thickness_reduction")[:, 0],
             ring_thickness=d.ring_thickness + float(of("ring.thickness_reduction")[0, 0]),
-        )
+        )  # fmt: skip
 
     def image(self, deviations: SetDeviations) -> SetDeviations:
         """Find deviations as the solved set has them."""
-        original, solved = self.basis.gears, self.solved.gears
-        same = solved is original
-        return deviations if same else mirrored_deviations(deviations, original, solved, self.order)
+        sets = self.basis.gears, self.solved.gears
+        return deviations if sets[0] is sets[1] else mirrored_deviations(deviations, *sets, self.order)
 
     def level(self, share: float, nearest: float) -> _Level:
         """Find what samples share in windows of a size, see `mesh_windows`; it is kept."""
@@ -440,11 +435,8 @@ def _solved(
     stiffness = stiffness.reshape(n, P, 2, N).mean(axis=(1, 3))
     numbers = np.ptp(motions[..., N], axis=1), share.max(axis=(1, 2)), *stiffness.T
     planets = share.max(axis=1), (share <= 0.0).any(axis=1)
-    return (
-        dict(zip(_NUMBERS, (*numbers, *planets), strict=True)),
-        np.asarray(unsolved),
-        np.asarray(missed.any(axis=1)),
-    )
+    all_numbers = dict(zip(_NUMBERS, (*numbers, *planets), strict=True))
+    return all_numbers, np.asarray(unsolved), np.asarray(missed.any(axis=1))
 
 
 def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts, force):
@@ -543,51 +535,71 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
 
 @one_blas_thread()
 def samples_into(
-    case: Case,
-    folder: Path,
-    basis: tuple[SampleModel, str],
-    *,
-    count: int = 1000,
-    seed: int = 1,
-    exact: bool = False,
-    progress: Progress = silent,
-    runner: Runner | None = None,
-) -> tuple[list[Block], list[str]]:
+    case: Case, folder: Path, basis: tuple[SampleModel, str], *, count: int = 1000, seed: int = 1,
+    exact: bool = False, progress: Progress = silent, runner: Runner | None = None
+) -> tuple[list[Block], list[str]]:  # fmt: skip
     """Compute samples 0 to ``count - 1``; write numbers, a figure and the worst of them as a case file.
 
     The worst has the largest transmission error. ``basis`` is what `prepared` gives. What there is to say
     comes back with the names of the files; what keeps samples from being computed is raised (`Runner.map`).
+    Blocks of samples are kept in a journal until the end: an interrupted command goes on from it.
     """
     model, text = basis
     checked(count, "--number", 1)
     own_files(folder, FILES)
-    items = [(first, min(_BLOCK, count - first)) for first in range(0, count, _BLOCK)]
-    found = {}
-    for index, outcome in (runner or Runner()).map(partial(_block, model, seed, exact), items):
+    method = "exact" if exact else "spring"
+    more = {"tolerances": fingerprint(text), "seed": seed, "method": method, "positions": len(model.position)}
+    with resumable(folder), open_journal(folder / _JOURNAL, case, more, _is_block) as journal:
+        values = _computed(model, more, count, journal, progress, runner or Runner())
+        data, ideal = _checked_again(case, model, text, values, more)
+        write_dataset(data, folder / FILES[0])
+        save_figure(figure(data), folder / FILES[1])
+        write_text(to_toml(sample_case(case, model, seed, data.attrs["worst"])), folder / FILES[2])
+    (folder / _JOURNAL).unlink(missing_ok=True)
+    tilted = model.level(*model.windows).tilts is not None
+    return [_described(data, ideal, tilted)], list(FILES)
+
+
+def _computed(model, more, count, journal: Journal, progress, runner: Runner) -> dict[str, np.ndarray]:
+    """Numbers of all samples; blocks that the journal has not are computed, and kept in it."""
+    seed, size = more["seed"], _BLOCKS[more["method"]]
+    blocks = [(first, min(first + size, count)) for first in range(0, count, size)]
+    keys = [f"{first}-{end}" for first, end in blocks]
+    left = [(key, block) for key, block in zip(keys, blocks) if key not in journal]
+    block_of = partial(_block, model, seed, more["method"] == "exact")
+    found = runner.map(block_of, [block for _, block in left])
+    for done, (index, outcome) in enumerate(found, len(keys) - len(left) + 1):
         if isinstance(outcome, FemgearError):
             raise outcome
-        found[index] = outcome
-        progress("samples", len(found), len(items))
-    values = _joined([found[i] for i in range(len(items))])
+        journal.add(left[index][0], {name: part.tolist() for name, part in outcome.items()})
+        progress("samples", done, len(keys))
+    check_complete(keys, journal)
+    return _joined([journal[key] for key in keys])
+
+
+def _is_block(key: str, record: dict) -> bool:
+    """Tell whether a record of a journal has the numbers of a block of samples."""
+    first, end = map(int, key.split("-"))
+    parts = [np.array(record[name], float) for name in _NUMBERS]
+    return all(len(part) == end - first and np.isfinite(part).all() for part in parts)
+
+
+def _checked_again(case: Case, model: SampleModel, text: str, values, more) -> tuple[xr.Dataset, dict]:
+    """Numbers of all samples with those of some that are solved exactly; those of the set without errors."""
+    count, seed = len(values["transmission_error"]), more["seed"]
     order = np.argsort(values["transmission_error"], kind="stable")
-    worst = int(order[-1])
     chosen = order[np.linspace(0, count - 1, min(_CHECKED, count)).astype(int)]
     chosen = np.unique(np.append(chosen, values["largest_share"].argmax()))
     errors = np.concatenate([model.draw(seed, int(i), 1) for i in chosen])
     again = exact_numbers(model, errors)
     turn = dict(zip(_SHOWN, np.transpose([over_a_turn(model, one) for one in errors])))
     ideal = exact_numbers(model, np.zeros((1, model.size)))
-    attrs = {"seed": seed, "tolerances": text, "case": to_toml(case), "worst": worst}
-    data = _dataset(model, values, chosen, again, turn, attrs | {"method": "exact" if exact else "spring"})
-    write_dataset(data, folder / FILES[0])
-    save_figure(figure(data), folder / FILES[1])
-    write_text(to_toml(sample_case(case, model, seed, worst)), folder / FILES[2])
-    tilted = model.level(*model.windows).tilts is not None
-    return [_described(data, ideal, tilted)], list(FILES)
+    attrs = {"seed": seed, "tolerances": text, "case": to_toml(case), "worst": int(order[-1])}
+    return _dataset(model, values, chosen, again, turn, attrs | {"method": more["method"]}), ideal
 
 
-def _block(model: SampleModel, seed: int, exact: bool, item: tuple[int, int]) -> dict[str, np.ndarray]:
-    return sample_block(model, seed, *item, exact=exact)
+def _block(model: SampleModel, seed: int, exact: bool, ends: tuple[int, int]) -> dict[str, np.ndarray]:
+    return sample_block(model, seed, ends[0], ends[1] - ends[0], exact=exact)
 
 
 def prepared(

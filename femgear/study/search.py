@@ -39,14 +39,10 @@ from femgear.trains.static.stages import static_supports
 
 Method = Literal["auto", "minimax", "global", "simplex", "powell"]
 METHODS = get_args(Method)
-_HOP = 0.1
-"""Standard deviation of a hop, over the range of every variable."""
-_STEP = 1e-4
-"""Half the difference of separations, over the range of the variable: their round-off is 1e-12 of that."""
-_SMALLEST, _LEAST = 1e-4, 1e-5
-"""Box, over the ranges, and gain, over the objective of the case, at which a descent ends."""
-_MOST_STEPS = 60
-"""Of a descent."""
+_HOP, _STEP = 0.1, 1e-4
+"""Standard deviation of a hop, and half the difference of separations (round-off: 1e-12), over the ranges."""
+_SMALLEST, _LEAST, _MOST_STEPS = 1e-4, 1e-5, 60
+"""Box, over the ranges, gain, over the objective of the case, and steps at which a descent ends."""
 
 
 @dataclass(frozen=True)
@@ -172,17 +168,10 @@ class Optimum:
 
 @one_blas_thread()
 def minimise(
-    problem: Problem,
-    *,
-    method: Method = "auto",
-    journal: str | Path | None = None,
-    start: Vector | None = None,
-    options: SearchOptions | None = None,
-    sensitivity: bool = True,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-    runner: Runner | None = None,
-) -> Optimum:
+    problem: Problem, *, method: Method = "auto", journal: str | Path | None = None,
+    start: Vector | None = None, options: SearchOptions | None = None, sensitivity: bool = True,
+    cache: Path | None = None, progress: Progress | None = None, runner: Runner | None = None
+) -> Optimum:  # fmt: skip
     """Find the best design within the bounds and limits of a problem.
 
     A search repeats itself exactly with the same arguments: with a journal one that was interrupted goes
@@ -245,13 +234,11 @@ def _method(problem: Problem, method: Method) -> Method:
     wrong = method not in METHODS
     if wrong or (method == "minimax" and not smooth):
         raise CaseError(
-            "no such method" if wrong else "this problem has no derivatives",
-            code="E-CHOICE",
-            key="method",
+            "no such method" if wrong else "this problem has no derivatives", code="E-CHOICE", key="method",
             value=method,
             limit=", ".join(METHODS) if wrong else "a transmission error over deviations of the drive flanks",
             remedy=None if wrong else 'take "global"',
-        )
+        )  # fmt: skip
     if method != "global" and any(variable.integer for variable in problem.variables):
         raise CaseError("whole numbers", code="E-CHOICE", key="method", value=method, limit='"global"')
     return method
@@ -319,10 +306,8 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimu
     except Failure as failure:
         raise ConvergenceError(
             f"the optimum has the objective but not all other quantities: {failure}",
-            code=failure.error["code"],
-            key=failure.error["key"],
-            value=problem.point(x),
-        ) from None
+            code=failure.error["code"], key=failure.error["key"], value=problem.point(x),
+        ) from None  # fmt: skip
     quantities = (problem.objective, *problem.also)
     off, all_off = tolerances(run, x, quantities) if sensitivity else ((), {})
     designs, (method, message, converged) = run.designs, ended
@@ -341,12 +326,9 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
     x, (low, high) = np.asarray(start, float), problem.bounds.T
     if x.shape != low.shape or not np.all((x >= low) & (x <= high)):
         raise CaseError(
-            "the start lies outside the bounds",
-            code="E-START",
-            key="start",
-            value=start,
+            "the start lies outside the bounds", code="E-START", key="start", value=start,
             limit=", ".join(f"{v.name} {v.low} to {v.high}" for v in problem.variables),
-        )
+        )  # fmt: skip
     return x
 
 
@@ -390,8 +372,7 @@ def polish(
     from scipy.optimize import minimize
 
     low, high = run.problem.bounds.T
-    width, n = high - low, len(low)
-    unit = [(0.0, 1.0)] * n
+    width, n, unit = high - low, len(low), [(0.0, 1.0)] * len(low)
     # a point at a bound is one after scaling back and forth as well
     u = np.clip((x0 - low) / width, 0.0, 1.0)
 
@@ -405,9 +386,8 @@ def polish(
         steps = np.where(u + size > 1.0, -size, size)
         simplex = u + np.vstack([np.zeros(n), np.diag(steps)])
         options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "adaptive": n > 4}
-        found = minimize(
-            scaled, u, method="Nelder-Mead", bounds=unit, options=options | {"maxfev": 15 * (n + 1)}
-        )
+        options["maxfev"] = 15 * (n + 1)
+        found = minimize(scaled, u, method="Nelder-Mead", bounds=unit, options=options)
         u, size = found.x, 0.5 * size
     return bool(found.success), str(found.message)
 
@@ -420,11 +400,9 @@ def numbers(problem: Problem, point: Point) -> np.ndarray:
 def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
     """Make the error that a search ends with that found no design."""
     return ConvergenceError(
-        f"none of {run.asked} designs can be computed and lies within the limits",
-        code="E-INFEASIBLE",
-        limit=limit,
-        remedy="widen limits or bounds, or ask for more samples",
-    )
+        f"none of {run.asked} designs can be computed and lies within the limits", code="E-INFEASIBLE",
+        limit=limit, remedy="widen limits or bounds, or ask for more samples",
+    )  # fmt: skip
 
 
 def has_derivatives(problem: Problem) -> bool:
@@ -460,8 +438,7 @@ def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) ->
             # the linearisation is that of the same contact problem: its value is the cost
             gain = float(np.ptp(value, axis=1).max()) / scale - promised
             if radius < _SMALLEST or gain < _LEAST:
-                ended = "no linearised descent" if gain < _LEAST else "the smallest steps gain nothing"
-                return True, ended
+                return True, "no linearised descent" if gain < _LEAST else "the smallest steps gain nothing"
             # a bound may be missed by rounding
             trial = np.clip(x + move, low, high)
             new = evaluations.cost(trial)
@@ -486,13 +463,8 @@ def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndar
     flat = np.moveaxis(slopes, 0, -1).reshape(K * P, n) * width
     owner = np.kron(np.eye(K), np.ones((P, 1)))
     none, zeros = np.zeros((K * P, K)), np.zeros((K * P, 1))
-    A = np.block(
-        [
-            [flat, -owner, none, zeros],
-            [-flat, none, owner, zeros],
-            [np.zeros((K, n)), np.eye(K), -np.eye(K), -np.ones((K, 1))],
-        ]
-    )
+    last = [np.zeros((K, n)), np.eye(K), -np.eye(K), -np.ones((K, 1))]
+    A = np.block([[flat, -owner, none, zeros], [-flat, none, owner, zeros], last])
     b = np.concatenate([-value.ravel(), value.ravel(), np.zeros(K)])
     limits = [(max(-radius, lo), min(radius, hi)) for lo, hi in zip((low - x) / width, (high - x) / width)]
     cost = np.zeros(n + 2 * K + 1)
@@ -521,17 +493,12 @@ def signals(evaluations: Evaluations, x: Vector) -> tuple[np.ndarray, np.ndarray
 def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     """As `signals`, from the contact problem at the point."""
     problem = evaluations.problem
-    variant = evaluations.designs.variant(problem.point(x))
-    case, objective = variant.case, problem.objective
-    static = variant.static(objective.torque)
+    variant, objective = evaluations.designs.variant(problem.point(x)), problem.objective
+    case, static = variant.case, variant.static(objective.torque)
     basis = DesignBasis(
-        static.planetary_set,
-        static.bodies,
-        static_supports(case),
-        set_deviations(case),
-        case.static.positions,
-        case.static.contact,
-    )
+        static.planetary_set, static.bodies, static_supports(case), set_deviations(case),
+        case.static.positions, case.static.contact,
+    )  # fmt: skip
     linear = linearise(basis, sun_torque=static.sun_torque, periods=static.cycle.periods)
     n, signal = static.planetary_set.n_planets, objective.signal
     assert signal is not None, "see has_derivatives"

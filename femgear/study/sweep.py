@@ -27,14 +27,10 @@ from femgear.study.runner import Runner
 from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_value
 
-_LARGEST = 100_000
-"""Combinations at most."""
-_MANY = 1000
-"""Combinations from which their time is estimated and said."""
+_LARGEST, _MANY, _TIMED = 100_000, 1000, 3
+"""Combinations at most, those from which their time is estimated and said, and those that it is made from."""
 _JOURNAL, _TABLE, _FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 """Files of a sweep."""
-_TIMED = 3
-"""Cases that the estimate is made from."""
 _WITHOUT_EFFECT = {"title", "format"}
 _RANGE = re.compile(r"(.+?)\.\.(.+?)/\s*(\d{1,18})\s*", re.DOTALL)
 
@@ -75,15 +71,10 @@ class Sweep:
 
 @one_blas_thread()
 def sweep(
-    case: Case,
-    over: Mapping[str, Sequence[object]],
-    quantities: Sequence[Quantity],
-    *,
-    journal: str | Path | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-    runner: Runner | None = None,
-) -> Sweep:
+    case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity], *,
+    journal: str | Path | None = None, cache: Path | None = None, progress: Progress | None = None,
+    runner: Runner | None = None
+) -> Sweep:  # fmt: skip
     """Compute quantities of a case over values of entries of its file.
 
     Parameters
@@ -209,26 +200,17 @@ def _value(text: str) -> str | float | bool:
 
 def _not_over(text: str) -> CaseError:
     return CaseError(
-        "not a key with values",
-        code="E-VARIABLE",
-        key="--over",
-        value=text,
+        "not a key with values", code="E-VARIABLE", key="--over", value=text,
         limit=f"KEY=V1,V2,V3 or KEY=LOW..HIGH/COUNT with a count of 2 to {_LARGEST}",
         remedy='--over "operation.torque=50 N m, 100 N m" --over "sun.modifications[0].amount=0 um..12 um/7"',
-    )
+    )  # fmt: skip
 
 
 def sweep_into(
-    case: Case,
-    folder: Path,
-    *,
-    over: Sequence[str],
-    of: Sequence[str] = ("ste",),
-    speeds: tuple[str, str] | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-    runner: Runner | None = None,
-) -> tuple[Sweep, list[str]]:
+    case: Case, folder: Path, *, over: Sequence[str], of: Sequence[str] = ("ste",),
+    speeds: tuple[str, str] | None = None, cache: Path | None = None, progress: Progress | None = None,
+    runner: Runner | None = None
+) -> tuple[Sweep, list[str]]:  # fmt: skip
     """Compute a sweep, or what is left of it, and write its table and figure.
 
     Parameters

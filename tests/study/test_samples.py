@@ -1,23 +1,27 @@
 """As-built sets: closed forms of load sharing, springs against the whole contact problem, the command."""
 
 import math
+import re
+import signal
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from script_runs import wait_for_lines
+from soak import programs
 
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.cli import main
 from femgear.contact.batch import PairLaws, solve_laws
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports
-from femgear.errors import CaseError
+from femgear.errors import CaseError, StorageError
 from femgear.gears.deviations import no_deviations
 from femgear.run import grid_cache, solve
 from femgear.storage.files import read_dataset
 from femgear.study.relief import design_basis
-from femgear.study.runner import open_runner
+from femgear.study.runner import Runner, open_runner
 from femgear.study.samples import (
     Law,
     Tolerances,
@@ -347,14 +351,68 @@ def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, 
     assert planetary_set(again).n_planets == 3
 
 
-def test_two_processes_give_the_same_bits(case, tmp_path, monkeypatch):
-    monkeypatch.setattr("femgear.study.samples._BLOCK", 8)
-    found, basis = [], prepared(case, TOLERANCES, cache=grid_cache())
-    for workers in (1, 2):
-        with open_runner(workers) as runner:
-            samples_into(case, tmp_path, basis, count=20, runner=runner)
-        found.append(read_dataset(tmp_path / "samples.nc"))
-    assert found[0].identical(found[1])
+class Interrupted(Runner):
+    """Ends after some tasks, or counts them."""
+
+    def __init__(self, tasks):
+        super().__init__()
+        self.tasks = tasks
+
+    def _next(self):
+        if not self.tasks:
+            raise KeyboardInterrupt
+        self.tasks -= 1
+        return super()._next()
+
+
+def test_two_processes_and_an_interrupted_command_give_the_same_bits(case, tmp_path, monkeypatch):
+    monkeypatch.setattr("femgear.study.samples._BLOCKS", {"spring": 8, "exact": 4})
+    basis, journal = prepared(case, TOLERANCES, positions=8, cache=grid_cache()), tmp_path / "samples.jsonl"
+    with open_runner(2) as runner:
+        samples_into(case, tmp_path, basis, count=20, runner=runner)
+    expected = read_dataset(tmp_path / "samples.nc")
+    assert not journal.exists()
+    with pytest.raises(KeyboardInterrupt) as ended:
+        samples_into(case, tmp_path, basis, count=20, runner=Interrupted(2))
+    assert "goes on" in ended.value.__notes__[0] and len(journal.read_bytes().splitlines()) == 3
+    # of other samples nothing is taken, and nothing is lost
+    for more in ({"seed": 2}, {"exact": True}):
+        with pytest.raises(StorageError, match=r"E-JOURNAL.*written for another (seed|method)"):
+            samples_into(case, tmp_path, basis, count=20, **more)
+    with pytest.raises(StorageError, match=r"E-JOURNAL.*written for other tolerances"):
+        samples_into(case, tmp_path, (basis[0], basis[1] + "\n"), count=20)
+    with pytest.raises(StorageError, match=r"E-JOURNAL.*written for another case"):
+        samples_into(with_value(case, "sun.mass", "3 kg"), tmp_path, basis, count=20)
+    # a damaged block is computed again
+    text = journal.read_bytes()
+    journal.write_bytes(re.sub(rb'"8-16"', b'"0-16"', text))
+    last = Interrupted(9)
+    with pytest.warns(UserWarning, match="W-JOURNAL"):
+        samples_into(case, tmp_path, basis, count=20, runner=last)
+    assert last.tasks == 7 and not journal.exists()
+    assert expected.identical(read_dataset(tmp_path / "samples.nc"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["spring", "exact"])
+def test_samples_that_are_killed_go_on_with_the_same_command(tmp_path, method):
+    """By Ctrl-C and kill -9, in two processes and in one: the same numbers as without."""
+    words = ["samples", CASE, "--tolerances", TOLERANCES, "--method", method]
+    words += ["-n", "2000" if method == "spring" else "500", "-o"]
+    journal, lines = tmp_path / "killed" / "samples.jsonl", 0
+    for way, workers in ((signal.SIGINT, 2), (signal.SIGKILL, 2), (signal.SIGKILL, 1)):
+        run = programs.start([*words, "killed", "--workers", workers], tmp_path, fresh=True)
+        wait_for_lines(journal, lines + 2, run)
+        run.kill(way)
+        ended = run.wait()
+        assert ended.code == (130 if way == signal.SIGINT else -9) and not ended.crash
+        found = journal.read_bytes().count(b"\n")
+        assert lines < found
+        lines = found
+    assert programs.start([*words, "killed"], tmp_path, fresh=True).wait().code == 0
+    assert programs.start([*words, "whole"], tmp_path, fresh=True).wait().code == 0
+    killed, whole = (read_dataset(tmp_path / name / "samples.nc") for name in ("killed", "whole"))
+    assert whole.identical(killed) and not journal.exists()
 
 
 @pytest.mark.parametrize(
