@@ -40,6 +40,7 @@ try:
 
     from femgear import __version__
     from femgear.errors import CaseError, FemgearError, printable
+    from femgear.exchange.formats import Sampling
     from femgear.storage.files import noted_interrupts, storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
@@ -265,12 +266,42 @@ def report(folder: Path, /) -> int:
     return 0
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Formats:
+    """What is written.
+
+    Parameters
+    ----------
+    csv
+        Tables with units in their headers: one file for each stage and each set of dimensions.
+    xlsx
+        The same tables as sheets of results.xlsx.
+    mat
+        All numbers as results.mat for MATLAB.
+    wav
+        Accelerometer and microphone at every speed, in m/s^2 and Pa over the full scale.
+    uff
+        Universal files: the same signals and their lines (dataset 58), modes of the ring (15, 55).
+    quality
+        Loudness, tone-to-noise ratio and prominence of the sound, as table.
+    """
+
+    csv: Annotated[bool, Parameter(negative="")] = False
+    xlsx: Annotated[bool, Parameter(negative="")] = False
+    mat: Annotated[bool, Parameter(negative="")] = False
+    wav: Annotated[bool, Parameter(negative="")] = False
+    uff: Annotated[bool, Parameter(negative="")] = False
+    quality: Annotated[bool, Parameter(negative="")] = False
+
+
 @app.command
 def export(
     folder: Path,
     /,
     *,
-    csv: Annotated[bool, Parameter(negative="")] = False,
+    formats: Formats | None = None,
+    sampling: Annotated[Sampling | None, Parameter(name="*")] = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
 ) -> int:
     """Write the numbers of a run as files that other programs read.
@@ -279,31 +310,26 @@ def export(
     ----------
     folder
         Folder that femgear run wrote.
-    csv
-        Tables with units in their headers: one file for each stage and each set of dimensions.
     output
         Folder of the files. Default: exported, inside the other.
     """
+    from femgear.run import export_results
     from femgear.storage.files import list_own, own_files
-    from femgear.storage.results import EXPORTED, Results, additions, folder_lock, write_csv_tables
+    from femgear.storage.results import EXPORTED, additions, folder_lock
     from femgear.trains.reading import open_results
 
-    if not csv:
-        raise CaseError(
-            "no format is named", code="E-ARGUMENTS", limit="--csv", remedy="femgear export --help"
-        )
-
-    def write(place: Path, results: Results) -> list[str]:
-        return [name for stage in results.stages for name in write_csv_tables(results[stage], place, stage)]
-
+    named = [name for name, wanted in vars(formats or Formats()).items() if wanted]
+    if not named:
+        known = ", ".join(f"--{name}" for name in vars(Formats()))
+        raise CaseError("no format is named", code="E-ARGUMENTS", limit=known, remedy="femgear export --help")
     if output is None:
         with folder_lock(folder), additions(folder) as new:
             list_own(new / EXPORTED)
-            names = write(new / EXPORTED, open_results(folder))
+            names = export_results(open_results(folder), new / EXPORTED, named, sampling or Sampling())
     else:
         results = open_results(folder)  # refused before the other folder is touched
         own_files(output, ())
-        names = write(output, results)
+        names = export_results(results, output, named, sampling or Sampling())
     _say(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
     return 0
 

@@ -6,6 +6,8 @@ count. What is allowed but deserves a look is a `Finding`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
@@ -213,6 +215,19 @@ def _one_line(value: object, limit: int = 120) -> str:
     text = repr(value) if isinstance(value, str) else " ".join(str(value).split())
     text = text.lower() if isinstance(value, bool) else text
     return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+@contextmanager
+def nvh_library(words: str) -> Iterator[None]:
+    """Say how the libraries of the extra ``nvh`` are installed where the block lacks one (E-LIBRARY)."""
+    try:
+        yield
+    except ImportError as error:
+        message, remedy = (
+            f"{words} need a library that is not installed: {error}",
+            'pip install "femgear[nvh]"',
+        )
+        raise FemgearError(message, code="E-LIBRARY", remedy=remedy) from error
 
 
 class CaseError(FemgearError, ValueError):

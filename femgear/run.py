@@ -7,23 +7,37 @@ import os
 import time
 import warnings
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from femgear.case.dependencies import fingerprint
-from femgear.errors import StorageError
+from femgear.errors import CaseError, Finding, StorageError
+from femgear.exchange.formats import (
+    Sampling,
+    Signal,
+    write_functions,
+    write_matlab,
+    write_modes,
+    write_wav,
+    write_workbook,
+)
+from femgear.housing.sound import sound_quality
 from femgear.report.page import page, write_pictures
 from femgear.storage.files import (
     append_dataset,
+    checked_name,
     checksum,
     own_files,
     read_dataset,
     read_result,
     replaced_file,
+    write_csv,
     write_dataset,
     write_result,
     write_text,
@@ -38,7 +52,9 @@ from femgear.storage.results import (
     folder_lock,
     read_manifest,
     record,
+    tables_of,
     versions,
+    write_csv_tables,
 )
 from femgear.trains.protocol import Drawn, Progress, Stage, joint_verdict, one_blas_thread, silent
 from femgear.trains.reading import open_results, read_case
@@ -270,3 +286,71 @@ def report_again(folder: Path) -> None:
             results = open_results(folder)
         with additions(results.folder) as new:
             write_text(page(train, results), new / "report.html")
+
+
+def export_results(results: Results, folder: Path, formats: Collection[str], sampling: Sampling) -> list[str]:
+    """Write a run in formats of "csv", "xlsx", "mat", "uff", "wav" and "quality", what is heard of its sound.
+
+    The folder was made ready by `own_files` or `list_own`. Returns the names of the files. FemgearError: the
+    run has no signals or modes (E-STAGE), the library of a format is not installed (E-LIBRARY).
+    """
+    recorded, found = train_of(results.case).recorded, list[str]()
+    for stage, chosen in (("housing", {"wav", "uff", "quality"}), ("modes", {"uff"})):
+        if not chosen.isdisjoint(formats) and (recorded is None or stage not in results.stages):
+            raise CaseError(
+                "the run has nothing that these formats hold", code="E-STAGE",
+                value=", ".join(f"--{one}" for one in formats if one in chosen),
+                limit=f"runs with an elastic ring up to the stage {stage}",
+                remedy="export tables, or run such a case without --only",
+            )  # fmt: skip
+    if "csv" in formats:
+        found += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
+    if "xlsx" in formats:
+        tables = (table for stage in results for table in tables_of(results[stage], stage))
+        write_workbook(tables, folder / "results.xlsx")
+        found.append("results.xlsx")
+    if "mat" in formats:
+        write_matlab({stage: results[stage] for stage in results}, folder / "results.mat")
+        found.append("results.mat")
+    if recorded is not None and "uff" in formats:
+        signals = (one for one in recorded.signals(results, sampling) if one.steady)
+        write_functions(signals, recorded.spectra(results), folder / "signals.uff")
+        write_modes(recorded.shapes(results), folder / "modes.uff")
+        found += ["signals.uff", "modes.uff"]
+    if recorded is not None and not {"wav", "quality"}.isdisjoint(formats):
+        found += _export_sound(recorded.signals(results, sampling), folder, formats, sampling)
+    return found
+
+
+def _export_sound(
+    signals: Iterable[Signal], folder: Path, formats: Collection[str], sampling: Sampling
+) -> list[str]:
+    """Write signals as WAV files, what is heard of those of microphones as a table; returns their names."""
+    found, rows, peaks = list[str](), list[list](), dict[str, float]()
+    scales = {"Pa": sampling.pressure_scale, "m/s^2": sampling.acceleration_scale}
+    for signal in signals:
+        if "wav" in formats:
+            peaks[signal.unit] = max(peaks.get(signal.unit, 0.0), float(np.abs(signal.values).max()))
+            found.append(checked_name(f"{signal.name}.wav"))
+            write_wav(signal, folder / found[-1], full_scale=scales[signal.unit])
+        if "quality" in formats and signal.unit == "Pa" and signal.steady:
+            heard = sound_quality(signal.values, signal.rate)
+            tones = " ".join(f"{one:g}" for one in heard.tones)
+            rows.append([signal.name, heard.loudness, heard.tone_to_noise, heard.prominence, tones])
+    for unit in [unit for unit, peak in peaks.items() if peak > scales[unit]]:
+        text = (
+            f"samples reach {peaks[unit]:.4g} {unit}, the full scale is {scales[unit]:g}: most players clip"
+        )
+        remedy = f"raise --{'pressure' if unit == 'Pa' else 'acceleration'}-scale to hear it"
+        warnings.warn(str(Finding("W-CLIPPING", "", text, remedy=remedy)), stacklevel=4)
+    if rows:
+        header = (
+            "signal",
+            "loudness [sone]",
+            "tone-to-noise ratio [dB]",
+            "prominence ratio [dB]",
+            "tones [Hz]",
+        )
+        write_csv(folder / "sound_quality.csv", header, rows)
+        found.append("sound_quality.csv")
+    return found

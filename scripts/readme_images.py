@@ -13,6 +13,7 @@ IMAGES = (
     "deformed_set.png",
     "mesh_stiffness.png",
     "mode_shapes.png",
+    "microphone_spectrum_3100_rpm.png",
     "modulation_250_rpm.png",
     "order_spectrum_250_rpm.png",
 )

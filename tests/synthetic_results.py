@@ -307,10 +307,15 @@ def housing() -> xr.Dataset:
             "level": _variable(
                 "speed", np.sqrt((np.abs(acceleration) ** 2).sum(axis=1) / 2), "m/s^2", "level"
             ),
+            "pressure_level": _variable("speed", np.array([50.9, 87.7]), "dB", "level at the microphone"),
         },
         coords={
             "speed": _variable("speed", SPEEDS, "rpm", "input speed"),
             "order": _variable("order", np.arange(top), "1", "carrier order"),
         },
-        attrs={"sensor_angle": 0.0, "ring_teeth": RING, "form": "linear", "points": 54},
+        attrs={
+            **{"sensor_angle": 0.0, "ring_teeth": RING, "form": "linear", "points": 54},
+            **{"microphone_distance": 1.0, "microphone_angle": 0.0, "air_density": 1.2, "sound_speed": 343.0},
+            **{"outer_radius": OUTER, "face_width": FACE_WIDTH},
+        },
     )

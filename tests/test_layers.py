@@ -17,7 +17,7 @@ LAYERS = (
     ("solvers",),
     ("case",),
     ("storage",),
-    ("report",),
+    ("report", "exchange"),
     ("trains",),
     ("study",),
     ("run",),

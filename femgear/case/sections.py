@@ -404,8 +404,15 @@ class PublishedLines(Section):
     source: Title
 
 
+class MicrophoneSection(Section):
+    """Where sound is heard: distance from the outer surface of the ring, and angle, that of the sensor."""
+
+    distance: Annotated[float, Quantity(LENGTH, 0.0, 1000.0)] = 1.0
+    angle: Angle | None = None
+
+
 class HousingSection(Section):
-    """The fixed sensor, and how the ring's field is carried to it.
+    """The fixed sensor, how the ring's field is carried to it, and the microphone.
 
     ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
     interpolation between ``points`` points of the paper on carrier modulation, with its images.
@@ -414,6 +421,7 @@ class HousingSection(Section):
     form: Literal["exact", "linear"] = "exact"
     points: Annotated[int, Count(3, 100_000)] = 54
     sensor_angle: Angle = 0.0
+    microphone: MicrophoneSection = MicrophoneSection()
     published: Annotated[tuple[PublishedLines, ...], Field(max_length=100)] = ()
 
 

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
-_FORMAT = 3
+_FORMAT = 4
 MANIFEST = "manifest.json"
 KEPT = ".stages"
 """Folder of results that a run goes on from when it was interrupted."""
@@ -74,10 +74,12 @@ _ATTRIBUTES = {
     name: unit
     for unit, names in (
         ("Hz", "bandwidth compared_to excitation_reach natural_frequency resolution"),
-        ("m", "centre_distance face_width half_backlash"),
+        ("kg/m^3", "air_density"),
+        ("m", "centre_distance face_width half_backlash microphone_distance outer_radius"),
+        ("m/s", "sound_speed"),
         ("N", "unit_force"),
         ("N m", "sun_torque"),
-        ("rad", "base_helix_angle planet_angles sensor_angle"),
+        ("rad", "base_helix_angle microphone_angle planet_angles sensor_angle"),
         ("rad", "working_pressure_angle_planet_ring working_pressure_angle_sun_planet"),
         ("rad/s", "speed"),
         ("s", "settle step"),
@@ -121,16 +123,15 @@ def declared(texts: Mapping[str, tuple[str, str, str]], values: Mapping[str, Any
     }
 
 
-def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
-    """Write the variables of a stage as CSV files, one for each set of dimensions; headers carry the units.
+def tables_of(data: xr.Dataset, stage: str) -> Iterator[tuple[str, Any]]:
+    """Make a pandas table of every set of dimensions of a stage, with its name; headers carry the units.
 
-    ``modes_dof_mode.csv`` holds the variables over degrees of freedom and modes, a line for each pair;
-    ``modes.csv`` holds single numbers and the attributes of the file, a line for each. Tables without a line
-    are left out. Returns the names of the files.
+    ``modes_dof_mode`` holds the variables over degrees of freedom and modes, a line for each pair; ``modes``
+    holds single numbers and the attributes of the file, a line for each. Tables without a line are left out.
     """
     import pandas as pd
 
-    flat, names = data.reset_coords(), []
+    flat = data.reset_coords()
     single = [
         *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
         *(_attribute(str(name), value) for name, value in data.attrs.items()),
@@ -142,9 +143,15 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
             frame = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
         else:
             frame = pd.DataFrame(single, columns=["name", "value", "unit"])
-        if frame.empty:
-            continue
-        names.append(checked_name("_".join((stage, *map(str, dims))) + ".csv"))
+        if not frame.empty:
+            yield "_".join((stage, *map(str, dims))), frame
+
+
+def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
+    """Write the tables of a stage, see `tables_of`, as CSV files; returns the names of the files."""
+    names = []
+    for name, frame in tables_of(data, stage):
+        names.append(checked_name(f"{name}.csv"))
         text = frame.select_dtypes(["object", "str"]).map(csv_cell)
         frame[text.columns] = text
         write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])

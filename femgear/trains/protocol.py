@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from femgear.errors import Finding
+    from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
     from femgear.storage.results import Results
 
 Progress = Callable[[str, float, float], None]
@@ -158,6 +159,15 @@ class Stage:
 
 
 @dataclass(frozen=True)
+class Recorded:
+    """What a test bench would record of a run: signals of every sensor, their spectra, modes at points."""
+
+    signals: Callable[[Results, Sampling], Iterator[Signal]]
+    spectra: Callable[[Results], Iterator[Spectrum]]
+    shapes: Callable[[Results], Shapes]
+
+
+@dataclass(frozen=True)
 class Train:
     """A kind of case and what is computed of it.
 
@@ -175,6 +185,8 @@ class Train:
         By stage; ``""`` are those of the case, whatever is computed of it.
     remarks : callable
         ``(Results, name of a picture) -> sentences`` that this case adds to a caption.
+    recorded : Recorded, optional
+        Signals, spectra and modes of its runs; None where there are none.
     """
 
     name: str
@@ -184,6 +196,7 @@ class Train:
     warnings: Callable[[Any], Iterable[Finding]]
     figures: Mapping[str, Figures] = field(default_factory=dict)
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
+    recorded: Recorded | None = None
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""

@@ -12,11 +12,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.ndimage import maximum_filter1d
 
 from femgear.errors import StorageError
+from femgear.housing.sound import Cylinder, pressure_transfer
 from femgear.report import response, style
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, distinct_lines
 from femgear.trains.elastic import figures as elastic_figures
 from femgear.trains.elastic.figures import _highest
+from femgear.trains.elastic.results import describe_housing
 from femgear.trains.static import figures as static_figures
 
 _HERE = Path(__file__).parents[1]
@@ -51,6 +53,7 @@ def all_figures():
         "signal": elastic_figures.housing_signal(housing.isel(speed=[1])),
         "orders": elastic_figures.order_spectrum(housing.isel(speed=[1])),
         "modulation": elastic_figures.modulation_polar(housing.isel(speed=[1])),
+        "microphone": elastic_figures.microphone_spectrum(housing.isel(speed=[1])),
     }
 
 
@@ -248,6 +251,32 @@ def test_polar_modulation_of_an_amplitude_modulated_signal():
     np.testing.assert_allclose(line.get_ydata(), 1 + 0.8 * np.cos(4 * line.get_xdata()), atol=1e-9)
 
 
+def test_microphone_hears_less_of_many_nodal_diameters():
+    """Lines of equal acceleration and n = 0, 3 and 6: both sensors, each relative to its strongest line."""
+    housing = heard({TEETH - 6: 1.0, TEETH - 3: 1.0, TEETH: 1.0}).isel(speed=[1])
+    band = elastic_figures.microphone_spectrum(housing).axes[2]
+    accelerometer, microphone = (
+        {round(float(line[0, 0])): float(line[1, 1]) for line in bars.get_segments()}
+        for bars in band.collections
+    )
+    assert accelerometer == pytest.approx(dict.fromkeys((TEETH - 6, TEETH - 3, TEETH), 0.0), abs=1e-9)
+    order, n = TEETH - np.array([6, 3, 0]), np.array([6, 3, 0])
+    frequency = order * float(housing["carrier_speed"][0]) / (2 * np.pi)
+    cylinder = Cylinder(synthetic.OUTER, synthetic.FACE_WIDTH, 1.2, 343.0)
+    pressure = np.abs(pressure_transfer(n, frequency, cylinder, 1.0)) / order
+    level = 20 * np.log10(pressure / pressure.max())
+    assert level[0] < -40.0 and -8.0 < level[1] < -4.0
+    assert microphone == pytest.approx({k: one for k, one in zip(order, level) if one > -50.0}, abs=1e-9)
+    assert [text.get_text() for text in band.texts] == ["6", "3", "0"]
+
+
+def test_the_table_of_the_housing_has_both_sensors():
+    block = describe_housing(synthetic.housing())
+    column = block.header.index("microphone [dB(A)]")
+    assert [row[column] for row in block.rows] == ["50.9", "87.7"]
+    assert "1 m from the ring" in block.notes[-1] and "upper bound" in block.notes[-1]
+
+
 def test_envelope_of_the_housing_signal():
     figure = elastic_figures.housing_signal(modulated(0.5, 6), harmonics=[5])
     line = line_of(figure, "envelope")
@@ -344,6 +373,7 @@ def test_silent_housing_is_drawn():
         elastic_figures.housing_signal,
         elastic_figures.order_spectrum,
         elastic_figures.modulation_polar,
+        elastic_figures.microphone_spectrum,
     ):
         assert style.png_bytes(draw(housing)).startswith(b"\x89PNG")
 

@@ -310,7 +310,7 @@ def test_a_finished_run_whose_files_differ_from_its_manifest_is_refused(results)
 
 
 @pytest.mark.parametrize(
-    "text", ["", "{}", '{"femgear_format": 3, "complete": true, "files": {"../x": "0"}}']
+    "text", ["", "{}", '{"femgear_format": 4, "complete": true, "files": {"../x": "0"}}']
 )
 def test_a_finished_run_without_a_valid_manifest_is_refused(results, text):
     (finished(results) / MANIFEST).write_text(text)

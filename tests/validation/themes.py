@@ -32,6 +32,7 @@ from validation import (
     ring,
     routes,
     sharing,
+    sound,
     standard,
     static,
     stress,
@@ -364,6 +365,20 @@ THEMES = (
             housing.first_harmonic,
             housing.interpolation,
             housing.higher_harmonics,
+        ),
+    ),
+    Theme(
+        "sound",
+        "Sound of the housing",
+        "The ring radiates as an infinite cylinder; air of 1.204 kg/m3 and 343 m/s.",
+        (
+            sound.efficiency,
+            sound.side_bands,
+            sound.short_ring,
+            sound.power,
+            sound.weighting,
+            sound.signals,
+            sound.loudness,
         ),
     ),
 )

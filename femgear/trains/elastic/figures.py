@@ -12,7 +12,7 @@ By stage:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,8 @@ from femgear.contact.bodies import active_flank_load
 from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
 from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
-from femgear.housing.sensor import fixed_sensor_signal, stored_lines
+from femgear.housing.sensor import SensorLines, fixed_sensor_signal, stored_lines
+from femgear.housing.sound import REFERENCE_PRESSURE, nodal_diameters, stored_sound
 from femgear.report.response import (
     MODE_CAPTIONS,
     RESPONSE_CAPTIONS,
@@ -73,6 +74,9 @@ _STEPS = [1, 2, 2.5, 5, 10]
 _LABELS = 12
 _LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
 _ACCELERATION = "acceleration [m/s²]"
+_ACCELEROMETER, _MICROPHONE = "accelerometer", "microphone"
+# lowest level of a line of a band that is shown [dB]
+_BAND_FLOOR = -50.0
 
 
 def natural_frequencies(modes: xr.Dataset) -> Figure:
@@ -365,6 +369,59 @@ def _around(values):
     return uniform_filter1d(values, max(len(values) // 15, 1), mode="wrap")
 
 
+def microphone_spectrum(housing: xr.Dataset) -> Figure:
+    """Draw the lines of accelerometer and microphone of housing.nc over the frequency at its first speed.
+
+    Below are the first mesh harmonic and that of the strongest line: what the air filters is the difference
+    between the two levels of an order, each relative to the strongest line of the band at its sensor.
+    """
+    lines, pressure = stored_sound(housing.isel(speed=0))
+    acceleration, pressure = np.abs(lines.acceleration), np.abs(pressure)
+    bands = _shown_harmonics(housing)
+    figure, axes = new_figure(rows=2 + len(bands), width=9.5, height=4.6 + 3.0 * len(bands))
+    frequency, floor = lines.frequency * 1e-3, 1e-4 * (acceleration.max() or 1.0)
+    _stems(axes[0], frequency, acceleration, floor, text=_ACCELEROMETER)
+    level = 20 * np.log10(np.maximum(pressure, 1e-30) / (np.sqrt(2) * REFERENCE_PRESSURE))
+    # down to the threshold of hearing, or 40 dB
+    root = min(0.0, level.max() - 40.0)
+    shown = _highest(lines.order, level, level > root)
+    axes[1].vlines(frequency[shown], root, level[shown], color=VERMILION, linewidth=1.0, label=_MICROPHONE)
+    axes[1].set_ylim(bottom=root)
+    label(axes[0], "frequency [kHz]", _ACCELERATION)
+    total, place = float(housing["pressure_level"][0]), housing.attrs["microphone_distance"]
+    label(axes[1], "frequency [kHz]", "sound pressure level [dB]", f"{total:.1f} dB(A) at {place:g} m")
+    axes[1].sharex(axes[0])
+    for ax, harmonic in zip(axes[2:], bands):
+        _draw_sensors(ax, lines, {_ACCELEROMETER: acceleration, _MICROPHONE: pressure}, harmonic)
+    speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
+    figure.suptitle(f"Accelerometer and microphone, {speed}", fontsize=12)
+    legend_below(figure)
+    return figure
+
+
+def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], harmonic: int) -> None:
+    """Levels of the lines of a band at both sensors, each relative to its strongest, with nodal diameters."""
+    from matplotlib.ticker import MaxNLocator
+
+    own = np.rint(lines.order / lines.z_ring) == harmonic
+    order, n, highest = lines.order[own], np.abs(nodal_diameters(lines)[own]), np.full(own.sum(), -np.inf)
+    for (text, amplitude), colour, side in zip(amplitudes.items(), (BLUE, VERMILION), (-0.2, 0.2)):
+        relative = amplitude[own] / (amplitude[own].max(initial=0.0) or 1.0)
+        level = 20 * np.log10(np.maximum(relative, 1e-30))
+        shown = level > _BAND_FLOOR
+        ax.vlines(order[shown] + side, _BAND_FLOOR, level[shown], color=colour, linewidth=3.0, label=text)
+        highest = np.maximum(highest, level)
+    shown = highest > _BAND_FLOOR
+    for k in np.flatnonzero(shown):
+        ax.text(order[k], highest[k] + 1.0, str(n[k]), ha="center", fontsize=SIZE - 2)
+    reach = np.abs(order[shown] - harmonic * lines.z_ring).max(initial=4) + 2
+    ax.set_xlim(harmonic * lines.z_ring - reach, harmonic * lines.z_ring + reach)
+    ax.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=_STEPS, integer=True))
+    ax.set_ylim(_BAND_FLOOR, 8)
+    title = f"around mesh harmonic {harmonic} (order {harmonic * lines.z_ring}); numbers: nodal diameters"
+    label(ax, "carrier order [1]", "level [dB]", title)
+
+
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
     modes = drawn.data["modes"]
     return {
@@ -445,6 +502,7 @@ def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
         ("housing_signal", housing_signal),
         ("order_spectrum", order_spectrum),
         ("modulation", modulation_polar),
+        ("microphone_spectrum", microphone_spectrum),
     )
     for s in shown_speeds(housing):
         one = housing.isel(speed=[s])
@@ -489,6 +547,11 @@ FIGURES = STATIC | {
                 "heard at order h z − n, z the teeth of the ring, when the carrier turns counter-clockwise."
             ),
             "modulation": "Envelope around a mesh harmonic over the angle of the carrier ({}).",
+            "microphone_spectrum": (
+                "Lines of the accelerometer and of a microphone beside it ({}), and their levels around mesh "
+                "harmonics, each relative to its strongest line there: waves of many nodal diameters hardly "
+                "radiate at low frequency, so that the microphone hears other side bands."
+            ),
         },
         draw=_housing_figures,
     ),

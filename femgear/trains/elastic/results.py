@@ -6,6 +6,7 @@ belong to real motions by ``x(t) = Re sum_h X_h exp(i h omega t)``.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
+from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
 from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
 from femgear.housing.sensor import (
@@ -25,6 +27,19 @@ from femgear.housing.sensor import (
     lines_in_form,
     rounded_lines,
     stored_lines,
+)
+from femgear.housing.sound import (
+    Cylinder,
+    Microphone,
+    microphone_lines,
+    power_level,
+    pressure_level,
+    run_up_signal,
+    sampled_signal,
+    sound_power,
+    sound_pressure,
+    stored_sound,
+    whole_turns,
 )
 from femgear.report.response import harmonics_of
 from femgear.report.tables import Block, chosen, tabulate
@@ -202,6 +217,8 @@ class HousingResult:
     harmonics: int
     symmetry: int
     excitation_limit: np.ndarray
+    cylinder: Cylinder
+    microphone: Microphone
 
     @cached_property
     def lines(self) -> SensorLines:
@@ -218,10 +235,18 @@ class HousingResult:
                 f"less than {_ROUNDED:g} of the largest acceleration of a speed; smaller lines are zero"
             )
         lines = ("lines", "speed order", values, "m", words)
+        cylinder, frequency = self.cylinder, exact.frequency
+        pressure = sound_pressure(exact, cylinder, self.microphone)
+        radiated, equivalent = (sound_power(exact, cylinder, equivalent=one) for one in (False, True))
+        heard = "A-weighted sound pressure level at the microphone, re 20 uPa"
+        power, bound = "A-weighted sound power level, re 1 pW", "the same with the radiation efficiency one"
         variables = complex_entries((lines,), single=True) | {
             "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
+            "pressure_level": ("speed", pressure_level(pressure, frequency), "dB", heard),
+            "power_level": ("speed", power_level(radiated, frequency), "dB", power),
+            "equivalent_power_level": ("speed", power_level(equivalent, frequency), "dB", bound),
         }
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return dataset(
@@ -230,6 +255,10 @@ class HousingResult:
                 "title": "what a sensor fixed on the housing hears", "sensor_angle": exact.sensor_angle,
                 "form": self.form, "points": self.points, "ring_teeth": exact.z_ring,
                 "symmetry": self.symmetry, "rounding": rounding,
+                "microphone_distance": self.microphone.distance,
+                "microphone_angle": self.microphone.angle,
+                "outer_radius": cylinder.radius, "face_width": cylinder.length,
+                "air_density": cylinder.density, "sound_speed": cylinder.sound_speed,
             },
         )  # fmt: skip
 
@@ -240,12 +269,78 @@ def describe_housing(data: xr.Dataset) -> Block:
         "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
         "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
         "rms [m/s^2]": lambda one: f"{float(one.level):.4g}",
+        "microphone [dB(A)]": lambda one: f"{float(one.pressure_level):.1f}",
         "largest lines: carrier order (amplitude [m/s^2])": _largest_lines,
     }
     form = data.attrs["form"]
     note = f"form of the signal: {form}" + (f", {data.attrs['points']} points" if form == "linear" else "")
+    heard = (
+        "microphone: {microphone_distance:g} m from the ring, which radiates as a cylinder without end (an "
+        "upper bound) into air of {air_density:g} kg/m^3 and {sound_speed:g} m/s"
+    ).format(**data.attrs)
     speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
-    return tabulate("Housing", speeds, columns, (note,))
+    return tabulate("Housing", speeds, columns, (note, heard))
+
+
+def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
+    """Sample accelerometer and microphone of housing.nc at every speed over whole turns of the carrier.
+
+    Then those of runup.nc, where the run has it, during a run-up from its first to its last speed.
+    """
+    rate = sampling.rate
+    for speed, name, unit, order, values in _recordings(results):
+        samples = whole_turns(speed, sampling.duration, rate=rate)
+        yield Signal(name, unit, rate, sampled_signal(order, values, speed, samples=samples, rate=rate))
+    if "runup" in results.stages:
+        runup, known = results.runup, results.housing.attrs
+        order, carrier = runup["order"].values, runup["carrier_speed"].values
+        heard = runup["lines_real"].values + 1j * runup["lines_imag"].values
+        displacement = -heard / (np.maximum(order, 1) * carrier[:, None]) ** 2
+        place = float(known["sensor_angle"]), int(known["ring_teeth"])
+        lines = SensorLines(order, displacement, carrier, *place, "exact")
+        pressure = "microphone_run_up", "Pa", microphone_lines(lines, known)
+        for name, unit, values in (("accelerometer_run_up", "m/s^2", heard), pressure):
+            found = run_up_signal(order, values, lines.base_speed, duration=sampling.run_up, rate=rate)
+            yield Signal(name, unit, rate, found, steady=False)
+
+
+def sensor_spectra(results: Results) -> Iterator[Spectrum]:
+    """List the lines of accelerometer and microphone of housing.nc at every speed and every carrier order."""
+    for speed, name, unit, order, values in _recordings(results):
+        every = np.zeros(order[-1] + 1, complex)
+        every[order] = values
+        yield Spectrum(name, unit, speed / (2 * np.pi), every)
+
+
+def _recordings(results: Results) -> Iterator[tuple[float, str, str, np.ndarray, np.ndarray]]:
+    """Speed of the carrier [rad/s], name, unit, orders and amplitudes of both sensors at every speed."""
+    housing = results.housing
+    for s, rpm in enumerate(housing["speed"].values):
+        one = housing.isel(speed=s)
+        (exact, pressure), lines = stored_sound(one), stored_lines(one)
+        name, speed = np.format_float_positional(rpm, 9, fractional=False, trim="-"), float(exact.base_speed)
+        yield speed, f"accelerometer_{name}_rpm", "m/s^2", lines.order, lines.acceleration
+        yield speed, f"microphone_{name}_rpm", "Pa", exact.order, pressure
+
+
+def ring_shapes(results: Results) -> Shapes:
+    """Evaluate the modes of modes.nc at points of the ring's outer surface, in the frame of the carrier."""
+    modes, radius = results.modes, float(results.case.ring.outer_radius)
+    n = modes["circumferential"].values
+    angle = 2 * np.pi * np.arange(4 * (n.max() + 1)) / (4 * (n.max() + 1))
+    wave = np.exp(1j * np.outer(n, angle))
+    radial, tangential = (
+        ((modes[f"{name}_real"].values + 1j * modes[f"{name}_imag"].values) @ wave).real
+        for name in ("ring_shape", "ring_tangential_shape")
+    )
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y = radial * cosine - tangential * sine, radial * sine + tangential * cosine
+    return Shapes(
+        radius * np.stack([cosine, sine, np.zeros_like(angle)], axis=-1),
+        modes["frequency"].values,
+        modes["damping_ratio"].values,
+        np.stack([x, y, np.zeros_like(x)], axis=-1),
+    )
 
 
 def _largest_lines(one: xr.Dataset) -> str:

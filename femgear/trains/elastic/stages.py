@@ -42,6 +42,7 @@ from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
+from femgear.housing.sound import Cylinder, Microphone
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
@@ -81,9 +82,13 @@ from femgear.trains.elastic.results import (
     ModesResult,
     describe_housing,
     mesh_bands,
+    ring_shapes,
+    sensor_signals,
+    sensor_spectra,
 )
 from femgear.trains.protocol import (
     Progress,
+    Recorded,
     Stage,
     Train,
     modes_verdict,
@@ -441,11 +446,14 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     """Compute the carrier orders that a sensor fixed on the ring hears while the carrier turns past it."""
     check_entries(dynamics, DynamicsResult, dynamic_entries(case), "dynamic response")
     place = dynamics.ring_teeth, np.array([s.carrier for s in dynamics.speeds]), case.housing.sensor_angle
+    heard, width = case.housing.microphone, planetary_set(case).ring.face_width
+    angle = case.housing.sensor_angle if heard.angle is None else heard.angle
     return HousingResult(
         input_speed=np.array(case.operation.speeds),
         exact=component_lines(dynamics.ring_radial, *place, symmetry=dynamics.symmetry),
         form=case.housing.form, points=case.housing.points, harmonics=dynamics.harmonics,
         symmetry=dynamics.symmetry, excitation_limit=dynamics.excitation_limit,
+        cylinder=Cylinder(case.ring.outer_radius, width), microphone=Microphone(heard.distance, angle),
     )  # fmt: skip
 
 
@@ -495,4 +503,5 @@ ELASTIC = Train(
         ),
     ),
     describe=describe_set, warnings=_warnings, figures=FIGURES,
+    recorded=Recorded(sensor_signals, sensor_spectra, ring_shapes),
 )  # fmt: skip

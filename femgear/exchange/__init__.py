@@ -1,0 +1,1 @@
+"""Other people's formats: WAV, universal file, spreadsheet and MATLAB."""

@@ -1,0 +1,242 @@
+"""Signals as WAV, signals, spectra and modes as universal files, tables as spreadsheets, numbers for MATLAB.
+
+Every file is whole or not there. Numbers are in SI units: the sample 1.0 of a WAV file is its full scale,
+which the file states; nothing is normalised.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.errors import CaseError, StorageError, nvh_library, printable
+from femgear.storage.files import replaced_file
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_QUANTITIES = {"m/s^2": 12, "Pa": 15}
+"""Specific data type of a unit: universal file, dataset 58, record 9."""
+_ROWS = 1_048_576  # of a sheet: ECMA-376 leaves it open, Excel has no more
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How signals are sampled.
+
+    Parameters
+    ----------
+    rate
+        Samples a second [Hz].
+    duration
+        Of every signal at one speed [s]; whole turns of the carrier come nearest to it.
+    run_up
+        Duration of the run-up from the first to the last of its speeds [s].
+    pressure_scale
+        Full scale of WAV files of sound pressure [Pa]: the sample 1.0 stands for it.
+    acceleration_scale
+        Full scale of WAV files of acceleration [m/s^2].
+    """
+
+    rate: int = 48000
+    duration: float = 10.0
+    run_up: float = 30.0
+    pressure_scale: float = 1.0
+    acceleration_scale: float = 1.0
+
+    def __post_init__(self):
+        for name, value in vars(self).items():
+            if not 0.0 < value < np.inf:
+                raise CaseError(
+                    "no such sampling", code="E-RANGE", key=f"--{name.replace('_', '-')}", value=value,
+                    limit="a number above zero", remedy="leave it out for the default",
+                )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Sampled signal: what it is called, unit, samples a second [Hz], samples (n,), whether it is steady."""
+
+    name: str
+    unit: str
+    rate: int
+    values: np.ndarray
+    steady: bool = True
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Lines at the multiples 0, 1, 2, .. of a frequency [Hz]: name, unit, peak amplitudes (n,) complex."""
+
+    name: str
+    unit: str
+    step: float
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Modes at points (P, 3) [m]: frequency [Hz] and damping ratio (M,), shape (M, P, 3) [kg^-1/2]."""
+
+    points: np.ndarray
+    frequency: np.ndarray
+    damping_ratio: np.ndarray
+    shape: np.ndarray
+
+
+def write_wav(signal: Signal, path: Path, *, full_scale: float = 1.0) -> None:
+    """Write a signal as WAV file of 32-bit floats: samples are its values over the full scale, in its unit.
+
+    The full scale stands in the comment of the file (RIFF INFO, ICMT). Samples above 1 are kept as they are;
+    most players clip them.
+    """
+    from scipy.io import wavfile
+
+    text = f"{signal.name}; 1.0 = {full_scale:.9g} {signal.unit}; femgear".encode("ascii", "replace") + b"\0"
+    text += b"\0" * (len(text) % 2)
+    comment = b"LIST" + struct.pack("<I", len(text) + 12) + b"INFOICMT" + struct.pack("<I", len(text)) + text
+    samples = (signal.values / full_scale).astype(np.float32)
+    with replaced_file(path, size=samples.nbytes) as temporary:
+        wavfile.write(temporary, signal.rate, samples)
+        with open(temporary, "r+b") as stream:
+            end = stream.seek(0, 2)
+            stream.write(comment)
+            stream.seek(4)
+            stream.write(struct.pack("<I", end + len(comment) - 8))
+
+
+def write_functions(signals: Iterable[Signal], spectra: Iterable[Spectrum], path: Path) -> None:
+    """Write signals and spectra as universal file, datasets 164 (SI units) and 58.
+
+    Spectra have the function type 0: of complex lines the library writes no other. The format holds the step
+    of the abscissa with six digits and values with twelve; ID line 2 tells the rate or step in full.
+    """
+    unused = {f"{name}_spec_data_type": 0 for name in ("orddenom", "z_axis")} | {"z_axis_value": 0.0}
+    scalar = {"rsp_dir": 0, "ref_node": 0, "ref_dir": 0, "binary": 0, "abscissa_spacing": 1, **unused}
+    with _universal_file(path) as write:
+        for number, one in enumerate([*signals, *spectra], 1):
+            if isinstance(one, Signal):
+                step, words = 1 / one.rate, f"samples a second [Hz]: {one.rate!r}"
+                kind = {"func_type": 1, "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s"}
+            else:
+                step, words = one.step, f"peak amplitudes, step [Hz]: {one.step!r}"
+                kind = {"func_type": 0, "abscissa_spec_data_type": 18, "abscissa_axis_units_lab": "Hz"}
+            unit = {"ordinate_spec_data_type": _QUANTITIES[one.unit], "ordinate_axis_units_lab": one.unit}
+            data = {"data": one.values, "x": step * np.arange(len(one.values)), "id1": one.name, "id2": words}
+            write(58, rsp_node=number, **data, **kind, **unit, **scalar)
+
+
+def write_modes(shapes: Shapes, path: Path) -> None:
+    """Write modes as universal file: datasets 164 (SI units), 15 (nodes) and one 55 (normal mode) for each.
+
+    Shapes are normalised to the modal mass 1 kg; the format holds six digits.
+    """
+    nodes = np.arange(1, len(shapes.points) + 1)
+    # structural model, normal mode, displacement vectors, real
+    fixed = {"model_type": 1, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "data_type": 2}
+    fixed |= {"n_data_per_node": 3, "load_case": 1, "modal_damp_his": 0.0, "node_nums": nodes}
+    with _universal_file(path) as write:
+        write(15, node_nums=nodes, **dict(zip("xyz", shapes.points.T)))
+        modes = zip(shapes.frequency.tolist(), shapes.damping_ratio.tolist(), shapes.shape)
+        for number, (frequency, damping, shape) in enumerate(modes, 1):
+            motion = dict(zip(("r1", "r2", "r3"), shape.T))
+            known = {"mode_n": number, "freq": frequency, "modal_m": 1.0, "modal_damp_vis": damping}
+            write(55, id1="in the frame of the carrier", **known, **motion, **fixed)
+
+
+@contextmanager
+def _universal_file(path: Path) -> Iterator[Any]:
+    """Give a function ``(dataset, **fields)`` that appends to a new universal file in SI units."""
+    with nvh_library("universal files"):
+        import pyuff
+    with replaced_file(path) as temporary:
+        file = pyuff.UFF(str(temporary))
+
+        def write(kind: int, **values: Any) -> None:
+            try:
+                file.write_sets(getattr(pyuff, f"prepare_{kind}")(**values), mode="add")
+            except Exception as error:  # the library hides what happened: a full disk, an interrupt
+                raise error.__context__ or error from None
+
+        scales = {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
+        write(164, units_code=1, units_description="SI", temp_mode=1, **scales)
+        yield write
+
+
+def write_workbook(tables: Iterable[tuple[str, Any]], path: Path) -> None:
+    """Write pandas tables by name as spreadsheet (xlsx), one sheet for each; no text becomes a formula.
+
+    Numbers that are not finite become text. StorageError: a table of more rows than a sheet has (E-RANGE).
+    """
+    with nvh_library("spreadsheets"):
+        from openpyxl import Workbook
+        from openpyxl.cell import WriteOnlyCell
+    book, known = Workbook(write_only=True), set[str]()
+    for name, frame in tables:
+        if len(frame) >= _ROWS:
+            raise StorageError(
+                f"the table {name} has {len(frame)} rows", code="E-RANGE", file=str(path),
+                limit=f"{_ROWS - 1} rows", remedy="export it with --csv",
+            )  # fmt: skip
+        sheet = book.create_sheet(_sheet_name(name, known))
+
+        def cell(value: Any, sheet=sheet) -> Any:
+            if isinstance(value, int) or (isinstance(value, float) and np.isfinite(value)):
+                return value
+            one = WriteOnlyCell(sheet, printable(str(value)))
+            one.data_type = "s"  # a beginning = would make it a formula
+            return one
+
+        sheet.append([cell(str(column)) for column in frame.columns])
+        for row in frame.itertuples(index=False):
+            sheet.append([cell(value) for value in row])
+    with replaced_file(path) as temporary:
+        book.save(temporary)
+
+
+def _sheet_name(name: str, known: set[str]) -> str:
+    """Shorten a name to the 31 characters of a sheet, so that no two are the same."""
+    short, number = name[:31], 2
+    while short.lower() in known:
+        end = f"~{number}"
+        short, number = name[: 31 - len(end)] + end, number + 1
+    known.add(short.lower())
+    return short
+
+
+def write_matlab(stages: Mapping[str, xr.Dataset], path: Path) -> None:
+    """Write the numbers of some stages as MATLAB file (level 5): a struct for each, ``modes.frequency``.
+
+    Real and imaginary part are one complex array, texts are cells, ``units`` and ``attributes`` structs.
+    StorageError: a stage of 2 GB or more, which the format does not hold (E-RANGE).
+    """
+    from scipy.io import savemat
+
+    largest = max((one.nbytes for one in stages.values()), default=0)
+    if largest >= 2**31:
+        raise StorageError(
+            f"a stage of {largest / 1e9:.1f} GB", code="E-RANGE", file=str(path),
+            limit="less than 2.1 GB", remedy="export it with --csv, or read its .nc file by ncread",
+        )  # fmt: skip
+    found = {stage: _struct(data) for stage, data in stages.items()}
+    with replaced_file(path, size=sum(data.nbytes for data in stages.values())) as temporary:
+        savemat(temporary, found, appendmat=False, long_field_names=True, oned_as="column")
+
+
+def _struct(data: xr.Dataset) -> dict[str, Any]:
+    """Variables of a dataset by name, as `write_matlab` writes them."""
+    found, units = dict[str, Any](), dict[str, str]()
+    for key, one in data.variables.items():
+        name, values = str(key), one.values
+        whole = name.removesuffix("_real").removesuffix("_imag")
+        if f"{whole}_real" in data and f"{whole}_imag" in data:
+            name, values = whole, data[f"{whole}_real"].values + 1j * data[f"{whole}_imag"].values
+        found[name] = values.astype(object) if values.dtype.kind in "OU" else values
+        units[name] = str(one.attrs.get("units", "1"))
+    return {**found, "units": units, "attributes": {str(name): one for name, one in data.attrs.items()}}

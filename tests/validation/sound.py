@@ -1,0 +1,179 @@
+"""Sound of a radiating cylinder, of its signals and of tones, beside closed forms and standards."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from femgear.housing.sensor import SensorLines
+from femgear.housing.sound import (
+    Cylinder,
+    Microphone,
+    a_weighting,
+    pressure_transfer,
+    radiation_efficiency,
+    sampled_signal,
+    sound_power,
+    sound_pressure,
+    sound_quality,
+)
+from validation.rows import Row, at_most, printed, within
+
+JUNGER = "Junger and Feit 1986, closed form, evaluated apart"
+EFFICIENCIES = {
+    0.5: (".57252", ".19746", "3.0914e-3", "2.0884e-5"),
+    1.0: (".79188", ".73880", ".099544", "2.5456e-3"),
+    2.0: (".92514", ".98814", "1.0248", ".26988"),
+}
+"""Radiation efficiency of 0 to 3 nodal diameters by ka."""
+WEIGHTS = {31.62: -39.4, 100.0: -19.1, 501.19: -3.2, 1000.0: 0.0, 1995.3: 1.2, 3981.1: 1.0, 15849.0: -6.6}
+"""A-weighting [dB] by exact frequency: IEC 61672-1:2013, table 3."""
+
+
+def outgoing(n: int, near: float, far: float) -> complex:
+    """Integrate the radial wave equation inwards: outgoing wave at kr = far over its slope at ka = near.
+
+    From 400, where the asymptotic series of an outgoing wave is exact to rounding, and without any Hankel
+    function.
+    """
+    start = 400.0
+
+    def series(x):
+        total, term = 0j, 1 + 0j
+        for k in range(1, 30):
+            total += term
+            term *= -1j * (4 * n * n - (2 * k - 1) ** 2) / (8 * k * x)
+        return np.exp(-1j * (x - start)) / np.sqrt(x) * total
+
+    step = 1e-3
+    slope = (8 * (series(start + step) - series(start - step)) - series(start + 2 * step)) / (12 * step)
+    slope += series(start - 2 * step) / (12 * step)
+
+    def equation(x, w):
+        return [w[1], -w[1] / x - (1 - (n / x) ** 2) * w[0]]
+
+    places = sorted({near, far}, reverse=True)
+    options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "t_eval": places}
+    found = solve_ivp(equation, (start, near), [series(start), slope], **options)
+    return found.y[0, 0] / found.y[1, -1]
+
+
+def efficiency() -> tuple[Row, ...]:
+    """Radiation efficiency of a cylinder."""
+    return tuple(
+        printed(
+            "sigma", JUNGER, f"radiation efficiency, n = {n}, ka = {ka:g}", text, radiation_efficiency(n, ka)
+        )
+        for ka, texts in EFFICIENCIES.items()
+        for n, text in enumerate(texts)
+    )
+
+
+def side_bands() -> tuple[Row, ...]:
+    """What air filters of side bands of equal velocity: 1116 Hz, a = 100 mm, at 1 m from the axis."""
+    cylinder, frequency = Cylinder(0.1, 0.025), 1116.0
+    n = np.arange(5)
+    pressure = pressure_transfer(n, frequency, cylinder, 0.9)
+    k = 2 * np.pi * frequency / 343.0
+    rows = []
+    for m, text in enumerate(("0.3", "0.5", "-4.7", "-16.6"), 1):
+        level = 20 * np.log10(np.abs(pressure[m] / pressure[0]))
+        quantity = f"1116 Hz, a = 100 mm, r = 1 m: pressure of n = {m} over that of n = 0 [dB]"
+        rows.append(printed("air", JUNGER, quantity, text, level))
+    for m in n:
+        wave = -1j * 1.204 * 343.0 * outgoing(int(m), 0.1 * k, k)
+        error = abs(pressure[m] / wave - 1)
+        quantity = f"1116 Hz, n = {m}: complex pressure at 1 m against the wave equation in steps, relative"
+        rows.append(at_most("air", "Helmholtz equation, integrated inwards", quantity, 1e-8, error))
+    return tuple(rows)
+
+
+def short_ring() -> tuple[Row, ...]:
+    """Pressure of a ring between rigid cylinders over that of an endless one, by axial wave numbers."""
+    from scipy.special import h2vp, hankel2
+
+    a, width, far, k = 0.1, 0.025, 10.0, 2 * np.pi * 1116.0 / 343.0
+    half = np.pi / 2 / 400_000
+    angle = np.linspace(0.0, np.pi / 2, 200_001)[:-1] + half
+    decay = (np.arange(200_000) + 0.5) * (60 / far / 200_000)
+    steps = 2 * half * k * np.cos(angle), 60 / far / 200_000 * decay / np.hypot(k, decay)
+    waves = (k * np.sin(angle), k * np.cos(angle)), (np.hypot(k, decay), -1j * decay)
+    rows = []
+    for n in range(5):
+        total = sum(
+            (
+                step
+                * np.sinc(axial * width / 2 / np.pi)
+                * hankel2(n, radial * far)
+                / (radial * h2vp(n, radial * a))
+            ).sum()
+            for step, (axial, radial) in zip(steps, waves)
+        )
+        ours = pressure_transfer(n, 1116.0, Cylinder(a, width), far - a) / (-1j * 1.204 * 343.0)
+        ratio = abs(width * k / np.pi * total / ours)
+        quantity = (
+            f"1116 Hz, n = {n}, 10 m: ring of 25 mm over endless cylinder, against b/sqrt(wavelength r)"
+        )
+        expected = width / np.sqrt(2 * np.pi / k * far)
+        rows.append(within("width", "integral over axial wave numbers", quantity, ratio, expected, 0.006))
+    return tuple(rows)
+
+
+def power() -> tuple[Row, ...]:
+    """Sound power against the integral of the intensity far away."""
+    rows, cylinder = [], Cylinder(0.1, 0.025)
+    for n in range(4):
+        order = np.array([108 - n])
+        lines = SensorLines(order, np.array([1e-6 + 2e-6j]), np.array(60.0), 0.3, 108, "exact")
+        far = 5000.0
+        angles = np.linspace(0.0, 2 * np.pi, 33)[:-1]
+        heard = [sound_pressure(lines, cylinder, Microphone(far - 0.1, angle))[0] for angle in angles]
+        flow = np.mean(np.abs(heard) ** 2) / (2 * 1.204 * 343.0) * 2 * np.pi * far * cylinder.length
+        quantity = f"1031 Hz, n = {n}: power by sigma_n against the intensity over a circle of 5 km [W]"
+        rows.append(
+            within("power", "intensity p^2/(rho c)", quantity, flow, sound_power(lines, cylinder)[0], 1e-6)
+        )
+    return tuple(rows)
+
+
+def weighting() -> tuple[Row, ...]:
+    """A-weighting against the table of the standard."""
+    return tuple(
+        printed("A", "IEC 61672-1:2013, table 3", f"A-weighting at {frequency:g} Hz [dB]", f"{level:.1f}",
+                float(20 * np.log10(a_weighting(frequency))))
+        for frequency, level in WEIGHTS.items()
+    )  # fmt: skip
+
+
+def signals() -> tuple[Row, ...]:
+    """Signals against their lines."""
+    rng = np.random.default_rng(3)
+    order = np.arange(0, 28_000, 3)
+    values = (rng.normal(size=order.size) + 1j * rng.normal(size=order.size)) / (1 + order)
+    values[0] = 0.4
+    speed, samples = 2 * np.pi * 50 / 60, 8 * 57_600
+    signal = sampled_signal(order, values, speed, samples=samples)
+    heard = values[order * 50 / 60 < 24e3]
+    power_of_lines = heard[0].real ** 2 + 0.5 * (np.abs(heard[1:]) ** 2).sum()
+    ours, expected = np.sqrt(np.mean(signal**2)), np.sqrt(power_of_lines)
+    some = rng.integers(0, samples, 40)
+    turned = np.outer(some * (50 / 60 / 48e3), order[: len(heard)]) % 1.0
+    direct = (np.exp(2j * np.pi * turned) @ heard).real
+    error = np.abs(signal[some] - direct).max() / np.abs(heard).sum()
+    name = "9 600 carrier orders at 50 rpm, 48 kHz, eight turns: "
+    return (
+        within("signal", "Parseval", name + "root mean square over that of the lines", expected, ours, 1e-12),
+        at_most("signal", "sum of cosines", name + "samples, over the sum of amplitudes", 1e-11, error),
+    )
+
+
+def loudness() -> tuple[Row, ...]:
+    """Loudness of tones by mosqito against the definition of the sone."""
+    time = np.arange(96_000) / 48e3
+    rows = []
+    for level, sone, gate in ((40.0, 1.0, 0.01), (60.0, 4.0, 0.02)):
+        tone = np.sqrt(2) * 20e-6 * 10 ** (level / 20) * np.sin(2 * np.pi * 1000 * time)
+        quantity = f"loudness of 1 kHz at {level:g} dB by mosqito [sone]"
+        ours = sound_quality(tone).loudness
+        rows.append(within("loudness", "sone: 40 phon = 1, twice every 10 phon", quantity, sone, ours, gate))
+    return tuple(rows)
