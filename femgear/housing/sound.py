@@ -35,10 +35,7 @@ _BLOCK = 2**16  # samples in memory at a time
 
 @dataclass(frozen=True)
 class Cylinder:
-    """What radiates: radius and length of the housing [m], density [kg/m^3] and sound speed [m/s] of the air.
-
-    The length counts for the power alone: the pressure is that of a cylinder without end.
-    """
+    """What radiates: radius and, for the power alone, length [m]; density [kg/m^3], speed [m/s] of air."""
 
     radius: float
     length: float
@@ -74,14 +71,14 @@ def pressure_transfer(n, frequency, cylinder: Cylinder, distance: float = 0.0) -
     For nodal diameters and frequencies [Hz] of shapes that broadcast, at a distance from the surface [m]. At
     0 Hz there is none. Formula: see the head of this module.
     """
-    from scipy.special import h2vp, hankel2
-
     n, frequency = np.broadcast_arrays(np.abs(n), np.asarray(frequency, float))
-    ka = 2 * np.pi * frequency * cylinder.radius / cylinder.sound_speed
-    spread = 1 + distance / cylinder.radius
+    ka, spread = (
+        2 * np.pi * frequency * cylinder.radius / cylinder.sound_speed,
+        1 + distance / cylinder.radius,
+    )
     moving = np.where(ka > 0, ka, 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
-        ratio = hankel2(n, moving * spread) / h2vp(n, moving)
+        ratio = _hankel(n, moving * spread)[0] / _hankel(n, moving)[1]
     # where Hankel functions exceed the largest number, the limit of low frequencies is exact
     near = -moving / np.maximum(n, 1) * spread ** -n.astype(float)
     ratio = np.where(np.isfinite(ratio), ratio, near)
@@ -93,13 +90,22 @@ def radiation_efficiency(n, ka) -> np.ndarray:
 
     For nodal diameters n and numbers ka > 0 of shapes that broadcast. Formula: see the head of this module.
     """
-    from scipy.special import h2vp
-
-    ka = np.asarray(ka, float)
+    n, ka = np.broadcast_arrays(np.abs(n), np.asarray(ka, float))
     with np.errstate(invalid="ignore", over="ignore"):
-        slope = np.abs(h2vp(np.abs(n), ka))
-    # beyond the largest number nothing is radiated
-    return np.where(np.isfinite(slope), 2 / (np.pi * ka * slope**2), 0.0)
+        slope = np.abs(_hankel(n, ka)[1])
+    return np.where(np.isfinite(slope), 2 / (np.pi * ka * slope**2), 0.0)  # nothing beyond the largest number
+
+
+def _hankel(n: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Hankel functions H_n(x) of the second kind and their slopes: upwards in n, which is stable for them."""
+    from scipy.special import j0, j1, y0, y1
+
+    before, here = j0(x) - 1j * y0(x), j1(x) - 1j * y1(x)
+    value, slope = before, -here
+    for m in range(1, int(n.max(initial=0)) + 1):
+        value, slope = np.where(n == m, (here, before - m / x * here), (value, slope))
+        before, here = here, 2 * m / x * here - before
+    return value, slope
 
 
 def sound_pressure(lines: SensorLines, cylinder: Cylinder, microphone: Microphone) -> np.ndarray:
@@ -107,9 +113,9 @@ def sound_pressure(lines: SensorLines, cylinder: Cylinder, microphone: Microphon
 
     CaseError: as `nodal_diameters`.
     """
-    n, velocity = nodal_diameters(lines), _velocity(lines)
-    turned = np.exp(1j * n * (microphone.angle - lines.sensor_angle))
-    return pressure_transfer(n, lines.frequency, cylinder, microphone.distance) * turned * velocity
+    n = nodal_diameters(lines)
+    turned = np.exp(1j * n * (microphone.angle - lines.sensor_angle)) * _velocity(lines)
+    return pressure_transfer(n, lines.frequency, cylinder, microphone.distance) * turned
 
 
 def sound_power(lines: SensorLines, cylinder: Cylinder, *, equivalent: bool = False) -> np.ndarray:
@@ -119,8 +125,8 @@ def sound_power(lines: SensorLines, cylinder: Cylinder, *, equivalent: bool = Fa
     times the integral of |v|^2 over the surface S = 2 pi a l. CaseError: as `nodal_diameters`.
     """
     n, speed = nodal_diameters(lines), cylinder.sound_speed
-    power = 0.5 * cylinder.density * speed * np.abs(_velocity(lines)) ** 2
-    power = power * (2 * np.pi * cylinder.radius * cylinder.length)
+    surface = 2 * np.pi * cylinder.radius * cylinder.length
+    power = 0.5 * cylinder.density * speed * surface * np.abs(_velocity(lines)) ** 2
     if equivalent:
         return power
     ka = 2 * np.pi * cylinder.radius / speed * lines.frequency
@@ -265,8 +271,7 @@ def _checked_lines(order, values, speeds, rate: float) -> tuple[np.ndarray, np.n
 
 def _heard(order: np.ndarray, values: np.ndarray, speeds: np.ndarray, rate: float) -> np.ndarray:
     """Lines (n_speeds, n_orders) without those that reach half the rate up to the next speed."""
-    following = np.append(speeds[1:], speeds[-1])
-    return np.where(np.outer(following, order) < np.pi * rate, values, 0.0)
+    return np.where(np.outer(np.append(speeds[1:], speeds[-1]), order) < np.pi * rate, values, 0.0)
 
 
 def _turn(order: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -299,8 +304,7 @@ def _between(grid: np.ndarray, turns: np.ndarray) -> np.ndarray:
         place = (turns[some] % 1.0) * grid.shape[-1]
         first = np.ceil(place - _WIDTH / 2).astype(int)
         for m in range(_WIDTH):
-            distance = 2 / _WIDTH * (place - first - m)
-            kernel = i0(_BETA * np.sqrt(np.maximum(1 - distance**2, 0.0)))
+            kernel = i0(_BETA * np.sqrt(np.maximum(1 - (2 / _WIDTH * (place - first - m)) ** 2, 0.0)))
             found[:, some] += kernel * periodic[:, first + (_WIDTH + m)]
     return found
 

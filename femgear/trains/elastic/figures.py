@@ -382,8 +382,7 @@ def microphone_spectrum(housing: xr.Dataset) -> Figure:
     frequency, floor = lines.frequency * 1e-3, 1e-4 * (acceleration.max() or 1.0)
     _stems(axes[0], frequency, acceleration, floor, text=_ACCELEROMETER)
     level = 20 * np.log10(np.maximum(pressure, 1e-30) / (np.sqrt(2) * REFERENCE_PRESSURE))
-    # down to the threshold of hearing, or 40 dB
-    root = min(0.0, level.max() - 40.0)
+    root = min(0.0, level.max() - 40.0)  # the threshold of hearing
     shown = _highest(lines.order, level, level > root)
     axes[1].vlines(frequency[shown], root, level[shown], color=VERMILION, linewidth=1.0, label=_MICROPHONE)
     axes[1].set_ylim(bottom=root)

@@ -69,7 +69,7 @@ _ROUNDED, _MANY = 1e-5, 40
 # speeds, and bands at each of them, that are listed
 _FEW = 4
 _FIRST, _STRONGEST = 6, 4
-_HIGHEST = "highest frequency of the excitation"
+_HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _DIRECTIONS = {RADIAL: "radial", TANGENTIAL: "tangential"}
 
 
@@ -238,15 +238,14 @@ class HousingResult:
         cylinder, frequency = self.cylinder, exact.frequency
         pressure = sound_pressure(exact, cylinder, self.microphone)
         radiated, equivalent = (sound_power(exact, cylinder, equivalent=one) for one in (False, True))
-        heard = "A-weighted sound pressure level at the microphone, re 20 uPa"
-        power, bound = "A-weighted sound power level, re 1 pW", "the same with the radiation efficiency one"
+        heard, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
         variables = complex_entries((lines,), single=True) | {
             "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
-            "pressure_level": ("speed", pressure_level(pressure, frequency), "dB", heard),
-            "power_level": ("speed", power_level(radiated, frequency), "dB", power),
-            "equivalent_power_level": ("speed", power_level(equivalent, frequency), "dB", bound),
+            "pressure_level": ("speed", pressure_level(pressure, frequency), "dB", f"A-weighted {heard}"),
+            "power_level": ("speed", power_level(radiated, frequency), "dB", f"A-weighted {power}"),
+            "equivalent_power_level": ("speed", power_level(equivalent, frequency), "dB", _EQUIVALENT),
         }
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return dataset(
