@@ -112,7 +112,7 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
 def mass(grid: Grid, material: Material, thickness=1.0):
     """Assemble the consistent mass matrix, shape (2n, 2n) [kg]; arguments as in `stiffness`."""
     scalar = basis(grid)
-    values = np.array([np.broadcast_to(field.value, scalar.dx.shape) for (field,) in scalar.basis])
+    values = np.array([np.broadcast_to(field, scalar.dx.shape) for (field,) in scalar.basis])
     values = values * np.sqrt(scalar.dx * (material.density * _per_element(grid, thickness))[:, None])
     local = values.transpose(1, 0, 2) @ values.transpose(1, 2, 0)
     nodes = _element_nodes(grid, scalar)

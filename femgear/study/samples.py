@@ -458,9 +458,9 @@ def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts,
 @lru_cache(maxsize=2)
 def _repeated(level: _Level, times: int) -> Candidates:
     """Candidates of so many samples without their errors; the last samples are often fewer."""
-    names = "position", "pair", "gap", "candidate", "polynomials", "local", "smooth"
+    names = "position", "pair", "gap", "candidate", "polynomials", "local"
     arrays = {name: np.concatenate([getattr(level.found, name)] * times) for name in names}
-    return replace(level.found, **arrays)
+    return replace(level.found, **arrays, images=np.concatenate([level.found.images] * times, axis=1))
 
 
 def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
