@@ -75,11 +75,13 @@ _ATTRIBUTES = {
     for unit, names in (
         ("Hz", "bandwidth compared_to excitation_reach natural_frequency resolution"),
         ("m", "centre_distance face_width half_backlash"),
+        ("m/s^2", "reference_acceleration"),
         ("N", "unit_force"),
         ("N m", "sun_torque"),
         ("rad", "base_helix_angle planet_angles sensor_angle"),
         ("rad", "working_pressure_angle_planet_ring working_pressure_angle_sun_planet"),
         ("rad/s", "speed"),
+        ("rpm", "operating_speeds"),
         ("s", "settle step"),
     )
     for name in names.split()

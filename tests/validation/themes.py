@@ -364,6 +364,7 @@ THEMES = (
             housing.first_harmonic,
             housing.interpolation,
             housing.higher_harmonics,
+            housing.resonances,
         ),
     ),
 )
