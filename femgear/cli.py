@@ -8,6 +8,7 @@ import contextlib
 import os
 import signal
 import sys
+import textwrap
 import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -116,16 +117,50 @@ def _print(blocks) -> None:
         console.width = 120
     for block in blocks:
         console.print(f"\n{printable(block.title)}")
-        if block.rows:
+        rows = [[printable(cell) for cell in row] for row in block.rows]
+        for columns in _fitting(block.header, rows, console.width) if rows else ():
             table = Table(box=box.SIMPLE_HEAD if block.header else None, show_header=bool(block.header))
-            for index, name in enumerate(block.header or block.rows[0]):
-                side = "right" if index else "left"
-                table.add_column(name if block.header else "", justify=side, overflow="fold")
-            for row in block.rows:
-                table.add_row(*map(printable, row))
+            for index, name, least in columns:
+                side = "right" if index and block.header else "left"
+                # numbers stay whole, texts break between words
+                whole = not any(" " in row[index] for row in rows)
+                table.add_column(name, justify=side, overflow="fold", no_wrap=whole, min_width=least)
+            for row in rows:
+                table.add_row(*(row[index] for index, *_ in columns))
             console.print(table)
         for note in block.notes:
             console.print(f"  {printable(note)}")
+
+
+def _fitting(
+    header: Sequence[str], rows: Sequence[Sequence[str]], width: int
+) -> list[list[tuple[int, str, int]]]:
+    """Split columns so that no number breaks in a width, the first one repeated; places, names, least widths.
+
+    Names break between words where that makes the table narrower.
+    """
+    names = list(header) or [""] * len(rows[0])
+    cells = [max(len(row[i]) for row in rows) for i in range(len(names))]
+    natural = sum(max(len(name), cell) + 3 for name, cell in zip(names, cells))
+    if natural > width:
+        names = [_broken(name, cell) for name, cell in zip(names, cells)]
+    least = [
+        max(map(len, [*name.split("\n"), *(word for row in rows for word in row[i].split())]), default=0)
+        for i, name in enumerate(names)
+    ]
+    parts, used = [[0]], least[0]
+    for i in range(1, len(names)):
+        if used + least[i] + 3 * (len(parts[-1]) + 1) >= width and len(parts[-1]) > 1:
+            parts.append([0])
+            used = least[0]
+        parts[-1].append(i)
+        used += least[i]
+    return [[(i, names[i], least[i]) for i in part] for part in parts]
+
+
+def _broken(name: str, width: int) -> str:
+    """Break a name between words to lines of a width, or of its longest word."""
+    return "\n".join(textwrap.wrap(name, max([width, *map(len, name.split())]), break_on_hyphens=False))
 
 
 def _say(text: str) -> None:

@@ -319,3 +319,44 @@ def housing() -> xr.Dataset:
             **{"outer_radius": OUTER, "face_width": FACE_WIDTH},
         },
     )
+
+
+def runup() -> xr.Dataset:
+    """Five speeds with lines at 105, 108 and 111 and their double, and two resonances."""
+    speed, order = np.linspace(100.0, 500.0, 5), np.array([105, 108, 111, 213, 216, 219])
+    lines = np.outer(speed / 500.0, [0.5, 0.1, 0.4, 0.2, 0.05, 0.3])
+    kinds = np.outer(speed, [1.0, 0.5])
+    text, rows, both = "some number", "resonance", ("speed", "mesh_kind")
+    data = xr.Dataset(
+        {
+            "mesh_frequency": _variable("speed", 0.36 * speed, "Hz", "mesh frequency"),
+            "carrier_speed": _variable("speed", speed * 2 * np.pi / 300, "rad/s", "speed of the carrier"),
+            "excitation_limit": _variable("speed", np.full(5, 1e3), "Hz", text),
+            "level": _variable("speed", np.sqrt(0.5 * (lines**2).sum(axis=1)), "m/s^2", text),
+            "force_rms": _variable(both, kinds, "N", text),
+            "force_peak": _variable(both, 1e3 + kinds, "N", text),
+            "lowest_force": _variable("speed", 1e3 - speed, "N", text),
+            "dynamic_factor": _variable(both, 1.0 + 1e-3 * kinds, "1", text),
+            "lines_real": _variable(("speed", "order"), lines, "m/s^2", text),
+            "lines_imag": _variable(("speed", "order"), 0.0 * lines, "m/s^2", text),
+            "mode": _variable(rows, [3, 4], "1", text),
+            "kind": _variable(rows, ["rotational", "ring, rotational"], "1", text),
+            "mesh_harmonic": _variable(rows, [1, 2], "1", text),
+            "frequency": _variable(rows, [90.0, 200.0], "Hz", text),
+            "resonance_speed": _variable(rows, [250.0, 277.8], "rpm", text),
+            "share": _variable(rows, [1.0, 0.2], "1", text),
+            "resonance_level": _variable(rows, [0.2, 0.3], "m/s^2", text),
+            "resonance_alone": _variable(rows, [0.15, 0.1], "m/s^2", text),
+            "resonance_factor": _variable((rows, "mesh_kind"), np.full((2, 2), 1.1), "1", text),
+            "operating_speed": _variable(rows, [250.0, 250.0], "rpm", text),
+            "operating_alone": _variable(rows, [0.15, 0.0], "m/s^2", text),
+            "distance": _variable(rows, [0.0, 11.1], "%", text),
+        },
+        coords={
+            "speed": _variable("speed", speed, "rpm", "speed of the input"),
+            "order": _variable("order", order, "1", "carrier order"),
+            "mesh_kind": ["sun-planet", "planet-ring"],
+        },
+        attrs={"ring_teeth": 108, "operating_speeds": [250.0], "reference_acceleration": 1e-6},
+    )
+    return data

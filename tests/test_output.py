@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import io
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 import script_tools
+from rich.console import Console
 
 from femgear import cli
 from femgear import run as run_module
@@ -211,3 +213,22 @@ def test_an_interrupt_while_a_script_loads_its_libraries_is_told_as_such(monkeyp
     monkeypatch.setattr("femgear.trains.protocol.one_blas_thread", interrupted)
     assert script_tools.run_script(script, arguments=["--wide"]) == 130
     assert capsys.readouterr().err == "interrupted\n"
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_no_number_of_a_table_breaks_in_a_narrow_terminal(width, capsys, monkeypatch):
+    """Names break between words, and what is still too wide goes below with the first column again."""
+    header = "speed [rpm]", *(f"a long name of column {i} [m/s²]" for i in range(9)), "kind"
+    rows = tuple((f"{100 * i}", *(f"{i}.2345{j}" for j in range(9)), "ring, rotational") for i in range(3))
+
+    class Terminal(Console):
+        def __init__(self, **options):
+            super().__init__(width=width, force_terminal=True, **options)
+
+    monkeypatch.setattr("rich.console.Console", Terminal)
+    cli._print([Block("Table", header, rows)])
+    text = re.sub("\x1b[^m]*m", "", capsys.readouterr().out)
+    assert max(map(len, text.splitlines())) <= width
+    for cell in (cell for row in rows for cell in row[:-1]):
+        assert re.search(rf"(?<![\d.]){re.escape(cell)}(?![\d.])", text)
+    assert text.count("speed") == {60: 3, 80: 2, 120: 1}[width]

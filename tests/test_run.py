@@ -75,8 +75,10 @@ def test_an_interrupted_run_goes_on_from_its_stages_to_the_same_bits(name, tmp_p
     stages = run(case, tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
         run(case, tmp_path / "out", stop=stages[-1])
-    assert not read_manifest(tmp_path / "out").complete
-    with pytest.warns(UserWarning, match=f"{', '.join(stages[:-1])}: as the run that was interrupted"):
+    left = read_manifest(tmp_path / "out")
+    # what is solved with the parts of another stage does not begin by itself
+    assert not left.complete and [name for name in left.timings if name != "housing"] == stages[:-1]
+    with pytest.warns(UserWarning, match=f"{', '.join(left.timings)}: as the run that was interrupted"):
         assert run(case, tmp_path / "out") == stages[-1:]
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(

@@ -27,8 +27,8 @@ _KEPT = 4
 FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"})
 """Entries that do nothing but separate flanks: no grid knows them, and derivatives reach them."""
 
-_WORDS = {"format", "title", "housing"}
-"""No stage before the housing depends on them."""
+_WORDS = {"format", "title", "housing", "runup", *(f"material.{n}_stress_limit" for n in ("root", "contact"))}
+"""No stage before housing and run-up depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 """As the supports, without effect on the static solution while all members are fixed."""

@@ -235,7 +235,10 @@ class RackSection(Section):
 
 
 class MaterialSection(Section):
-    """Isotropic elastic material of all gears."""
+    """Isotropic elastic material of all gears; its strength, where it is known, gives safeties.
+
+    ``root_stress_limit`` and ``contact_stress_limit`` are sigma_Flim and sigma_Hlim of ISO 6336-5.
+    """
 
     youngs_modulus: Annotated[float, Quantity(MODULUS, 1e9, 1e12)]
     poisson_ratio: Annotated[
@@ -249,6 +252,8 @@ class MaterialSection(Section):
         ),
     ]
     density: Annotated[float, Quantity(DENSITY, 100.0, 25000.0)]
+    root_stress_limit: Annotated[float, Quantity(MODULUS, 1e6, 5e9)] | None = None
+    contact_stress_limit: Annotated[float, Quantity(MODULUS, 1e6, 5e9)] | None = None
 
 
 class ShaftPart(Section):
@@ -394,6 +399,18 @@ class DynamicsSection(Section):
     tolerance: Annotated[float, Number(1e-12, 1e-2)] = 1e-6
 
 
+class RunupSection(Section):
+    """Speeds over which mesh forces and sensor are followed; `count` 0 leaves the run-up out.
+
+    Without ends it reaches from 0.8 times the lowest operating speed, or a quarter of the highest if that is
+    less, to 1.25 times the highest.
+    """
+
+    start: Speed | None = Field(default=None, alias="from")
+    to: Speed | None = None
+    count: Annotated[int, Count(0, 20_000)] = 400
+
+
 class PublishedLines(Section):
     """Lines and lobes around a mesh harmonic that somebody published; the report compares them."""
 
@@ -448,6 +465,7 @@ class Case(Section, ReadCase):
     static: StaticSection = StaticSection()
     dynamics: DynamicsSection = DynamicsSection()
     housing: HousingSection = HousingSection()
+    runup: RunupSection = RunupSection()
 
     @property
     def rigid(self) -> bool:

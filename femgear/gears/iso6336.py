@@ -164,6 +164,31 @@ def stress_correction(slenderness: float, notch: float) -> float:
     return (1.2 + 0.13 * slenderness) * notch ** (1.0 / (1.21 + 2.3 / slenderness))
 
 
+def root_safety(limit: float, nominal: float, load_factor: float, *, reversed_bending: bool) -> float:
+    """Compute the safety S_F against breakage of a tooth (ISO 6336-3, section 5), for long life.
+
+    ``sigma_Flim Y_ST Y_M / (sigma_F0 K)`` with Y_ST = 2 and Y_M = 0.7 for teeth that bend both ways (annex B:
+    planets); all other factors Y are 1.
+
+    Parameters
+    ----------
+    limit, nominal : float
+        sigma_Flim of the material (ISO 6336-5) and sigma_F0 [Pa].
+    load_factor : float
+        Product of the factors K of the load.
+    """
+    return 2.0 * limit * (0.7 if reversed_bending else 1.0) / (nominal * load_factor)
+
+
+def contact_safety(limit: float, nominal: float, load_factor: float) -> float:
+    """Compute the safety S_H against pitting (ISO 6336-2, section 5), for long life.
+
+    ``sigma_Hlim / (sigma_H0 sqrt(K))`` with sigma_Hlim of the material (ISO 6336-5) and sigma_H0 [Pa], the
+    product K of the factors of the load; all factors Z beside those of sigma_H0 are 1.
+    """
+    return limit / (nominal * math.sqrt(load_factor))
+
+
 def _standard_signs(gear: Gear) -> tuple[float, float, float]:
     """Teeth, profile shift and dedendum of the rack [modules] as the standard counts them."""
     sign = -1.0 if gear.internal else 1.0

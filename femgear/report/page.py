@@ -209,6 +209,7 @@ def page(train: Train, results: Results) -> str:
         (
             f"<h1>{escape(case.title)}</h1>\n",
             f'<p class="lead">{escape(_lead(results))}</p>\n',
+            "".join(map(_table, train.verdict(results))),
             _contents(sections, numbers, pictures),
             _warnings(warnings),
             '<h2 id="gears">Gears and operation</h2>\n',

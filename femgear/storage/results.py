@@ -77,11 +77,13 @@ _ATTRIBUTES = {
         ("kg/m^3", "air_density"),
         ("m", "centre_distance face_width half_backlash microphone_distance outer_radius"),
         ("m/s", "sound_speed"),
+        ("m/s^2", "reference_acceleration"),
         ("N", "unit_force"),
         ("N m", "sun_torque"),
         ("rad", "base_helix_angle microphone_angle planet_angles sensor_angle"),
         ("rad", "working_pressure_angle_planet_ring working_pressure_angle_sun_planet"),
         ("rad/s", "speed"),
+        ("rpm", "operating_speeds"),
         ("s", "settle step"),
     )
     for name in names.split()

@@ -187,6 +187,8 @@ class Train:
         ``(Results, name of a picture) -> sentences`` that this case adds to a caption.
     recorded : Recorded, optional
         Signals, spectra and modes of its runs; None where there are none.
+    verdict : callable
+        ``(Results) -> blocks``: what decides, before everything else.
     """
 
     name: str
@@ -197,6 +199,7 @@ class Train:
     figures: Mapping[str, Figures] = field(default_factory=dict)
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
     recorded: Recorded | None = None
+    verdict: Callable[[Results], Iterable[Block]] = lambda results: ()
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""
@@ -208,10 +211,10 @@ class Train:
         return Block(case.title), *self.describe(case), Block("Warnings", notes=warnings or ("none",))
 
     def describe_results(self, results: Results) -> tuple[Block, ...]:
-        """Tabulate the numbers of a run, one block a stage, and the time that each took."""
+        """Tabulate the numbers of a run: its verdict, one block a stage, and the time that each took."""
         blocks = [stage.describe(results) for stage in self._in(results)]
         timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
-        return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
+        return (*self.verdict(results), *blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
 
     def case_warnings(self, case: Any) -> tuple[Finding, ...]:
         """List what a case is allowed to be but deserves a look, each once.

@@ -179,3 +179,20 @@ def higher_harmonics() -> tuple[Row, ...]:
 def _level(lines, order: int) -> float:
     amplitude = np.abs(lines.acceleration[FAST])
     return float(amplitude[order] / amplitude[order - 54 : order + 55].max())
+
+
+def resonances() -> tuple[Row, ...]:
+    """Modes that mesh phasing lets harmonics excite, and the one of them that lies on 3100 rpm."""
+    from femgear.solvers.linear.resonances import modal_forces
+
+    modes = reference_modes()
+    forces = modal_forces(modes.modes, modes.excitation, 12)
+    kinds = np.array([modes.modes.kind[i].removeprefix("ring, ") for i in forces.mode])
+    other = float(forces.share[kinds == "translational"].max())
+    place = int(np.abs(forces.frequency - 4 * 1116.0).argmin())
+    rule = "Parker 2000; Ambarisha and Parker 2006"
+    where = "3100 rpm, 4th mesh harmonic: "
+    return (
+        at_most("symmetry", rule, "modal force on translational modes over the largest", 1e-9, other),
+        counted("symmetry", rule, where + "excited mode nearest to it", 15, int(forces.mode[place]) + 1),
+    )

@@ -365,6 +365,7 @@ THEMES = (
             housing.first_harmonic,
             housing.interpolation,
             housing.higher_harmonics,
+            housing.resonances,
         ),
     ),
     Theme(

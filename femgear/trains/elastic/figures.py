@@ -5,7 +5,8 @@ By stage:
 - modes.nc: natural frequencies by kind and nodal diameter, and modes of the ring as fields and pictures;
 - dynamics.nc: dynamic transmission error and mean deflection of the ring, its motion as an animation;
 - housing.nc: what a sensor fixed to the housing hears during one carrier revolution, its orders and
-  modulation.
+  modulation;
+- runup.nc: levels, mesh forces, lines and excited resonances over the speed.
 
 `FIGURES` at the end ties the pictures of the report to their captions.
 """
@@ -51,6 +52,7 @@ from femgear.report.style import (
     new_figure,
     rpm,
 )
+from femgear.report.waterfall import RUNUP_CAPTIONS, runup_figures
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import picture_sectors
@@ -553,5 +555,8 @@ FIGURES = STATIC | {
             ),
         },
         draw=_housing_figures,
+    ),
+    "runup": Figures(
+        RUNUP_CAPTIONS, draw=lambda drawn: runup_figures(drawn.data["runup"], drawn.data["modes"])
     ),
 }

@@ -18,6 +18,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
+from femgear.gears.iso6336 import contact_safety, root_safety
 from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
 from femgear.housing.sensor import (
@@ -42,7 +43,7 @@ from femgear.housing.sound import (
     whole_turns,
 )
 from femgear.report.response import harmonics_of
-from femgear.report.tables import Block, chosen, tabulate
+from femgear.report.tables import MANY, Block, chosen, tabulate
 from femgear.storage.results import (
     FOURIER,
     complex_entries,
@@ -51,8 +52,10 @@ from femgear.storage.results import (
     mode_entries,
     response_entries,
 )
+from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import checked_speeds
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
+from femgear.trains.elastic.runup import KINDS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,6 +73,8 @@ _ROUNDED, _MANY = 1e-5, 40
 _FEW = 4
 _FIRST, _STRONGEST = 6, 4
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
+_NEAR, _COUNTS = 10.0, 0.05
+"""Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
 _DIRECTIONS = {RADIAL: "radial", TANGENTIAL: "tangential"}
 
 
@@ -260,6 +265,137 @@ class HousingResult:
                 "air_density": cylinder.density, "sound_speed": cylinder.sound_speed,
             },
         )  # fmt: skip
+
+
+def verdict(results: Results) -> Iterator[Block]:
+    """Tabulate what decides, as far as it was computed: errors, factors, stresses, levels, resonances."""
+    stages, rows, notes = results.stages, list[tuple[str, str]](), list[str]()
+    if "static" in stages:
+        static = results.static
+        error = _by_kind(static["mesh"].values, np.ptp(static["ste"].values, axis=1) * 1e6)
+        rows.append(("transmission error, peak to peak", _kinds("{:.3f} um", error)))
+    factors, sharing = np.ones((1, 2)), np.ones(2)
+    if "dynamics" in stages:
+        factors, sharing = _load_factors(results.dynamics)
+        rows.append(("planet load factor K_gamma", _kinds("{:.3f}", sharing)))
+        rows.append(("largest dynamic factor K_v", _kinds("{:.3f}", factors.max(axis=0))))
+    if "stress" in stages:
+        rows += _strength(results, sharing * factors.max(axis=0), notes)
+    if "runup" in stages:
+        speed, level = results.runup["speed"].values, results.runup["level"].values
+        worst = int(level.argmax())
+        rows.append(("largest level of the run-up", f"{level[worst]:.4g} m/s² at {speed[worst]:.6g} rpm"))
+    if rows:
+        yield Block("Verdict", rows=tuple(rows), notes=tuple(notes))
+    if "dynamics" in stages:
+        yield _operating_points(results, factors)
+    if "runup" in stages:
+        yield _near_resonances(results.runup)
+
+
+def _by_kind(names, values: np.ndarray) -> np.ndarray:
+    """Find the largest values (2,) of sun-planet and planet-ring meshes, of those of all (n_meshes,)."""
+    ring = np.array(["ring" in str(name) for name in names])
+    return np.array([values[~ring].max(), values[ring].max()])
+
+
+def _kinds(form: str, values) -> str:
+    """Write a value of either kind of mesh."""
+    return ", ".join(f"{kind} {form.format(value)}" for kind, value in zip(KINDS, values))
+
+
+def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """K_v (n, 2) at the first and last speeds, as tables show them, and K_gamma (2,), ISO 6336-1.
+
+    Largest over mean force of a mesh, and largest mean force of a mesh over that of all of its kind.
+    """
+    names, factors, sharing = dynamics["mesh"].values, list[np.ndarray](), np.ones(2)
+    for i in chosen(dynamics.sizes["speed"]):
+        force = harmonics_of(dynamics.isel(speed=i), "mesh_force")
+        mean, peak = np.real(force[:, 0]), sample(force, 4 * force.shape[-1]).max(axis=-1)
+        factors.append(_by_kind(names, peak / mean))
+        of_all = [mean[len(mean) // 2 * k :][: len(mean) // 2].mean() for k in range(2)]
+        sharing = np.maximum(sharing, _by_kind(names, mean) / of_all)
+    return np.array(factors), sharing
+
+
+def _strength(results: Results, factors: np.ndarray, notes: list[str]) -> Iterator[tuple[str, str]]:
+    """Rows of the largest stresses, and of the safeties of ISO 6336 with load factors (2,) of either mesh."""
+    stress, material = results.stress, results.case.material
+    N, parts = stress.sizes["mesh"] // 2, ("sun", "planet, sun side", "planet, ring side", "ring")
+
+    def largest(name: str) -> np.ndarray:
+        values = stress[name].values
+        return np.array([values[:N].max(axis=0), values[N:].max(axis=0)])
+
+    root, nominal = largest("root_worst").ravel(), largest("iso_root_stress").ravel()
+    contact, worst = largest("contact_pressure").reshape(2, -1).max(axis=1), int(root.argmax())
+    yield "largest root stress, static", f"{root[worst] * 1e-6:.1f} MPa, {parts[worst]}"
+    yield "largest contact pressure, static", _kinds("{:.1f} MPa", contact * 1e-6)
+    limits = material.root_stress_limit, material.contact_stress_limit
+    if limits[0] is not None:
+        safe = [
+            root_safety(limits[0], one, factors[i // 2], reversed_bending=i in (1, 2))
+            for i, one in enumerate(nominal)
+        ]
+        yield "safety S_F, ISO 6336-3", ", ".join(f"{part} {one:.2f}" for part, one in zip(parts, safe))
+    if limits[1] is not None:
+        nominals = largest("iso_contact_stress")
+        safe = [contact_safety(limits[1], one, factor) for one, factor in zip(nominals, factors)]
+        yield "safety S_H, ISO 6336-2", _kinds("{:.2f}", safe)
+    if None in limits:
+        notes.append("material.root_stress_limit and contact_stress_limit would give safeties")
+    if limits != (None, None):
+        notes.append(
+            "S_F and S_H: nominal stresses with K_gamma and K_v alone, long life, planets bent both ways "
+            "(Y_M = 0.7), every other factor 1"
+        )
+
+
+def _operating_points(results: Results, factors: np.ndarray) -> Block:
+    """Tabulate dynamic factors and level at the operating speeds, with what they assume."""
+    dynamics, housing, case = results.dynamics, "housing" in results.stages, results.case
+    speeds, shown = dynamics["speed"].values, list(chosen(dynamics.sizes["speed"]))
+    columns = {
+        "speed [rpm]": lambda i: f"{speeds[i]:.6g}",
+        **{f"K_v {kind}": lambda i, k=k: f"{factors[shown.index(i), k]:.3f}" for k, kind in enumerate(KINDS)},
+        "level [m/s²]": lambda i: f"{float(results.housing['level'][i]):.4g}" if housing else "-",
+    }
+    ring, end = case.ring, ""
+    if "excitation_limit" in dynamics:
+        end = f"excitation up to {1e-3 * float(dynamics['excitation_limit'].min()):.4g} kHz; "
+    notes = (
+        f"levels assume: foundation of the ring {ring.foundation_radial:.3g} N/m³ radial, "
+        f"{ring.foundation_tangential:.3g} N/m³ tangential; damping ratio {case.dynamics.damping_ratio:g} of "
+        f"all modes; {end}small motion about the static state",
+    )
+    return tabulate("At the operating speeds", shown, columns, notes)
+
+
+def _near_resonances(runup: xr.Dataset) -> Block:
+    """Tabulate the resonances nearest to the operating speeds, of those that count there."""
+    value = {str(name): one.values for name, one in runup.items() if one.dims[:1] == ("resonance",)}
+    level = np.interp(value["operating_speed"], runup["speed"].values, runup["level"].values)
+    near = np.abs(value["distance"]) <= _NEAR
+    counts, found = np.flatnonzero(near & (value["operating_alone"] >= _COUNTS * level)), list[int]()
+    for speed in np.unique(value["operating_speed"][counts]):
+        own = counts[value["operating_speed"][counts] == speed]
+        found += own[np.argsort(np.abs(value["distance"][own]), kind="stable")[:_FEW]].tolist()
+    columns = {
+        "operating [rpm]": lambda i: f"{value['operating_speed'][i]:.6g}",
+        "resonance": lambda i: f"{value['distance'][i]:+.1f} %",
+        "mode": lambda i: str(value["mode"][i]),
+        "kind": lambda i: str(value["kind"][i]),
+        "[Hz]": lambda i: f"{value['frequency'][i]:.1f}",
+        "mesh harmonic": lambda i: str(value["mesh_harmonic"][i]),
+        "alone [m/s²]": lambda i: f"{value['operating_alone'][i]:.3g}",
+    }
+    note = (
+        f"mesh harmonics within {_NEAR:g} % of a mode that they excite, the nearest {_FEW} of those that "
+        f"give {100 * _COUNTS:g} % of the level or more; alone: level there by that mode at that harmonic"
+    )
+    rows = found[: 2 * MANY]
+    return tabulate("Resonances near the operating speeds", rows, columns, (note if rows else "none",))
 
 
 def describe_housing(data: xr.Dataset) -> Block:

@@ -46,6 +46,7 @@ from femgear.housing.sound import Cylinder, Microphone
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
+from femgear.solvers.linear.resonances import ONE_FREQUENCY, crossings, modal_forces
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
@@ -62,6 +63,8 @@ from femgear.trains.elastic.checks import (
     fastest_mesh_frequency,
     max_nodal_diameter,
     missing_level,
+    runup_ends,
+    slowest_wave,
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
@@ -85,6 +88,18 @@ from femgear.trains.elastic.results import (
     ring_shapes,
     sensor_signals,
     sensor_spectra,
+    verdict,
+)
+from femgear.trains.elastic.runup import (
+    HeardSpeeds,
+    RunupResult,
+    describe_runup,
+    heard_speeds,
+    joined,
+    mode_levels,
+    refined_speeds,
+    resonances,
+    runup_warnings,
 )
 from femgear.trains.protocol import (
     Progress,
@@ -111,6 +126,10 @@ HARMONICS = 512
 speeds are excited less far, and `_lost_level` tells what they lose."""
 _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
+_LINES_TOGETHER = 8000
+"""Harmonics of the run-up's speeds that are in memory at a time."""
+_BELOW_WAVES = 0.9
+"""The run-up ends, unless the case says otherwise, so far below the slowest wave around the ring."""
 _NOTICED, _PACKED, _SECONDS = 2e9, 2.5, 1.5e-5
 """Size of files that is said before, and that of a number in compressed ones [bytes]; what a harmonic of one
 speed takes (2 GHz, one core) [s]."""
@@ -155,6 +174,25 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     beyond = excitation + 2 * np.minimum(excitation, 6)
     response = np.maximum(case.dynamics.response_harmonics or beyond, excitation)
     return _FrequencyLimit(excitation, response, excitation * frequency)
+
+
+def _excitation_end(
+    case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, some: np.ndarray
+) -> tuple[float, float, np.ndarray]:
+    """Choose where the excitation ends, from some of the speeds, so that the level has converged if it may.
+
+    Frequency [Hz], that to which the level was compared [Hz], and its changes at those speeds [dB]; mesh
+    frequencies [Hz] and speeds of the carrier [rad/s] are (n_speeds,).
+    """
+    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
+    while True:
+        limit = limited(case, frequency, up_to, given=given)
+        response = solve_spectral(modes.modes, modes.excitation, frequency[some], **limit.options(case, some))
+        beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
+        change, short = _level_change(case, modes, carrier[some], response, beyond)
+        if not short or given is not None or up_to != modes.reach or case.dynamics.up_to is not None:
+            return up_to, beyond, change
+        up_to = beyond  # once: the modal basis carries no more
 
 
 def _level_change(
@@ -384,16 +422,8 @@ def dynamics_parts(
     basis, excitation, gears = modes.modes, modes.excitation, static.planetary_set
     speeds, (frequency, carrier) = np.array(case.operation.speeds), _turning_speeds(case, modes)
     names, pulls, some = mesh_names(gears.n_planets), list[np.ndarray](), checked_speeds(len(speeds))
-    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
-    limit = limited(case, frequency, up_to, given=given)
-    response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
-    beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
-    change, short = _level_change(case, modes, carrier[some], response, beyond)
-    if short and given is None and case.dynamics.up_to is None:
-        limit = limited(case, frequency, beyond)
-        response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
-        beyond *= 2.0
-        change, _ = _level_change(case, modes, carrier[some], response, beyond)
+    up_to, beyond, change = _excitation_end(case, modes, frequency, carrier, some)
+    limit = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics)
     level_change = np.full(len(speeds), np.nan)
     level_change[some] = change
     slow = frequency * HARMONICS < beyond - frequency
@@ -402,8 +432,7 @@ def dynamics_parts(
     short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     for own, part in parts_of_speeds(case, _HARMONIC * limit.response, memory):
-        if len(own) < len(speeds) or len(own) > len(some):
-            response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
+        response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
         pulls.append(pulls_of(response.force))
         if (complete := own[-1] + 1 == len(speeds)) and part is not case:
@@ -457,6 +486,71 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )  # fmt: skip
 
 
+@one_blas_thread()
+def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) -> RunupResult:
+    """Follow sensor and mesh forces over the speeds of the run-up, without stability.
+
+    The excitation ends where that of `solve_dynamics` does. CaseError: E-SPEED as there. ConvergenceError.
+    """
+    check_entries(modes, ModesResult, modal_entries(case), "modal basis")
+    one, basis, excitation = member_speeds(case, planetary_set(case)), modes.modes, modes.excitation
+    operating, given = np.array(case.operation.speeds), case.dynamics.mesh_harmonics
+    some = checked_speeds(len(operating))
+    up_to = _excitation_end(case, modes, *_turning_speeds(case, modes), some)[0]
+    first, last = _runup_ends(case, modes)
+    slowest, fastest = first * one.mesh_frequency, last * one.mesh_frequency
+    count = int(limited(case, [slowest], up_to, given=given).excitation[0])
+    field = ring_field(
+        modes.model, modes.ring.modes, basis.shape[modes.model.ring_slice].T, RADIAL, modes.max_diameter
+    )
+    forces = modal_forces(basis, excitation, count, output=field)
+    met = crossings(forces, slowest, fastest, up_to if given is None else math.inf)
+    resonance = met.mesh_frequency / one.mesh_frequency
+    heard, damping = forces.heard[met.row, met.harmonic - 1], forces.damping_ratio[met.row]
+    speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, heard, damping)
+    speeds = np.union1d(speeds, operating[some][(operating[some] >= first) & (operating[some] <= last)])
+    beside = operating[np.abs(operating[:, None] - resonance).argmin(axis=0)]
+    found = resonances(basis, forces, met, resonance, beside)
+    alike = np.abs(basis.frequency[:, None] / found["frequency"] - 1.0) <= ONE_FREQUENCY
+    nearest = [np.abs(speeds[:, None] - at).argmin(axis=0) for at in (resonance, beside)]
+    frequency, carrier, parts = one.mesh_frequency * speeds, one.carrier * speeds, list[HeardSpeeds]()
+    alone, n = np.zeros((2, len(resonance))), np.arange(-modes.max_diameter, modes.max_diameter + 1)
+    limit = limited(case, frequency, up_to, given=given)
+    cuts = np.flatnonzero(np.diff(np.cumsum(limit.response) // _LINES_TOGETHER)) + 1
+    for own in np.split(np.arange(len(speeds)), cuts):
+        response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
+        parts.append(heard_speeds(response, _sensor_lines(case, modes, response, carrier[own])))
+        order = np.arange(response.force.shape[-1])[:, None] * case.ring.teeth - np.sign(one.carrier) * n
+        turning = carrier[own][:, None, None] * order
+        for level, at in zip(alone, nearest):
+            inside = np.where((at >= own[0]) & (at <= own[-1]), at - own[0], -1)
+            level += mode_levels(response, field, alike, met.harmonic, turning, inside)
+        progress("runup", float(own[-1] + 1), float(len(speeds)))
+    return RunupResult(
+        input_speed=speeds,
+        mesh_frequency=frequency,
+        excitation_limit=limit.frequency,
+        carrier_speed=carrier,
+        heard=joined(parts),
+        resonances={**found, "resonance_alone": alone[0], "operating_alone": alone[1]},
+        ring_teeth=case.ring.teeth,
+        sensor_angle=case.housing.sensor_angle,
+        operating_speeds=operating,
+    )
+
+
+def _runup_ends(case: Case, modes: ModesResult) -> tuple[float, float]:
+    """First and last speed of the run-up [rad/s]; a default does not leave the range of the model."""
+    one, (first, last) = member_speeds(case, planetary_set(case)), runup_ends(case)
+    if case.runup.to is not None:
+        check_rim_speed(modes.ring.modes, one.carrier * last)
+        return first, last
+    highest = min(HIGHEST_RESPONSE / (case.response_harmonics or 3), case.dynamics.up_to or math.inf)
+    wave = _BELOW_WAVES * slowest_wave(modes.ring.modes)[0]
+    allowed = min(highest / one.mesh_frequency, wave / abs(one.carrier))
+    return first, max(min(last, allowed), *case.operation.speeds)
+
+
 def _warnings(case: Case) -> Iterator[Finding]:
     """List what deserves a look in the case, and the size of the results of many speeds."""
     yield from case_warnings(case)
@@ -501,7 +595,18 @@ ELASTIC = Train(
             describe=lambda results: describe_housing(results.housing),
             tables=lambda results: (mesh_bands(results),),
         ),
+        Stage(
+            name="runup",
+            title="Run-up",
+            solve=solve_runup,
+            takes=("modes",),
+            options=("progress",),
+            verdict=lambda result: {"speeds": len(result.input_speed)},
+            describe=lambda results: describe_runup(results.runup),
+            warnings=runup_warnings,
+            unavailable=lambda case: "" if case.runup.count else "runup.count is 0",
+        ),
     ),
-    describe=describe_set, warnings=_warnings, figures=FIGURES,
+    describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,
     recorded=Recorded(sensor_signals, sensor_spectra, ring_shapes),
 )  # fmt: skip

@@ -79,7 +79,7 @@ def torque_path(folder: Path) -> list[str]:
         if event != "return":
             return
         # a part of the response comes with its case
-        result = result[1] if isinstance(result, tuple) and len(result) == 2 else result
+        result = result[1] if type(result) is tuple and len(result) == 2 else result
         if isinstance(result, DynamicsResult):
             kept.append(result.response)
         elif isinstance(result, HousingResult):

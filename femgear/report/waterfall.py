@@ -1,0 +1,248 @@
+"""Figures of runup.nc: waterfall, order cuts, levels over the speed, Campbell diagram of excited modes.
+
+Colours tell kinds of modes and of meshes; everything else is labelled where it stands.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SIZE,
+    VERMILION,
+    label,
+    legend_below,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+RUNUP_CAPTIONS = {
+    "run_up_levels": (
+        "Over the speed: level at the sensor with its strongest resonances (mode × mesh harmonic), "
+        "fluctuation of the mesh forces, and dynamic factor K_v, largest over mean mesh force. Dots: "
+        "operating speeds."
+    ),
+    "campbell": (
+        "Natural frequencies and harmonics of the mesh frequency. Circles mark where a harmonic meets a mode "
+        "that it excites, larger for a higher level of that mode at that harmonic; elsewhere the phases of "
+        "the meshes cancel the force on the mode."
+    ),
+    "waterfall": "Level at the sensor over the speed, by frequency and by carrier order; what lies 80 dB "
+    "and more below the largest is dark.",
+    "order_cuts": (
+        "Amplitude of the strongest line around each of the strongest mesh harmonics over the speed; the "
+        "others in grey."
+    ),
+}
+_RAYS = 10
+"""Mesh harmonics of the Campbell diagram."""
+_DYNAMIC = 80.0
+"""Range of the waterfall [dB]."""
+_PIXELS = (400, 640)
+_CUTS, _NAMED = 6, 8
+_KIND = {"rotational": BLUE, "translational": VERMILION, "planet": GREEN, "mixed": PURPLE}
+_MESHES = (BLUE, VERMILION)
+
+
+def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset) -> Figure:
+    """Draw modes and mesh harmonics over the speeds of runup.nc, the excited crossings marked."""
+    figure, (ax,) = new_figure(width=9.5, height=6.4)
+    speed, mesh = runup["speed"].values, runup["mesh_frequency"].values * 1e-3
+    top = min(float(runup["excitation_limit"].max()) * 1e-3, (_RAYS - 2) * mesh[-1])
+    ax.set_xlim(speed[0], speed[-1])
+    ax.set_ylim(0.0, top)
+    for frequency, kind in zip(modes["frequency"].values * 1e-3, map(str, modes["kind"].values)):
+        if 0.0 < frequency <= top:
+            name = kind.removeprefix("ring, ")
+            style = {"color": _KIND.get(name, GREY), "linestyle": "--" if name != kind else "-"}
+            ax.axhline(frequency, linewidth=1.2, label=f"{kind} mode", **style)
+    for h in range(1, _RAYS + 1):
+        ax.plot(speed, h * mesh, color="0.55", linewidth=0.9)
+        inside = h * mesh[-1] <= top
+        at = (speed[-1], h * mesh[-1]) if inside else (top * speed[-1] / (h * mesh[-1]), top)
+        side = {"xytext": (4, 0), "va": "center"} if inside else {"xytext": (0, 3), "ha": "center"}
+        ax.annotate(f"h = {h}", at, textcoords="offset points", fontsize=SIZE - 2, color="0.35", **side)
+    rows = (runup["mesh_harmonic"].values <= _RAYS) & (runup["frequency"].values * 1e-3 <= top)
+    level = runup["resonance_alone"].values[rows]
+    place = runup["resonance_speed"].values[rows], runup["frequency"].values[rows] * 1e-3
+    size = 12.0 + 180.0 * level / max(level.max(initial=0.0), np.finfo(float).tiny)
+    ax.scatter(*place, s=size, facecolor="none", edgecolor=BLACK, linewidth=1.3, zorder=3)
+    _name_modes(ax, runup.isel(resonance=rows), speed)
+    _operating(ax, runup)
+    label(ax, "speed of the input [rpm]", "frequency [kHz]")
+    legend_below(figure, columns=3)
+    return figure
+
+
+def _name_modes(ax, crossings: xr.Dataset, speed: np.ndarray) -> None:
+    """Write the numbers of the modes before their first crossings, side by side where two are close."""
+    before, low, high = -np.inf, *ax.get_ylim()
+    for mode in np.unique(crossings["mode"].values):
+        own = crossings["mode"].values == mode
+        frequency = float(crossings["frequency"].values[own][0]) * 1e-3
+        column = 0.125 if frequency - before < 0.03 * (high - low) else 0.03
+        first = (crossings["resonance_speed"].values[own].min() - speed[0]) / np.ptp(speed)
+        if first > column + 0.11:
+            before = frequency if column < 0.1 else -np.inf
+            ax.annotate(
+                f"mode {mode}", (column, frequency), xycoords=("axes fraction", "data"), va="center",
+                fontsize=SIZE - 2, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+            )  # fmt: skip
+
+
+def _operating(ax, runup: xr.Dataset) -> None:
+    """Mark the operating speeds, if they are few, by dotted lines."""
+    operating = np.atleast_1d(runup.attrs["operating_speeds"])
+    for one in operating[: _NAMED if len(operating) <= _NAMED else 0]:
+        ax.axvline(one, color=ORANGE, linewidth=1.6, linestyle=":", label="operating speed")
+
+
+def waterfall(runup: xr.Dataset) -> Figure:
+    """Draw the level [dB re 1e-6 m/s^2] of runup.nc over speed and frequency, and over speed and order."""
+    figure, axes = new_figure(columns=2, width=12.0, height=5.8, sharey=True)
+    order, speed = runup["order"].values, runup["speed"].values
+    power = 0.5 * (
+        runup["lines_real"].values.astype(float) ** 2 + runup["lines_imag"].values.astype(float) ** 2
+    )
+    teeth, reach = int(runup.attrs["ring_teeth"]), 1e-3 * float(runup["excitation_limit"].max())
+    # a line crosses all that lies between the middles of the steps on either side of its speed
+    ends = np.concatenate([speed[:1], 0.5 * (speed[1:] + speed[:-1]), speed[-1:]])
+    turns = 1e-3 * np.interp(ends, speed, np.abs(runup["carrier_speed"].values)) / (2.0 * np.pi)
+    step = max(int(np.gcd.reduce(order)), 1)
+    views = (
+        (turns, reach, min(_PIXELS[1], int(reach / (turns[-1] * step))), "frequency [kHz]"),
+        (np.ones(len(ends)), (_RAYS + 0.5) * teeth, int((_RAYS + 0.5) * teeth // step), "carrier order [1]"),
+    )
+    images = []
+    for factor, end, columns, _ in views:
+        column = (factor[:, None] * order * (columns / end)).astype(int)
+        image = np.zeros((len(speed), columns + 1))
+        row = np.broadcast_to(np.arange(len(speed))[:, None], power.shape)
+        np.add.at(image, (row, np.minimum(column[:-1], columns)), power)
+        np.add.at(image, (row, np.minimum(column[1:] + 1, columns)), -power)
+        images.append(np.maximum(np.cumsum(image, axis=1)[:, :-1], 0.0))
+    # rows of equal height, whatever the speeds between which resonances got their own
+    even = np.linspace(speed[0], speed[-1], _PIXELS[0])
+    nearest = np.abs(speed - even[:, None]).argmin(axis=1)
+    floor = float(runup.attrs["reference_acceleration"]) ** 2
+    with np.errstate(divide="ignore"):
+        levels = [10.0 * np.log10(image[nearest] / floor) for image in images]
+    highest = max(float(one.max()) for one in levels)
+    for ax, one, (_, end, _, text) in zip(axes, levels, views):
+        shown = ax.imshow(
+            np.maximum(one, highest - _DYNAMIC), origin="lower", aspect="auto", cmap="cividis",
+            extent=(0.0, end, speed[0], speed[-1]), vmin=highest - _DYNAMIC, vmax=highest,
+            interpolation="nearest",
+        )  # fmt: skip
+        ax.grid(False)
+        label(ax, text)
+    label(axes[0], y="speed of the input [rpm]")
+    upper = axes[1].secondary_xaxis("top", functions=(lambda x: x / teeth, lambda h: h * teeth))
+    upper.set_xticks(range(1, _RAYS + 1))
+    upper.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
+    bar = figure.colorbar(shown, ax=axes, pad=0.02)
+    bar.set_label("level of the acceleration [dB re 1e-6 m/s²]", fontsize=SIZE)
+    return figure
+
+
+def order_cuts(runup: xr.Dataset) -> Figure:
+    """Draw amplitudes of the strongest orders of runup.nc over the speed, axes for each."""
+    order, speed = runup["order"].values, runup["speed"].values
+    amplitude = np.hypot(runup["lines_real"].values, runup["lines_imag"].values)
+    teeth, peak = int(runup.attrs["ring_teeth"]), amplitude.max(axis=0)
+    band, chosen = np.rint(order / teeth).astype(int), dict[int, int]()
+    for k in np.argsort(-peak, kind="stable"):
+        if band[k] > 0 and len(chosen) < _CUTS:
+            chosen.setdefault(int(band[k]), int(k))
+    rows = max(-(-len(chosen) // 3), 1)
+    figure, axes = new_figure(
+        rows=rows, columns=3, width=11.0, height=0.6 + 2.7 * rows, sharex=True, sharey=True
+    )
+    for ax in axes[len(chosen) :]:
+        ax.set_axis_off()
+    largest = max((peak[k] for k in chosen.values()), default=1.0)
+    for ax, (h, k) in zip(axes, sorted(chosen.items())):
+        for other in chosen.values():
+            ax.plot(speed, amplitude[:, other], color="0.82", linewidth=0.9)
+        ax.plot(speed, amplitude[:, k], color=BLUE, linewidth=1.8)
+        beside = int(order[k]) - h * teeth
+        sign = f" {'+' if beside > 0 else '−'} {abs(beside)}" if beside else ""
+        ax.set_yscale("log")
+        ax.set_ylim(1e-4 * largest, 2.0 * largest)
+        label(ax, title=f"order {order[k]} = {h}·{teeth}{sign}")
+    for ax in axes[-3:]:
+        label(ax, "speed of the input [rpm]")
+    for ax in axes[::3]:
+        label(ax, y="amplitude [m/s²]")
+    return figure
+
+
+def runup_levels(runup: xr.Dataset) -> Figure:
+    """Draw level, fluctuation of the mesh forces and dynamic factors of runup.nc over the speed."""
+    figure, axes = new_figure(rows=3, width=9.5, height=8.6, sharex=True)
+    speed, level = runup["speed"].values, runup["level"].values
+    axes[0].plot(speed, level, color=BLACK, linewidth=1.6)
+    axes[0].set_ylim(0.0, 1.45 * level.max(initial=0.0) or 1.0)
+    _name_resonances(axes[0], runup)
+    operating = np.atleast_1d(runup.attrs["operating_speeds"])
+    operating = operating[(operating >= speed[0]) & (operating <= speed[-1])]
+    axes[0].plot(operating, np.interp(operating, speed, level), "o", color=ORANGE, markersize=7, zorder=3)
+    names = [str(name) for name in runup["mesh_kind"].values]
+    for ax, name in zip(axes[1:], ("force_rms", "dynamic_factor")):
+        curves = runup[name].values.T
+        for curve, text, colour in zip(curves, names, _MESHES):
+            ax.plot(speed, curve, color=colour, linewidth=1.6)
+            ax.plot(operating, np.interp(operating, speed, curve), "o", color=ORANGE, markersize=7, zorder=3)
+            # apart where the curves end together
+            up = 5 if curve[-1] >= curves[:, -1].max() else -5
+            side = {
+                "xytext": (5, up),
+                "textcoords": "offset points",
+                "va": "center",
+                "annotation_clip": False,
+            }
+            ax.annotate(text, (speed[-1], curve[-1]), color=colour, fontsize=SIZE - 1, **side)
+    axes[1].set_ylim(bottom=0.0)
+    axes[2].set_ylim(bottom=1.0)
+    axes[0].set_xlim(speed[0], speed[-1])
+    label(axes[0], y="level, r.m.s. [m/s²]")
+    label(axes[1], y="mesh force, r.m.s.\nabout its mean [N]")
+    label(axes[2], "speed of the input [rpm]", "dynamic factor K_v [1]")
+    return figure
+
+
+def _name_resonances(ax, runup: xr.Dataset) -> None:
+    """Name the strongest resonances above the curve of the level, none over another one."""
+    speed, place = runup["speed"].values, runup["resonance_speed"].values
+    named = list[float]()
+    for i in np.argsort(-runup["resonance_alone"].values, kind="stable"):
+        if len(named) < _NAMED and all(abs(place[i] - other) > 0.025 * np.ptp(speed) for other in named):
+            named.append(float(place[i]))
+            text = f"{runup['mode'].values[i]} × {runup['mesh_harmonic'].values[i]}"
+            at = (place[i], float(runup["resonance_level"].values[i]))
+            style = {"arrowstyle": "-", "color": "0.5", "linewidth": 0.8}
+            ax.annotate(
+                text, at, xytext=(0, 16), textcoords="offset points", rotation=90, ha="center", va="bottom",
+                fontsize=SIZE - 2, arrowprops=style,
+            )  # fmt: skip
+
+
+def runup_figures(runup: xr.Dataset, modes: xr.Dataset) -> dict[str, Figure]:
+    """Draw the figures of a run-up by the names of their files."""
+    return {
+        "run_up_levels": runup_levels(runup),
+        "campbell": campbell_diagram(runup, modes),
+        "waterfall": waterfall(runup),
+        "order_cuts": order_cuts(runup),
+    }

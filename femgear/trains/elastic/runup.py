@@ -1,0 +1,277 @@
+"""Run-up of a case with an elastic ring: sensor, mesh forces and resonances over the speed, runup.nc.
+
+The speeds of the case's section `runup` are equally spaced; operating speeds stand among them, and resonances
+whose peaks are narrower than the steps get speeds of their own (`refined_speeds`). Lines of the sensor are
+those of the exact circumferential components, whatever form the housing has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.case.quantities import RPM
+from femgear.errors import Finding
+from femgear.housing.orders import order_level
+from femgear.report.tables import Block, tabulate
+from femgear.solvers.linear.resonances import EXCITED
+from femgear.storage.results import complex_entries, coordinates, dataset, declared
+from femgear.system.fourier import fluctuation, sample
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.housing.sensor import SensorLines
+    from femgear.solvers.linear.resonances import Crossings, ModalForces
+    from femgear.system.system import Modes, Response
+
+KINDS = ("sun-planet", "planet-ring")
+REFERENCE = 1e-6
+"""Acceleration of 0 dB [m/s^2] (ISO 1683)."""
+_SILENT = 1e-6
+"""Lines below this share of the largest one of all speeds are left out."""
+_REFINED = 40
+"""Resonances that get speeds of their own, at most."""
+_SHOWN = 12
+"""Rows of the table of resonances."""
+
+
+@dataclass(frozen=True)
+class HeardSpeeds:
+    """What is kept of the response at some speeds, (s,) or (s, 2) for both kinds of mesh.
+
+    Parameters
+    ----------
+    level : (s,) array
+        Root mean square of the acceleration at the sensor [m/s^2].
+    force_rms, force_peak, dynamic_factor : (s, 2) arrays
+        Of the meshes of a kind the largest: root mean square about the mean and peak of the force [N], and
+        peak over mean, the dynamic factor K_v of ISO 6336-1.
+    lowest_force : (s,) array
+        [N]
+    order : (n_orders,) int array
+        Carrier orders.
+    lines : (s, n_orders) complex array
+        Acceleration at the sensor [m/s^2].
+    """
+
+    level: np.ndarray
+    force_rms: np.ndarray
+    force_peak: np.ndarray
+    dynamic_factor: np.ndarray
+    lowest_force: np.ndarray
+    order: np.ndarray
+    lines: np.ndarray
+
+
+def heard_speeds(response: Response, lines: SensorLines) -> HeardSpeeds:
+    """Compute levels, mesh forces and lines of some speeds from their response and lines of the sensor."""
+    force, N = response.force, response.force.shape[1] // 2
+    peak = sample(force, 4 * force.shape[-1]).max(axis=-1)
+
+    def largest(values: np.ndarray) -> np.ndarray:
+        return np.stack([values[:, :N].max(axis=1), values[:, N:].max(axis=1)], axis=1)
+
+    return HeardSpeeds(
+        level=order_level(lines),
+        force_rms=largest(fluctuation(force)),
+        force_peak=largest(peak),
+        dynamic_factor=largest(peak / np.real(force[..., 0])),
+        lowest_force=response.lowest_force,
+        order=lines.order,
+        lines=lines.acceleration.astype(np.complex64),
+    )
+
+
+def joined(parts: Sequence[HeardSpeeds]) -> HeardSpeeds:
+    """Join what is kept of speeds one after the other, without the orders that are silent at all of them."""
+    order = np.unique(np.concatenate([one.order for one in parts]))
+    lines = np.zeros((sum(len(one.level) for one in parts), len(order)), np.complex64)
+    first = 0
+    for one in parts:
+        lines[first : first + len(one.level), np.searchsorted(order, one.order)] = one.lines
+        first += len(one.level)
+    largest = np.abs(lines).max(axis=0)
+    heard = largest > _SILENT * largest.max(initial=0.0)
+    names = {one.name for one in fields(HeardSpeeds)} - {"order", "lines"}
+    rest = {name: np.concatenate([getattr(one, name) for one in parts]) for name in names}
+    return HeardSpeeds(order=order[heard], lines=lines[:, heard], **rest)
+
+
+def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray):
+    """Add speeds at resonances (c,) whose peaks are narrower than the steps between speeds (s,), ascending.
+
+    A peak of damping ratio z at speed w falls to half its power at ``w (1 - z)`` and ``w (1 + z)``. The
+    resonances of the highest expected levels, from `ModalForces.heard`, get these three speeds; undamped
+    ones, which have no largest level, none.
+    """
+    step = np.diff(speeds).max(initial=0.0) if len(speeds) > 1 else np.inf
+    narrow = np.flatnonzero((damping > 0.0) & (damping * resonance < step))
+    strongest = narrow[np.argsort(-heard[narrow] / damping[narrow], kind="stable")[:_REFINED]]
+    around = resonance[strongest, None] * (1.0 + damping[strongest, None] * np.array([-1.0, 0.0, 1.0]))
+    inside = (around >= speeds[0]) & (around <= speeds[-1])
+    return np.unique(np.concatenate([speeds, around[inside]]))
+
+
+def mode_levels(response: Response, field: np.ndarray, alike, harmonic, heard_speed: np.ndarray, at):
+    """Compute the levels (c,) of the modes and harmonics of resonances, each alone, in a response [m/s^2].
+
+    Parameters
+    ----------
+    field : (n_modes, L) complex array
+        Components of the modes that are heard apart, see `femgear.trains.elastic.model.ring_field`.
+    alike : (n_modes, c) bool array
+        Modes of every resonance, of which several may have one frequency.
+    harmonic, at : (c,) int arrays
+        Mesh harmonics, and speeds of the response; the level is zero where these are negative, and beyond
+        the harmonics of the response.
+    heard_speed : (n_speeds, H + 1, L) array
+        Angular frequency at which each component is heard [rad/s].
+    """
+    levels = np.zeros(len(at))
+    for i in np.flatnonzero((at >= 0) & (harmonic < response.modal.shape[-1])):
+        own, h = np.flatnonzero(alike[:, i]), harmonic[i]
+        lines = response.modal[at[i], own, h] @ field[own] * heard_speed[at[i], h] ** 2
+        levels[i] = np.sqrt(0.5 * (np.abs(lines) ** 2).sum())
+    return levels
+
+
+_ROW = "resonance"
+_RESONANCE = {
+    "mode": (_ROW, "1", "mode, from 1"),
+    "kind": (_ROW, "1", "kind of mode"),
+    "nodal_diameter": (_ROW, "1", "dominant nodal diameter of the ring"),
+    "mesh_harmonic": (_ROW, "1", "harmonic of the mesh frequency"),
+    "frequency": (_ROW, "Hz", "natural frequency"),
+    "resonance_speed": (_ROW, "rpm", "speed of the input where both meet"),
+    "share": (_ROW, "1", "modal force over the largest of the harmonic"),
+    "resonance_level": (_ROW, "m/s^2", "level at that speed"),
+    "resonance_alone": (_ROW, "m/s^2", "level there by mode and harmonic alone"),
+    "resonance_factor": (f"{_ROW} mesh_kind", "1", "dynamic factor K_v at that speed"),
+    "operating_speed": (_ROW, "rpm", "nearest operating speed"),
+    "operating_alone": (_ROW, "m/s^2", "level there by mode and harmonic alone"),
+    "distance": (_ROW, "%", "distance of the resonance from that speed"),
+}
+
+
+def resonances(modes: Modes, forces: ModalForces, met: Crossings, speed, operating) -> dict[str, Any]:
+    """Collect what is known of crossings before the run-up; their speeds and those next to them [rad/s]."""
+    mode = forces.mode[met.row]
+    return {
+        "mode": mode + 1,
+        "kind": [modes.kind[i] for i in mode],
+        "nodal_diameter": modes.nodal_diameter[mode],
+        "mesh_harmonic": met.harmonic,
+        "frequency": forces.frequency[met.row],
+        "resonance_speed": speed / RPM,
+        "share": forces.share[met.row, met.harmonic - 1],
+        "operating_speed": operating / RPM,
+        "distance": 100.0 * (speed / operating - 1.0),
+    }
+
+
+@dataclass(frozen=True)
+class RunupResult:
+    """Levels, mesh forces and lines over ``input_speed`` (s,) [rad/s], and the resonances between its ends.
+
+    Mesh frequency and end of the excitation (s,) [Hz], speed of the carrier (s,) and operating
+    speeds (n,) [rad/s]. ``resonances`` are the variables of runup.nc, (c,) each.
+    """
+
+    input_speed: np.ndarray
+    mesh_frequency: np.ndarray
+    excitation_limit: np.ndarray
+    carrier_speed: np.ndarray
+    heard: HeardSpeeds
+    resonances: Mapping[str, Any]
+    ring_teeth: int
+    sensor_angle: float
+    operating_speeds: np.ndarray
+
+    def at(self, values: np.ndarray) -> np.ndarray:
+        """Interpolate values (s, ...) to the speeds of the resonances, (c, ...)."""
+        speed = self.resonances["resonance_speed"] * RPM
+        after = np.clip(np.searchsorted(self.input_speed, speed), 1, len(self.input_speed) - 1)
+        low, high = self.input_speed[after - 1], self.input_speed[after]
+        part = ((speed - low) / (high - low)).reshape(-1, *[1] * (values.ndim - 1))
+        return (1.0 - part) * values[after - 1] + part * values[after]
+
+    def dataset(self) -> xr.Dataset:
+        """Collect the contents of runup.nc."""
+        heard, kinds = self.heard, "speed mesh_kind"
+        words = "acceleration at the sensor, single-sided amplitude"
+        there = {
+            "resonance_level": self.at(heard.level),
+            "resonance_factor": self.at(heard.dynamic_factor),
+        }
+        variables = {
+            "mesh_frequency": ("speed", self.mesh_frequency, "Hz", "mesh frequency"),
+            "carrier_speed": ("speed", self.carrier_speed, "rad/s", "speed of the carrier"),
+            "excitation_limit": ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation"),
+            "level": ("speed", heard.level, "m/s^2", "root mean square of the acceleration at the sensor"),
+            "force_rms": (kinds, heard.force_rms, "N", "root mean square of the mesh force about its mean"),
+            "force_peak": (kinds, heard.force_peak, "N", "largest mesh force"),
+            "dynamic_factor": (kinds, heard.dynamic_factor, "1", "largest mesh force over its mean, K_v"),
+            "lowest_force": ("speed", heard.lowest_force, "N", "smallest mesh force; teeth cannot pull"),
+            **complex_entries((("lines", "speed order", heard.lines, "m/s^2", words),), single=True),
+            **declared(_RESONANCE, {**self.resonances, **there}),
+        }
+        return dataset(
+            variables,
+            coords=coordinates(speed=self.input_speed / RPM)
+            | {
+                "mesh_kind": ("mesh_kind", list(KINDS), "1", "kind of mesh"),
+                "order": ("order", heard.order, "1", "carrier order"),
+            },
+            attrs={
+                "title": "run-up: sensor, mesh forces and resonances over the speed",
+                "sensor_angle": self.sensor_angle,
+                "ring_teeth": self.ring_teeth,
+                "reference_acceleration": REFERENCE,
+                "operating_speeds": self.operating_speeds / RPM,
+            },
+        )
+
+
+def describe_runup(data: xr.Dataset) -> Block:
+    """Tabulate the strongest resonances of runup.nc by speed."""
+    speed, level = data["speed"].values, data["level"].values
+    strongest = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN]
+    worst, count = int(level.argmax()), data.sizes["resonance"]
+    value = {str(name): one.values for name, one in data.items() if one.dims[:1] == ("resonance",)}
+    columns = {
+        "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
+        "from operating": lambda i: f"{value['distance'][i]:+.1f} %",
+        "mode": lambda i: str(value["mode"][i]),
+        "kind": lambda i: str(value["kind"][i]),
+        "[Hz]": lambda i: f"{value['frequency'][i]:.1f}",
+        "mesh harmonic": lambda i: str(value["mesh_harmonic"][i]),
+        "force share": lambda i: f"{value['share'][i]:.3f}",
+        "alone [m/s²]": lambda i: f"{value['resonance_alone'][i]:.4g}",
+        "level [m/s²]": lambda i: f"{value['resonance_level'][i]:.4g}",
+        "K_v": lambda i: f"{value['resonance_factor'][i].max():.3f}",
+    }
+    notes = (
+        f"{len(strongest)} of {count} meetings of a mode with a mesh harmonic that excites it: those with "
+        "the highest level by this mode at this harmonic alone; modes together may give less",
+        f"excited: modal force of {EXCITED:g} or more of the largest of that harmonic (force share)",
+        f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; largest level "
+        f"{level[worst]:.4g} m/s² at {speed[worst]:.6g} rpm",
+    )
+    return tabulate("Run-up", sorted(strongest), columns, notes)
+
+
+def runup_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """Say at which speeds of runup.nc meshes pull (W-PULL): its teeth cannot part."""
+    lowest, speed = data["lowest_force"].values, data["speed"].values
+    if (pulling := lowest < -1e-3 * data["force_peak"].values.max()).any():
+        low, high = speed[pulling].min(), speed[pulling].max()
+        text = (
+            f"run-up: meshes pull at {pulling.sum()} of {len(speed)} speeds from {low:.6g} to {high:.6g} rpm "
+            f"with up to {-1e-3 * lowest.min():.4g} kN: real teeth would part"
+        )
+        remedy = "raise the damping, or let meshes part in a section [planar]"
+        yield Finding("W-PULL", "", text, remedy=remedy)

@@ -1,0 +1,192 @@
+"""Run-up of the reference set: the numbers of the other stages at their speeds, resonances, peaks."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.case.quantities import RPM
+from femgear.errors import CaseError
+from femgear.housing.orders import order_level
+from femgear.storage.results import Manifest, Results
+from femgear.system.fourier import fluctuation, sample
+from femgear.trains.elastic.checks import runup_ends
+from femgear.trains.elastic.results import verdict
+from femgear.trains.elastic.runup import describe_runup, runup_warnings
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
+from femgear.trains.reading import read_case, with_value, with_values
+from femgear.trains.registry import check_case, stages_of
+from femgear.trains.static.stages import solve_static, solve_stress
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def case():
+    changes = {"static.flank_elements": 8, "runup.from": "900 rpm", "runup.to": "3500 rpm", "runup.count": 60}
+    return with_values(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), changes)
+
+
+@pytest.fixture(scope="module")
+def static(case):
+    return solve_static(case)
+
+
+@pytest.fixture(scope="module")
+def modes(case, static):
+    return solve_modes(case, static)
+
+
+@pytest.fixture(scope="module")
+def found(case, modes):
+    return solve_runup(case, modes)
+
+
+@pytest.fixture(scope="module")
+def data(found):
+    return found.dataset()
+
+
+def test_at_its_speeds_it_is_the_dynamics_and_the_housing(case, static, modes, found):
+    chosen = [0, 20, len(found.input_speed) - 1, int(np.argmin(np.abs(found.input_speed / RPM - 3100.0)))]
+    speeds = [f"{float(found.input_speed[i])!r} rad/s" for i in chosen]
+    same = with_values(case, {"operation.speeds": speeds, "housing.published": None})
+    dynamics = solve_dynamics(same, static, modes)
+    level = order_level(solve_housing(same, dynamics).exact)
+    assert found.heard.level[chosen] == pytest.approx(level, rel=1e-9)
+    assert found.excitation_limit[chosen] == pytest.approx(dynamics.excitation_limit, rel=1e-12)
+    force = dynamics.response.force
+    peak = sample(force, 4 * force.shape[-1]).max(axis=-1)
+    for kind, own in enumerate((slice(3), slice(3, 6))):
+        assert found.heard.force_rms[chosen, kind] == pytest.approx(
+            fluctuation(force)[:, own].max(axis=1), rel=1e-9
+        )
+        # instants of another number of harmonics
+        assert found.heard.force_peak[chosen, kind] == pytest.approx(peak[:, own].max(axis=1), rel=1e-3)
+    assert np.isclose(found.input_speed / RPM, 3100.0).any()
+
+
+def test_level_is_the_root_mean_square_of_the_lines(found, data):
+    lines = data["lines_real"].values + 1j * data["lines_imag"].values
+    assert np.sqrt(0.5 * (np.abs(lines) ** 2).sum(axis=1)) == pytest.approx(data["level"].values, rel=1e-5)
+    # three planets in phase: multiples of three alone
+    assert not (found.heard.order % 3).any()
+
+
+def test_equal_planets_in_phase_are_excited_in_rotational_modes_alone(data):
+    """Of ring modes those of 0, 3, 6, .. nodal diameters; harmonic 4 lies on mode 15 at 3100 rpm."""
+    kinds = {str(kind).removeprefix("ring, ") for kind in data["kind"].values}
+    assert kinds == {"rotational"} and not (data["nodal_diameter"].values[data["mode"] > 3] % 3).any()
+    own = (data["mode"] == 15) & (data["mesh_harmonic"] == 4)
+    assert int(own.sum()) == 1
+    assert abs(float(data["distance"][own.values].item())) < 0.5
+    assert float(data["operating_speed"][own.values].item()) == pytest.approx(3100.0)
+    assert float(data["frequency"][own.values].item()) == pytest.approx(4464.0, rel=5e-3)
+
+
+def test_the_antisymmetric_ring_mode_has_its_nodes_at_the_meshes(modes, data):
+    """A rule of kinds and diameters alone would list this one of the two modes of three diameters."""
+    near = np.flatnonzero((modes.modes.nodal_diameter == 3) & (modes.modes.frequency < 5e3))
+    kinds = [modes.modes.kind[i] for i in near]
+    listed = set(data["mode"].values - 1)
+    left_out = [i for i in near if i not in listed]
+    assert len(left_out) == 1 and kinds[list(near).index(left_out[0])] == "ring, rotational"
+    assert (
+        np.abs(modes.modes.mesh_deflection[:, left_out[0]]).max()
+        < 1e-6 * np.abs(modes.modes.mesh_deflection).max()
+    )
+
+
+def test_the_strongest_resonances_are_of_the_size_of_the_level(data):
+    alone, level = data["resonance_alone"].values, data["resonance_level"].values
+    strongest = np.argsort(-alone)[:10]
+    assert (alone[strongest] < 1.5 * level[strongest]).all() and (
+        alone[strongest] > 0.05 * level[strongest]
+    ).all()
+    block = describe_runup(data)
+    assert len(block.rows) == 12 and all(len(row) == len(block.header) for row in block.rows)
+
+
+def test_meshes_that_pull_are_told_of(data):
+    assert list(runup_warnings(data)) == []
+    pulling = data.copy(deep=True)
+    pulling["lowest_force"][3:6] = [-100.0, -250.0, -50.0]
+    (finding,) = runup_warnings(pulling)
+    first, last = (float(data["speed"][i]) for i in (3, 5))
+    assert finding.code == "W-PULL" and f"from {first:.6g} to {last:.6g} rpm" in str(finding)
+    assert "0.25 kN" in str(finding) and "3 of " in str(finding)
+
+
+def test_a_narrow_peak_between_two_speeds_is_found(case, static):
+    """Damping 0.2 %: a peak is 12 rpm wide, the steps are 100 rpm; against steps of 2 rpm around it."""
+    light = with_values(
+        case,
+        {
+            "dynamics.damping_ratio": 0.002,
+            "dynamics.up_to": "8 kHz",
+            "runup.from": "2000 rpm",
+            "runup.to": "3000 rpm",
+            "runup.count": 11,
+        },
+    )
+    modes = solve_modes(light, static)
+    found = solve_runup(light, modes)
+    peak = found.input_speed[found.heard.level.argmax()] / RPM
+    window = {"runup.from": f"{peak - 30} rpm", "runup.to": f"{peak + 30} rpm", "runup.count": 121}
+    dense = solve_runup(with_values(light, window), modes)
+    assert found.heard.level.max() == pytest.approx(dense.heard.level.max(), rel=0.05)
+    coarse = np.isin(np.round(found.input_speed / RPM, 6), np.linspace(2000, 3000, 11))
+    assert found.heard.level[coarse].max() < 0.7 * found.heard.level.max()
+
+
+def test_default_ends_and_refusals(case):
+    default = with_value(case, "runup", None)
+    assert np.array(runup_ends(default)) / RPM == pytest.approx([200.0, 3875.0])
+    one = with_values(default, {"operation.speeds": ["3100 rpm"], "housing.published": None})
+    assert np.array(runup_ends(one)) / RPM == pytest.approx([775.0, 3875.0])
+    with pytest.raises(CaseError, match="ends where it begins") as error:
+        check_case(with_values(case, {"runup.from": "3500 rpm"}))
+    assert error.value.key == "runup.to"
+    with pytest.raises(CaseError) as error:
+        check_case(with_values(case, {"runup.to": "300000 rpm"}))
+    assert error.value.key == "runup.to" and error.value.code == "E-RANGE"
+
+
+def test_a_count_of_zero_leaves_it_out(case):
+    off = with_value(case, "runup.count", 0)
+    assert [stage.name for stage in stages_of(off)][-1] == "housing"
+    with pytest.raises(CaseError, match=r"runup.count is 0"):
+        stages_of(off, "runup")
+
+
+def test_the_verdict_states_factors_stresses_and_what_they_assume(static, case, modes, found, tmp_path):
+    """K_v and safeties against the numbers that they come from; the run-up after the operating points."""
+    strong = with_values(
+        case, {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"}
+    )
+    check_case(strong)
+    dynamics = solve_dynamics(strong, static, modes)  # the limits decide no stage
+    files = {
+        "static": static.dataset(),
+        "stress": solve_stress(strong, static).dataset(),
+        "dynamics": dynamics.dataset(),
+        "housing": solve_housing(strong, dynamics).dataset(),
+        "runup": found.dataset(),
+    }
+    names = Manifest(complete=True, files={f"{name}.nc": "" for name in files})
+    results = Results(tmp_path, names, lambda path: strong).with_known(files)
+    vars(results)["case"] = strong
+    first, points, near = verdict(results)
+    told = dict(first.rows)
+    at_3100 = np.argmin(np.abs(found.input_speed / RPM - 3100.0))
+    sun, ring = found.heard.dynamic_factor[at_3100]
+    assert told["largest dynamic factor K_v"] == f"sun-planet {sun:.3f}, planet-ring {ring:.3f}"
+    assert told["planet load factor K_gamma"] == "sun-planet 1.000, planet-ring 1.000"
+    nominal = files["stress"]["iso_root_stress"].values[0, 1]
+    safety = 2 * 0.7 * 430e6 / (nominal * sun)
+    assert f"planet, sun side {safety:.2f}" in told["safety S_F, ISO 6336-3"]
+    contact = files["stress"]["iso_contact_stress"].values[0]
+    assert f"sun-planet {1500e6 / (contact * np.sqrt(sun)):.2f}" in told["safety S_H, ISO 6336-2"]
+    assert points.rows[1][3] == f"{float(files['housing']['level'][1]):.4g}"
+    assert "1e+10 N/m³ radial" in points.notes[0] and "damping ratio 0.05" in points.notes[0]
+    assert ("3100", "15", "4") in {(row[0], row[2], row[5]) for row in near.rows}
