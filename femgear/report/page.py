@@ -6,16 +6,20 @@ Figures are PNG, grids VTU, the turning carrier is a GIF; the page is one HTML f
 from __future__ import annotations
 
 import base64
+import hashlib
+import json
 import re
+import zlib
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from femgear.errors import printable
+from femgear.report.charts import chart
 from femgear.report.style import save_figure
 from femgear.report.tables import Block
-from femgear.storage.files import checksum, storage_errors
+from femgear.storage.files import checksum, storage_errors, write_text
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -29,39 +33,28 @@ _OTHER = "Other pictures"
 # what HTML and UTF-8 do not hold, and what reverses the order of the text around it
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
-_STYLE = """
-body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;
-  max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
-h1 { font-size: 1.7rem; margin-bottom: 0.2rem; }
-h2 { font-size: 1.25rem; margin-top: 2.4rem; border-bottom: 2px solid #0072b2; padding-bottom: 0.15rem; }
-h3 { font-size: 1.05rem; margin: 1.6rem 0 0.4rem; }
-p.lead { color: #555; margin-top: 0; }
-nav a { margin-right: 1rem; color: #0072b2; }
-div.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 0.86rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.2rem 0.7rem; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap; }
-th { border-bottom: 2px solid #888; font-weight: 600; }
-th:first-child, td:first-child { text-align: left; padding-left: 0; }
-p.note { font-size: 0.86rem; color: #444; margin: 0.3rem 0; }
-ul.warnings { border-left: 5px solid #d55e00; background: #fdf3ec; margin: 1rem 0;
-  padding: 0.6rem 1rem 0.6rem 2rem; }
-figure { margin: 1.4rem 0 2rem; }
-figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
-figcaption { font-size: 0.9rem; color: #333; margin-top: 0.4rem; }
-pre { font-size: 0.8rem; background: #f5f5f5; padding: 0.8rem; overflow-x: auto; }
-@media print { body { max-width: none; margin: 0; font-size: 11pt; } nav { display: none; }
-  figure, table { break-inside: avoid; } h2, h3 { break-after: avoid; } pre { white-space: pre-wrap; } }
-"""
+_WEB = Path(__file__).parent / "web"
+"""Style sheet, scripts, and the libraries that they draw with."""
+_CHARTS = "charts.json"
+"""File of what the charts of the page show."""
 
 
 def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
-    """Write the figures of the stages whose data are there, and of the case; returns the file names."""
+    """Write the figures of the stages whose data are there, and of the case; returns the file names.
+
+    What their charts on the page show is written with them.
+    """
     figures = {}
     for stage in _drawn(train, drawn):
         figures |= stage.draw(drawn)
+    if not figures:
+        return []
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in figures]
+    charts = {name: chart(figure) for name, figure in figures.items()}
+    found = {name: one for name, one in charts.items() if one is not None}
+    write_text(json.dumps(found, allow_nan=False, separators=(",", ":")), folder / _CHARTS)
+    return [*(f"{name}.png" for name in figures), _CHARTS]
 
 
 def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
@@ -88,22 +81,37 @@ def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progre
 
 @dataclass(frozen=True)
 class _Picture:
-    """A picture of the page: its section, caption, kind (``"image/png"``) and bytes."""
+    """A picture of the page: file name without suffix, section, caption, kind (``"image/png"``) and bytes."""
 
+    name: str
     section: str
     caption: str
     kind: str
     data: bytes
 
 
-def page(train: Train, results: Results) -> str:
-    """Make the page of a run as HTML text: tables, warnings, pictures, provenance.
+def page(train: Train, results: Results, *, static: bool = False) -> str:
+    """Make the page of a run as HTML text: tables, warnings, charts, pictures, provenance.
 
-    The pictures that its manifest names are embedded; the page loads nothing else. The same results give the
-    same text. StorageError: files were changed since the run.
+    Everything that it shows is in the page, which loads nothing else. The same results give the same text.
+
+    Parameters
+    ----------
+    train : Train
+        Of the case of the results.
+    results : Results
+    static : bool
+        Pictures instead of charts, and no scripts: for paper, and where scripts are not allowed.
+
+    Raises
+    ------
+    StorageError
+        Files were changed since the run.
     """
     case = results.case
-    pictures, skipped = _pictures(train, results)
+    pictures, charts, skipped = _pictures(train, results)
+    if static:
+        charts = {}
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
@@ -117,16 +125,42 @@ def page(train: Train, results: Results) -> str:
             "".join(map(_table, train.describe(case))),
         )
     )
-    body = "".join(_section(name, numbers, pictures, train, results) for name in sections)
-    text = (
+    body = "".join(_section(name, numbers, pictures, charts, train, results) for name in sections)
+    scripts = "" if static else _scripts({"charts": charts})
+    main = f"<main>\n{head}{body}{_provenance(results, numbers)}</main>\n"
+    text = _CONTROLS.sub(lambda found: printable(found[0]), main)
+    return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
-        "style-src 'unsafe-inline'\">\n"
+        f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(case.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
-        f"{head}{body}{_provenance(results, numbers)}</body>\n</html>\n"
+        f"<title>{_CONTROLS.sub(lambda found: printable(found[0]), escape(case.title))}</title>\n"
+        f"<style>{(_WEB / 'page.css').read_text('utf-8')}</style>\n</head>\n<body>\n"
+        f"{text}{scripts}</body>\n</html>\n"
     )
-    return _CONTROLS.sub(lambda found: printable(found[0]), text)
+
+
+def _scripts(data: dict[str, object]) -> str:
+    """Data and scripts of a page that can be read off and turned."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"), sort_keys=True)
+    packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
+    files = ("plotly-cartesian.min.js", "charts.js")
+    scripts = "".join(f"<script>{(_WEB / name).read_text('utf-8')}</script>\n" for name in files)
+    return (
+        '<noscript><p class="note">Charts need scripts, which are in this file: femgear report --static '
+        "writes a page without any.</p></noscript>\n"
+        f'<script type="text/plain" id="data">{packed}</script>\n{scripts}'
+    )
+
+
+def _policy(scripts: str) -> str:
+    """Allow the page its own scripts, by their checksums, and nothing from anywhere."""
+    found = re.findall(r"<script>(.*?)</script>", scripts, re.DOTALL)
+    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in found]
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+    return (
+        f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}; "
+        "base-uri 'none'; form-action 'none'"
+    )
 
 
 def _lead(results: Results) -> str:
@@ -156,7 +190,7 @@ def _warnings(warnings) -> str:
     return '<ul class="warnings">\n' + items + "</ul>\n"
 
 
-def _section(name: str, numbers, pictures, train: Train, results: Results) -> str:
+def _section(name: str, numbers, pictures, charts, train: Train, results: Results) -> str:
     """Show tables and pictures of a stage, nothing without any."""
     blocks = [numbers[name]] if name in numbers else []
     for stage in train.stages:
@@ -166,55 +200,73 @@ def _section(name: str, numbers, pictures, train: Train, results: Results) -> st
     if not blocks and not figures:
         return ""
     tables = "".join(_table(block, heading=i > 0) for i, block in enumerate(blocks))
-    return f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n' + tables + "".join(map(_figure, figures))
+    return (
+        f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n'
+        + tables
+        + "".join(_figure(one, charts) for one in figures)
+    )
 
 
 def _table(block: Block, *, heading: bool = True) -> str:
     """Show a table with its notes."""
-    title = f"<h3>{escape(block.title)}</h3>\n" if heading else ""
-    header = "".join(f"<th>{escape(text)}</th>" for text in block.header)
-    rows = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>\n" for row in block.rows
-    )
+    title = f"<h3>{escape(block.title)}</h3>\n" if heading and not block.rows else ""
+    header = "".join(f'<th scope="col">{escape(text)}</th>' for text in block.header)
+    rows = "".join(f"<tr>{_cells(row)}</tr>\n" for row in block.rows)
     table = ""
     if header or rows:
+        caption = f"<caption>{escape(block.title)}</caption>\n"
         head = f"<thead><tr>{header}</tr></thead>\n" if header else ""
-        table = f'<div class="wide"><table>\n{head}<tbody>\n{rows}</tbody>\n</table></div>\n'
+        body = f"{caption}{head}<tbody>\n{rows}</tbody>"
+        table = f'<div class="wide" tabindex="0"><table>\n{body}\n</table></div>\n'
     notes = "".join(f'<p class="note">{escape(note)}</p>\n' for note in block.notes)
     return title + table + notes
 
 
-def _figure(picture: _Picture) -> str:
-    """Embed a picture with its caption."""
-    data = base64.b64encode(picture.data).decode("ascii")
+def _cells(row) -> str:
+    """Cells of a row; the first one names it."""
+    first, *others = map(escape, row)
+    return f'<th scope="row">{first}</th>' + "".join(f"<td>{cell}</td>" for cell in others)
+
+
+def _figure(picture: _Picture, charts) -> str:
+    """Embed a chart, or the picture where there is none, with its caption."""
     caption = escape(picture.caption)
+    if picture.name in charts:
+        return (
+            f'<figure>\n<div class="chart" role="img" aria-label="{caption}" '
+            f'data-chart="{escape(picture.name)}"></div>\n<figcaption>{caption}</figcaption>\n</figure>\n'
+        )
+    data = base64.b64encode(picture.data).decode("ascii")
     return (
         f'<figure>\n<img alt="{caption}" src="data:{picture.kind};base64,{data}">\n'
         f"<figcaption>{caption}</figcaption>\n</figure>\n"
     )
 
 
-def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[str]]:
-    """Read the pictures that the manifest names, in the order of the captions, and what was left out."""
-    found, skipped = [], []
+def _pictures(train: Train, results: Results) -> tuple[list[_Picture], dict[str, object], list[str]]:
+    """Read the pictures that the manifest names in the order of the captions, charts, what was left out."""
+    found, skipped, charts = [], [], {}
     for name, digest in results.manifest.files.items():
         path = results.folder / name
         kind = _KINDS.get(path.suffix)
-        if kind is None:
+        if kind is None and name != _CHARTS:
             continue
         if not path.is_file() or path.is_symlink() or checksum(path) != digest:
             skipped.append(f"{name} is missing or was changed since the run, and is not shown")
             continue
         with storage_errors(path):
             data = path.read_bytes()
+        if kind is None:
+            charts = json.loads(data)
+            continue
         if len(data) > _LARGEST_PICTURE:
             skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
             continue
         rank, section, caption = caption_of(train, path.stem)
         caption = " ".join((caption, *train.remarks(results, path.stem)))
-        found.append((rank, _Picture(section, caption, kind, data)))
+        found.append((rank, _Picture(path.stem, section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
-    return [picture for _, picture in found], skipped
+    return [picture for _, picture in found], charts, skipped
 
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
