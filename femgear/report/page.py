@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from femgear.errors import printable
 from femgear.report.charts import chart
+from femgear.report.solid import SOLID
 from femgear.report.style import save_figure
 from femgear.report.tables import Block
 from femgear.storage.files import checksum, storage_errors, write_text
@@ -37,6 +38,21 @@ _WEB = Path(__file__).parent / "web"
 """Style sheet, scripts, and the libraries that they draw with."""
 _CHARTS = "charts.json"
 """File of what the charts of the page show."""
+_DATA = {_CHARTS: "charts", SOLID: "solid"}
+"""Files of a run that the scripts of its page draw, and their names there."""
+
+
+_SOLID = """<figure class="panel" id="solid"><div class="controls">
+<label>Shown <select id="solid-view"></select></label>
+<button id="solid-play" type="button">Move</button>
+<label>Magnified <input id="solid-scale" type="range" min="0" max="3" step="0.1" value="1"></label></div>
+<div class="view" id="solid-place" role="img" aria-label="The gear set in space"></div>
+<p class="note" id="solid-bar"></p>
+<figcaption>The set with its teeth; drag to turn it, arrow keys too. Stresses are those of a coarse grid under
+point loads: those of the roots stand in the table. A mode moves bodies and ring; the teeth of the ring follow
+its outer surface.</figcaption></figure>
+"""
+"""Place of the set in space."""
 
 
 def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
@@ -109,9 +125,9 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
         Files were changed since the run.
     """
     case = results.case
-    pictures, charts, skipped = _pictures(train, results)
+    pictures, data, skipped = _pictures(train, results)
     if static:
-        charts = {}
+        data = {}
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
@@ -122,11 +138,13 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
             _contents(sections, numbers, pictures),
             _warnings(warnings),
             '<h2 id="gears">Gears and operation</h2>\n',
+            _SOLID if "solid" in data else "",
             "".join(map(_table, train.describe(case))),
         )
     )
+    charts = data.setdefault("charts", {})
     body = "".join(_section(name, numbers, pictures, charts, train, results) for name in sections)
-    scripts = "" if static else _scripts({"charts": charts})
+    scripts = "" if static else _scripts(data)
     main = f"<main>\n{head}{body}{_provenance(results, numbers)}</main>\n"
     text = _CONTROLS.sub(lambda found: printable(found[0]), main)
     return (
@@ -143,7 +161,9 @@ def _scripts(data: dict[str, object]) -> str:
     """Data and scripts of a page that can be read off and turned."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), sort_keys=True)
     packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
-    files = ("plotly-cartesian.min.js", "charts.js")
+    files = ["plotly-cartesian.min.js", "charts.js"]
+    if "solid" in data:
+        files += ["three.min.js", "solid.js"]
     scripts = "".join(f"<script>{(_WEB / name).read_text('utf-8')}</script>\n" for name in files)
     return (
         '<noscript><p class="note">Charts need scripts, which are in this file: femgear report --static '
@@ -245,11 +265,11 @@ def _figure(picture: _Picture, charts) -> str:
 
 def _pictures(train: Train, results: Results) -> tuple[list[_Picture], dict[str, object], list[str]]:
     """Read the pictures that the manifest names in the order of the captions, charts, what was left out."""
-    found, skipped, charts = [], [], {}
+    found, skipped, others = [], [], {}
     for name, digest in results.manifest.files.items():
         path = results.folder / name
         kind = _KINDS.get(path.suffix)
-        if kind is None and name != _CHARTS:
+        if kind is None and name not in _DATA:
             continue
         if not path.is_file() or path.is_symlink() or checksum(path) != digest:
             skipped.append(f"{name} is missing or was changed since the run, and is not shown")
@@ -257,7 +277,7 @@ def _pictures(train: Train, results: Results) -> tuple[list[_Picture], dict[str,
         with storage_errors(path):
             data = path.read_bytes()
         if kind is None:
-            charts = json.loads(data)
+            others[_DATA[name]] = json.loads(data)
             continue
         if len(data) > _LARGEST_PICTURE:
             skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
@@ -266,7 +286,7 @@ def _pictures(train: Train, results: Results) -> tuple[list[_Picture], dict[str,
         caption = " ".join((caption, *train.remarks(results, path.stem)))
         found.append((rank, _Picture(path.stem, section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
-    return [picture for _, picture in found], charts, skipped
+    return [picture for _, picture in found], others, skipped
 
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
