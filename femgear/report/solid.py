@@ -122,7 +122,8 @@ def von_mises(grid: Grid, displacement: np.ndarray, material: Material) -> np.nd
     """Compute von Mises' stress at the nodes [Pa] in plane stress, mean of the elements around each.
 
     The displacement is (n, 2) [m]. Stresses of elements are taken at their corners and at the
-    middles of their sides; the faces of a gear are free (Timoshenko and Goodier, Theory of Elasticity, 3rd ed., 1970, article 16).
+    middles of their sides; the faces of a gear are free (Timoshenko and Goodier, "Theory of Elasticity",
+    3rd ed., section 10).
     """
     places = np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
     slopes = np.stack(shape_functions(*places)[1:])
