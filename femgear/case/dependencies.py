@@ -27,8 +27,8 @@ _KEPT = 4
 FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"})
 """Entries that do nothing but separate flanks: no grid knows them, and derivatives reach them."""
 
-_WORDS = {"format", "title", "housing"}
-"""No stage before the housing depends on them."""
+_WORDS = {"format", "title", "housing", "runup"}
+"""No stage before housing and run-up depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 """As the supports, without effect on the static solution while all members are fixed."""
@@ -67,6 +67,13 @@ def modal_entries(case: Case) -> Entries:
 def dynamic_entries(case: Case) -> Entries:
     """List the entries that decide the periodic response: all but the sensor."""
     return _entries(case, _DYNAMIC)
+
+
+def runup_entries(case: Case) -> Entries:
+    """List the entries that decide the run-up: those of the response, its own and the sensor's angle."""
+    return _entries(
+        case, _DYNAMIC, kept={"housing.sensor_angle", *(f"runup.{n}" for n in ("start", "to", "count"))}
+    )
 
 
 def compliance_entries(case: Case) -> Entries:

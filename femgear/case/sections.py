@@ -398,6 +398,18 @@ class DynamicsSection(Section):
     tolerance: Annotated[float, Number(1e-12, 1e-2)] = 1e-6
 
 
+class RunupSection(Section):
+    """Speeds over which mesh forces and sensor are followed; `count` 0 leaves the run-up out.
+
+    Without ends it reaches from 0.8 times the lowest operating speed, or a quarter of the highest if that is
+    less, to 1.25 times the highest.
+    """
+
+    start: Speed | None = Field(default=None, alias="from")
+    to: Speed | None = None
+    count: Annotated[int, Count(0, 20_000)] = 400
+
+
 class PublishedLines(Section):
     """Lines and lobes around a mesh harmonic that somebody published; the report compares them."""
 
@@ -444,6 +456,7 @@ class Case(Section, ReadCase):
     static: StaticSection = StaticSection()
     dynamics: DynamicsSection = DynamicsSection()
     housing: HousingSection = HousingSection()
+    runup: RunupSection = RunupSection()
 
     @property
     def rigid(self) -> bool:

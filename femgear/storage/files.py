@@ -66,6 +66,8 @@ _LISTED: set[Path] = set()
 _SPARSE, _MARGIN = 100, 1_000_000
 # numbers in a piece of a variable that grows
 _CHUNK = 2**16
+# bytes of a variable from which it is compressed
+_COMPRESSED = 4_000_000
 # bytes of numbers of a file from which they are read when they are asked for
 _LARGE = 200_000_000
 
@@ -106,8 +108,9 @@ def _create(dataset: xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> N
         for name, one in dataset.variables.items():
             kind = stored.get(one.dtype.kind, one.dtype)
             options = {"maxshape": [longest[dim] for dim in one.dims], "fletcher32": kind.kind != "O"}
-            if free and one.dtype.kind not in "OUS":
-                options |= {"chunks": _chunk(one, free), "compression": "gzip", "compression_opts": 1}
+            if (free or one.nbytes > _COMPRESSED) and one.dtype.kind not in "OUS":
+                pieces = _chunk(one, free) if free else True
+                options |= {"chunks": pieces, "compression": "gzip", "compression_opts": 1}
             values = one.values.astype(kind, copy=False)
             made[name] = file.create_dataset(str(name), data=values, **(options if one.dims else {}))
             made[name].attrs.update(one.attrs, **({"dtype": "bool"} if one.dtype.kind == "b" else {}))

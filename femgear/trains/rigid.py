@@ -51,11 +51,12 @@ def listed(names: list[str]) -> str:
 
 
 def entries_without_effect(data: dict, others: Sequence[str] = ()) -> list[str]:
-    """List entries that no set of rigid bodies takes up: machines, housing, foundation of the ring, others.
+    """List entries that no set of rigid bodies takes up: machines, housing, run-up, foundation of the ring,
+    others.
 
     ``data`` are the tables of a case file that was checked.
     """
-    machines = [name for name in ("motor", "brake", "housing") if name in data]
+    machines = [name for name in ("motor", "brake", "housing", "runup") if name in data]
     keys = ("foundation_radial", "foundation_tangential")
     return [*machines, *others, *(f"ring.{key}" for key in keys if key in data["ring"])]
 

@@ -66,6 +66,8 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
         )
     check_one_period(case, gears, "modes, dynamics and housing take")
     fastest_mesh_frequency(case, gears)
+    if case.runup.count:
+        runup_ends(case)
 
 
 def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
@@ -93,19 +95,52 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
 
     CaseError: a carrier speed [rad/s] at or above the lowest ``2 pi f_n / n`` (E-SPEED).
     """
-    wave = ring_modes.nodal_diameter > 0
-    critical = 2.0 * np.pi * ring_modes.frequency[wave] / ring_modes.nodal_diameter[wave]
-    lowest, fastest = int(np.argmin(critical)), float(np.max(np.abs(carrier_speeds)))
-    if fastest >= critical[lowest]:
+    (critical, diameters), fastest = slowest_wave(ring_modes), float(np.max(np.abs(carrier_speeds)))
+    if fastest >= critical:
         raise CaseError(
             f"the carrier turns at {fastest / RPM:.6g} rpm, faster than the wave of "
-            f"{ring_modes.nodal_diameter[wave][lowest]} nodal diameters around the ring",
+            f"{diameters} nodal diameters around the ring",
             code="E-SPEED",
             key="operation.speeds",
             value=f"{fastest / RPM:.6g} rpm of the carrier",
-            limit=f"below {critical[lowest] / RPM:.6g} rpm of the carrier",
+            limit=f"below {critical / RPM:.6g} rpm of the carrier",
             remedy="leave the highest speeds out, or stiffen the ring or its foundation",
         )
+
+
+def slowest_wave(ring_modes: CyclicModes) -> tuple[float, int]:
+    """Find the angular speed of the slowest wave around the ring [rad/s], and its nodal diameters."""
+    wave = ring_modes.nodal_diameter > 0
+    critical = 2.0 * np.pi * ring_modes.frequency[wave] / ring_modes.nodal_diameter[wave]
+    lowest = int(np.argmin(critical))
+    return float(critical[lowest]), int(ring_modes.nodal_diameter[wave][lowest])
+
+
+def runup_ends(case: Case) -> tuple[float, float]:
+    """Find the first and the last speed of the run-up [rad/s], as the case gives them or by default.
+
+    CaseError: they are not in this order, or the last one is beyond what the model means anything for.
+    """
+    speeds, section, gears = case.operation.speeds, case.runup, planetary_set(case)
+    to = section.to or 1.25 * max(speeds)
+    start = section.start or min(0.8 * min(speeds), 0.25 * max(speeds))
+    if not start < to:
+        raise CaseError(
+            "the run-up ends where it begins, or before",
+            code="E-RANGE",
+            key="runup.from" if section.to is None else "runup.to",
+            value=f"{(start if section.to is None else to) / RPM:.6g} rpm",
+            limit=f"from {start / RPM:.6g} to {to / RPM:.6g} rpm",
+            remedy="give runup.from below runup.to; defaults are around operation.speeds",
+        )
+    if section.to is not None:
+        operation = case.operation.model_copy(update={"speeds": (section.to,)})
+        try:
+            fastest_mesh_frequency(case.model_copy(update={"operation": operation}), gears)
+        except CaseError as error:
+            error.key = "runup.to"
+            raise
+    return start, to
 
 
 def case_warnings(case: Case) -> Iterator[Finding]:

@@ -27,6 +27,7 @@ from femgear.case.dependencies import (
     dynamic_entries,
     modal_entries,
     ring_entries,
+    runup_entries,
     state_entries,
     static_entries,
 )
@@ -45,6 +46,7 @@ from femgear.housing.sensor import SensorLines, component_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
+from femgear.solvers.linear.resonances import crossings, modal_forces
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
@@ -61,6 +63,8 @@ from femgear.trains.elastic.checks import (
     fastest_mesh_frequency,
     max_nodal_diameter,
     missing_level,
+    runup_ends,
+    slowest_wave,
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.model import (
@@ -81,6 +85,15 @@ from femgear.trains.elastic.results import (
     ModesResult,
     describe_housing,
     mesh_bands,
+)
+from femgear.trains.elastic.runup import (
+    HeardSpeeds,
+    RunupResult,
+    describe_runup,
+    heard_speeds,
+    joined,
+    refined_speeds,
+    resonances,
 )
 from femgear.trains.protocol import (
     Progress,
@@ -106,6 +119,10 @@ HARMONICS = 512
 speeds are excited less far, and `_lost_level` tells what they lose."""
 _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
+_LINES_TOGETHER = 8000
+"""Harmonics of the run-up's speeds that are in memory at a time."""
+_BELOW_WAVES = 0.9
+"""The run-up ends, unless the case says otherwise, so far below the slowest wave around the ring."""
 _NOTICED, _SECONDS = 2e9, 1.5e-4
 """Size of files that is said before [bytes], and what a harmonic of one speed takes (2 GHz, one core) [s]."""
 
@@ -152,6 +169,25 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     beyond = excitation + 2 * np.minimum(excitation, 6)
     response = np.maximum(case.dynamics.response_harmonics or beyond, excitation)
     return _FrequencyLimit(excitation, response, excitation * frequency)
+
+
+def _excitation_end(
+    case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, some: np.ndarray
+) -> tuple[float, float, np.ndarray, Response]:
+    """Choose where the excitation ends, from some of the speeds, so that the level has converged if it may.
+
+    Frequency [Hz], that to which the level was compared [Hz], its changes [dB] and the response at those
+    speeds; mesh frequencies [Hz] and speeds of the carrier [rad/s] are (n_speeds,).
+    """
+    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
+    while True:
+        limit = limited(case, frequency, up_to, given=given)
+        response = solve_spectral(modes.modes, modes.excitation, frequency[some], **limit.options(case, some))
+        beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
+        change, short = _level_change(case, modes, carrier[some], response, beyond)
+        if not short or given is not None or up_to != modes.reach or case.dynamics.up_to is not None:
+            return up_to, beyond, change, response
+        up_to = beyond  # once: the modal basis carries no more
 
 
 def _level_change(
@@ -388,16 +424,8 @@ def dynamics_parts(
     basis, excitation, gears = modes.modes, modes.excitation, static.planetary_set
     speeds, (frequency, carrier) = np.array(case.operation.speeds), _turning_speeds(case, modes)
     names, pulls, some = mesh_names(gears.n_planets), list[np.ndarray](), checked_speeds(len(speeds))
-    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
-    limit = limited(case, frequency, up_to, given=given)
-    response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
-    beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
-    change, short = _level_change(case, modes, carrier[some], response, beyond)
-    if short and given is None and case.dynamics.up_to is None:
-        limit = limited(case, frequency, beyond)
-        response = solve_spectral(basis, excitation, frequency[some], **limit.options(case, some))
-        beyond *= 2.0
-        change, _ = _level_change(case, modes, carrier[some], response, beyond)
+    up_to, beyond, change, response = _excitation_end(case, modes, frequency, carrier, some)
+    limit = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics)
     level_change = np.full(len(speeds), np.nan)
     level_change[some] = change
     slow = frequency * HARMONICS < beyond - frequency
@@ -471,6 +499,61 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )
 
 
+@one_blas_thread()
+def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) -> RunupResult:
+    """Follow sensor and mesh forces over the speeds of the run-up, without stability.
+
+    The excitation ends where that of `solve_dynamics` does. CaseError: E-SPEED as there. ConvergenceError.
+    """
+    check_entries(modes, ModesResult, modal_entries(case), "modal basis")
+    one, basis, excitation = member_speeds(case, planetary_set(case)), modes.modes, modes.excitation
+    operating, given = np.array(case.operation.speeds), case.dynamics.mesh_harmonics
+    some = checked_speeds(len(operating))
+    up_to = _excitation_end(case, modes, *_turning_speeds(case, modes), some)[0]
+    first, last = _runup_ends(case, modes)
+    slowest, fastest = first * one.mesh_frequency, last * one.mesh_frequency
+    count = int(limited(case, [slowest], up_to, given=given).excitation[0])
+    field = ring_field(
+        modes.model, modes.ring.modes, basis.shape[modes.model.ring_slice].T, RADIAL, modes.max_diameter
+    )
+    forces = modal_forces(basis, excitation, count, output=field)
+    met = crossings(forces, slowest, fastest, up_to if given is None else math.inf)
+    found = resonances(basis, forces, met, one.mesh_frequency, operating)
+    speeds = np.linspace(first, last, case.runup.count)
+    speeds = refined_speeds(speeds, found.speed, found.alone, forces.damping_ratio[met.row])
+    speeds = np.union1d(speeds, operating[some][(operating[some] >= first) & (operating[some] <= last)])
+    frequency, carrier, parts = one.mesh_frequency * speeds, one.carrier * speeds, list[HeardSpeeds]()
+    limit = limited(case, frequency, up_to, given=given)
+    cuts = np.flatnonzero(np.diff(np.cumsum(limit.response) // _LINES_TOGETHER)) + 1
+    for own in np.split(np.arange(len(speeds)), cuts):
+        response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
+        parts.append(heard_speeds(response, _sensor_lines(case, modes, response, carrier[own])))
+        progress("runup", float(own[-1] + 1), float(len(speeds)))
+    return RunupResult(
+        input_speed=speeds,
+        mesh_frequency=frequency,
+        excitation_limit=limit.frequency,
+        carrier_speed=carrier,
+        heard=joined(parts),
+        resonances=found,
+        ring_teeth=case.ring.teeth,
+        sensor_angle=case.housing.sensor_angle,
+        entries=runup_entries(case),
+    )
+
+
+def _runup_ends(case: Case, modes: ModesResult) -> tuple[float, float]:
+    """First and last speed of the run-up [rad/s]; a default does not leave the range of the model."""
+    one, (first, last) = member_speeds(case, planetary_set(case)), runup_ends(case)
+    if case.runup.to is not None:
+        check_rim_speed(modes.ring.modes, one.carrier * last)
+        return first, last
+    highest = min(HIGHEST_RESPONSE / (case.response_harmonics or 3), case.dynamics.up_to or math.inf)
+    wave = _BELOW_WAVES * slowest_wave(modes.ring.modes)[0]
+    allowed = min(highest / one.mesh_frequency, wave / abs(one.carrier))
+    return first, max(min(last, allowed), *case.operation.speeds)
+
+
 def _warnings(case: Case) -> Iterator[Finding]:
     """List what deserves a look in the case, and the size of the results of many speeds."""
     yield from case_warnings(case)
@@ -528,6 +611,16 @@ ELASTIC = Train(
             verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(results.housing),
             tables=lambda results: (mesh_bands(results),),
+        ),
+        Stage(
+            name="runup",
+            title="Run-up",
+            solve=solve_runup,
+            takes=("modes",),
+            options=("progress",),
+            verdict=lambda result: {"speeds": len(result.input_speed)},
+            describe=lambda results: describe_runup(results.runup),
+            unavailable=lambda case: "" if case.runup.count else "runup.count is 0",
         ),
     ),
     describe=describe_set,

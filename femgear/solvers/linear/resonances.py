@@ -1,0 +1,143 @@
+"""Which harmonics of the mesh frequency excite which modes, and where they meet over the speed.
+
+At rest the meshes have the deflection ``s_j`` and the force ``F_j`` of their static record. Beyond its mean
+stiffness ``k_j``, which the modes contain, mesh j acts with ``P_jh = F_jh - k_j s_jh`` in harmonic h, the
+right-hand side of the harmonic equations in `femgear.solvers.periodic.spectral` in the limit of low speed.
+On mode i with the mesh deflections ``r_ij`` that is the modal force ``Q_ih = -sum_j r_ij P_jh``.
+
+Equal and equally spaced planets have equal ``P_jh`` but for their phases, which cancel this sum for all modes
+of other kinds: with ``k = h z_sun mod N`` rotational modes are excited where k = 0, translational ones where
+k = 1 or N - 1, planet modes else (R. G. Parker, J. Sound Vib. 236, 2000, 561-573; V. K. Ambarisha and R. G.
+Parker, J. Vib. Acoust. 128, 2006, 133-142), and those of an elastic ring by its nodal diameters n where
+n = k or -k mod N. Nothing here knows the rule: the sum itself is computed, so that unequal planets and
+spacing are no exceptions, and nodes of a mode at the meshes count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.system.system import MeshExcitation, Modes, freeze, mesh_harmonics
+
+EXCITED = 1e-3
+"""Share of the largest modal force of a harmonic from which on a mode counts as excited by it."""
+_ONE_FREQUENCY = 1e-6
+"""Modes closer than this (relative) are one: any mixture of them is a mode."""
+
+
+@dataclass(frozen=True)
+class ModalForces:
+    """Forces of the mesh harmonics 1..H on the G natural frequencies of a system, rigid motions left out.
+
+    Parameters
+    ----------
+    mode : (G,) int array
+        First mode of each natural frequency.
+    frequency : (G,) array
+        [Hz]
+    damping_ratio : (G,) array
+    force : (G, H) array
+        Modal force [N/kg^1/2], of several modes of one frequency the root of the sum of squares.
+    acceleration : (G, H) array
+        Root mean square [m/s^2] of the output when the harmonic lies on the mode, by that mode alone;
+        infinite without damping.
+    """
+
+    mode: np.ndarray
+    frequency: np.ndarray
+    damping_ratio: np.ndarray
+    force: np.ndarray
+    acceleration: np.ndarray
+
+    def __post_init__(self):
+        freeze(self)
+
+    @property
+    def share(self) -> np.ndarray:
+        """Modal forces over the largest of their harmonic, (G, H), 0 to 1."""
+        return self.force / np.maximum(self.force.max(axis=0, initial=0.0), np.finfo(float).tiny)
+
+    @property
+    def excited(self) -> np.ndarray:
+        """Whether a harmonic excites a natural frequency, (G, H) bool: its share is `EXCITED` or more."""
+        return self.share >= EXCITED
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Meetings of a mesh harmonic with a natural frequency that it excites, (c,) each, by mesh frequency.
+
+    ``row`` are numbers of natural frequencies in `ModalForces`, ``harmonic`` those of mesh harmonics from 1,
+    ``mesh_frequency`` is in Hz.
+    """
+
+    row: np.ndarray
+    harmonic: np.ndarray
+    mesh_frequency: np.ndarray
+
+    def __post_init__(self):
+        freeze(self)
+
+
+def modal_forces(modes: Modes, excitation: MeshExcitation, count: int, output=None) -> ModalForces:
+    """Compute the modal forces of mesh harmonics 1 to ``count``.
+
+    Parameters
+    ----------
+    modes : Modes
+        Basis with the mean stiffnesses of the excitation.
+    excitation : MeshExcitation
+    count : int
+        At most half the positions of the record.
+    output : (n_modes, L) complex array, optional
+        Amplitudes [m kg^-1/2] of L lines that are heard apart, of every mode: components of a field. The
+        accelerations are zero without them.
+
+    Raises
+    ------
+    CaseError
+        Data that do not fit each other (E-SHAPE), too few positions (E-HARMONICS).
+    """
+    if len(modes.mesh_stiffness) != len(excitation.stiffness):
+        raise CaseError(
+            f"modes of {len(modes.mesh_stiffness)} meshes, excitation of {len(excitation.stiffness)}",
+            code="E-SHAPE",
+        )
+    _, deflection, force = mesh_harmonics(excitation, count)
+    left = force - modes.mesh_stiffness[:, None] * deflection
+    heard = slice(excitation.periods, None, excitation.periods)
+    Q = -modes.mesh_deflection.T @ left[:, heard]
+    elastic = np.flatnonzero(modes.frequency > 0.0)
+    frequency, damping = modes.frequency[elastic], modes.damping_ratio[elastic]
+    first = np.flatnonzero(np.diff(frequency, prepend=0.0) > _ONE_FREQUENCY * frequency)
+    Q = Q[elastic]
+    lines = np.zeros((len(modes.frequency), 1)) if output is None else np.asarray(output)
+    amplitude = np.add.reduceat(Q[:, :, None] * lines[elastic][:, None, :], first, axis=0)
+    rms = np.sqrt(0.5 * (np.abs(amplitude) ** 2).sum(axis=-1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # twice differentiated, the resonance Q / (2 zeta w^2) of a modal coordinate is free of w
+        acceleration = np.where(rms > 0.0, 0.5 * rms / damping[first, None], 0.0)
+    return ModalForces(
+        mode=elastic[first],
+        frequency=frequency[first],
+        damping_ratio=damping[first],
+        force=np.sqrt(np.add.reduceat(np.abs(Q) ** 2, first, axis=0)),
+        acceleration=acceleration,
+    )
+
+
+def crossings(forces: ModalForces, lowest: float, highest: float, up_to: float) -> Crossings:
+    """Find the mesh frequencies [Hz] between two at which an excited mode meets its harmonic.
+
+    Natural frequencies above ``up_to`` [Hz], where the excitation ends, meet none.
+    """
+    harmonic = np.arange(1, forces.force.shape[1] + 1)
+    at = forces.frequency[:, None] / harmonic
+    met = forces.excited & (at >= lowest) & (at <= highest) & (forces.frequency[:, None] <= up_to)
+    row, column = np.nonzero(met)
+    along = np.argsort(at[row, column], kind="stable")
+    row, column = row[along], column[along]
+    return Crossings(row, harmonic[column], at[row, column])
