@@ -1,4 +1,4 @@
-"""A run-up that the page lets one walk through: modes and mesh orders, spectrum, lobes and sound at any speed."""
+"""A run-up that the page lets one walk through: modes, mesh orders, spectrum, lobes and sound at a speed."""
 
 from __future__ import annotations
 

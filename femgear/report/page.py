@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from femgear.errors import printable
 from femgear.report.charts import chart
+from femgear.report.explorer import EXPLORER
 from femgear.report.solid import SOLID
 from femgear.report.style import save_figure
 from femgear.report.tables import Block
@@ -38,21 +39,10 @@ _WEB = Path(__file__).parent / "web"
 """Style sheet, scripts, and the libraries that they draw with."""
 _CHARTS = "charts.json"
 """File of what the charts of the page show."""
-_DATA = {_CHARTS: "charts", SOLID: "solid"}
+_DATA = {_CHARTS: "charts", SOLID: "solid", EXPLORER: "runup"}
 """Files of a run that the scripts of its page draw, and their names there."""
-
-
-_SOLID = """<figure class="panel" id="solid"><div class="controls">
-<label>Shown <select id="solid-view"></select></label>
-<button id="solid-play" type="button">Move</button>
-<label>Magnified <input id="solid-scale" type="range" min="0" max="3" step="0.1" value="1"></label></div>
-<div class="view" id="solid-place" role="img" aria-label="The gear set in space"></div>
-<p class="note" id="solid-bar"></p>
-<figcaption>The set with its teeth; drag to turn it, arrow keys too. Stresses are those of a coarse grid under
-point loads: those of the roots stand in the table. A mode moves bodies and ring; the teeth of the ring follow
-its outer surface.</figcaption></figure>
-"""
-"""Place of the set in space."""
+_PARTS = {"solid": ("three.min.js", "solid.js"), "runup": ("explorer.js",)}
+"""Scripts of the parts of the page that have a place of their own."""
 
 
 def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
@@ -138,12 +128,15 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
             _contents(sections, numbers, pictures),
             _warnings(warnings),
             '<h2 id="gears">Gears and operation</h2>\n',
-            _SOLID if "solid" in data else "",
+            _part("solid", data),
             "".join(map(_table, train.describe(case))),
         )
     )
     charts = data.setdefault("charts", {})
-    body = "".join(_section(name, numbers, pictures, charts, train, results) for name in sections)
+    body = "".join(
+        _section(name, numbers, pictures, charts, train, results, _part(name.lower().replace("-", ""), data))
+        for name in sections
+    )
     scripts = "" if static else _scripts(data)
     main = f"<main>\n{head}{body}{_provenance(results, numbers)}</main>\n"
     text = _CONTROLS.sub(lambda found: printable(found[0]), main)
@@ -161,9 +154,8 @@ def _scripts(data: dict[str, object]) -> str:
     """Data and scripts of a page that can be read off and turned."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), sort_keys=True)
     packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
-    files = ["plotly-cartesian.min.js", "charts.js"]
-    if "solid" in data:
-        files += ["three.min.js", "solid.js"]
+    parts = [name for part, names in _PARTS.items() if part in data for name in names]
+    files = ("plotly-cartesian.min.js", "charts.js", *parts)
     scripts = "".join(f"<script>{(_WEB / name).read_text('utf-8')}</script>\n" for name in files)
     return (
         '<noscript><p class="note">Charts need scripts, which are in this file: femgear report --static '
@@ -210,7 +202,12 @@ def _warnings(warnings) -> str:
     return '<ul class="warnings">\n' + items + "</ul>\n"
 
 
-def _section(name: str, numbers, pictures, charts, train: Train, results: Results) -> str:
+def _part(name: str, data) -> str:
+    """Place of what scripts draw of the whole set or run, nothing where there is none."""
+    return (_WEB / f"{name}.html").read_text("utf-8") if name in data and name in _PARTS else ""
+
+
+def _section(name: str, numbers, pictures, charts, train: Train, results: Results, part: str = "") -> str:
     """Show tables and pictures of a stage, nothing without any."""
     blocks = [numbers[name]] if name in numbers else []
     for stage in train.stages:

@@ -66,6 +66,7 @@ page.axis = (axis, share, other, narrow) => {
   if (axis.range) found.range = axis.log ? axis.range.map(Math.log10) : axis.range;
   if (axis.ticks) Object.assign(found, { tickmode: "array", tickvals: axis.ticks, ticktext: axis.texts.map(page.clear) });
   if (axis.log) found.dtick = 1;
+  else found.tickformat = ",~r";
   if (axis.hidden) Object.assign(found, { visible: false });
   if (narrow) found.nticks = 5;
   return found;

@@ -27,9 +27,9 @@ page.explorer = () => {
 
   const look = (title) => ({ paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 62, r: 14, t: 34, b: 50 }, height: 330,
     font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: 12, color: page.style("--ink") }, showlegend: false, hovermode: "closest",
-    title: { text: title, x: 0, xref: "paper", font: { size: 13 } } });
+    title: { text: page.wrapped(title, root.clientWidth > 800 ? root.clientWidth / 2 - 80 : root.clientWidth - 70).text, x: 0, xref: "paper", font: { size: 13 } } });
   const axis = (title, more) => ({ title: { text: title }, gridcolor: page.style("--rule"), linecolor: page.style("--soft"), showline: true, zeroline: false,
-    exponentformat: "power", automargin: true, ...more });
+    exponentformat: "power", automargin: true, ...(more.type === "log" ? { dtick: 1 } : { tickformat: ",~r" }), ...more });
   const quiet = { displaylogo: false, responsive: false, displayModeBar: false };
   const top = Math.max(...data.mesh) * (data.harmonics + 0.5), speeds = [data.speed[0], data.speed[data.speed.length - 1]];
 
@@ -40,9 +40,10 @@ page.explorer = () => {
       traces.push({ x: data.speed, y: data.mesh.map((one) => h * one), mode: "lines", line: { color: page.colour("#808080"), width: 1, dash: "dot" },
         hovertemplate: `mesh harmonic ${h}<br>%{x:.5g} rpm, %{y:.5g} Hz<extra></extra>` });
     }
-    traces.push({ x: data.resonances.map((one) => one[0]), y: data.resonances.map((one) => one[1]), mode: "markers",
+    const met = data.resonances.filter((one) => one[4] <= data.harmonics);
+    traces.push({ x: met.map((one) => one[0]), y: met.map((one) => one[1]), mode: "markers",
       marker: { symbol: "circle-open", size: 9, color: page.colour("#d55e00"), line: { width: 2 } },
-      text: data.resonances.map(([rpm, hertz, mode, kind, h]) => `${rpm.toFixed(1)} rpm: mode ${mode} (${page.clear(kind)})<br>${hertz.toFixed(1)} Hz, mesh harmonic ${h}`),
+      text: met.map(([rpm, hertz, mode, kind, h]) => `${rpm.toFixed(1)} rpm: mode ${mode} (${page.clear(kind)})<br>${hertz.toFixed(1)} Hz, mesh harmonic ${h}`),
       hovertemplate: "%{text}<extra></extra>" });
     traces.push({ x: [], y: [], mode: "markers", marker: { size: 8, color: page.colour("#d55e00") }, hoverinfo: "skip" });
     const kinds = [...new Map(data.modes.map((one) => [one[2], one[3]]))];

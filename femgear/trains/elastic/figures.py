@@ -12,6 +12,7 @@ By stage:
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,6 +26,7 @@ from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
 from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
 from femgear.housing.sensor import fixed_sensor_signal, stored_lines
+from femgear.report.explorer import EXPLORER, explorer
 from femgear.report.response import (
     MODE_CAPTIONS,
     RESPONSE_CAPTIONS,
@@ -50,6 +52,7 @@ from femgear.report.style import (
     new_figure,
     rpm,
 )
+from femgear.storage.files import write_text
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import picture_sectors
@@ -440,6 +443,13 @@ def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
     return ["operating_deflection.gif"]
 
 
+def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
+    """What the page walks through of the run-up."""
+    found = explorer(drawn.data["runup"], drawn.data["modes"])
+    write_text(json.dumps(found, allow_nan=False, separators=(",", ":")), folder / EXPLORER)
+    return [EXPLORER]
+
+
 def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
     figures, housing = {}, drawn.data["housing"]
     drawings = (
@@ -493,4 +503,5 @@ FIGURES = STATIC | {
         },
         draw=_housing_figures,
     ),
+    "runup": Figures({}, write=(_write_explorer,)),
 }
