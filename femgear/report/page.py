@@ -219,6 +219,7 @@ def _section(name: str, numbers, pictures, charts, train: Train, results: Result
     tables = "".join(_table(block, heading=i > 0) for i, block in enumerate(blocks))
     return (
         f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n'
+        + part
         + tables
         + "".join(_figure(one, charts) for one in figures)
     )
