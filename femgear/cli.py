@@ -236,17 +236,19 @@ def run(
 
 
 @app.command
-def report(folder: Path, /) -> int:
+def report(folder: Path, /, *, static: Annotated[bool, Parameter(negative="")] = False) -> int:
     """Write report.html from the results in a folder.
 
     Parameters
     ----------
     folder
         Folder that femgear run wrote.
+    static
+        Pictures and no scripts: for paper, and where scripts are not allowed.
     """
     from femgear.run import report_again
 
-    report_again(folder)
+    report_again(folder, static=static)
     _say(f"report:  {folder / 'report.html'}")
     return 0
 
