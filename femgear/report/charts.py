@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _DIGITS = 5
@@ -63,7 +62,7 @@ def chart(figure: Figure) -> dict[str, Any] | None:
         found = [_panel(ax, number, panels) for number, ax in enumerate(panels)]
     except _PictureOnly:
         return None
-    grids = [ax.get_gridspec() for ax in panels if ax.get_subplotspec() is not None]
+    grids: list[Any] = [ax.get_gridspec() for ax in panels if ax.get_subplotspec() is not None]
     if len(grids) != len(panels) or not found:
         return None
     title = figure.get_suptitle()
@@ -82,7 +81,7 @@ def _fields(figure: Figure) -> list[Any]:
     return [one for ax in figure.axes for one in ax.collections if getattr(one, "colorbar", None) is not None]
 
 
-def _panel(ax: Axes, number: int, panels: list[Axes]) -> dict[str, Any]:
+def _panel(ax: Any, number: int, panels: list[Any]) -> dict[str, Any]:
     """Read one pair of axes."""
     spec = ax.get_subplotspec()
     polar = ax.name == "polar"
@@ -108,13 +107,13 @@ def _panel(ax: Axes, number: int, panels: list[Axes]) -> dict[str, Any]:
     )
 
 
-def _polar_limits(ax: Axes) -> dict[str, Any]:
+def _polar_limits(ax: Any) -> dict[str, Any]:
     """Limits of the plane that a polar diagram is drawn in."""
     reach = float(ax.get_rmax() - ax.get_rorigin()) * 1.12
     return {name: {"hidden": True, "range": [-reach, reach], "title": ""} for name in ("x", "y")}
 
 
-def _circles(ax: Axes) -> list[dict[str, Any]]:
+def _circles(ax: Any) -> list[dict[str, Any]]:
     """Circles and rays of a polar diagram, with their numbers."""
     turn = np.linspace(0.0, 2 * np.pi, 181)
     origin, outer = float(ax.get_rorigin()), float(ax.get_rmax())
@@ -153,12 +152,12 @@ def _axis(axis, limits) -> dict[str, Any]:
     return found
 
 
-def _lines(ax: Axes) -> list[dict[str, Any]]:
+def _lines(ax: Any) -> list[dict[str, Any]]:
     """Read curves, markers and lines across the panel."""
     return [_curve(line, ax) for line in ax.get_lines() if line.get_visible()]
 
 
-def _curve(line, ax: Axes) -> dict[str, Any]:
+def _curve(line, ax: Any) -> dict[str, Any]:
     """Read one curve."""
     from matplotlib.colors import to_hex
 
@@ -184,14 +183,14 @@ def _curve(line, ax: Axes) -> dict[str, Any]:
     return {**found, **_coordinates(x, y, ax), **_name(line)}
 
 
-def _across(transform, ax: Axes) -> str:
+def _across(transform, ax: Any) -> str:
     """Tell whether x or y of an artist is a share of the panel's side."""
     if transform == ax.get_yaxis_transform():
         return "x"
     return "y" if transform == ax.get_xaxis_transform() else ""
 
 
-def _spread(x, y, across: str, ax: Axes) -> dict[str, Any]:
+def _spread(x, y, across: str, ax: Any) -> dict[str, Any]:
     """Spread shares of the side of a panel over its limits."""
     low, high = ax.get_xlim() if across == "x" else ax.get_ylim()
     if (ax.get_xscale() if across == "x" else ax.get_yscale()) == "log":
@@ -208,7 +207,7 @@ def _name(artist) -> dict[str, Any]:
     return {"name": "" if text.startswith("_") else text}
 
 
-def _coordinates(x, y, ax: Axes) -> dict[str, Any]:
+def _coordinates(x, y, ax: Any) -> dict[str, Any]:
     """Coordinates of points as they are drawn."""
     x, y = _thinned(np.asarray(x, float), np.asarray(y, float))
     if ax.name == "polar":
@@ -236,7 +235,7 @@ def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x[kept], y[kept]
 
 
-def _areas(ax: Axes) -> list[dict[str, Any]]:
+def _areas(ax: Any) -> list[dict[str, Any]]:
     """Read filled areas, bundles of lines, and fields."""
     from matplotlib.collections import LineCollection, PathCollection, PolyCollection, QuadMesh
 
@@ -255,7 +254,7 @@ def _areas(ax: Axes) -> list[dict[str, Any]]:
     return found
 
 
-def _points(one, ax: Axes) -> dict[str, Any]:
+def _points(one, ax: Any) -> dict[str, Any]:
     """Read scattered points."""
     x, y = np.asarray(one.get_offsets(), float).T
     if one.get_array() is not None or len(one.get_facecolors()) > 1:
@@ -265,18 +264,19 @@ def _points(one, ax: Axes) -> dict[str, Any]:
     return {"mode": "markers", "marker": marker, **_coordinates(x, y, ax), **_name(one)}
 
 
-def _bundle(segments, one, ax: Axes) -> dict[str, Any]:
+def _bundle(segments, one, ax: Any) -> dict[str, Any]:
     """Read many straight lines as one curve with gaps."""
     gap = np.full((1, 2), np.nan)
     joined = np.concatenate([np.concatenate([segment, gap]) for segment in segments] or [gap])
     line = {"color": _colour(one.get_colors()), "width": _width(one.get_linewidths()[0])}
-    return {"mode": "lines", "line": line, **_coordinates(*joined.T, ax), **_name(one)}
+    return {"mode": "lines", "line": line, **_coordinates(joined[:, 0], joined[:, 1], ax), **_name(one)}
 
 
-def _area(corners, one, ax: Axes) -> dict[str, Any]:
+def _area(corners, one, ax: Any) -> dict[str, Any]:
     """Read one filled area."""
     if len(one.get_facecolors()) > 1:
         raise _PictureOnly
+    corners = np.asarray(corners, float)[:: 1 + len(corners) // _POINTS]
     faces = one.get_facecolors()
     fill = (
         {"fill": "toself", "fillcolor": _colour(faces), "fillopacity": float(faces[0][3])}
@@ -287,7 +287,7 @@ def _area(corners, one, ax: Axes) -> dict[str, Any]:
         "mode": "none" if fill else "lines",
         "hoverinfo": "skip",
         **fill,
-        **_coordinates(*np.asarray(corners, float)[:: 1 + len(corners) // _POINTS].T, ax),
+        **_coordinates(corners[:, 0], corners[:, 1], ax),
         **_name(one),
     }
 
@@ -311,17 +311,18 @@ def _field(one) -> dict[str, Any]:
     }
 
 
-def _patches(ax: Axes) -> list[dict[str, Any]]:
+def _patches(ax: Any) -> list[dict[str, Any]]:
     """Read bars, bands across the panel, stairs and polygons."""
     from matplotlib.patches import Polygon, Rectangle, StepPatch
 
     found: list[dict[str, Any]] = []
+    one: Any
     for one in ax.patches:
         if isinstance(one, StepPatch):
             values, edges, _ = one.get_data()
             x, y = np.repeat(edges, 2)[1:-1], np.repeat(values, 2)
             line = {"color": _colour([one.get_edgecolor()]), "width": _width(one.get_linewidth())}
-            line["dash"] = _DASHES.get(one.get_linestyle(), "solid")
+            line["dash"] = _DASHES.get(str(one.get_linestyle()), "solid")
             step = {"mode": "lines", "line": line, **_coordinates(x, y, ax), **_name(one)}
             if one.get_fill():
                 x, y = [x[0], *x, x[-1]], [0.0, *y, 0.0]
@@ -335,23 +336,25 @@ def _patches(ax: Axes) -> list[dict[str, Any]]:
             corners = one.get_xy()
         else:
             raise _PictureOnly
+        x, y = corners[:, 0], corners[:, 1]
         across = _across(one.get_data_transform() if one.is_transform_set() else ax.transData, ax)
-        place = _spread(*corners.T, across, ax) if across else _coordinates(*corners.T, ax)
-        face = one.get_facecolor()
+        place = _spread(x, y, across, ax) if across else _coordinates(x, y, ax)
+        face: Any = one.get_facecolor()
         fill = {"fill": "toself", "fillcolor": _colour([face]), "fillopacity": float(face[3])}
         found.append({"mode": "none", "hoverinfo": "skip", **fill, **place, **_bar_name(one, ax)})
     return found
 
 
-def _bar_name(one, ax: Axes) -> dict[str, Any]:
+def _bar_name(one, ax: Any) -> dict[str, Any]:
     """Name a bar as its group is named."""
     group = next((bars for bars in ax.containers if one in list(bars)), one)
     return _name(group)
 
 
-def _words(ax: Axes) -> list[dict[str, Any]]:
+def _words(ax: Any) -> list[dict[str, Any]]:
     """Read texts within the panel."""
     found = []
+    text: Any
     for text in ax.texts:
         if not text.get_text():
             continue

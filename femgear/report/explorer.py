@@ -38,7 +38,7 @@ def explorer(runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None =
         What JSON can hold: speeds in rpm, frequencies in Hz, accelerations in m/s^2, pressures in Pa. Of the
         lines those with the largest amplitudes, and the share of the power that they leave out at most.
     """
-    lines = runup["lines_real"].values + 1j * runup["lines_imag"].values
+    lines = np.asarray(runup["lines_real"].values) + 1j * np.asarray(runup["lines_imag"].values)
     speeds = _chosen_speeds(runup)
     strength = np.abs(lines).max(axis=0)
     if pressure is not None:
@@ -87,7 +87,7 @@ def _resonances(runup: xr.Dataset, top: float) -> list[list[Any]]:
 
 def _packed(values: np.ndarray) -> dict[str, Any]:
     """Real and imaginary parts (speed, order, 2) as whole numbers of sixteen bits, a unit for each order."""
-    parts = np.stack([values.real, values.imag], axis=-1).astype(float)
+    parts = np.stack([np.real(values), np.imag(values)], axis=-1).astype(float)
     unit = np.abs(parts).max(axis=(0, 2)) / 32767
     unit[unit == 0] = 1.0
     whole = np.round(parts / unit[None, :, None]).astype("<i2")

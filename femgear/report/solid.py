@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from femgear.fe.grid import Grid, shape_functions
 if TYPE_CHECKING:
     import xarray as xr
 
+    from femgear.contact.tooth_loads import DeformedBody
     from femgear.fe.elasticity import Material
     from femgear.gears.planetary import PlanetarySet
 
@@ -25,16 +26,6 @@ _MODES = 24
 """Modes that can be chosen."""
 _WAVES = 1e-3
 """Waves around the ring below this share of the largest of a mode are left out."""
-
-
-class DeformedBody(Protocol):
-    """A body of `femgear.contact.tooth_loads.deformed_set`."""
-
-    name: str
-    kind: str
-    centre: np.ndarray
-    angle: float
-    displacement: np.ndarray
 
 
 def solid(

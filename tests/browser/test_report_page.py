@@ -1,4 +1,4 @@
-"""The page of a run of every train in Chromium: no message, no request, accessible, drawn, moving and heard."""
+"""The page of a run of every train in Chromium: silent, without requests, accessible, drawn and heard."""
 
 import shutil
 from pathlib import Path
@@ -102,9 +102,11 @@ def test_paper_shows_every_chart_and_every_column(opened, name):
 def test_set_in_space_is_drawn_turns_and_moves(opened):
     tab = opened(DEMO)
     pixels = """() => { const canvas = document.querySelector('#solid-place canvas');
-        const copy = document.createElement('canvas'); [copy.width, copy.height] = [canvas.width, canvas.height];
+        const copy = document.createElement('canvas'), { width, height } = canvas;
+        [copy.width, copy.height] = [width, height];
         const pen = copy.getContext('2d'); pen.drawImage(canvas, 0, 0);
-        return Array.from(pen.getImageData(0, 0, copy.width, copy.height).data).filter((_, i) => i % 64 === 3 || i % 64 === 0); }"""
+        const bytes = Array.from(pen.getImageData(0, 0, width, height).data);
+        return bytes.filter((_, i) => i % 64 === 3 || i % 64 === 0); }"""
     tab.wait_for_function("document.querySelector('#solid-place canvas').width > 300")
     first = tab.evaluate(pixels)
     covered = sum(alpha > 0 for alpha in first[1::2])
@@ -152,7 +154,8 @@ def test_sound_has_the_power_of_the_lines(opened):
     tab = opened(DEMO)
     powers = """() => { const { samples } = page.turns(60, 48000), whole = samples.subarray(0, -1);
         const lines = page.linesAt(60, document.getElementById('runup-source').value);
-        const power = lines.filter((one) => one.hertz < 0.45 * 48000).reduce((sum, one) => sum + one.size ** 2 / 2, 0);
+        const heard = lines.filter((one) => one.hertz < 0.45 * 48000);
+        const power = heard.reduce((sum, one) => sum + one.size ** 2 / 2, 0);
         return [whole.reduce((sum, one) => sum + one * one, 0) / whole.length, power]; }"""
     heard, wanted = tab.evaluate(powers)
     assert heard == pytest.approx(wanted, rel=1e-4)
