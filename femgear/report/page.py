@@ -228,7 +228,7 @@ def _section(name: str, numbers, pictures, charts, train: Train, results: Result
 def _table(block: Block, *, heading: bool = True) -> str:
     """Show a table with its notes."""
     title = f"<h3>{escape(block.title)}</h3>\n" if heading and not block.rows else ""
-    header = "".join(f'<th scope="col">{escape(text)}</th>' for text in block.header)
+    header = "".join(f'<th scope="col">{escape(text)}</th>' if text else "<td></td>" for text in block.header)
     rows = "".join(f"<tr>{_cells(row)}</tr>\n" for row in block.rows)
     table = ""
     if header or rows:
@@ -243,7 +243,8 @@ def _table(block: Block, *, heading: bool = True) -> str:
 def _cells(row) -> str:
     """Cells of a row; the first one names it."""
     first, *others = map(escape, row)
-    return f'<th scope="row">{first}</th>' + "".join(f"<td>{cell}</td>" for cell in others)
+    name = f'<th scope="row">{first}</th>' if first else "<td></td>"
+    return name + "".join(f"<td>{cell}</td>" for cell in others)
 
 
 def _figure(picture: _Picture, charts) -> str:
@@ -251,7 +252,7 @@ def _figure(picture: _Picture, charts) -> str:
     caption = escape(picture.caption)
     if picture.name in charts:
         return (
-            f'<figure>\n<div class="chart" role="img" aria-label="{caption}" '
+            f'<figure>\n<div class="chart" role="group" aria-label="{caption}" '
             f'data-chart="{escape(picture.name)}"></div>\n<figcaption>{caption}</figcaption>\n</figure>\n'
         )
     data = base64.b64encode(picture.data).decode("ascii")
