@@ -13,7 +13,7 @@ import zlib
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from femgear.errors import printable
 from femgear.report.charts import chart
@@ -115,9 +115,8 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
         Files were changed since the run.
     """
     case = results.case
-    pictures, data, skipped = _pictures(train, results)
-    if static:
-        data = {}
+    pictures, skipped = _pictures(train, results)
+    data = {} if static else shown_data(results)
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
@@ -128,33 +127,39 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
             _contents(sections, numbers, pictures),
             _warnings(warnings),
             '<h2 id="gears">Gears and operation</h2>\n',
-            _part("solid", data),
-            "".join(map(_table, train.describe(case))),
+            part_of("solid") if "solid" in data else "",
+            "".join(map(table, train.describe(case))),
         )
     )
     charts = data.setdefault("charts", {})
+    parts = {stage.title: part_of(stage.name) for stage in train.stages if stage.name in {*data} & {*_PARTS}}
     body = "".join(
-        _section(name, numbers, pictures, charts, train, results, _part(name.lower().replace("-", ""), data))
-        for name in sections
+        _section(name, numbers, pictures, charts, train, results, parts.get(name, "")) for name in sections
     )
-    scripts = "" if static else _scripts(data)
-    main = f"<main>\n{head}{body}{_provenance(results, numbers)}</main>\n"
-    text = _CONTROLS.sub(lambda found: printable(found[0]), main)
+    main = f"{head}{body}{_provenance(results, numbers)}"
+    return document(case.title, main, None if static else data)
+
+
+def document(title: str, main: str, data: dict[str, Any] | None) -> str:
+    """Make an HTML file of its title, its contents and what scripts draw; without scripts where it is None."""
+    scripts = "" if data is None else _scripts(data)
+    main, title = (_CONTROLS.sub(lambda found: printable(found[0]), text) for text in (main, escape(title)))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{_CONTROLS.sub(lambda found: printable(found[0]), escape(case.title))}</title>\n"
-        f"<style>{(_WEB / 'page.css').read_text('utf-8')}</style>\n</head>\n<body>\n"
-        f"{text}{scripts}</body>\n</html>\n"
+        f"<title>{title}</title>\n<style>{(_WEB / 'page.css').read_text('utf-8')}</style>\n</head>\n<body>\n"
+        f"<main>\n{main}</main>\n{scripts}</body>\n</html>\n"
     )
 
 
-def _scripts(data: dict[str, object]) -> str:
+def _scripts(data: dict[str, Any]) -> str:
     """Data and scripts of a page that can be read off and turned."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), sort_keys=True)
     packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
-    parts = [name for part, names in _PARTS.items() if part in data for name in names]
+    parts = [
+        name for part, names in _PARTS.items() if any(key.startswith(part) for key in data) for name in names
+    ]
     files = ("plotly-cartesian.min.js", "charts.js", *parts)
     scripts = "".join(f"<script>{(_WEB / name).read_text('utf-8')}</script>\n" for name in files)
     return (
@@ -202,9 +207,9 @@ def _warnings(warnings) -> str:
     return '<ul class="warnings">\n' + items + "</ul>\n"
 
 
-def _part(name: str, data) -> str:
-    """Place of what scripts draw of the whole set or run, nothing where there is none."""
-    return (_WEB / f"{name}.html").read_text("utf-8") if name in data and name in _PARTS else ""
+def part_of(name: str) -> str:
+    """Read the place of what scripts draw of a whole set or run."""
+    return (_WEB / f"{name}.html").read_text("utf-8")
 
 
 def _section(name: str, numbers, pictures, charts, train: Train, results: Results, part: str = "") -> str:
@@ -216,7 +221,7 @@ def _section(name: str, numbers, pictures, charts, train: Train, results: Result
     figures = [picture for picture in pictures if picture.section == name]
     if not blocks and not figures:
         return ""
-    tables = "".join(_table(block, heading=i > 0) for i, block in enumerate(blocks))
+    tables = "".join(table(block, heading=i > 0) for i, block in enumerate(blocks))
     return (
         f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n'
         + part
@@ -225,19 +230,19 @@ def _section(name: str, numbers, pictures, charts, train: Train, results: Result
     )
 
 
-def _table(block: Block, *, heading: bool = True) -> str:
-    """Show a table with its notes."""
+def table(block: Block, *, heading: bool = True) -> str:
+    """Write a table with its notes as HTML."""
     title = f"<h3>{escape(block.title)}</h3>\n" if heading and not block.rows else ""
     header = "".join(f'<th scope="col">{escape(text)}</th>' if text else "<td></td>" for text in block.header)
     rows = "".join(f"<tr>{_cells(row)}</tr>\n" for row in block.rows)
-    table = ""
+    whole = ""
     if header or rows:
         caption = f"<caption>{escape(block.title)}</caption>\n"
         head = f"<thead><tr>{header}</tr></thead>\n" if header else ""
         body = f"{caption}{head}<tbody>\n{rows}</tbody>"
-        table = f'<div class="wide" tabindex="0"><table>\n{body}\n</table></div>\n'
+        whole = f'<div class="wide" tabindex="0"><table>\n{body}\n</table></div>\n'
     notes = "".join(f'<p class="note">{escape(note)}</p>\n' for note in block.notes)
-    return title + table + notes
+    return title + whole + notes
 
 
 def _cells(row) -> str:
@@ -247,14 +252,20 @@ def _cells(row) -> str:
     return name + "".join(f"<td>{cell}</td>" for cell in others)
 
 
+def chart_figure(name: str, caption: str) -> str:
+    """Place of a chart, with its caption."""
+    text = escape(caption)
+    return (
+        f'<figure>\n<div class="chart" role="group" aria-label="{text}" data-chart="{escape(name)}"></div>\n'
+        f"<figcaption>{text}</figcaption>\n</figure>\n"
+    )
+
+
 def _figure(picture: _Picture, charts) -> str:
     """Embed a chart, or the picture where there is none, with its caption."""
     caption = escape(picture.caption)
     if picture.name in charts:
-        return (
-            f'<figure>\n<div class="chart" role="group" aria-label="{caption}" '
-            f'data-chart="{escape(picture.name)}"></div>\n<figcaption>{caption}</figcaption>\n</figure>\n'
-        )
+        return chart_figure(picture.name, picture.caption)
     data = base64.b64encode(picture.data).decode("ascii")
     return (
         f'<figure>\n<img alt="{caption}" src="data:{picture.kind};base64,{data}">\n'
@@ -262,30 +273,41 @@ def _figure(picture: _Picture, charts) -> str:
     )
 
 
-def _pictures(train: Train, results: Results) -> tuple[list[_Picture], dict[str, object], list[str]]:
-    """Read the pictures that the manifest names in the order of the captions, charts, what was left out."""
-    found, skipped, others = [], [], {}
-    for name, digest in results.manifest.files.items():
-        path = results.folder / name
-        kind = _KINDS.get(path.suffix)
+def shown_data(results: Results) -> dict[str, Any]:
+    """Read what scripts draw of a run, by the name they know it by; nothing of files that were changed."""
+    found = {key: _own_bytes(results, name) for name, key in _DATA.items()}
+    return {key: json.loads(data) for key, data in found.items() if data is not None}
+
+
+def _own_bytes(results: Results, name: str) -> bytes | None:
+    """Read a file of a run; None where it is missing or was changed since."""
+    path = results.folder / name
+    digest = results.manifest.files.get(name)
+    if digest is None or not path.is_file() or path.is_symlink() or checksum(path) != digest:
+        return None
+    with storage_errors(path):
+        return path.read_bytes()
+
+
+def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[str]]:
+    """Read the pictures that the manifest names, in the order of the captions, and what was left out."""
+    found, skipped = [], []
+    for name in results.manifest.files:
+        kind = _KINDS.get(Path(name).suffix)
         if kind is None and name not in _DATA:
             continue
-        if not path.is_file() or path.is_symlink() or checksum(path) != digest:
+        data = _own_bytes(results, name)
+        if data is None:
             skipped.append(f"{name} is missing or was changed since the run, and is not shown")
-            continue
-        with storage_errors(path):
-            data = path.read_bytes()
-        if kind is None:
-            others[_DATA[name]] = json.loads(data)
-            continue
-        if len(data) > _LARGEST_PICTURE:
+        elif kind is not None and len(data) > _LARGEST_PICTURE:
             skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
-            continue
-        rank, section, caption = caption_of(train, path.stem)
-        caption = " ".join((caption, *train.remarks(results, path.stem)))
-        found.append((rank, _Picture(path.stem, section, caption, kind, data)))
+        elif kind is not None:
+            stem = Path(name).stem
+            rank, section, caption = caption_of(train, stem)
+            caption = " ".join((caption, *train.remarks(results, stem)))
+            found.append((rank, _Picture(stem, section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
-    return [picture for _, picture in found], others, skipped
+    return [picture for _, picture in found], skipped
 
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
@@ -310,7 +332,7 @@ def _provenance(results: Results, numbers) -> str:
     files = tuple((name, digest) for name, digest in manifest.files.items() if name != "report.html")
     blocks = [numbers["Time"]] if "Time" in numbers else []
     blocks += [versions, Block("Files", ("file", "SHA-256"), files)]
-    tables = "".join(_table(block) for block in blocks)
+    tables = "".join(table(block) for block in blocks)
     return (
         f'<h2 id="provenance">Provenance</h2>\n{tables}<h3>Case as run</h3>\n'
         f"<pre>{escape(results.case.source)}</pre>\n"

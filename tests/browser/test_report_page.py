@@ -124,36 +124,38 @@ def test_set_in_space_is_drawn_turns_and_moves(opened):
 
 def test_hover_tells_the_line(opened):
     tab = opened(DEMO)
-    spectrum = tab.locator("#runup-spectrum")
+    spectrum = tab.locator("[data-part=spectrum]")
     spectrum.scroll_into_view_if_needed()
-    tab.wait_for_selector("#runup-spectrum .points path")
-    strongest = """() => { const found = [...document.querySelectorAll('#runup-spectrum .points path')]
+    tab.wait_for_selector("[data-part=spectrum] .points path")
+    strongest = """() => { const found = [...document.querySelectorAll('[data-part=spectrum] .points path')]
         .map((one) => one.getBoundingClientRect()).sort((a, b) => a.top - b.top)[0];
         return [found.x + found.width / 2, found.y + found.height / 2]; }"""
     tab.mouse.move(*tab.evaluate(strongest))
-    tab.wait_for_selector("#runup-spectrum .hovertext")
-    text = tab.locator("#runup-spectrum .hovertext").inner_text()
+    tab.wait_for_selector("[data-part=spectrum] .hovertext")
+    text = tab.locator("[data-part=spectrum] .hovertext").inner_text()
     assert "order" in text and "Hz" in text and "m/s²" in text
 
 
 def test_speed_moves_all_pictures_and_the_sound(opened):
     tab = opened(DEMO)
     ids = ("campbell", "level", "spectrum", "lobes")
-    state = """(ids) => ids.map((id) => { const { data, layout } = document.getElementById('runup-' + id);
+    state = """(ids) => ids.map((id) => {
+        const { data, layout } = document.querySelector(`[data-part=${id}]`);
         return JSON.stringify([data, layout.shapes, layout.title]); })"""
-    tab.wait_for_function("document.getElementById('runup-lobes').data")
-    first, label = tab.evaluate(state, ids), tab.inner_text("#runup-value")
-    tab.locator("#runup-speed").fill("60")
+    tab.wait_for_function("document.querySelector('[data-part=lobes]').data")
+    first, label = tab.evaluate(state, ids), tab.inner_text("[data-part=value]")
+    tab.locator("[data-part=speed]").fill("60")
     assert all(a != b for a, b in zip(first, tab.evaluate(state, ids)))
-    assert tab.inner_text("#runup-value") != label
-    tab.click("#runup-play")
-    assert tab.get_attribute("#runup-play", "aria-pressed") == "true"
+    assert tab.inner_text("[data-part=value]") != label
+    tab.click("[data-part=play]")
+    assert tab.get_attribute("[data-part=play]", "aria-pressed") == "true"
 
 
 def test_sound_has_the_power_of_the_lines(opened):
     tab = opened(DEMO)
-    powers = """() => { const { samples } = page.turns(60, 48000), whole = samples.subarray(0, -1);
-        const lines = page.linesAt(60, document.getElementById('runup-source').value);
+    powers = """() => { const { turns, linesAt } = document.querySelector('.runup').explorer;
+        const { samples } = turns(60, 48000), whole = samples.subarray(0, -1);
+        const lines = linesAt(60, document.querySelector('[data-part=source]').value);
         const heard = lines.filter((one) => one.hertz < 0.45 * 48000);
         const power = heard.reduce((sum, one) => sum + one.size ** 2 / 2, 0);
         return [whole.reduce((sum, one) => sum + one * one, 0) / whole.length, power]; }"""

@@ -1,10 +1,8 @@
 // A run-up to walk through: modes and mesh orders, level, spectrum, lobes and sound at one speed.
 "use strict";
 
-page.explorer = () => {
-  const data = page.data.runup, root = document.getElementById("runup");
-  if (!data || !root) return;
-  const part = (name) => document.getElementById("runup-" + name);
+page.explorer = (root) => {
+  const data = page.data[root.dataset.run], part = (name) => root.querySelector(`[data-part="${name}"]`);
   const count = data.order.length, unpack = ({ unit, values }) => {
     const bytes = Uint8Array.from(atob(values), (letter) => letter.charCodeAt(0)), whole = new Int16Array(bytes.buffer);
     return Float32Array.from(whole, (value, i) => value * unit[(i >> 1) % count]);
@@ -162,6 +160,6 @@ page.explorer = () => {
   new ResizeObserver(() => { if (Math.abs(root.clientWidth - width) > 4) { width = root.clientWidth; all(); } }).observe(root);
   addEventListener("beforeprint", all);
   addEventListener("afterprint", () => setTimeout(all));
-  Object.assign(page, { turns, speedAt: () => index, linesAt: at });
+  root.explorer = { turns, linesAt: at };
 };
-page.parts.push(page.explorer);
+page.parts.push(() => document.querySelectorAll(".runup").forEach(page.explorer));
