@@ -13,8 +13,8 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_DIGITS = 5
-"""Digits of a coordinate, counted from the largest of its curve: a hundredth of a pixel."""
+_DIGITS = 6
+"""Digits of a coordinate, counted from the largest of its curve: a pixel of a curve enlarged a hundredfold."""
 _POINTS = 6000
 """Points of a curve, at most; of more, every step of the abscissa keeps its largest and its smallest."""
 _DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}

@@ -131,17 +131,17 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
             "".join(map(table, train.describe(case))),
         )
     )
-    charts = data.setdefault("charts", {})
+    charts = data.get("charts", {})
     parts = {stage.title: part_of(stage.name) for stage in train.stages if stage.name in {*data} & {*_PARTS}}
     body = "".join(
         _section(name, numbers, pictures, charts, train, results, parts.get(name, "")) for name in sections
     )
     main = f"{head}{body}{_provenance(results, numbers)}"
-    return document(case.title, main, None if static else data)
+    return document(case.title, main, {"charts": charts} | data if data else None)
 
 
 def document(title: str, main: str, data: dict[str, Any] | None) -> str:
-    """Make an HTML file of its title, its contents and what scripts draw; without scripts where it is None."""
+    """Make an HTML file of its title, its contents and what scripts draw; none where it is None."""
     scripts = "" if data is None else _scripts(data)
     main, title = (_CONTROLS.sub(lambda found: printable(found[0]), text) for text in (main, escape(title)))
     return (
