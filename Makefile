@@ -1,6 +1,6 @@
 # Everything a user or a maintainer does, by name. Needs git, python3 (3.11 or newer) and make.
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test lint validate soak bench mutants clean
+.PHONY: help environment demo test test-browser lint validate soak bench mutants clean
 
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -20,6 +20,7 @@ MINUTES := 60
 help:
 	@echo "make demo      run the reference planetary set ($(CASE)) and write its report"
 	@echo "make test      run the tests"
+	@echo "make test-browser  open the pages of all trains in Chromium, which must be installed"
 	@echo "make lint      check style and formatting (ruff) and types (basedpyright)"
 	@echo "make validate  recompute docs/validation.md and run the slow verification tests"
 	@echo "make soak      fuzz, damage, kill and starve femgear for MINUTES=60, write docs/reliability.md"
@@ -37,6 +38,10 @@ demo: environment
 
 test: environment
 	$(PY) -m pytest -n 2 --dist loadfile --benchmark-disable $(ARGS)
+
+test-browser: environment
+	$(PY) -m pip install --quiet --disable-pip-version-check -e ".[browser]"
+	$(PY) -m pytest -m browser tests/browser --benchmark-disable $(ARGS)
 
 lint: environment
 	$(PY) -m ruff check .

@@ -286,17 +286,19 @@ def run(
 
 
 @app.command
-def report(folder: Path, /) -> int:
+def report(folder: Path, /, *, static: Annotated[bool, Parameter(negative="")] = False) -> int:
     """Write report.html from the results in a folder.
 
     Parameters
     ----------
     folder
         Folder that femgear run wrote.
+    static
+        Pictures and no scripts: for paper, and where scripts are not allowed.
     """
     from femgear.run import report_again
 
-    report_again(folder)
+    report_again(folder, static=static)
     _say(f"report:  {folder / 'report.html'}")
     return 0
 
@@ -328,6 +330,38 @@ class Formats:
     wav: Annotated[bool, Parameter(negative="")] = False
     uff: Annotated[bool, Parameter(negative="")] = False
     quality: Annotated[bool, Parameter(negative="")] = False
+
+
+@app.command
+def compare(
+    first: Path, second: Path, /, *, output: Annotated[Path, Parameter(name=("--output", "-o"))]
+) -> int:
+    """Compare two runs: entries of the cases and numbers that differ, curves over each other, both sounds.
+
+    Parameters
+    ----------
+    first, second
+        Folders that femgear run wrote, of cases of one kind.
+    output
+        Page to write, such as compare.html.
+    """
+    from femgear.report.compare import compare_page, compared
+    from femgear.storage.files import write_text
+    from femgear.trains.reading import open_results
+    from femgear.trains.registry import train_of
+
+    runs = [open_results(folder) for folder in (first, second)]
+    train, other = (train_of(run.case) for run in runs)
+    if train.name != other.name:
+        raise CaseError(
+            f"{first} is {train.words}, {second} {other.words}",
+            code="E-CHOICE",
+            remedy="compare runs of cases of one kind",
+        )
+    _print(compared(train, *runs))
+    write_text(compare_page(train, *runs), output)
+    _say(f"page: {output}")
+    return 0
 
 
 @app.command

@@ -274,8 +274,11 @@ def _source_checksum() -> str:
 
 
 @one_blas_thread()
-def report_again(folder: Path) -> None:
-    """Write report.html of a complete run anew, with figures where it drew none; update the manifest."""
+def report_again(folder: Path, *, static: bool = False) -> None:
+    """Write report.html of a complete run anew, with figures where it drew none; update the manifest.
+
+    ``static`` is that of `femgear.report.page.page`.
+    """
     with folder_lock(folder):
         results = open_results(folder, partial=False)
         train = train_of(results.case)
@@ -285,7 +288,7 @@ def report_again(folder: Path) -> None:
                 write_pictures(new, train, Drawn(results.case, data), progress=silent)
             results = open_results(folder)
         with additions(results.folder) as new:
-            write_text(page(train, results), new / "report.html")
+            write_text(page(train, results, static=static), new / "report.html")
 
 
 def export_results(results: Results, folder: Path, formats: Collection[str], sampling: Sampling) -> list[str]:

@@ -56,7 +56,7 @@ def _nothing(*_, progress, **__):
 ])  # fmt: skip
 def test_what_an_encoding_lacks_is_escaped(titled, tmp_path, monkeypatch, encoding, title):
     monkeypatch.setattr(importlib.import_module("femgear.study.sweep"), "sweep_into", _nothing)
-    monkeypatch.setattr(run_module, "report_again", lambda folder: None)
+    monkeypatch.setattr(run_module, "report_again", lambda folder, **_: None)
     code, out, err = printed_in(encoding, monkeypatch, lambda: cli.main(["check", str(titled)]))
     assert (code, err) == (0, "") and title in out
     assert ("─" in out) == (encoding == "utf-8")  # borders of tables are not escaped but drawn otherwise

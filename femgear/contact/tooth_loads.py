@@ -108,7 +108,7 @@ class LoadSpectrum:
 
 
 @dataclass(frozen=True)
-class _DeformedBody:
+class DeformedBody:
     """One gear in the frame of the set: where its sector 0 is turned to and how every sector moves."""
 
     name: str
@@ -164,7 +164,7 @@ def load_spectrum(teeth: LoadedTeeth, *, closes: bool = True) -> LoadSpectrum:
 
 def deformed_set(
     planetary_set: PlanetarySet, sectors: Sectors, cycle: MeshCycle, *, position: int = 0
-) -> tuple[_DeformedBody, ...]:
+) -> tuple[DeformedBody, ...]:
     """Compute the elastic displacement of sun, planets and ring, each held as in the static problem.
 
     The load of each tooth pair acts at its point on the line of action; the half-plane indentation, a few
@@ -181,7 +181,7 @@ def deformed_set(
         bodies.append((f"planet {n + 1}", "planet", sectors.planet, centre, at.planets[n], on_planets[n]))
     bodies.append(("ring", "ring", sectors.ring, np.zeros(2), at.ring, on_ring))
     return tuple(
-        _DeformedBody(name, kind, centre, float(angle), _displacement(teeth, s, sector, acting, position))
+        DeformedBody(name, kind, centre, float(angle), _displacement(teeth, s, sector, acting, position))
         for name, kind, sector, centre, angle, acting in bodies
     )
 

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import base64
 import ctypes
+import hashlib
+import json
 import multiprocessing
 import os
 import re
 import signal
 import sys
 import warnings
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -22,9 +25,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from femgear.errors import FemgearError, printable
+from femgear.report.charts import chart
+from femgear.report.explorer import EXPLORER
+from femgear.report.solid import SOLID
 from femgear.report.style import png_bytes
 from femgear.report.tables import Block
-from femgear.storage.files import checksum, storage_errors, write_bytes
+from femgear.storage.files import checksum, storage_errors, write_bytes, write_text
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -38,29 +44,14 @@ _OTHER = "Other pictures"
 # what HTML and UTF-8 do not hold, and what reverses the order of the text around it
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
-_STYLE = """
-body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;
-  max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
-h1 { font-size: 1.7rem; margin-bottom: 0.2rem; }
-h2 { font-size: 1.25rem; margin-top: 2.4rem; border-bottom: 2px solid #0072b2; padding-bottom: 0.15rem; }
-h3 { font-size: 1.05rem; margin: 1.6rem 0 0.4rem; }
-p.lead { color: #555; margin-top: 0; }
-nav a { margin-right: 1rem; color: #0072b2; }
-div.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 0.86rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.2rem 0.7rem; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap; }
-th { border-bottom: 2px solid #888; font-weight: 600; }
-th:first-child, td:first-child { text-align: left; padding-left: 0; }
-p.note { font-size: 0.86rem; color: #444; margin: 0.3rem 0; }
-ul.warnings { border-left: 5px solid #d55e00; background: #fdf3ec; margin: 1rem 0;
-  padding: 0.6rem 1rem 0.6rem 2rem; }
-figure { margin: 1.4rem 0 2rem; }
-figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
-figcaption { font-size: 0.9rem; color: #333; margin-top: 0.4rem; }
-pre { font-size: 0.8rem; background: #f5f5f5; padding: 0.8rem; overflow-x: auto; }
-@media print { body { max-width: none; margin: 0; font-size: 11pt; } nav { display: none; }
-  figure, table { break-inside: avoid; } h2, h3 { break-after: avoid; } pre { white-space: pre-wrap; } }
-"""
+_WEB = Path(__file__).parent / "web"
+"""Style sheet, scripts, and the libraries that they draw with."""
+_CHARTS = "charts.json"
+"""File of what the charts of the page show."""
+_DATA = {_CHARTS: "charts", SOLID: "solid", EXPLORER: "runup"}
+"""Files of a run that the scripts of its page draw, and their names there."""
+_PARTS = {"solid": ("three.min.js", "solid.js"), "runup": ("explorer.js",)}
+"""Scripts of the parts of the page that have a place of their own."""
 
 
 def write_figures(
@@ -68,18 +59,23 @@ def write_figures(
 ) -> list[str]:
     """Write the figures of the stages whose data are there, and of the case; returns the file names.
 
-    They are drawn in two processes where there are two cores, and in this one ``beside()`` comes first.
+    They are drawn in two processes where there are two cores, and in this one ``beside()`` comes first. What
+    their charts on the page show is written with them.
     """
     import matplotlib.backends.backend_agg  # noqa: F401  before the process is copied
 
-    def pictures(stage: Figures) -> dict[str, bytes]:
-        return {f"{name}.png": png_bytes(figure) for name, figure in stage.draw(drawn).items()}
+    def pictures(stage: Figures) -> dict[str, tuple[bytes, Any]]:
+        return {name: (png_bytes(figure), chart(figure)) for name, figure in stage.draw(drawn).items()}
 
     tasks = [partial(pictures, stage) for stage in _drawn(train, drawn)]
-    found = {name: data for part in _shared(tasks, beside) for name, data in part.items()}
-    for name, data in found.items():
-        write_bytes(data, folder / name)
-    return [*found]
+    found = {name: both for part in _shared(tasks, beside) for name, both in part.items()}
+    if not found:
+        return []
+    for name, (data, _) in found.items():
+        write_bytes(data, folder / f"{name}.png")
+    charts = {name: one for name, (_, one) in found.items() if one is not None}
+    write_text(json.dumps(charts, allow_nan=False, separators=(",", ":")), folder / _CHARTS)
+    return [*(f"{name}.png" for name in found), _CHARTS]
 
 
 def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
@@ -186,22 +182,36 @@ def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progre
 
 @dataclass(frozen=True)
 class _Picture:
-    """A picture of the page: its section, caption, kind (``"image/png"``) and bytes."""
+    """A picture of the page: file name without suffix, section, caption, kind (``"image/png"``) and bytes."""
 
+    name: str
     section: str
     caption: str
     kind: str
     data: bytes
 
 
-def page(train: Train, results: Results) -> str:
-    """Make the page of a run as HTML text: tables, warnings, pictures, provenance.
+def page(train: Train, results: Results, *, static: bool = False) -> str:
+    """Make the page of a run as HTML text: tables, warnings, charts, pictures, provenance.
 
-    The pictures that its manifest names are embedded; the page loads nothing else. The same results give the
-    same text. StorageError: files were changed since the run.
+    Everything that it shows is in the page, which loads nothing else. The same results give the same text.
+
+    Parameters
+    ----------
+    train : Train
+        Of the case of the results.
+    results : Results
+    static : bool
+        Pictures instead of charts, and no scripts: for paper, and where scripts are not allowed.
+
+    Raises
+    ------
+    StorageError
+        Files were changed since the run.
     """
     case = results.case
     pictures, skipped = _pictures(train, results)
+    data = {} if static else shown_data(results)
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
@@ -209,23 +219,61 @@ def page(train: Train, results: Results) -> str:
         (
             f"<h1>{escape(case.title)}</h1>\n",
             f'<p class="lead">{escape(_lead(results))}</p>\n',
-            "".join(map(_table, train.verdict(results))),
+            "".join(map(table, train.verdict(results))),
             _contents(sections, numbers, pictures),
             _warnings(warnings),
             '<h2 id="gears">Gears and operation</h2>\n',
-            "".join(map(_table, train.describe(case))),
+            part_of("solid") if "solid" in data else "",
+            "".join(map(table, train.describe(case))),
         )
     )
-    body = "".join(_section(name, numbers, pictures, train, results) for name in sections)
-    text = (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
-        "style-src 'unsafe-inline'\">\n"
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(case.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
-        f"{head}{body}{_provenance(results, numbers)}</body>\n</html>\n"
+    charts = data.get("charts", {})
+    parts = {stage.title: part_of(stage.name) for stage in train.stages if stage.name in {*data} & {*_PARTS}}
+    body = "".join(
+        _section(name, numbers, pictures, charts, train, results, parts.get(name, "")) for name in sections
     )
-    return _CONTROLS.sub(lambda found: printable(found[0]), text)
+    main = f"{head}{body}{_provenance(results, numbers)}"
+    return document(case.title, main, {"charts": charts} | data if data else None)
+
+
+def document(title: str, main: str, data: dict[str, Any] | None) -> str:
+    """Make an HTML file of its title, its contents and what scripts draw; none where it is None."""
+    scripts = "" if data is None else _scripts(data)
+    main, title = (_CONTROLS.sub(lambda found: printable(found[0]), text) for text in (main, escape(title)))
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{title}</title>\n<style>{(_WEB / 'page.css').read_text('utf-8')}</style>\n</head>\n<body>\n"
+        f"<main>\n{main}</main>\n{scripts}</body>\n</html>\n"
+    )
+
+
+def _scripts(data: dict[str, Any]) -> str:
+    """Data and scripts of a page that can be read off and turned."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"), sort_keys=True)
+    packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
+    parts = [
+        name for part, names in _PARTS.items() if any(key.startswith(part) for key in data) for name in names
+    ]
+    files = ("plotly-cartesian.min.js", "charts.js", *parts)
+    scripts = "".join(f"<script>{(_WEB / name).read_text('utf-8')}</script>\n" for name in files)
+    return (
+        '<noscript><p class="note">Charts need scripts, which are in this file: femgear report --static '
+        "writes a page without any.</p></noscript>\n"
+        f'<script type="text/plain" id="data">{packed}</script>\n{scripts}'
+    )
+
+
+def _policy(scripts: str) -> str:
+    """Allow the page its own scripts, by their checksums, and nothing from anywhere."""
+    found = re.findall(r"<script>(.*?)</script>", scripts, re.DOTALL)
+    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in found]
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+    return (
+        f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}; "
+        "base-uri 'none'; form-action 'none'"
+    )
 
 
 def _lead(results: Results) -> str:
@@ -255,7 +303,12 @@ def _warnings(warnings) -> str:
     return '<ul class="warnings">\n' + items + "</ul>\n"
 
 
-def _section(name: str, numbers, pictures, train: Train, results: Results) -> str:
+def part_of(name: str) -> str:
+    """Read the place of what scripts draw of a whole set or run."""
+    return (_WEB / f"{name}.html").read_text("utf-8")
+
+
+def _section(name: str, numbers, pictures, charts, train: Train, results: Results, part: str = "") -> str:
     """Show tables and pictures of a stage, nothing without any."""
     blocks = [numbers[name]] if name in numbers else []
     for stage in train.stages:
@@ -264,54 +317,91 @@ def _section(name: str, numbers, pictures, train: Train, results: Results) -> st
     figures = [picture for picture in pictures if picture.section == name]
     if not blocks and not figures:
         return ""
-    tables = "".join(_table(block, heading=i > 0) for i, block in enumerate(blocks))
-    return f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n' + tables + "".join(map(_figure, figures))
-
-
-def _table(block: Block, *, heading: bool = True) -> str:
-    """Show a table with its notes."""
-    title = f"<h3>{escape(block.title)}</h3>\n" if heading else ""
-    header = "".join(f"<th>{escape(text)}</th>" for text in block.header)
-    rows = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>\n" for row in block.rows
+    tables = "".join(table(block, heading=i > 0) for i, block in enumerate(blocks))
+    return (
+        f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n'
+        + part
+        + tables
+        + "".join(_figure(one, charts) for one in figures)
     )
-    table = ""
+
+
+def table(block: Block, *, heading: bool = True) -> str:
+    """Write a table with its notes as HTML."""
+    title = f"<h3>{escape(block.title)}</h3>\n" if heading and not block.rows else ""
+    header = "".join(f'<th scope="col">{escape(text)}</th>' if text else "<td></td>" for text in block.header)
+    rows = "".join(f"<tr>{_cells(row)}</tr>\n" for row in block.rows)
+    whole = ""
     if header or rows:
+        caption = f"<caption>{escape(block.title)}</caption>\n"
         head = f"<thead><tr>{header}</tr></thead>\n" if header else ""
-        table = f'<div class="wide"><table>\n{head}<tbody>\n{rows}</tbody>\n</table></div>\n'
+        body = f"{caption}{head}<tbody>\n{rows}</tbody>"
+        whole = f'<div class="wide" tabindex="0"><table>\n{body}\n</table></div>\n'
     notes = "".join(f'<p class="note">{escape(note)}</p>\n' for note in block.notes)
-    return title + table + notes
+    return title + whole + notes
 
 
-def _figure(picture: _Picture) -> str:
-    """Embed a picture with its caption."""
-    data = base64.b64encode(picture.data).decode("ascii")
+def _cells(row) -> str:
+    """Cells of a row; the first one names it."""
+    first, *others = map(escape, row)
+    name = f'<th scope="row">{first}</th>' if first else "<td></td>"
+    return name + "".join(f"<td>{cell}</td>" for cell in others)
+
+
+def chart_figure(name: str, caption: str) -> str:
+    """Place of a chart, with its caption."""
+    text = escape(caption)
+    return (
+        f'<figure>\n<div class="chart" role="group" aria-label="{text}" data-chart="{escape(name)}"></div>\n'
+        f"<figcaption>{text}</figcaption>\n</figure>\n"
+    )
+
+
+def _figure(picture: _Picture, charts) -> str:
+    """Embed a chart, or the picture where there is none, with its caption."""
     caption = escape(picture.caption)
+    if picture.name in charts:
+        return chart_figure(picture.name, picture.caption)
+    data = base64.b64encode(picture.data).decode("ascii")
     return (
         f'<figure>\n<img alt="{caption}" src="data:{picture.kind};base64,{data}">\n'
         f"<figcaption>{caption}</figcaption>\n</figure>\n"
     )
 
 
+def shown_data(results: Results) -> dict[str, Any]:
+    """Read what scripts draw of a run, by the name they know it by; nothing of files that were changed."""
+    found = {key: _own_bytes(results, name) for name, key in _DATA.items()}
+    return {key: json.loads(data) for key, data in found.items() if data is not None}
+
+
+def _own_bytes(results: Results, name: str) -> bytes | None:
+    """Read a file of a run; None where it is missing or was changed since."""
+    path = results.folder / name
+    digest = results.manifest.files.get(name)
+    if digest is None or not path.is_file() or path.is_symlink() or checksum(path) != digest:
+        return None
+    with storage_errors(path):
+        return path.read_bytes()
+
+
 def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[str]]:
     """Read the pictures that the manifest names, in the order of the captions, and what was left out."""
     found, skipped = [], []
-    for name, digest in results.manifest.files.items():
-        path = results.folder / name
-        kind = _KINDS.get(path.suffix)
-        if kind is None:
+    for name in results.manifest.files:
+        kind = _KINDS.get(Path(name).suffix)
+        if kind is None and name not in _DATA:
             continue
-        if not path.is_file() or path.is_symlink() or checksum(path) != digest:
+        data = _own_bytes(results, name)
+        if data is None:
             skipped.append(f"{name} is missing or was changed since the run, and is not shown")
-            continue
-        with storage_errors(path):
-            data = path.read_bytes()
-        if len(data) > _LARGEST_PICTURE:
+        elif kind is not None and len(data) > _LARGEST_PICTURE:
             skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
-            continue
-        rank, section, caption = caption_of(train, path.stem)
-        caption = " ".join((caption, *train.remarks(results, path.stem)))
-        found.append((rank, _Picture(section, caption, kind, data)))
+        elif kind is not None:
+            stem = Path(name).stem
+            rank, section, caption = caption_of(train, stem)
+            caption = " ".join((caption, *train.remarks(results, stem)))
+            found.append((rank, _Picture(stem, section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
     return [picture for _, picture in found], skipped
 
@@ -338,7 +428,7 @@ def _provenance(results: Results, numbers) -> str:
     files = tuple((name, digest) for name, digest in manifest.files.items() if name != "report.html")
     blocks = [numbers["Time"]] if "Time" in numbers else []
     blocks += [versions, Block("Files", ("file", "SHA-256"), files)]
-    tables = "".join(_table(block) for block in blocks)
+    tables = "".join(table(block) for block in blocks)
     return (
         f'<h2 id="provenance">Provenance</h2>\n{tables}<h3>Case as run</h3>\n'
         f"<pre>{escape(results.case.source)}</pre>\n"

@@ -13,6 +13,7 @@ By stage:
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +28,7 @@ from femgear.fe.reduction import cyclic_modes, sector_basis
 from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
 from femgear.housing.sensor import SensorLines, fixed_sensor_signal, stored_lines
 from femgear.housing.sound import REFERENCE_PRESSURE, nodal_diameters, stored_sound
+from femgear.report.explorer import EXPLORER, explorer
 from femgear.report.response import (
     MODE_CAPTIONS,
     RESPONSE_CAPTIONS,
@@ -53,6 +55,8 @@ from femgear.report.style import (
     rpm,
 )
 from femgear.report.waterfall import RUNUP_CAPTIONS, runup_figures
+from femgear.storage.files import write_text
+from femgear.trains.elastic.results import run_up_lines
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import picture_sectors
@@ -497,6 +501,15 @@ def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
     return ["operating_deflection.gif"]
 
 
+def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
+    """What the page walks through of the run-up."""
+    runup, housing = drawn.data["runup"], drawn.data.get("housing")
+    pressure = None if housing is None else run_up_lines(runup, housing.attrs)[1]
+    found = explorer(runup, drawn.data["modes"], pressure)
+    write_text(json.dumps(found, allow_nan=False, separators=(",", ":")), folder / EXPLORER)
+    return [EXPLORER]
+
+
 def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
     figures, housing = {}, drawn.data["housing"]
     drawings = (
@@ -557,6 +570,8 @@ FIGURES = STATIC | {
         draw=_housing_figures,
     ),
     "runup": Figures(
-        RUNUP_CAPTIONS, draw=lambda drawn: runup_figures(drawn.data["runup"], drawn.data["modes"])
+        RUNUP_CAPTIONS,
+        draw=lambda drawn: runup_figures(drawn.data["runup"], drawn.data["modes"]),
+        write=(_write_explorer,),
     ),
 }

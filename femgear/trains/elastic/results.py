@@ -6,10 +6,10 @@ belong to real motions by ``x(t) = Re sum_h X_h exp(i h omega t)``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -427,16 +427,24 @@ def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
         samples = whole_turns(speed, sampling.duration, rate=rate)
         yield Signal(name, unit, rate, sampled_signal(order, values, speed, samples=samples, rate=rate))
     if "runup" in results.stages:
-        runup, known = results.runup, results.housing.attrs
-        order, carrier = runup["order"].values, runup["carrier_speed"].values
-        heard = runup["lines_real"].values + 1j * runup["lines_imag"].values
-        displacement = -heard / (np.maximum(order, 1) * carrier[:, None]) ** 2
-        place = float(known["sensor_angle"]), int(known["ring_teeth"])
-        lines = SensorLines(order, displacement, carrier, *place, "exact")
-        pressure = "microphone_run_up", "Pa", microphone_lines(lines, known)
-        for name, unit, values in (("accelerometer_run_up", "m/s^2", heard), pressure):
-            found = run_up_signal(order, values, lines.base_speed, duration=sampling.run_up, rate=rate)
+        lines, pressure = run_up_lines(results.runup, results.housing.attrs)
+        heard = lines.acceleration, pressure
+        for name, unit, values in zip(("accelerometer_run_up", "microphone_run_up"), ("m/s^2", "Pa"), heard):
+            found = run_up_signal(lines.order, values, lines.base_speed, duration=sampling.run_up, rate=rate)
             yield Signal(name, unit, rate, found, steady=False)
+
+
+def run_up_lines(runup: xr.Dataset, known: Mapping[str, Any]) -> tuple[SensorLines, np.ndarray]:
+    """Read the lines of the sensor from runup.nc, and compute those of the microphone [Pa].
+
+    ``known`` are the attributes of housing.nc: places of both, ring and air.
+    """
+    order, carrier = runup["order"].values, runup["carrier_speed"].values
+    heard = runup["lines_real"].values + 1j * runup["lines_imag"].values
+    displacement = -heard / (np.maximum(order, 1) * carrier[:, None]) ** 2
+    place = float(known["sensor_angle"]), int(known["ring_teeth"])
+    lines = SensorLines(order, displacement, carrier, *place, "exact")
+    return lines, microphone_lines(lines, known)
 
 
 def sensor_spectra(results: Results) -> Iterator[Spectrum]:

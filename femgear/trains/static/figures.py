@@ -7,6 +7,7 @@ angle and pitches over the teeth. `FIGURES` at the end ties the pictures of the 
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,6 +27,7 @@ from femgear.gears.gear import Gear
 from femgear.gears.modifications import form_deviation
 from femgear.gears.planetary import PlanetarySet
 from femgear.report.scene import Body, assemble_set, deformed_picture, placed, whole_field, write_vtu
+from femgear.report.solid import SOLID, solid
 from femgear.report.style import (
     BLACK,
     BLUE,
@@ -41,6 +43,7 @@ from femgear.report.style import (
     new_figure,
     periodic,
 )
+from femgear.storage.files import write_text
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import static_supports
@@ -508,8 +511,8 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
 
     gears, cycle = _left_flanks_loaded(static, case)
     sectors = picture_sectors(drawn, gears)
-    bodies = []
-    for body in deformed_set(gears, sectors, cycle):
+    bodies, deformed = [], deformed_set(gears, sectors, cycle)
+    for body in deformed:
         sector = getattr(sectors, body.kind)
         count = sector.gear.teeth
         numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
@@ -521,7 +524,10 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     write_vtu(grid, folder / "deformed_set.vtu")
     title = "static deflection, position 0"
     deformed_picture(grid, folder / "deformed_set.png", title=title)
-    return ["deformed_set.vtu", "deformed_set.png"]
+    grids = {kind: getattr(sectors, kind).grid for kind in ("sun", "planet", "ring")}
+    model = solid(gears, grids, deformed, material_of(case), drawn.data.get("modes"))
+    write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SOLID)
+    return ["deformed_set.vtu", "deformed_set.png", SOLID]
 
 
 def _left_flanks_loaded(static: StaticResult, case: Case) -> tuple[PlanetarySet, MeshCycle]:

@@ -1,0 +1,410 @@
+"""Read the curves of a Matplotlib figure, as the data of a chart that a browser draws.
+
+Every figure is drawn once, by Matplotlib; the page shows the same curves so that they can be read off and
+enlarged. What a browser's chart cannot hold stays a picture.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DIGITS = 6
+"""Digits of a coordinate, counted from the largest of its curve: a pixel of one enlarged a hundredfold."""
+_POINTS = 6000
+"""Points of a curve, at most; of more, every step of the abscissa keeps its largest and its smallest."""
+_DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
+_MARKERS = {
+    "o": "circle",
+    "s": "square",
+    "D": "diamond",
+    "^": "triangle-up",
+    "v": "triangle-down",
+    "P": "cross",
+}
+_MARKERS |= {"X": "x", "x": "x-thin", "*": "star", "<": "triangle-left", ">": "triangle-right", ".": "circle"}
+_MARKERS |= {
+    "+": "cross-thin",
+    "d": "diamond-tall",
+    "p": "pentagon",
+    "h": "hexagon",
+    "|": "line-ns",
+    "_": "line-ew",
+}
+
+
+class _PictureOnly(Exception):
+    """The figure has something that the chart has no words for."""
+
+
+def chart(figure: Figure) -> dict[str, Any] | None:
+    """Read the panels, curves, areas, fields and words of a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        Of `femgear.report.style.new_figure`; its axes may be polar, which come back as plane curves.
+
+    Returns
+    -------
+    dict or None
+        What JSON can hold: ``title``, ``size`` [in], ``rows``, ``columns``, and for every panel its place,
+        axes and traces, named as plotly.js names them; None where a part of the figure is neither a line, an
+        area, a bar, a field nor a text.
+    """
+    bars = {id(found.colorbar.ax) for found in _fields(figure)}
+    panels = [ax for ax in figure.axes if id(ax) not in bars]
+    try:
+        found = [_panel(ax, number, panels) for number, ax in enumerate(panels)]
+    except _PictureOnly:
+        return None
+    grids: list[Any] = [ax.get_gridspec() for ax in panels if ax.get_subplotspec() is not None]
+    if len(grids) != len(panels) or not found:
+        return None
+    title = figure.get_suptitle()
+    width, height = figure.get_size_inches()
+    return {
+        "title": title,
+        "size": [float(width), float(height)],
+        "rows": grids[0].nrows,
+        "columns": grids[0].ncols,
+        "panels": found,
+    }
+
+
+def _fields(figure: Figure) -> list[Any]:
+    """List what has a colour bar."""
+    return [one for ax in figure.axes for one in ax.collections if getattr(one, "colorbar", None) is not None]
+
+
+def _panel(ax: Any, number: int, panels: list[Any]) -> dict[str, Any]:
+    """Read one pair of axes."""
+    spec = ax.get_subplotspec()
+    polar = ax.name == "polar"
+    titles = (ax.get_title(loc) for loc in ("left", "center", "right"))
+    plane = {"x": {"hidden": True}, "y": {"hidden": True}} if polar or not ax.axison else {}
+    shared = next((i for i, other in enumerate(panels) if ax.get_shared_x_axes().joined(ax, other)), number)
+    traces = [*_areas(ax), *_lines(ax), *_patches(ax)]
+    return (
+        {
+            "place": [spec.rowspan.start, spec.rowspan.stop, spec.colspan.start, spec.colspan.stop]
+            if spec
+            else [],
+            "title": next((text for text in titles if text), ""),
+            "x": _axis(ax.xaxis, ax.get_xlim()),
+            "y": _axis(ax.yaxis, ax.get_ylim()),
+            "shared": shared,
+            "square": polar or ax.get_aspect() == 1.0,
+            "traces": (_circles(ax) if polar else []) + traces,
+            "words": _words(ax),
+        }
+        | plane
+        | (_polar_limits(ax) if polar else {})
+    )
+
+
+def _polar_limits(ax: Any) -> dict[str, Any]:
+    """Limits of the plane that a polar diagram is drawn in."""
+    reach = float(ax.get_rmax() - ax.get_rorigin()) * 1.12
+    return {name: {"hidden": True, "range": [-reach, reach], "title": ""} for name in ("x", "y")}
+
+
+def _circles(ax: Any) -> list[dict[str, Any]]:
+    """Circles and rays of a polar diagram, with their numbers."""
+    turn = np.linspace(0.0, 2 * np.pi, 181)
+    origin, outer = float(ax.get_rorigin()), float(ax.get_rmax())
+    low = float(ax.get_rmin())
+    radii = [r for r in ax.get_yticks() if low < r <= outer]
+    label_at = np.radians(ax.get_rlabel_position())
+    grid = {"mode": "lines", "line": {"color": "#d0d0d0", "width": 1}, "hoverinfo": "skip"}
+    found = [{**grid, **_plane(turn, np.full_like(turn, r), origin)} for r in (*radii, outer)]
+    angles = np.arange(8) * np.pi / 4
+    found += [{**grid, **_plane(np.array([a, a]), np.array([low, outer]), origin)} for a in angles]
+    text = {"mode": "text", "hoverinfo": "skip", "line": {"color": "#606060"}}
+    rim = outer + 0.07 * (outer - origin)
+    degrees = {"text": [f"{np.degrees(a):.0f}°" for a in angles]}
+    found.append({**text, **degrees, **_plane(angles, np.full(8, rim), origin)})
+    numbers = {"text": [f"{r:g}".replace("-", "−") for r in radii]}
+    return [*found, {**text, **numbers, **_plane(np.full(len(radii), label_at), np.array(radii), origin)}]
+
+
+def _plane(angle: np.ndarray, radius: np.ndarray, origin: float) -> dict[str, Any]:
+    """Turn angles [rad] and radii into coordinates of the plane."""
+    length = np.asarray(radius, float) - origin
+    return {"x": _numbers(length * np.cos(angle)), "y": _numbers(length * np.sin(angle))}
+
+
+def _axis(axis, limits) -> dict[str, Any]:
+    """Read title, scale, limits and the ticks that are words."""
+    from matplotlib.ticker import FixedFormatter
+
+    scale = axis.get_scale()
+    if scale not in ("linear", "log"):
+        raise _PictureOnly
+    found = {"title": axis.get_label_text(), "log": scale == "log", "range": [float(end) for end in limits]}
+    if isinstance(axis.get_major_formatter(), FixedFormatter):
+        texts = [text.get_text() for text in axis.get_ticklabels()]
+        found |= {"ticks": _numbers(axis.get_majorticklocs()), "texts": texts}
+    return found
+
+
+def _lines(ax: Any) -> list[dict[str, Any]]:
+    """Read curves, markers and lines across the panel."""
+    return [_curve(line, ax) for line in ax.get_lines() if line.get_visible()]
+
+
+def _curve(line, ax: Any) -> dict[str, Any]:
+    """Read one curve."""
+    from matplotlib.colors import to_hex
+
+    x, y = (np.ma.filled(np.ma.asarray(values, float), np.nan) for values in line.get_data(orig=False))
+    style, marker = line.get_linestyle(), line.get_marker()
+    drawn, marked = style not in ("None", "none", " ", ""), marker not in ("None", "none", None, " ", "")
+    colour = to_hex(line.get_color())
+    found: dict[str, Any] = {
+        "mode": "+".join(["lines"] * drawn + ["markers"] * marked) or "none",
+        "line": {"color": colour, "width": _width(line.get_linewidth()), "dash": _DASHES.get(style, "dash")},
+        "opacity": float(line.get_alpha() or 1.0),
+    }
+    if line.get_drawstyle().startswith("steps"):
+        found["line"]["shape"] = {"steps-mid": "hvh", "steps-post": "hv"}.get(line.get_drawstyle(), "vh")
+    if marked:
+        open_face = str(line.get_markerfacecolor()).lower() in ("none", "white")
+        symbol = _MARKERS.get(marker, "circle") + "-open" * open_face
+        edge = to_hex(line.get_markeredgecolor()) if open_face else to_hex(line.get_markerfacecolor())
+        found["marker"] = {"symbol": symbol, "size": 1.2 * line.get_markersize(), "color": edge}
+    across = _across(line.get_transform(), ax)
+    if across:
+        return {**found, **_spread(x, y, across, ax), **_name(line), "hoverinfo": "skip"}
+    return {**found, **_coordinates(x, y, ax), **_name(line)}
+
+
+def _across(transform, ax: Any) -> str:
+    """Tell whether x or y of an artist is a share of the panel's side."""
+    if transform == ax.get_yaxis_transform():
+        return "x"
+    return "y" if transform == ax.get_xaxis_transform() else ""
+
+
+def _spread(x, y, across: str, ax: Any) -> dict[str, Any]:
+    """Spread shares of the side of a panel over its limits."""
+    low, high = ax.get_xlim() if across == "x" else ax.get_ylim()
+    if (ax.get_xscale() if across == "x" else ax.get_yscale()) == "log":
+        ends = low * (high / low) ** np.asarray(x if across == "x" else y, float)
+    else:
+        ends = low + (high - low) * np.asarray(x if across == "x" else y, float)
+    x, y = (ends, y) if across == "x" else (x, ends)
+    return {"x": _numbers(x), "y": _numbers(y)}
+
+
+def _name(artist) -> dict[str, Any]:
+    """Name a curve as the legend does."""
+    text = str(artist.get_label())
+    return {"name": "" if text.startswith("_") else text}
+
+
+def _coordinates(x, y, ax: Any) -> dict[str, Any]:
+    """Coordinates of points as they are drawn."""
+    x, y = _thinned(np.asarray(x, float), np.asarray(y, float))
+    if ax.name == "polar":
+        return _plane(x, y, float(ax.get_rorigin()))
+    steps = np.diff(x)
+    if len(x) > 8 and np.all(np.isfinite(steps)) and np.ptp(steps) <= 1e-9 * np.abs(x).max() and steps[0]:
+        return {
+            "x0": float(x[0]),
+            "dx": float((x[-1] - x[0]) / (len(x) - 1)),
+            "y": _numbers(y, ax.get_yscale()),
+        }
+    return {"x": _numbers(x, ax.get_xscale()), "y": _numbers(y, ax.get_yscale())}
+
+
+def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Leave out points between the largest and the smallest of every step where there are very many."""
+    if len(x) <= _POINTS or np.any(~(np.diff(x) >= 0)):
+        return x, y
+    starts = np.linspace(0, len(x), _POINTS // 2, endpoint=False).astype(int)
+    parts = [slice(*ends) for ends in zip(starts, [*starts[1:], len(x)])]
+    kept = np.array(
+        [sorted((part.start + y[part].argmin(), part.start + y[part].argmax())) for part in parts]
+    )
+    kept = np.unique([0, *kept.ravel(), len(x) - 1])
+    return x[kept], y[kept]
+
+
+def _areas(ax: Any) -> list[dict[str, Any]]:
+    """Read filled areas, bundles of lines, and fields."""
+    from matplotlib.collections import LineCollection, PathCollection, PolyCollection, QuadMesh
+
+    found = []
+    for one in ax.collections:
+        if isinstance(one, QuadMesh):
+            found.append(_field(one))
+        elif isinstance(one, LineCollection):
+            found.append(_bundle(one.get_segments(), one, ax))
+        elif isinstance(one, PolyCollection):
+            found += [_area(path.vertices, one, ax) for path in one.get_paths()]
+        elif isinstance(one, PathCollection):
+            found.append(_points(one, ax))
+        else:
+            raise _PictureOnly
+    return found
+
+
+def _points(one, ax: Any) -> dict[str, Any]:
+    """Read scattered points."""
+    x, y = np.asarray(one.get_offsets(), float).T
+    if one.get_array() is not None or len(one.get_facecolors()) > 1:
+        raise _PictureOnly
+    colours = one.get_facecolors() if len(one.get_facecolors()) else one.get_edgecolors()
+    marker = {"size": float(np.sqrt(one.get_sizes()[0])), "color": _colour(colours), "symbol": "circle"}
+    return {"mode": "markers", "marker": marker, **_coordinates(x, y, ax), **_name(one)}
+
+
+def _bundle(segments, one, ax: Any) -> dict[str, Any]:
+    """Read many straight lines as one curve with gaps."""
+    gap = np.full((1, 2), np.nan)
+    joined = np.concatenate([np.concatenate([segment, gap]) for segment in segments] or [gap])
+    line = {"color": _colour(one.get_colors()), "width": _width(one.get_linewidths()[0])}
+    return {"mode": "lines", "line": line, **_coordinates(joined[:, 0], joined[:, 1], ax), **_name(one)}
+
+
+def _area(corners, one, ax: Any) -> dict[str, Any]:
+    """Read one filled area."""
+    if len(one.get_facecolors()) > 1:
+        raise _PictureOnly
+    corners = np.asarray(corners, float)[:: 1 + len(corners) // _POINTS]
+    faces = one.get_facecolors()
+    fill = (
+        {"fill": "toself", "fillcolor": _colour(faces), "fillopacity": float(faces[0][3])}
+        if len(faces)
+        else {}
+    )
+    return {
+        "mode": "none" if fill else "lines",
+        "hoverinfo": "skip",
+        **fill,
+        **_coordinates(corners[:, 0], corners[:, 1], ax),
+        **_name(one),
+    }
+
+
+def _field(one) -> dict[str, Any]:
+    """Read a field of coloured cells on straight lines."""
+    corners = one.get_coordinates()
+    x, y = corners[0, :, 0], corners[:, 0, 1]
+    straight = np.array_equal(corners[..., 0], np.broadcast_to(x, corners.shape[:2]))
+    if not straight or not np.array_equal(corners[..., 1], np.broadcast_to(y[:, None], corners.shape[:2])):
+        raise _PictureOnly
+    values = np.ma.filled(np.ma.asarray(one.get_array(), float), np.nan).reshape(len(y) - 1, len(x) - 1)
+    low, high = one.get_clim()
+    colours = [[float(s), _colour([one.cmap(s)])] for s in np.linspace(0.0, 1.0, 17)]
+    bar = one.colorbar
+    return {
+        "type": "heatmap",
+        **{"x": _numbers(x), "y": _numbers(y), "z": [_numbers(row) for row in values]},
+        **{"zmin": float(low), "zmax": float(high), "colorscale": colours, "showscale": bar is not None},
+        "text": "" if bar is None else bar.ax.get_ylabel() or bar.ax.get_xlabel(),
+    }
+
+
+def _patches(ax: Any) -> list[dict[str, Any]]:
+    """Read bars, bands across the panel, stairs and polygons."""
+    from matplotlib.patches import Polygon, Rectangle, StepPatch
+
+    found: list[dict[str, Any]] = []
+    one: Any
+    for one in ax.patches:
+        if isinstance(one, StepPatch):
+            values, edges, _ = one.get_data()
+            x, y = np.repeat(edges, 2)[1:-1], np.repeat(values, 2)
+            line = {"color": _colour([one.get_edgecolor()]), "width": _width(one.get_linewidth())}
+            line["dash"] = _DASHES.get(str(one.get_linestyle()), "solid")
+            step = {"mode": "lines", "line": line, **_coordinates(x, y, ax), **_name(one)}
+            if one.get_fill():
+                x, y = [x[0], *x, x[-1]], [0.0, *y, 0.0]
+                step |= {"fill": "toself", "fillcolor": _colour([one.get_facecolor()]), "fillopacity": 1.0}
+                step |= _coordinates(x, y, ax)
+            found.append(step)
+            continue
+        if isinstance(one, Rectangle):
+            corners = one.get_patch_transform().transform(one.get_path().vertices)
+        elif isinstance(one, Polygon):
+            corners = one.get_xy()
+        else:
+            raise _PictureOnly
+        x, y = corners[:, 0], corners[:, 1]
+        across = _across(one.get_data_transform() if one.is_transform_set() else ax.transData, ax)
+        place = _spread(x, y, across, ax) if across else _coordinates(x, y, ax)
+        face: Any = one.get_facecolor()
+        fill = {"fill": "toself", "fillcolor": _colour([face]), "fillopacity": float(face[3])}
+        found.append({"mode": "none", "hoverinfo": "skip", **fill, **place, **_bar_name(one, ax)})
+    return found
+
+
+def _bar_name(one, ax: Any) -> dict[str, Any]:
+    """Name a bar as its group is named."""
+    group = next((bars for bars in ax.containers if one in list(bars)), one)
+    return _name(group)
+
+
+def _words(ax: Any) -> list[dict[str, Any]]:
+    """Read texts within the panel."""
+    found = []
+    text: Any
+    for text in ax.texts:
+        if not text.get_text():
+            continue
+        x, y = getattr(text, "xy", None) or text.get_position()
+        if _across(text.get_transform(), ax):
+            place = {
+                name: value[0]
+                for name, value in _spread([x], [y], _across(text.get_transform(), ax), ax).items()
+            }
+        elif text.get_transform() == ax.transAxes:
+            place = {"x": float(x), "y": float(y), "paper": True}
+        else:
+            place = {name: _numbers([v])[0] for name, v in (("x", x), ("y", y))}
+            if ax.name == "polar":
+                place = {
+                    name: v[0] for name, v in _plane(np.array([x]), np.array([y]), ax.get_rorigin()).items()
+                }
+        shift = (
+            text.xyann if hasattr(text, "xyann") and getattr(text, "xycoords", "") == "data" else (0.0, 0.0)
+        )
+        found.append(
+            place
+            | {
+                "text": text.get_text(),
+                "angle": -float(text.get_rotation()),
+                "align": [text.get_ha(), text.get_va()],
+                "shift": [float(shift[0]), -float(shift[1])],
+                "color": _colour([text.get_color()]),
+            }
+        )
+    return found
+
+
+def _width(points: float) -> float:
+    """Width of a line in pixels of a page."""
+    return round(1.1 * float(points), 2)
+
+
+def _colour(colours) -> str:
+    """First of some colours as #rrggbb, black without any."""
+    from matplotlib.colors import to_hex
+
+    return to_hex(colours[0]) if len(colours) else "#000000"
+
+
+def _numbers(values, scale: str = "linear") -> list[float | None]:
+    """Round numbers for JSON, which has no NaN."""
+    values = np.asarray(values, float)
+    if scale == "log":
+        return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in values]
+    largest = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    places = _DIGITS - 1 - int(np.floor(np.log10(largest))) if largest > 0 else 0
+    return [v if np.isfinite(v) else None for v in np.round(values, places).tolist()]

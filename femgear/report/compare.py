@@ -1,0 +1,116 @@
+"""Two runs beside one another: what differs in cases and numbers, curves over each other, both sounds."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from femgear.report.page import chart_figure, document, part_of, shown_data, table
+from femgear.report.tables import Block
+
+if TYPE_CHECKING:
+    from femgear.storage.results import Results
+    from femgear.trains.protocol import Train
+
+_FADED = 0.55
+"""Opacity of the curves of the second run."""
+
+
+def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]:
+    """Tabulate what differs between two runs of one train: entries of the case, then numbers by stage."""
+    cases = (_flat(tomllib.loads(run.case.source)) for run in (first, second))
+    a, b = ({key: str(value) for key, value in entries} for entries in cases)
+    keys = sorted(key for key in a.keys() | b.keys() if a.get(key) != b.get(key))
+    rows = tuple((key, a.get(key, "not given"), b.get(key, "not given")) for key in keys)
+    entries = Block(
+        "Cases", ("entry", "first", "second") if rows else (), rows, () if rows else ("the same",)
+    )
+    others = {block.title: block for block in train.describe_results(second)}
+    found = [entries]
+    for block in train.describe_results(first):
+        if block.title in others and block.title != "Time":
+            found.append(_differences(block, others[block.title]))
+    return tuple(found)
+
+
+def _flat(entries: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Entries of a case file with their whole names."""
+    if isinstance(entries, dict):
+        for key, value in entries.items():
+            yield from _flat(value, f"{path}.{key}" if path else key)
+    elif isinstance(entries, list) and any(isinstance(one, dict) for one in entries):
+        for i, value in enumerate(entries, 1):
+            yield from _flat(value, f"{path}[{i}]")
+    else:
+        yield path, entries
+
+
+def _differences(first: Block, second: Block) -> Block:
+    """Cells of two tables that differ, with the change where both are numbers."""
+    if first.header != second.header or [row[0] for row in first.rows] != [row[0] for row in second.rows]:
+        return Block(first.title, notes=("the tables have other rows; see the reports",))
+    rows = []
+    for one, other in zip(first.rows, second.rows):
+        for name, x, y in zip(first.header[1:], one[1:], other[1:]):
+            if x != y:
+                rows.append((" ".join((first.header[0], one[0])).strip(), name, x, y, _change(x, y)))
+    header = ("row", "column", "first", "second", "change") if rows else ()
+    return Block(first.title, header, tuple(rows), () if rows else ("the same",))
+
+
+def _change(first: str, second: str) -> str:
+    """Change in per cent, nothing where a cell is no number."""
+    try:
+        x, y = float(first), float(second)
+    except ValueError:
+        return ""
+    return f"{100.0 * (y / x - 1.0):+.3g} %" if x else ""
+
+
+def compare_page(train: Train, first: Results, second: Results) -> str:
+    """Make the page of two runs as HTML text; see `compared`."""
+    data = [shown_data(run) for run in (first, second)]
+    charts = {
+        name: both
+        for name, one in data[0].get("charts", {}).items()
+        if name in data[1].get("charts", {}) and (both := _overlaid(one, data[1]["charts"][name])) is not None
+    }
+    title = f"{first.folder.name} and {second.folder.name}"
+    runs = {f"runup {i}": one["runup"] for i, one in enumerate(data, 1) if "runup" in one}
+    main = [f"<h1>{escape(title)}</h1>\n"]
+    for block in compared(train, first, second):
+        main.append(f"<h2>{escape(block.title)}</h2>\n{table(block, heading=False)}")
+    for run, key in zip((first, second), runs):
+        place = part_of("runup").replace('data-run="runup"', f'data-run="{key}"')
+        main.append(f"<h2>Run-up of {escape(run.folder.name)}</h2>\n{place}")
+    main.append('<h2>Curves</h2>\n<p class="note">Pale: the second run.</p>\n')
+    main += [chart_figure(name, name.replace("_", " ")) for name in charts]
+    return document(title, "".join(main), {"charts": charts} | runs)
+
+
+def _overlaid(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any] | None:
+    """Draw the curves of two charts over each other; None where their panels differ."""
+    if len(first["panels"]) != len(second["panels"]):
+        return None
+    panels = []
+    for one, other in zip(first["panels"], second["panels"]):
+        if any(trace.get("type") == "heatmap" for trace in one["traces"]):
+            return None
+        faded = [
+            trace | {"name": f"{trace['name']}, second" if trace.get("name") else "", "opacity": _FADED}
+            for trace in other["traces"]
+            if trace.get("hoverinfo") != "skip"
+        ]
+        ranges = {axis: one[axis] | _joint(one[axis], other[axis]) for axis in ("x", "y")}
+        panels.append(one | ranges | {"traces": [*one["traces"], *faded], "words": []})
+    return first | {"panels": panels}
+
+
+def _joint(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+    """Limits that hold both axes."""
+    if "range" not in first or "range" not in second:
+        return {}
+    ends = [*first["range"], *second["range"]]
+    return {"range": [min(ends), max(ends)]}

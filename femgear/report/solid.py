@@ -1,0 +1,170 @@
+"""A planetary set in space for the page: exact teeth as wide as they are, its static state and its modes.
+
+Every gear is one sector of its grid and the number of copies; the browser makes the rest.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.fe.grid import Grid, shape_functions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.contact.tooth_loads import DeformedBody
+    from femgear.fe.elasticity import Material
+    from femgear.gears.planetary import PlanetarySet
+
+SOLID = "solid.json"
+"""File of what the page turns in space."""
+_MODES = 24
+"""Modes that can be chosen."""
+_WAVES = 1e-3
+"""Waves around the ring below this share of the largest of a mode are left out."""
+
+
+def solid(
+    planetary_set: PlanetarySet,
+    grids: dict[str, Grid],
+    bodies: Iterable[DeformedBody],
+    material: Material,
+    modes: xr.Dataset | None = None,
+) -> dict[str, Any]:
+    """Collect what the browser draws of a set in space.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    grids : dict of str to Grid
+        One sector of ``"sun"``, ``"planet"``, ``"ring"``, centred on the origin.
+    bodies : iterable of deformed bodies
+        With displacements (teeth, n, 2) [m] in the frame of every sector.
+    material : Material
+    modes : xarray.Dataset, optional
+        Of modes.nc.
+
+    Returns
+    -------
+    dict
+        What JSON can hold: lengths in mm, displacements in um, stresses in MPa.
+    """
+    sectors = {kind: _Sector(grid) for kind, grid in grids.items()}
+    found = []
+    for body in bodies:
+        sector, moved = sectors[body.kind], np.asarray(body.displacement)
+        stress = np.stack([von_mises(grids[body.kind], one, material) for one in moved])
+        found.append(
+            {
+                "name": body.name,
+                "kind": body.kind,
+                "centre": [1e3 * float(x) for x in body.centre],
+                "angle": float(body.angle),
+                "displacement": _packed(1e6 * moved[:, sector.nodes]),
+                "stress": _packed(1e-6 * stress[:, sector.nodes]),
+            }
+        )
+    return {
+        "width": 1e3 * planetary_set.sun.face_width,
+        "radius": 1e3 * planetary_set.ring.rim_radius,
+        "pins": [1e3 * planetary_set.centre_distance, [float(a) for a in planetary_set.planet_angles]],
+        "sectors": {
+            kind: sectors[kind].packed(gear.teeth)
+            for kind, gear in (
+                ("sun", planetary_set.sun),
+                ("planet", planetary_set.planet),
+                ("ring", planetary_set.ring),
+            )
+        },
+        "bodies": found,
+        "modes": [] if modes is None else _modes(modes),
+    }
+
+
+class _Sector:
+    """Corners, triangles and free edges of one sector."""
+
+    def __init__(self, grid: Grid):
+        corners = grid.triangles[:, :3]
+        self.nodes, numbers = np.unique(corners, return_inverse=True)
+        self.points, self.triangles = grid.points[self.nodes], numbers.reshape(-1, 3)
+        edges = np.concatenate([self.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+        _, first, count = np.unique(np.sort(edges), axis=0, return_index=True, return_counts=True)
+        cuts = np.concatenate([grid.boundaries[name][:, :2] for name in ("cut_left", "cut_right")])
+        kept = {tuple(sorted(edge)) for edge in np.searchsorted(self.nodes, cuts).tolist()}
+        outer = edges[first[count == 1]].tolist()
+        self.edges = np.array([edge for edge in outer if tuple(sorted(edge)) not in kept])
+
+    def packed(self, count: int) -> dict[str, Any]:
+        """Points [mm], triangles and edges of the free surface, for JSON."""
+        return {
+            "count": count,
+            "points": [round(1e3 * float(x), 4) for x in self.points.ravel()],
+            "triangles": self.triangles.ravel().tolist(),
+            "edges": self.edges.ravel().tolist(),
+        }
+
+
+def von_mises(grid: Grid, displacement: np.ndarray, material: Material) -> np.ndarray:
+    """Compute von Mises' stress at the nodes [Pa] in plane stress, mean of the elements around each.
+
+    The displacement is (n, 2) [m]. Stresses of elements are taken at their corners and at the
+    middles of their sides; the faces of a gear are free (Timoshenko and Goodier, "Theory of Elasticity",
+    3rd ed., section 10).
+    """
+    places = np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
+    slopes = np.stack(shape_functions(*places)[1:])
+    jacobian = np.einsum("aiq,mib->mqab", slopes, grid.points[grid.triangles])
+    moved = np.einsum("aiq,mib->mqab", slopes, displacement[grid.triangles])
+    gradient = np.linalg.solve(jacobian, moved)
+    xx, yy = gradient[..., 0, 0], gradient[..., 1, 1]
+    xy = gradient[..., 0, 1] + gradient[..., 1, 0]
+    first, shear = material.lame("plane stress")
+    mean = first * (xx + yy)
+    sx, sy, t = mean + 2 * shear * xx, mean + 2 * shear * yy, shear * xy
+    found = np.sqrt(sx**2 - sx * sy + sy**2 + 3 * t**2).ravel()
+    nodes = grid.triangles.ravel()
+    return np.bincount(nodes, found, grid.n_nodes) / np.maximum(np.bincount(nodes, minlength=grid.n_nodes), 1)
+
+
+def _modes(modes: xr.Dataset) -> list[dict[str, Any]]:
+    """Motions of the bodies and waves around the ring of the first modes that are no rigid motion."""
+    frequency, names = modes["frequency"].values, [str(name) for name in modes["dof"].values]
+    elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))[:_MODES]
+    found = []
+    for mode in elastic:
+        shape = dict(zip(names, modes["shape"].values[:, mode]))
+        bodies = dict.fromkeys(name.split(":")[0] for name in names if ": " in name)
+        axes = ("x", "y", "rotation")
+        moved = {body: [float(shape.get(f"{body}: {axis}", 0.0)) for axis in axes] for body in bodies}
+        title = f"{mode + 1}: {frequency[mode]:.5g} Hz, {modes['kind'].values[mode]}"
+        found.append({"title": title, "bodies": moved, "ring": _waves(modes, mode)})
+    return found
+
+
+def _waves(modes: xr.Dataset, mode: int) -> list[list[float]]:
+    """Waves around the outer surface of the ring: number, radial and tangential part (real, imaginary)."""
+    if "ring_shape_real" not in modes:
+        return []
+    numbers = modes["circumferential"].values
+    parts = np.stack(
+        [
+            modes[f"{name}_{part}"].values[mode]
+            for name in ("ring_shape", "ring_tangential_shape")
+            for part in ("real", "imag")
+        ]
+    )
+    size = np.abs(parts).max(axis=0)
+    kept = np.flatnonzero(size > _WAVES * size.max(initial=0.0))
+    return [[int(numbers[i]), *(float(f"{v:.5g}") for v in parts[:, i])] for i in kept]
+
+
+def _packed(values: np.ndarray) -> dict[str, Any]:
+    """Whole numbers of sixteen bits and what one of them is worth."""
+    largest = float(np.abs(values).max(initial=0.0)) or 1.0
+    whole = np.round(values * (32767 / largest)).astype("<i2")
+    return {"unit": largest / 32767, "values": base64.b64encode(whole.tobytes()).decode("ascii")}

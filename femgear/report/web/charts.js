@@ -1,0 +1,159 @@
+// Charts of the page: panels of curves, areas, bars and fields, drawn by plotly.js as they come into view.
+"use strict";
+
+const page = { data: null, dark: false };
+
+page.read = async () => {
+  const text = document.getElementById("data").textContent;
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return JSON.parse(await new Response(stream).text());
+};
+
+// greys change places in the dark; colours of the palette stand out on both grounds
+page.colour = (colour) => {
+  const found = /^#(..)(..)(..)$/.exec(colour || "");
+  if (!page.dark || !found) return colour;
+  const [r, g, b] = found.slice(1).map((part) => parseInt(part, 16));
+  if (Math.max(r, g, b) - Math.min(r, g, b) > 12) return colour;
+  const level = Math.round(30 + 0.85 * (255 - r));
+  return `rgb(${level},${level},${level})`;
+};
+page.style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+page.clear = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/\n/g, "<br>");
+page.wrapped = (text, pixels) => {
+  const letters = Math.max(12, Math.floor(pixels / 6.6));
+  const lines = text.split("\n").flatMap((line) => {
+    const found = [""];
+    for (const word of line.split(" ")) {
+      const last = found.length - 1;
+      if (found[last] && found[last].length + word.length >= letters) found.push(word);
+      else found[last] += (found[last] ? " " : "") + word;
+    }
+    return found;
+  });
+  return { text: page.clear(lines.join("\n")), lines: lines.length };
+};
+
+page.trace = (one, panel, key, seen) => {
+  const fade = (colour, share) => {
+    const [r, g, b] = page.colour(colour).match(/^#/)
+      ? page.colour(colour).slice(1).match(/../g).map((part) => parseInt(part, 16))
+      : page.colour(colour).match(/\d+/g);
+    return `rgba(${r},${g},${b},${share})`;
+  };
+  const trace = { type: "scatter", ...one, xaxis: key.x, yaxis: key.y, connectgaps: false };
+  if (one.line) trace.line = { ...one.line, color: page.colour(one.line.color) };
+  if (one.mode === "text") trace.textfont = { color: page.colour(one.line.color), size: 11 };
+  if (one.marker) trace.marker = { ...one.marker, color: page.colour(one.marker.color) };
+  if (one.fill) { trace.fillcolor = fade(one.fillcolor, one.fillopacity); trace.line = { width: 0 }; trace.mode = "lines"; }
+  if (one.type === "heatmap") {
+    trace.colorbar = { title: { text: page.clear(one.text), side: "right" }, thickness: 14, len: key.height, y: key.middle };
+    delete trace.text;
+  }
+  trace.showlegend = Boolean(one.name) && !seen.has(one.name);
+  trace.legendgroup = one.name || undefined;
+  if (one.name) seen.add(one.name);
+  const what = (axis, letter) => `${page.clear(axis.title || letter)}: %{${letter}:.5g}`;
+  if (!one.hoverinfo) trace.hovertemplate = `${one.name ? page.clear(one.name) + "<br>" : ""}${what(panel.x, "x")}<br>${what(panel.y, "y")}<extra></extra>`;
+  return trace;
+};
+
+page.axis = (axis, share, other, narrow) => {
+  const found = { domain: share, anchor: other, zeroline: false, gridcolor: page.style("--rule"), linecolor: page.style("--soft"),
+    showline: true, ticks: "outside", tickcolor: page.style("--soft"), exponentformat: "power", automargin: true,
+    title: { text: page.clear(axis.title || ""), standoff: 8 }, type: axis.log ? "log" : "linear" };
+  if (axis.range) found.range = axis.log ? axis.range.map(Math.log10) : axis.range;
+  if (axis.ticks) Object.assign(found, { tickmode: "array", tickvals: axis.ticks, ticktext: axis.texts.map(page.clear) });
+  if (axis.log) found.dtick = 1;
+  else found.tickformat = ",~r";
+  if (axis.hidden) Object.assign(found, { visible: false });
+  if (narrow) found.nticks = 5;
+  return found;
+};
+
+page.arrange = (chart, width) => {
+  const single = width < 620 && chart.columns > 1;
+  const rows = single ? chart.panels.length : chart.rows, columns = single ? 1 : chart.columns;
+  const gaps = { x: 78, y: single ? 86 : 74, left: 70, top: chart.title ? 62 : 36, bottom: 62 };
+  const ratio = chart.size[1] / chart.size[0];
+  const cell = chart.panels[0].square ? Math.min((width - 40) / columns, 460) * 1.02 : single ? 250 : Math.min(Math.max((width * ratio) / rows, 210), 340);
+  const height = rows * cell + gaps.top + gaps.bottom;
+  const inner = { w: width - gaps.left - 20, h: height - gaps.top - gaps.bottom };
+  const places = chart.panels.map((panel, i) => {
+    const [r0, r1, c0, c1] = single ? [i, i + 1, 0, 1] : panel.place;
+    const hidden = panel.x.hidden;
+    const dx = (hidden ? 10 : gaps.x) / inner.w, dy = (hidden ? 46 : gaps.y) / inner.h;
+    const wide = (1 + dx) / columns, high = (1 + dy) / rows;
+    return { x: [c0 * wide, c1 * wide - dx], y: [1 - (r1 * high - dy), 1 - r0 * high] };
+  });
+  return { height, places, gaps, inner };
+};
+
+page.draw = (div) => {
+  const chart = page.data.charts[div.dataset.chart], width = Math.max(div.clientWidth, 280);
+  const { height, places, gaps, inner } = page.arrange(chart, width);
+  const seen = new Set(), traces = [], notes = [], narrow = width < 620;
+  const layout = { height, width, margin: { l: gaps.left, r: 20, t: gaps.top, b: gaps.bottom }, paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: narrow ? 11 : 13, color: page.style("--ink") },
+    hovermode: "closest", hoverlabel: { align: "left" }, dragmode: narrow ? false : "zoom",
+    legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0 } };
+  if (chart.title) layout.title = { text: page.wrapped(chart.title, width).text, x: 0, xref: "paper", font: { size: 15 } };
+  chart.panels.forEach((panel, i) => {
+    const end = i ? String(i + 1) : "", key = { x: "x" + end, y: "y" + end };
+    const place = places[i], first = panel.shared ? String(panel.shared + 1) : "";
+    layout["xaxis" + end] = page.axis(panel.x, place.x, key.y, narrow);
+    layout["yaxis" + end] = page.axis(panel.y, place.y, key.x, false);
+    if (panel.shared !== i) layout["xaxis" + end].matches = "x" + first;
+    if (panel.square) Object.assign(layout["yaxis" + end], { scaleanchor: key.x, constrain: "domain" });
+    key.height = place.y[1] - place.y[0];
+    key.middle = (place.y[0] + place.y[1]) / 2;
+    panel.traces.forEach((one) => traces.push(page.trace(one, panel, key, seen)));
+    if (panel.title) {
+      const pixels = (place.x[1] - place.x[0]) * inner.w;
+      notes.push({ text: page.wrapped(panel.title, pixels).text, xref: "paper", yref: "paper", x: place.x[0], y: place.y[1],
+        xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: narrow ? 11 : 12.5 } });
+    }
+    panel.words.forEach((word) => {
+      const align = { center: "center", left: "left", right: "right" }, high = { bottom: "bottom", top: "top", center: "middle", baseline: "bottom" };
+      const own = word.paper ? { xref: key.x + " domain", yref: key.y + " domain" } : { xref: key.x, yref: key.y };
+      const at = (value, axis) => (axis.log && !word.paper ? Math.log10(value) : value);
+      notes.push({ text: page.clear(word.text), ...own, x: at(word.x, panel.x), y: at(word.y, panel.y), showarrow: false, textangle: word.angle,
+        xanchor: align[word.align[0]], yanchor: high[word.align[1]] || "middle", xshift: word.shift[0], yshift: -word.shift[1],
+        font: { size: 11, color: page.colour(word.color) } });
+    });
+  });
+  layout.annotations = notes;
+  layout.showlegend = seen.size > 1;
+  Plotly.react(div, traces, layout, { displaylogo: false, responsive: false, displayModeBar: "hover",
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] });
+  div.dataset.drawn = String(width);
+};
+
+page.drawAll = () => document.querySelectorAll(".chart").forEach(page.draw);
+
+page.start = async () => {
+  page.data = await page.read();
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  page.dark = dark.matches;
+  const watcher = new IntersectionObserver((entries) => entries.forEach((entry) => {
+    if (entry.isIntersecting && !entry.target.dataset.drawn) page.draw(entry.target);
+  }), { rootMargin: "600px" });
+  const resized = new ResizeObserver((entries) => entries.forEach(({ target }) => {
+    if (target.dataset.drawn && Math.abs(target.clientWidth - Number(target.dataset.drawn)) > 4) page.draw(target);
+  }));
+  document.querySelectorAll(".chart").forEach((div) => {
+    div.style.minHeight = page.arrange(page.data.charts[div.dataset.chart], Math.max(div.clientWidth, 280)).height + "px";
+    watcher.observe(div);
+    resized.observe(div);
+  });
+  const redraw = () => document.querySelectorAll(".chart[data-drawn]").forEach(page.draw);
+  dark.addEventListener("change", () => { page.dark = dark.matches; redraw(); });
+  // paper is white, and shows all charts
+  addEventListener("beforeprint", () => { document.documentElement.classList.add("paper"); page.dark = false; page.drawAll(); });
+  addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); page.dark = dark.matches; redraw(); });
+  page.parts.forEach((part) => part());
+  document.documentElement.dataset.ready = "yes";
+};
+page.parts = [];
+addEventListener("DOMContentLoaded", page.start);

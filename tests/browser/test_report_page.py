@@ -1,0 +1,174 @@
+"""The page of a run of every train in Chromium: silent, without requests, accessible, drawn and heard."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from femgear.cli import main
+
+pytest.importorskip("playwright", reason="make test-browser installs it")
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = [pytest.mark.browser, pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")]
+CASES = Path(__file__).parents[2] / "cases"
+DEMO = "planetary_27_40_108"
+TRAINS = (DEMO, "nrel_pgb", "helical_30_20_70", "four_stage_reducer", "grc_like_drivetrain", "gear_pair")
+WIDTHS = (1400, 420)
+DRAW = "document.querySelectorAll('.chart').forEach(page.draw)"
+
+
+@pytest.fixture(scope="session")
+def report(tmp_path_factory):
+    """Return the report of a case, run once."""
+    found = {}
+
+    def run(name: str) -> Path:
+        if name not in found:
+            folder = tmp_path_factory.mktemp("report") / name
+            assert main(["run", str(CASES / f"{name}.toml"), "-o", str(folder)]) == 0
+            found[name] = folder / "report.html"
+        return found[name]
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    from playwright.sync_api import sync_playwright
+
+    options = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=[*options, "--autoplay-policy=no-user-gesture-required"]
+        )
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(chromium, report):
+    """Open a report without a network; at the end nothing was said and nothing asked for."""
+    contexts, messages = [], []
+
+    def show(name: str, width: int = 1400, scheme: str = "light"):
+        context = chromium.new_context(
+            viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
+        )
+        contexts.append(context)
+        tab = context.new_page()
+        tab.set_default_timeout(120_000)
+        tab.on("console", lambda message: messages.append(message.text))
+        tab.on("pageerror", lambda error: messages.append(str(error)))
+        tab.on("request", lambda asked: messages.append(asked.url) if asked.url.startswith("http") else None)
+        tab.goto(report(name).as_uri())
+        tab.wait_for_selector("html[data-ready]")
+        return tab
+
+    yield show
+    for context in contexts:
+        context.close()
+    assert messages == []
+
+
+@pytest.mark.parametrize("scheme", ("light", "dark"))
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", TRAINS)
+def test_page_is_drawn_and_accessible(opened, name, width, scheme):
+    from axe_playwright_python.sync_playwright import Axe
+
+    tab = opened(name, width, scheme)
+    tab.evaluate(DRAW)
+    charts = tab.locator(".chart")
+    assert charts.count() > 0
+    for chart in charts.all():
+        assert chart.locator(".main-svg").count() > 0 and chart.locator(".trace, .hm image").count() > 0
+    assert tab.evaluate("document.documentElement.scrollWidth") <= width
+    found = Axe().run(tab, options={"resultTypes": ["violations"]}).response["violations"]
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+
+
+@pytest.mark.parametrize("name", TRAINS)
+def test_paper_shows_every_chart_and_every_column(opened, name):
+    tab = opened(name, 794)
+    tab.emulate_media(media="print")
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert tab.locator(".chart:not([data-drawn])").count() == 0
+    cut = """[...document.querySelectorAll('main table, .chart')].filter(
+        (one) => one.getBoundingClientRect().right > document.documentElement.clientWidth + 1).length"""
+    assert tab.evaluate(cut) == 0
+    assert len(tab.pdf()) > 10_000
+
+
+def test_set_in_space_is_drawn_turns_and_moves(opened):
+    tab = opened(DEMO)
+    pixels = """() => { const canvas = document.querySelector('#solid-place canvas');
+        const copy = document.createElement('canvas'), { width, height } = canvas;
+        [copy.width, copy.height] = [width, height];
+        const pen = copy.getContext('2d'); pen.drawImage(canvas, 0, 0);
+        const bytes = Array.from(pen.getImageData(0, 0, width, height).data);
+        return bytes.filter((_, i) => i % 64 === 3 || i % 64 === 0); }"""
+    tab.wait_for_function("document.querySelector('#solid-place canvas').width > 300")
+    first = tab.evaluate(pixels)
+    covered = sum(alpha > 0 for alpha in first[1::2])
+    assert 0.1 < covered / (len(first) // 2) < 0.9
+    tab.select_option("#solid-view", "8")
+    mode = tab.evaluate(pixels)
+    assert mode != first
+    tab.focus("#solid-place canvas")
+    tab.keyboard.press("ArrowLeft")
+    assert tab.evaluate(pixels) != mode
+    tab.click("#solid-play")
+    tab.wait_for_timeout(400)
+    assert tab.inner_text("#solid-play") == "Pause"
+
+
+def test_hover_tells_the_line(opened):
+    tab = opened(DEMO)
+    spectrum = tab.locator("[data-part=spectrum]")
+    spectrum.scroll_into_view_if_needed()
+    tab.wait_for_selector("[data-part=spectrum] .points path")
+    strongest = """() => { const found = [...document.querySelectorAll('[data-part=spectrum] .points path')]
+        .map((one) => one.getBoundingClientRect()).sort((a, b) => a.top - b.top)[0];
+        return [found.x + found.width / 2, found.y + found.height / 2]; }"""
+    tab.mouse.move(*tab.evaluate(strongest))
+    tab.wait_for_selector("[data-part=spectrum] .hovertext")
+    text = tab.locator("[data-part=spectrum] .hovertext").inner_text()
+    assert "order" in text and "Hz" in text and "m/s²" in text
+
+
+def test_speed_moves_all_pictures_and_the_sound(opened):
+    tab = opened(DEMO)
+    ids = ("campbell", "level", "spectrum", "lobes")
+    state = """(ids) => ids.map((id) => {
+        const { data, layout } = document.querySelector(`[data-part=${id}]`);
+        return JSON.stringify([data, layout.shapes, layout.title]); })"""
+    tab.wait_for_function("document.querySelector('[data-part=lobes]').data")
+    first, label = tab.evaluate(state, ids), tab.inner_text("[data-part=value]")
+    tab.locator("[data-part=speed]").fill("60")
+    assert all(a != b for a, b in zip(first, tab.evaluate(state, ids)))
+    assert tab.inner_text("[data-part=value]") != label
+    tab.click("[data-part=play]")
+    assert tab.get_attribute("[data-part=play]", "aria-pressed") == "true"
+
+
+def test_sound_has_the_power_of_the_lines(opened):
+    tab = opened(DEMO)
+    powers = """() => { const { turns, linesAt } = document.querySelector('.runup').explorer;
+        const { samples } = turns(60, 48000), whole = samples.subarray(0, -1);
+        const lines = linesAt(60, document.querySelector('[data-part=source]').value);
+        const heard = lines.filter((one) => one.hertz < 0.45 * 48000);
+        const power = heard.reduce((sum, one) => sum + one.size ** 2 / 2, 0);
+        return [whole.reduce((sum, one) => sum + one * one, 0) / whole.length, power]; }"""
+    heard, wanted = tab.evaluate(powers)
+    assert heard == pytest.approx(wanted, rel=1e-4)
+
+
+def test_size_and_static_form(report):
+    text = report(DEMO).read_text("utf-8")
+    assert len(text.encode()) < 6_000_000
+    folder = report(DEMO).parent
+    assert main(["report", str(folder), "--static"]) == 0
+    static = report(DEMO).read_text("utf-8")
+    assert "<script" not in static and "data:image/png" in static
+    assert main(["report", str(folder)]) == 0
+    assert report(DEMO).read_text("utf-8") == text

@@ -1,0 +1,130 @@
+"""Charts hold what Matplotlib drew: curves, areas, bars, fields, words; pages run their own scripts alone."""
+
+import base64
+import json
+import re
+import zlib
+
+import numpy as np
+import pytest
+
+from femgear.report.charts import chart
+from femgear.report.page import document
+from femgear.report.style import label, new_figure
+
+
+def panel(draw, **options):
+    figure, (ax,) = new_figure(**options)
+    draw(ax)
+    found = chart(figure)
+    json.dumps(found, allow_nan=False)
+    return found["panels"][0]
+
+
+def points(trace):
+    """Coordinates of a trace, those of an even abscissa written out."""
+    y = np.array([np.nan if v is None else v for v in trace["y"]])
+    x = trace["x0"] + trace["dx"] * np.arange(len(y)) if "x0" in trace else trace["x"]
+    return np.array([np.nan if v is None else v for v in x]), y
+
+
+def test_curve_axes_and_names():
+    def draw(ax):
+        ax.semilogy([1.0, 2.0, 3.0], [1.0, np.nan, 100.0], "--o", color="#0072B2", label="k", linewidth=2)
+        label(ax, "x [1]", "y [N]", "title")
+
+    found = panel(draw)
+    (trace,) = found["traces"]
+    assert trace["name"] == "k" and trace["mode"] == "lines+markers" and trace["line"]["dash"] == "dash"
+    assert trace["x"] == [1.0, 2.0, 3.0] and trace["y"] == [1.0, None, 100.0]
+    assert found["x"]["title"] == "x [1]" and found["y"] | {"range": 0} == {
+        "title": "y [N]",
+        "log": True,
+        "range": 0,
+    }
+    assert found["title"] == "title"
+
+
+def test_long_curves_keep_their_extremes():
+    x = np.linspace(0.0, 1.0, 100_001)
+    y = np.sin(5000 * x)
+    y[54_321] = 7.0
+    (trace,) = panel(lambda ax: ax.plot(x, y))["traces"]
+    at, found = points(trace)
+    assert len(found) <= 6002 and found.max() == 7.0 and found.min() == pytest.approx(y.min(), abs=1e-4)
+    assert at[found.argmax()] == pytest.approx(x[54_321], abs=1e-5)
+
+
+def test_lines_across_bundles_areas_bars_and_stairs():
+    def draw(ax):
+        ax.set_xlim(0.0, 10.0)
+        ax.axhline(3.0, label="limit")
+        ax.vlines([1.0, 2.0], 0.0, [5.0, 6.0])
+        ax.fill_between([0.0, 1.0], 0.0, [1.0, 2.0])
+        ax.bar([4.0], [2.0], width=1.0, label="bars")
+        ax.stairs([1.0, 2.0], [6.0, 7.0, 8.0], fill=True)
+        ax.set_ylim(0.0, 8.0)
+
+    area, bundle, limit, bar, stairs = _by_kind(panel(draw)["traces"])
+    assert limit["x"] == [0.0, 10.0] and limit["y"] == [3.0, 3.0] and limit["name"] == "limit"
+    assert bundle["x"] == [1.0, 1.0, None, 2.0, 2.0, None] and bundle["y"][1] == 5.0
+    assert area["fill"] == "toself" and max(area["y"]) == 2.0
+    assert (min(bar["x"]), max(bar["x"]), max(bar["y"]), bar["name"]) == (3.5, 4.5, 2.0, "bars")
+    assert stairs["fill"] == "toself" and (min(stairs["x"]), max(stairs["y"])) == (6.0, 2.0)
+
+
+def _by_kind(traces):
+    """Areas, bundles, lines, bars, stairs."""
+    collections = [one for one in traces if one["name"] == ""]
+    area = next(one for one in collections if one.get("fill") and max(one["x"]) == 1.0)
+    bundle = next(one for one in collections if None in one["x"])
+    stairs = next(one for one in collections if one.get("fill") and max(one["x"]) == 8.0)
+    named = {one["name"]: one for one in traces if one["name"]}
+    return area, bundle, named["limit"], named["bars"], stairs
+
+
+def test_polar_curves_lie_in_the_plane():
+    def draw(ax):
+        ax.plot([0.0, np.pi / 2, np.pi], [1.0, 2.0, 3.0], label="envelope")
+        ax.set_ylim(0.0, 4.0)
+
+    found = panel(draw, polar=True)
+    curve = next(one for one in found["traces"] if one.get("name") == "envelope")
+    np.testing.assert_allclose(points(curve), [[1.0, 0.0, -3.0], [0.0, 2.0, 0.0]], atol=1e-4)
+    assert found["square"] and found["x"]["hidden"]
+
+
+def test_field_with_its_colour_bar():
+    figure, (ax,) = new_figure()
+    image = ax.pcolormesh([0.0, 1.0, 2.0], [0.0, 5.0], [[1.0, 2.0]], vmin=0.0, vmax=4.0)
+    figure.colorbar(image, label="pressure [MPa]")
+    found = chart(figure)
+    assert len(found["panels"]) == 1
+    (trace,) = found["panels"][0]["traces"]
+    assert trace["z"] == [[1.0, 2.0]] and trace["zmax"] == 4.0 and trace["text"] == "pressure [MPa]"
+
+
+def test_what_has_no_words_stays_a_picture():
+    figure, (ax,) = new_figure()
+    ax.tricontourf([0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 2.0, 3.0])
+    assert chart(figure) is None
+
+
+def test_words_stand_where_they_stood():
+    def draw(ax):
+        ax.plot([0.0, 1.0], [0.0, 1.0])
+        ax.annotate("peak", (0.5, 0.5), xytext=(0, 7), textcoords="offset points", rotation=90)
+        ax.text(0.1, 0.2, "inside", transform=ax.transAxes)
+
+    peak, inside = panel(draw)["words"]
+    assert (peak["text"], peak["x"], peak["shift"], peak["angle"]) == ("peak", 0.5, [0.0, -7.0], -90.0)
+    assert inside["paper"] and inside["x"] == 0.1
+
+
+def test_document_names_the_checksums_of_its_scripts_and_hides_hostile_text():
+    hostile = "</script><script>alert(1)</script>"
+    text = document(hostile, "<h1>x</h1>", {"charts": {"a": {"title": hostile}}})
+    assert text.count("<script>") == text.count("'sha256-") == 2 and "alert(1)</script>" not in text
+    packed = re.search(r'id="data">([^<]*)<', text)[1]
+    assert json.loads(zlib.decompress(base64.b64decode(packed)))["charts"]["a"]["title"] == hostile
+    assert "script-src 'none'" in document("x", "", None)

@@ -1,0 +1,44 @@
+"""Two runs compared: entries and numbers that differ, and the page with both."""
+
+import json
+
+from femgear.report import compare
+from femgear.report.tables import Block
+
+
+def test_entries_have_their_whole_names():
+    case = {"gears": {"sun": {"teeth": 27}}, "bodies": [{"mass": 1}, {"mass": 2}], "speeds": [1, 2]}
+    expected = [("gears.sun.teeth", 27), ("bodies[1].mass", 1), ("bodies[2].mass", 2), ("speeds", [1, 2])]
+    assert list(compare._flat(case)) == expected
+
+
+def test_cells_that_differ_come_with_their_change():
+    first = Block("Static", ("mesh", "STE", "form"), (("a", "2.0", "x"), ("b", "1.0", "x")))
+    second = Block("Static", ("mesh", "STE", "form"), (("a", "2.5", "y"), ("b", "1.0", "x")))
+    found = compare._differences(first, second)
+    assert found.rows == (("mesh a", "STE", "2.0", "2.5", "+25 %"), ("mesh a", "form", "x", "y", ""))
+    assert compare._differences(first, first).notes == ("the same",)
+    other = Block("Static", ("mesh", "STE"), (("a", "2.0"),))
+    assert "other rows" in compare._differences(first, other).notes[0]
+
+
+def test_curves_lie_over_each_other_within_joint_limits():
+    def chart(low, high, name):
+        axis = {"title": "", "log": False, "range": [low, high]}
+        return {
+            "panels": [
+                {"x": axis, "y": axis, "traces": [{"name": name, "y": [1.0]}], "words": [{"text": "w"}]}
+            ]
+        }
+
+    found = compare._overlaid(chart(0, 2, "k"), chart(-1, 1, "k"))
+    panel = found["panels"][0]
+    assert panel["x"]["range"] == [-1, 2] and [trace["name"] for trace in panel["traces"]] == [
+        "k",
+        "k, second",
+    ]
+    assert panel["traces"][1]["opacity"] < 1.0 and panel["words"] == []
+    field = chart(0, 1, "")
+    field["panels"][0]["traces"] = [{"type": "heatmap"}]
+    assert compare._overlaid(field, field) is None
+    json.dumps(found, allow_nan=False)
