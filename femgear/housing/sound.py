@@ -93,7 +93,8 @@ def radiation_efficiency(n, ka) -> np.ndarray:
     n, ka = np.broadcast_arrays(np.abs(n), np.asarray(ka, float))
     with np.errstate(invalid="ignore", over="ignore"):
         slope = np.abs(_hankel(n, ka)[1])
-    return np.where(np.isfinite(slope), 2 / (np.pi * ka * slope**2), 0.0)  # nothing beyond the largest number
+        # nothing beyond the largest number
+        return np.where(np.isfinite(slope), 2 / (np.pi * ka * slope**2), 0.0)
 
 
 def _hankel(n: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -124,7 +124,7 @@ def test_only_stress_of_no_torque_is_a_valid_run(tmp_path, recwarn):
     blocks = {block.title: block for block in ELASTIC.describe_results(results)}
     assert len(blocks["Stresses"].rows) == 6
     names = write_figures(tmp_path, ELASTIC, Drawn(case, {"stress": results.stress}))
-    assert len(names) == 5
+    assert len(names) == 6 and names[-1] == "charts.json"
     assert [str(w.message) for w in recwarn if issubclass(w.category, RuntimeWarning)] == []
 
 
@@ -147,6 +147,7 @@ def test_table_of_the_summary(results):
 def test_report_has_the_section_with_its_figures(tmp_path, case, library, results):
     _, result = library
     figures = write_figures(tmp_path, ELASTIC, Drawn(case, {"stress": result.dataset()}))
+    assert figures.pop() == "charts.json"
     assert set(figures) == {
         f"{name}.png"
         for name in ("root_stress", "root_profile", "contact_pressure", "load_spectrum", "planet_bending")
