@@ -183,10 +183,39 @@ def root_safety(limit: float, nominal: float, load_factor: float, *, reversed_be
 def contact_safety(limit: float, nominal: float, load_factor: float) -> float:
     """Compute the safety S_H against pitting (ISO 6336-2, section 5), for long life.
 
-    ``sigma_Hlim / (sigma_H0 sqrt(K))`` with sigma_Hlim of the material (ISO 6336-5) and sigma_H0 [Pa], the
-    product K of the factors of the load; all factors Z beside those of sigma_H0 are 1.
+    ``sigma_Hlim / (sigma_H0 sqrt(K))`` with sigma_Hlim of the material (ISO 6336-5), sigma_H0 [Pa] times
+    `single_pair_factor`, and the product K of the factors of the load; all other factors Z are 1.
     """
     return limit / (nominal * math.sqrt(load_factor))
+
+
+def single_pair_factor(
+    gear_1: Gear, gear_2: Gear, *, working_angle: float, path: tuple[float, float]
+) -> float:
+    """Compute the larger of Z_B, Z_D and 1, from the pitch point to a single pair in contact (ISO 6336-2, 6).
+
+    The root of the relative curvature at the inner point of single contact of either gear over that at the
+    pitch point; 1 where two pairs always touch.
+
+    Parameters
+    ----------
+    gear_1, gear_2 : Gear
+        As of `nominal_contact_stress`.
+    working_angle : float
+        [rad].
+    path : (float, float)
+        Ends of the path of contact [m], from the pitch point outwards on gear 1.
+    """
+    low, high, pitch = *path, gear_1.base_pitch
+    if high - low >= 2.0 * pitch:
+        return 1.0
+
+    def curvature(x: float) -> float:
+        one = gear_1.base_radius * math.tan(working_angle) + x
+        two = gear_2.base_radius * math.tan(working_angle) + (x if gear_2.internal else -x)
+        return 1.0 / one + (-1.0 if gear_2.internal else 1.0) / two
+
+    return math.sqrt(max(curvature(high - pitch), curvature(low + pitch), curvature(0.0)) / curvature(0.0))
 
 
 def _standard_signs(gear: Gear) -> tuple[float, float, float]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _DIGITS = 6
 """Digits of a coordinate, counted from the largest of its curve: a pixel of one enlarged a hundredfold."""
-_POINTS = 6000
+_POINTS = 4000
 """Points of a curve, at most; of more, every step of the abscissa keeps its largest and its smallest."""
 _DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
 _MARKERS = {

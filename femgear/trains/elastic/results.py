@@ -18,7 +18,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
-from femgear.gears.iso6336 import contact_safety, root_safety
+from femgear.gears.iso6336 import contact_safety, root_safety, single_pair_factor
 from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
 from femgear.housing.sensor import (
@@ -341,14 +341,20 @@ def _strength(results: Results, factors: np.ndarray, notes: list[str]) -> Iterat
         yield "safety S_F, ISO 6336-3", ", ".join(f"{part} {one:.2f}" for part, one in zip(parts, safe))
     if limits[1] is not None:
         nominals = largest("iso_contact_stress")
-        safe = [contact_safety(limits[1], one, factor) for one, factor in zip(nominals, factors)]
+        gears = planetary_set(results.case)
+        pairs = (
+            (gears.sun, gears.planet, gears.working_pressure_angle_sun_planet, gears.path_sun_planet),
+            (gears.planet, gears.ring, gears.working_pressure_angle_planet_ring, gears.path_planet_ring),
+        )
+        single = [single_pair_factor(*two, working_angle=angle, path=path) for *two, angle, path in pairs]
+        safe = [contact_safety(limits[1], *one) for one in zip(nominals * single, factors)]
         yield "safety S_H, ISO 6336-2", _kinds("{:.2f}", safe)
     if None in limits:
         notes.append("material.root_stress_limit and contact_stress_limit would give safeties")
     if limits != (None, None):
         notes.append(
             "S_F and S_H: nominal stresses with K_gamma and K_v alone, long life, planets bent both ways "
-            "(Y_M = 0.7), every other factor 1"
+            "(Y_M = 0.7), single pairs in contact (Z_B, Z_D), every other factor 1"
         )
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError
 from femgear.housing.orders import order_level
@@ -186,7 +187,16 @@ def test_the_verdict_states_factors_stresses_and_what_they_assume(static, case, 
     safety = 2 * 0.7 * 430e6 / (nominal * sun)
     assert f"planet, sun side {safety:.2f}" in told["safety S_F, ISO 6336-3"]
     contact = files["stress"]["iso_contact_stress"].values[0]
-    assert f"sun-planet {1500e6 / (contact * np.sqrt(sun)):.2f}" in told["safety S_H, ISO 6336-2"]
+    s = planetary_set(strong)
+    # M_1 and M_2 of ISO 6336-2: curvatures at the inner points of single contact
+    tips = [np.sqrt((gear.tip_radius / gear.base_radius) ** 2 - 1) for gear in (s.sun, s.planet)]
+    step = 2 * np.pi / np.array([s.sun.teeth, s.planet.teeth])
+    ratio = s.contact_ratio_sun_planet
+    inner = (tips[0] - step[0]) * (tips[1] - (ratio - 1) * step[1])
+    outer = (tips[1] - step[1]) * (tips[0] - (ratio - 1) * step[0])
+    single = max(1.0, np.tan(s.working_pressure_angle_sun_planet) / np.sqrt(min(inner, outer)))
+    assert single > 1.01
+    assert f"sun-planet {1500e6 / (single * contact * np.sqrt(sun)):.2f}" in told["safety S_H, ISO 6336-2"]
     assert points.rows[1][3] == f"{float(files['housing']['level'][1]):.4g}"
     assert "1e+10 N/m³ radial" in points.notes[0] and "damping ratio 0.05" in points.notes[0]
     assert ("3100", "15", "4") in {(row[0], row[2], row[5]) for row in near.rows}
