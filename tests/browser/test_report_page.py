@@ -132,7 +132,7 @@ def test_hover_tells_the_line(opened):
         return [found.x + found.width / 2, found.y + found.height / 2]; }"""
     tab.mouse.move(*tab.evaluate(strongest))
     tab.wait_for_selector("[data-part=spectrum] .hovertext")
-    text = tab.locator("[data-part=spectrum] .hovertext").inner_text()
+    text = tab.locator("[data-part=spectrum] .hovertext").text_content()
     assert "order" in text and "Hz" in text and "m/s²" in text
 
 
