@@ -124,6 +124,7 @@ def test_set_in_space_is_drawn_turns_and_moves(opened):
 
 def test_hover_tells_the_line(opened):
     tab = opened(DEMO)
+    tab.select_option("[data-part=source]", "acceleration")
     spectrum = tab.locator("[data-part=spectrum]")
     spectrum.scroll_into_view_if_needed()
     tab.wait_for_selector("[data-part=spectrum] .points path")
