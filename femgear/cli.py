@@ -343,13 +343,14 @@ def compare(
     first, second
         Folders that femgear run wrote, of cases of one kind.
     output
-        Page to write, such as compare.html.
+        Folder of the page compare.html.
     """
     from femgear.report.compare import compare_page, compared
-    from femgear.storage.files import write_text
+    from femgear.storage.files import own_files, write_text
     from femgear.trains.reading import open_results
     from femgear.trains.registry import train_of
 
+    own_files(output, ["compare.html"])
     runs = [open_results(folder) for folder in (first, second)]
     train, other = (train_of(run.case) for run in runs)
     if train.name != other.name:
@@ -359,8 +360,8 @@ def compare(
             remedy="compare runs of cases of one kind",
         )
     _print(compared(train, *runs))
-    write_text(compare_page(train, *runs), output)
-    _say(f"page: {output}")
+    write_text(compare_page(train, *runs), output / "compare.html")
+    _say(f"page: {output / 'compare.html'}")
     return 0
 
 

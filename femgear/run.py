@@ -310,7 +310,9 @@ def export_results(results: Results, folder: Path, formats: Collection[str], sam
         found += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
     if "xlsx" in formats:
         tables = (table for stage in results for table in tables_of(results[stage], stage))
-        write_workbook(tables, folder / "results.xlsx")
+        if long := write_workbook(tables, folder / "results.xlsx"):
+            text = f"tables that no sheet can hold are left out: {', '.join(long)}"
+            warnings.warn(str(Finding("W-ROWS", "", text, remedy="export them with --csv")), stacklevel=2)
         found.append("results.xlsx")
     if "mat" in formats:
         write_matlab({stage: results[stage] for stage in results}, folder / "results.mat")

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _QUANTITIES = {"m/s^2": 12, "Pa": 15}
 """Specific data type of a unit: universal file, dataset 58, record 9."""
+_SAMPLES = 50_000_000
+"""Samples of a signal, at most: 17 minutes at 48 kHz."""
 _ROWS = 1_048_576  # of a sheet: ECMA-376 leaves it open, Excel has no more
 
 
@@ -57,6 +59,12 @@ class Sampling:
                     "no such sampling", code="E-RANGE", key=f"--{name.replace('_', '-')}", value=value,
                     limit="a number above zero", remedy="leave it out for the default",
                 )  # fmt: skip
+        samples = self.rate * max(self.duration, self.run_up)
+        if samples > _SAMPLES:
+            raise CaseError(
+                "signals of so many samples take too much memory", code="E-MEMORY", value=f"{samples:.4g}",
+                limit=f"{_SAMPLES:.4g}", remedy="lower --rate, --duration or --run-up",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -169,21 +177,20 @@ def _universal_file(path: Path) -> Iterator[Any]:
         yield write
 
 
-def write_workbook(tables: Iterable[tuple[str, Any]], path: Path) -> None:
+def write_workbook(tables: Iterable[tuple[str, Any]], path: Path) -> list[str]:
     """Write pandas tables by name as spreadsheet (xlsx), one sheet for each; no text becomes a formula.
 
-    Numbers that are not finite become text. StorageError: a table of more rows than a sheet has (E-RANGE).
+    Numbers that are not finite become text. Returns the names of tables of more rows than a sheet has, which
+    are left out.
     """
     with nvh_library("spreadsheets"):
         from openpyxl import Workbook
         from openpyxl.cell import WriteOnlyCell
-    book, known = Workbook(write_only=True), set[str]()
+    book, known, long = Workbook(write_only=True), set[str](), list[str]()
     for name, frame in tables:
         if len(frame) >= _ROWS:
-            raise StorageError(
-                f"the table {name} has {len(frame)} rows", code="E-RANGE", file=str(path),
-                limit=f"{_ROWS - 1} rows", remedy="export it with --csv",
-            )  # fmt: skip
+            long.append(f"{name} ({len(frame)} rows)")
+            continue
         sheet = book.create_sheet(_sheet_name(name, known))
 
         def cell(value: Any, sheet=sheet) -> Any:
@@ -198,6 +205,7 @@ def write_workbook(tables: Iterable[tuple[str, Any]], path: Path) -> None:
             sheet.append([cell(value) for value in row])
     with replaced_file(path) as temporary:
         book.save(temporary)
+    return long
 
 
 def _sheet_name(name: str, known: set[str]) -> str:

@@ -445,5 +445,5 @@ def _provenance(results: Results, numbers) -> str:
     tables = "".join(table(block) for block in blocks)
     return (
         f'<h2 id="provenance">Provenance</h2>\n{tables}<h3>Case as run</h3>\n'
-        f"<pre tabindex=\"0\">{escape(results.case.source)}</pre>\n"
+        f'<pre tabindex="0">{escape(results.case.source)}</pre>\n'
     )

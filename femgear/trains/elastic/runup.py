@@ -116,6 +116,20 @@ def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray,
     return np.unique(np.concatenate([speeds, around[inside]]))
 
 
+def unresolved(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray) -> int:
+    """Count the resonances (c,) that matter with no speed (s,) within half the half width of their peaks.
+
+    There an amplitude is 11 % below its peak. Those count of which a twentieth of the highest level is
+    expected; arguments as of `refined_speeds`.
+    """
+    expected = heard / np.where(damping > 0.0, damping, np.inf)
+    counted = (
+        (expected > 0.05 * expected.max(initial=0.0)) & (resonance >= speeds[0]) & (resonance <= speeds[-1])
+    )
+    distance = np.abs(speeds[:, None] - resonance[counted]).min(axis=0)
+    return int(np.count_nonzero(distance > 0.5 * damping[counted] * resonance[counted]))
+
+
 def mode_levels(response: Response, field: np.ndarray, alike, harmonic, heard_speed: np.ndarray, at):
     """Compute the levels (c,) of the modes and harmonics of resonances, each alone, in a response [m/s^2].
 
@@ -190,6 +204,7 @@ class RunupResult:
     ring_teeth: int
     sensor_angle: float
     operating_speeds: np.ndarray
+    unresolved: int
 
     def at(self, values: np.ndarray) -> np.ndarray:
         """Interpolate values (s, ...) to the speeds of the resonances, (c, ...)."""
@@ -232,6 +247,7 @@ class RunupResult:
                 "ring_teeth": self.ring_teeth,
                 "reference_acceleration": REFERENCE,
                 "operating_speeds": self.operating_speeds / RPM,
+                "unresolved_resonances": self.unresolved,
             },
         )
 
@@ -265,7 +281,12 @@ def describe_runup(data: xr.Dataset) -> Block:
 
 
 def runup_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """Say at which speeds of runup.nc meshes pull (W-PULL): its teeth cannot part."""
+    """Say how many peaks lie between the speeds of runup.nc (W-STEPS), and where meshes pull (W-PULL)."""
+    if missed := int(data.attrs.get("unresolved_resonances", 0)):
+        text = (
+            f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels there may be higher"
+        )
+        yield Finding("W-STEPS", "runup.count", text, remedy="take more speeds, or a narrower range")
     lowest, speed = data["lowest_force"].values, data["speed"].values
     if (pulling := lowest < -1e-3 * data["force_peak"].values.max()).any():
         low, high = speed[pulling].min(), speed[pulling].max()

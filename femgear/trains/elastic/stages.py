@@ -100,6 +100,7 @@ from femgear.trains.elastic.runup import (
     refined_speeds,
     resonances,
     runup_warnings,
+    unresolved,
 )
 from femgear.trains.protocol import (
     Progress,
@@ -536,6 +537,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         ring_teeth=case.ring.teeth,
         sensor_angle=case.housing.sensor_angle,
         operating_speeds=operating,
+        unresolved=unresolved(speeds, resonance, heard, damping),
     )
 
 

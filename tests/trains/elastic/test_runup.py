@@ -13,7 +13,7 @@ from femgear.storage.results import Manifest, Results
 from femgear.system.fourier import fluctuation, sample
 from femgear.trains.elastic.checks import runup_ends
 from femgear.trains.elastic.results import verdict
-from femgear.trains.elastic.runup import describe_runup, runup_warnings
+from femgear.trains.elastic.runup import describe_runup, runup_warnings, unresolved
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import read_case, with_value, with_values
 from femgear.trains.registry import check_case, stages_of
@@ -158,6 +158,15 @@ def test_a_count_of_zero_leaves_it_out(case):
     assert [stage.name for stage in stages_of(off)][-1] == "housing"
     with pytest.raises(CaseError, match=r"runup.count is 0"):
         stages_of(off, "runup")
+
+
+def test_peaks_between_the_speeds_are_counted():
+    speeds, resonance, heard = np.array([90.0, 100.0, 110.0]), np.array([95.0, 100.0, 105.0]), np.ones(3)
+    # half the half width of the peaks: 5 % of 0.5 times 95 is 2.4, the next speed is 5 away
+    assert unresolved(speeds, resonance, heard, np.full(3, 0.05)) == 2
+    assert unresolved(speeds, resonance, heard, np.full(3, 0.12)) == 0
+    assert unresolved(speeds, resonance, np.array([1.0, 1.0, 0.01]), np.full(3, 0.05)) == 1
+    assert unresolved(speeds, resonance, heard, np.zeros(3)) == 0
 
 
 def test_the_verdict_states_factors_stresses_and_what_they_assume(static, case, modes, found, tmp_path):
