@@ -55,7 +55,7 @@ from femgear.storage.results import (
 from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import checked_speeds
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
-from femgear.trains.elastic.runup import KINDS
+from femgear.trains.elastic.runup import KINDS, meeting_columns
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -390,10 +390,7 @@ def _near_resonances(runup: xr.Dataset) -> Block:
     columns = {
         "operating [rpm]": lambda i: f"{value['operating_speed'][i]:.6g}",
         "resonance": lambda i: f"{value['distance'][i]:+.1f} %",
-        "mode": lambda i: str(value["mode"][i]),
-        "kind": lambda i: str(value["kind"][i]),
-        "[Hz]": lambda i: f"{value['frequency'][i]:.1f}",
-        "mesh harmonic": lambda i: str(value["mesh_harmonic"][i]),
+        **meeting_columns(value),
         "alone [m/s²]": lambda i: f"{value['operating_alone'][i]:.3g}",
     }
     note = (

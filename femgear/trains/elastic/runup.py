@@ -7,7 +7,7 @@ those of the exact circumferential components, whatever form the housing has.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -252,6 +252,16 @@ class RunupResult:
         )
 
 
+def meeting_columns(value: Mapping[str, np.ndarray]) -> dict[str, Callable[[int], str]]:
+    """Name the columns of tables that tell which mode [Hz] meets which mesh harmonic, (c,) each."""
+    return {
+        "mode": lambda i: str(value["mode"][i]),
+        "kind": lambda i: str(value["kind"][i]),
+        "[Hz]": lambda i: f"{value['frequency'][i]:.1f}",
+        "mesh harmonic": lambda i: str(value["mesh_harmonic"][i]),
+    }
+
+
 def describe_runup(data: xr.Dataset) -> Block:
     """Tabulate the strongest resonances of runup.nc by speed."""
     speed, level = data["speed"].values, data["level"].values
@@ -261,10 +271,7 @@ def describe_runup(data: xr.Dataset) -> Block:
     columns = {
         "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
         "from operating": lambda i: f"{value['distance'][i]:+.1f} %",
-        "mode": lambda i: str(value["mode"][i]),
-        "kind": lambda i: str(value["kind"][i]),
-        "[Hz]": lambda i: f"{value['frequency'][i]:.1f}",
-        "mesh harmonic": lambda i: str(value["mesh_harmonic"][i]),
+        **meeting_columns(value),
         "force share": lambda i: f"{value['share'][i]:.3f}",
         "alone [m/s²]": lambda i: f"{value['resonance_alone'][i]:.4g}",
         "level [m/s²]": lambda i: f"{value['resonance_level'][i]:.4g}",
