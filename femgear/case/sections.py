@@ -424,7 +424,7 @@ class PublishedLines(Section):
 class MicrophoneSection(Section):
     """Where sound is heard: distance from the outer surface of the ring, and angle, that of the sensor."""
 
-    distance: Annotated[float, Quantity(LENGTH, 0.0, 1000.0)] = 1.0
+    distance: Annotated[float, Quantity(LENGTH, 1e-3, 1000.0)] = 1.0
     angle: Angle | None = None
 
 

@@ -1,23 +1,27 @@
 """Sound of the housing: lines of a sensor as signals, run-ups and sound pressure, and what is heard of them.
 
-The ring radiates as an infinite cylinder of radius a. Its surface moves radially with v exp(i n phi) exp(i
-omega t); with k = omega/c, and H_n the Hankel function of the second kind, which goes outwards in this
-convention of time,
+The housing radiates as a ring of width b and radius a in a rigid cylinder without end. Its surface moves
+radially with v exp(i n phi) exp(i omega t); with k = omega/c, axial wave numbers kz, kr^2 = k^2 - kz^2 and
+H_n the Hankel function of the second kind, which goes outwards in this convention of time, beside its middle
 
-    p(r) = -i rho c v H_n(kr)/H_n'(ka) exp(i n phi),    sigma_n = 2/(pi ka |H_n'(ka)|^2),
+    p(r) = -i rho c k v b/(2 pi) integral sinc(kz b/2) H_n(kr r)/(kr H_n'(kr a)) dkz exp(i n phi),
+    sigma = k b/(2 pi) integral sinc^2(k b sin(t)/2) sigma_n(k a cos t) dt, t from -pi/2 to pi/2,
 
-sigma_n the radiation efficiency (Junger and Feit, "Sound, Structures, and Their Interaction", 2nd ed., MIT
-Press 1986; Fahy and Gardonio, "Sound and Structural Vibration", 2nd ed., Academic Press 2007). Every carrier
-order L of a set in a circular ring carries one n = h z_ring - L. Below ka = n air flows to and fro between
-neighbouring lobes: it filters side bands, so that a microphone hears others than an accelerometer. A ring of
-width b, small against the wavelength, makes about b/sqrt(wavelength r) of this pressure, whatever n.
+sigma the radiation efficiency (Junger and Feit, "Sound, Structures, and Their Interaction", 2nd ed., MIT
+Press 1986; Williams, "Fourier Acoustics", Academic Press 1999). Of a cylinder that moves as a whole
+
+    p(r) = -i rho c v H_n(kr)/H_n'(ka) exp(i n phi),    sigma_n = 2/(pi ka |H_n'(ka)|^2).
+
+Every carrier order L of a set in a circular ring carries one n = h z_ring - L. Below ka = n air flows to
+and fro between neighbouring lobes: it filters side bands, so that a microphone hears others than an
+accelerometer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import Any, cast
 
 import numpy as np
@@ -31,11 +35,15 @@ _WIDTH, _OVERSAMPLING = 14, 2
 """Of the kernel that interpolates between the samples of a turn: 1e-12 of the sum of the amplitudes."""
 _BETA = 0.98 * np.pi * _WIDTH * (1 - 0.5 / _OVERSAMPLING)
 _BLOCK = 2**16  # samples in memory at a time
+_WAVES = 120
+"""Axial wave numbers of the integral of the pressure: 1e-6 at a tenth of the width, 1e-3 at a fortieth."""
+_FREQUENCIES = 240
+"""Of which radiation is computed when there are more; between them it is interpolated."""
 
 
 @dataclass(frozen=True)
 class Cylinder:
-    """What radiates: radius and, for the power alone, length [m]; density [kg/m^3], speed [m/s] of air."""
+    """What radiates: radius and length of what moves [m]; density [kg/m^3], speed [m/s] of air."""
 
     radius: float
     length: float
@@ -68,45 +76,123 @@ def nodal_diameters(lines: SensorLines) -> np.ndarray:
 def pressure_transfer(n, frequency, cylinder: Cylinder, distance: float = 0.0) -> np.ndarray:
     """Compute the sound pressure over the velocity of the surface [Pa s/m], complex, of one angle.
 
-    For nodal diameters and frequencies [Hz] of shapes that broadcast, at a distance from the surface [m]. At
-    0 Hz there is none. Formula: see the head of this module.
+    For nodal diameters and frequencies [Hz] of shapes that broadcast, at a distance from the surface [m],
+    over 0 unless the cylinder is without end. At 0 Hz there is none. Formulas: see the head of this module.
     """
     n, frequency = np.broadcast_arrays(np.abs(n), np.asarray(frequency, float))
-    ka, spread = (
-        2 * np.pi * frequency * cylinder.radius / cylinder.sound_speed,
-        1 + distance / cylinder.radius,
+    wave = 2 * np.pi * frequency / cylinder.sound_speed
+    phase = -1j * wave * distance
+    if np.isinf(cylinder.length):
+        impedance, spread = -1j * cylinder.density * cylinder.sound_speed, 1 + distance / cylinder.radius
+        ratios = _over_frequency(n, wave * cylinder.radius, lambda ka: _ratios(ka, spread))
+        return impedance * ratios * np.exp(phase)
+    known = cylinder, distance
+    pressure = _over_frequency(
+        n, wave * cylinder.radius, lambda ka: _ring_transfer(ka / cylinder.radius, *known), _FREQUENCIES
     )
-    moving = np.where(ka > 0, ka, 1.0)
-    with np.errstate(invalid="ignore", over="ignore"):
-        ratio = _hankel(n, moving * spread)[0] / _hankel(n, moving)[1]
-    # where Hankel functions exceed the largest number, the limit of low frequencies is exact
-    near = -moving / np.maximum(n, 1) * spread ** -n.astype(float)
-    ratio = np.where(np.isfinite(ratio), ratio, near)
-    return np.where(ka > 0, -1j * cylinder.density * cylinder.sound_speed * ratio, 0.0)
+    return pressure * np.exp(phase)
 
 
-def radiation_efficiency(n, ka) -> np.ndarray:
-    """Compute the radiation efficiency sigma_n of a cylinder: its power over that of rho c v^2.
+def _ring_transfer(k: np.ndarray, cylinder: Cylinder, distance: float) -> Iterator[np.ndarray]:
+    """Pressure over velocity times exp(i k distance) of n = 0, 1, ..., at wave numbers, each (n_k,).
 
-    For nodal diameters n and numbers ka > 0 of shapes that broadcast. Formula: see the head of this module.
+    The path of the axial wave numbers leaves the real axis for where the integrand decays as a Gaussian
+    without oscillation, so that the trapezoidal rule converges exponentially.
+    """
+    width, kd = cylinder.length, k[:, None] * distance
+    scale, bend = np.minimum(1, 3 / np.sqrt(kd)), np.minimum(1, 40 / (k[:, None] * width))
+    last = np.arcsinh((1.5 + 30 / kd) / scale)
+    step = last * (np.arange(_WAVES) + 0.5) / _WAVES
+    t, slope = scale * np.sinh(step), scale * np.cosh(step) * last / _WAVES
+    axial = t + 1j * bend * t / (1 + t**2)
+    slope = slope * (1 + 1j * bend * (1 - t**2) / (1 + t**2) ** 2)
+    radial = -1j * np.sqrt(axial**2 - 1)
+    shape = np.sinc(k[:, None] * width * axial / (2 * np.pi)) * np.exp(-1j * kd * (radial - 1))
+    weight = shape * slope / radial
+    factor = -1j * cylinder.density * cylinder.sound_speed * width * k / np.pi
+    for ratio in _ratios(k[:, None] * cylinder.radius * radial, 1 + distance / cylinder.radius):
+        yield factor * (weight * ratio).sum(axis=1)
+
+
+def radiation_efficiency(n, ka, slenderness: float = np.inf) -> np.ndarray:
+    """Compute the radiation efficiency of a ring in a cylinder: its power over that of rho c v^2.
+
+    For nodal diameters n and numbers ka > 0 of shapes that broadcast, of a ring of width over radius b/a; of
+    the whole cylinder when not given. Formulas: see the head of this module.
     """
     n, ka = np.broadcast_arrays(np.abs(n), np.asarray(ka, float))
-    with np.errstate(invalid="ignore", over="ignore"):
-        slope = np.abs(_hankel(n, ka)[1])
-        # nothing beyond the largest number
-        return np.where(np.isfinite(slope), 2 / (np.pi * ka * slope**2), 0.0)
+    if np.isinf(slenderness):
+        return _over_frequency(n, ka, _efficiencies).real
+    nodes, weights = np.polynomial.legendre.leggauss(64 + int(slenderness * ka.max(initial=0.0)))
+    angle, weights = np.pi / 4 * (1 + nodes), np.pi / 2 * weights
+
+    def efficiencies(x):
+        width = x[:, None] * slenderness
+        share = width / (2 * np.pi) * np.sinc(width * np.sin(angle) / (2 * np.pi)) ** 2 * weights
+        return ((share * one).sum(axis=1) for one in _efficiencies(x[:, None] * np.cos(angle)))
+
+    return _over_frequency(n, ka, efficiencies, _FREQUENCIES).real
 
 
-def _hankel(n: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Hankel functions H_n(x) of the second kind and their slopes: upwards in n, which is stable for them."""
-    from scipy.special import j0, j1, y0, y1
+def _over_frequency(n: np.ndarray, x: np.ndarray, computed, most: float = np.inf) -> np.ndarray:
+    """Values of orders n at x = ka, of ``computed(x)`` which yields those of n = 0, 1, ...; none at x = 0.
 
-    before, here = j0(x) - 1j * y0(x), j1(x) - 1j * y1(x)
-    value, slope = before, -here
-    for m in range(1, int(n.max(initial=0)) + 1):
-        value, slope = np.where(n == m, (here, before - m / x * here), (value, slope))
-        before, here = here, 2 * m / x * here - before
-    return value, slope
+    At more than ``most`` x splines of the logarithm go through the values at as many.
+    """
+    from scipy.interpolate import CubicSpline
+
+    values, moving = np.zeros(x.shape, complex), x > 0
+    n, x = n[moving], x[moving]
+    if not len(x):
+        return values
+    if between := len(x) > most:
+        # even in the logarithm at low frequency, where powers rule, and in x where waves interfere
+        fine = np.geomspace(x.min(), x.max(), 20 * int(most))
+        scale = np.log(fine) + fine / 4
+        nodes = np.interp(np.linspace(scale[0], scale[-1], int(most)), scale, fine)
+        places = np.zeros(0, int)
+    else:
+        nodes, places = np.unique(x, return_inverse=True)
+    found = np.zeros(len(x), complex)
+    for m, row in zip(range(int(n.max()) + 1), computed(nodes)):
+        if between and (n == m).any():
+            size = np.log(np.maximum(np.abs(row), 1e-300))
+            logarithm = CubicSpline(np.log(nodes), size + 1j * np.unwrap(np.angle(row)))
+            found[n == m] = np.exp(logarithm(np.log(x[n == m])))
+        elif not between:
+            found[n == m] = row[places[n == m]]
+    values[moving] = found
+    return values
+
+
+def _ratios(x: np.ndarray, spread: float) -> Iterator[np.ndarray]:
+    """H_n(x spread)/H_n'(x) exp(i (spread - 1) x) of n = 0, 1, ..., x in the lower half plane or real."""
+    for n, (far, near) in enumerate(zip(_hankel(x * spread), _hankel(x))):
+        with np.errstate(invalid="ignore", over="ignore"):
+            ratio = far[0] / near[1]
+            # where Hankel functions exceed the largest number, the limit of low frequencies is exact
+            limit = -x / max(n, 1) * spread ** -float(n) * np.exp(1j * (spread - 1) * x)
+        yield np.where(np.isfinite(ratio), ratio, limit)
+
+
+def _efficiencies(ka: np.ndarray) -> Iterator[np.ndarray]:
+    """Radiation efficiency of an endless cylinder for n = 0, 1, ...; nothing beyond the largest number."""
+    for _, slope in _hankel(ka):
+        with np.errstate(invalid="ignore", over="ignore"):
+            square = np.abs(slope) ** 2
+        yield np.where(np.isfinite(square), 2 / (np.pi * ka * square), 0.0)
+
+
+def _hankel(x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Hankel functions of the second kind and their slopes, times exp(ix), for n = 0, 1, ..., stably."""
+    from scipy.special import hankel2e
+
+    before, here = hankel2e(0, x), hankel2e(1, x)
+    yield before, -here
+    for n in count(1):
+        with np.errstate(invalid="ignore", over="ignore"):
+            yield here, before - n / x * here
+            before, here = here, 2 * n / x * here - before
 
 
 def sound_pressure(lines: SensorLines, cylinder: Cylinder, microphone: Microphone) -> np.ndarray:
@@ -120,10 +206,10 @@ def sound_pressure(lines: SensorLines, cylinder: Cylinder, microphone: Microphon
 
 
 def sound_power(lines: SensorLines, cylinder: Cylinder, *, equivalent: bool = False) -> np.ndarray:
-    """Compute the sound power of every line [W], shape (..., n_orders): rho c S sigma_n |v|^2/2.
+    """Compute the sound power of every line [W], shape (..., n_orders): rho c S sigma |v|^2/2.
 
     With ``equivalent`` that of the radiation efficiency one: the equivalent radiated power (ERP), rho c/2
-    times the integral of |v|^2 over the surface S = 2 pi a l. CaseError: as `nodal_diameters`.
+    times the integral of |v|^2 over the surface S = 2 pi a b. CaseError: as `nodal_diameters`.
     """
     n, speed = nodal_diameters(lines), cylinder.sound_speed
     surface = 2 * np.pi * cylinder.radius * cylinder.length
@@ -131,7 +217,7 @@ def sound_power(lines: SensorLines, cylinder: Cylinder, *, equivalent: bool = Fa
     if equivalent:
         return power
     ka = 2 * np.pi * cylinder.radius / speed * lines.frequency
-    return power * np.where(ka > 0, radiation_efficiency(n, np.where(ka > 0, ka, 1.0)), 0.0)
+    return power * radiation_efficiency(n, ka, cylinder.length / cylinder.radius)
 
 
 def _velocity(lines: SensorLines) -> np.ndarray:

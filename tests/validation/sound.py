@@ -1,4 +1,4 @@
-"""Sound of a radiating cylinder, of its signals and of tones, beside closed forms and standards."""
+"""Sound of a radiating ring and cylinder, of its signals and of tones, beside closed forms and standards."""
 
 from __future__ import annotations
 
@@ -62,7 +62,11 @@ def efficiency() -> tuple[Row, ...]:
     """Radiation efficiency of a cylinder."""
     return tuple(
         printed(
-            "sigma", JUNGER, f"radiation efficiency, n = {n}, ka = {ka:g}", text, radiation_efficiency(n, ka)
+            "sigma",
+            JUNGER,
+            f"radiation efficiency, n = {n}, ka = {ka:g}",
+            text,
+            float(radiation_efficiency(n, ka)),
         )
         for ka, texts in EFFICIENCIES.items()
         for n, text in enumerate(texts)
@@ -71,7 +75,7 @@ def efficiency() -> tuple[Row, ...]:
 
 def side_bands() -> tuple[Row, ...]:
     """What air filters of side bands of equal velocity: 1116 Hz, a = 100 mm, at 1 m from the axis."""
-    cylinder, frequency = Cylinder(0.1, 0.025), 1116.0
+    cylinder, frequency = Cylinder(0.1, np.inf), 1116.0
     n = np.arange(5)
     pressure = pressure_transfer(n, frequency, cylinder, 0.9)
     k = 2 * np.pi * frequency / 343.0
@@ -88,51 +92,85 @@ def side_bands() -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def short_ring() -> tuple[Row, ...]:
-    """Pressure of a ring between rigid cylinders over that of an endless one, by axial wave numbers."""
+def axial_waves(n: int, frequency: float, ring: Cylinder, distance: float) -> complex:
+    """Sum the pressure of a ring in a rigid cylinder over real axial wave numbers, 400,000 of them."""
     from scipy.special import h2vp, hankel2
 
-    a, width, far, k = 0.1, 0.025, 10.0, 2 * np.pi * 1116.0 / 343.0
-    half = np.pi / 2 / 400_000
-    angle = np.linspace(0.0, np.pi / 2, 200_001)[:-1] + half
-    decay = (np.arange(200_000) + 0.5) * (60 / far / 200_000)
-    steps = 2 * half * k * np.cos(angle), 60 / far / 200_000 * decay / np.hypot(k, decay)
+    a, width, k = ring.radius, ring.length, 2 * np.pi * frequency / ring.sound_speed
+    angle = (np.arange(200_000) + 0.5) * (np.pi / 2 / 200_000)
+    decay = (np.arange(200_000) + 0.5) * (60 / distance / 200_000)
+    steps = np.pi / 2 / 200_000 * k * np.cos(angle), 60 / distance / 200_000 * decay / np.hypot(k, decay)
     waves = (k * np.sin(angle), k * np.cos(angle)), (np.hypot(k, decay), -1j * decay)
-    rows = []
+    total = sum(
+        (
+            step
+            * np.sinc(axial * width / 2 / np.pi)
+            * hankel2(n, radial * (a + distance))
+            / (radial * h2vp(n, radial * a))
+        ).sum()
+        for step, (axial, radial) in zip(steps, waves)
+    )
+    return complex(-1j * ring.density * ring.sound_speed * width * k / np.pi * total)
+
+
+def short_ring() -> tuple[Row, ...]:
+    """Pressure and power of a ring in a rigid cylinder."""
+    rows, ring = [], Cylinder(0.1, 0.025)
     for n in range(5):
-        total = sum(
-            (
-                step
-                * np.sinc(axial * width / 2 / np.pi)
-                * hankel2(n, radial * far)
-                / (radial * h2vp(n, radial * a))
-            ).sum()
-            for step, (axial, radial) in zip(steps, waves)
-        )
-        ours = pressure_transfer(n, 1116.0, Cylinder(a, width), far - a) / (-1j * 1.204 * 343.0)
-        ratio = abs(width * k / np.pi * total / ours)
-        quantity = (
-            f"1116 Hz, n = {n}, 10 m: ring of 25 mm over endless cylinder, against b/sqrt(wavelength r)"
-        )
-        expected = width / np.sqrt(2 * np.pi / k * far)
-        rows.append(within("width", "integral over axial wave numbers", quantity, ratio, expected, 0.006))
+        for frequency in (60.0, 1116.0, 8000.0):
+            expected = axial_waves(n, frequency, ring, 0.9)
+            error = abs(complex(pressure_transfer(n, frequency, ring, 0.9)) / expected - 1)
+            quantity = f"{frequency:g} Hz, n = {n}, ring of 25 mm: complex pressure at 1 m, relative"
+            rows.append(at_most("width", "sum over real axial wave numbers", quantity, 1e-5, error))
+    small, distance = Cylinder(1e-3, 1e-3), 3.0
+    monopole = 1j * 2 * np.pi * 50.0 * 1.204 * 1e-3 * 1e-3 / (2 * (distance + 1e-3))
+    monopole *= np.exp(-2j * np.pi * 50.0 / 343.0 * distance)
+    error = abs(complex(pressure_transfer(0, 50.0, small, distance)) / monopole - 1)
+    quantity = "50 Hz, n = 0, ring of 1 mm: complex pressure at 3 m, relative"
+    rows.append(at_most("width", "point source i omega rho Q/(4 pi r)", quantity, 1e-3, error))
+    n = np.arange(5)
+    over_endless = radiation_efficiency(n, 2.0, 2000.0) / radiation_efficiency(n, 2.0)
+    for m, ratio in zip(n, over_endless):
+        quantity = f"ka = 2, n = {m}: radiation efficiency of b = 2000 a over that of the endless cylinder"
+        rows.append(within("width", "endless cylinder", quantity, 1.0, ratio, 1e-3))
     return tuple(rows)
 
 
 def power() -> tuple[Row, ...]:
     """Sound power against the integral of the intensity far away."""
-    rows, cylinder = [], Cylinder(0.1, 0.025)
+    rows, cylinder, wide, far = [], Cylinder(0.1, np.inf), Cylinder(0.1, 0.025), 5000.0
+    nodes, weights = np.polynomial.legendre.leggauss(200)
     for n in range(4):
         order = np.array([108 - n])
         lines = SensorLines(order, np.array([1e-6 + 2e-6j]), np.array(60.0), 0.3, 108, "exact")
-        far = 5000.0
         angles = np.linspace(0.0, 2 * np.pi, 33)[:-1]
         heard = [sound_pressure(lines, cylinder, Microphone(far - 0.1, angle))[0] for angle in angles]
-        flow = np.mean(np.abs(heard) ** 2) / (2 * 1.204 * 343.0) * 2 * np.pi * far * cylinder.length
-        quantity = f"1031 Hz, n = {n}: power by sigma_n against the intensity over a circle of 5 km [W]"
+        velocity = abs(order[0] * 60.0 * lines.displacement[0])
+        ka, surface = lines.frequency[0] * 2 * np.pi * 0.1 / 343.0, 2 * np.pi * 0.1
+        flow = np.mean(np.abs(heard) ** 2) / (2 * 1.204 * 343.0) * 2 * np.pi * far
+        over = flow / (1.204 * 343.0 * surface * velocity**2 / 2)
+        quantity = f"1031 Hz, n = {n}: sigma_n against the intensity over a circle of 5 km"
         rows.append(
-            within("power", "intensity p^2/(rho c)", quantity, flow, sound_power(lines, cylinder)[0], 1e-6)
+            within("power", "intensity p^2/(rho c)", quantity, over, float(radiation_efficiency(n, ka)), 1e-6)
         )
+        # far away the pressure at polar angle t is that of the axial wave number k cos t (Williams 1999)
+        sine = np.sqrt(1 - nodes**2)
+        slope = np.sqrt(2 / (np.pi * ka * sine * radiation_efficiency(n, ka * sine)))
+        shape = np.sinc(ka / 0.1 * 0.025 * nodes / (2 * np.pi)) / (np.pi * sine * slope)
+        intensity = 1.204 * 343.0 * (velocity * 0.025 * shape) ** 2 / 2
+        flow = 2 * np.pi * (weights * intensity).sum()
+        quantity = f"1031 Hz, n = {n}: sound power against the intensity over a sphere [W]"
+        rows.append(
+            within(
+                "power", "far field by stationary phase", quantity, flow, sound_power(lines, wide)[0], 1e-4
+            )
+        )
+        beside = abs(sound_pressure(lines, wide, Microphone(far - 0.1, 0.0))[0]) * far
+        expected = (
+            1.204 * 343.0 * velocity * 0.025 * np.sqrt(np.pi * ka * radiation_efficiency(n, ka) / 2) / np.pi
+        )
+        quantity = f"1031 Hz, n = {n}: pressure times distance at 5 km [Pa m]"
+        rows.append(within("power", "far field by stationary phase", quantity, expected, beside, 1e-3))
     return tuple(rows)
 
 

@@ -413,8 +413,8 @@ def describe_housing(data: xr.Dataset) -> Block:
     form = data.attrs["form"]
     note = f"form of the signal: {form}" + (f", {data.attrs['points']} points" if form == "linear" else "")
     heard = (
-        "microphone: {microphone_distance:g} m from the ring, which radiates as a cylinder without end (an "
-        "upper bound) into air of {air_density:g} kg/m^3 and {sound_speed:g} m/s"
+        "microphone: {microphone_distance:g} m from the ring, which radiates over its face width in a rigid "
+        "cylinder into air of {air_density:g} kg/m^3 and {sound_speed:g} m/s"
     ).format(**data.attrs)
     speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
     return tabulate("Housing", speeds, columns, (note, heard))
