@@ -122,7 +122,7 @@ def radiation_efficiency(n, ka, slenderness: float = np.inf) -> np.ndarray:
     """
     n, ka = np.broadcast_arrays(np.abs(n), np.asarray(ka, float))
     if np.isinf(slenderness):
-        return _over_frequency(n, ka, _efficiencies).real
+        return np.real(_over_frequency(n, ka, _efficiencies))
     nodes, weights = np.polynomial.legendre.leggauss(64 + int(slenderness * ka.max(initial=0.0)))
     angle, weights = np.pi / 4 * (1 + nodes), np.pi / 2 * weights
 
@@ -131,7 +131,7 @@ def radiation_efficiency(n, ka, slenderness: float = np.inf) -> np.ndarray:
         share = width / (2 * np.pi) * np.sinc(width * np.sin(angle) / (2 * np.pi)) ** 2 * weights
         return ((share * one).sum(axis=1) for one in _efficiencies(x[:, None] * np.cos(angle)))
 
-    return _over_frequency(n, ka, efficiencies, _FREQUENCIES).real
+    return np.real(_over_frequency(n, ka, efficiencies, _FREQUENCIES))
 
 
 def _over_frequency(n: np.ndarray, x: np.ndarray, computed, most: float = np.inf) -> np.ndarray:

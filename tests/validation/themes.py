@@ -371,7 +371,7 @@ THEMES = (
     Theme(
         "sound",
         "Sound of the housing",
-        "The ring radiates as an infinite cylinder; air of 1.204 kg/m3 and 343 m/s.",
+        "The housing radiates as a ring in a rigid, endless cylinder; air of 1.204 kg/m3 and 343 m/s.",
         (
             sound.efficiency,
             sound.side_bands,
