@@ -210,8 +210,32 @@ def mixture(frequency, energy: Callable[[np.ndarray], np.ndarray], *, tolerance:
     for group in np.split(np.arange(len(frequency)), starts):
         # a single mode stays as it is, sign included
         if len(group) > 1:
-            Q[np.ix_(group, group)] = np.linalg.eigh(energy(group))[1]
+            share, mixed = np.linalg.eigh(energy(group))
+            # shares of the energy that differ by rounding are equal
+            Q[np.ix_(group, group)] = fixed_basis(np.round(share, 9), mixed)
     return Q
+
+
+def fixed_basis(values, vectors, *, tolerance: float = 1e-8) -> np.ndarray:
+    """Turn eigenvectors (n, m), orthonormal, so that every machine finds the same ones.
+
+    A library chooses the sign of an eigenvector, and those of a multiple eigenvalue at will within their
+    space. Here the coordinate with the most motion in that space, of those equal to a millionth the first,
+    moves in its first vector alone, and is positive there; the next vectors follow likewise from what is
+    left: QR with row pivoting (G. Golub and C. Van Loan, Matrix Computations, 4th ed., section 5.4.2).
+    Ascending ``values`` (m,) are equal that differ by less than the relative tolerance.
+    """
+    values, found = np.asarray(values), np.array(vectors)
+    starts = np.flatnonzero(np.diff(values) > tolerance * np.abs(values[1:])) + 1
+    for group in np.split(np.arange(len(values)), starts):
+        for first in group:
+            rest = found[:, first : group[-1] + 1]
+            size = np.linalg.norm(rest, axis=1)
+            row = rest[np.argmax(size >= (1.0 - 1e-6) * size.max())]
+            mirror = row + np.copysign(np.linalg.norm(row), row[0]) * np.eye(len(row))[0]
+            turned = rest - np.outer(rest @ mirror, 2.0 / (mirror @ mirror) * mirror)
+            found[:, first : group[-1] + 1] = -np.copysign(1.0, row[0]) * turned
+    return found
 
 
 def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> np.ndarray:

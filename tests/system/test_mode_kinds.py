@@ -12,6 +12,7 @@ from femgear.system.mode_kinds import (
     SetMotions,
     class_energies,
     class_shares,
+    fixed_basis,
     mode_kinds,
     phase_basis,
     phase_shares,
@@ -301,3 +302,30 @@ def test_a_motion_that_two_harmonics_explain_is_mixed():
     pure = replace(motions, planets=(motions.planets - 0.4 * (motions.planets != 0.0)))
     assert phase_shares(pure)[1, 0] == pytest.approx(1.0, rel=1e-12) and phase_shares(pure)[0, 0] > 0.01
     assert phasing(pure) == ("mixed",)
+
+
+def test_modes_have_one_sign_and_one_place_in_their_space():
+    """Whatever basis of each space a library hands out, the modes that come back are the same."""
+    rng = np.random.default_rng(3)
+    values = np.array([0.0, 0.0, 1.0, 2.0, 2.0 * (1 + 1e-12), 2.0 * (1 - 1e-12), 5.0])
+    vectors = np.linalg.qr(rng.normal(size=(9, 7)))[0]
+    found = fixed_basis(values, vectors)
+    assert found.T @ found == pytest.approx(np.eye(7), abs=1e-14)
+    for group in ([0, 1], [2], [3, 4, 5], [6]):
+        turned, n = vectors.copy(), len(group)
+        turned[:, group] = vectors[:, group] @ np.linalg.qr(rng.normal(size=(n, n)))[0]
+        assert fixed_basis(values, turned) == pytest.approx(found, abs=1e-13)
+        # still the same space, and the coordinate that moves most in it moves in the first mode alone
+        space = vectors[:, group] @ vectors[:, group].T
+        assert found[:, group] @ found[:, group].T == pytest.approx(space, abs=1e-13)
+        row = np.diag(space).argmax()
+        assert found[row, group[0]] == pytest.approx(np.sqrt(space[row, row]))
+        assert found[row, group[1:]] == pytest.approx(0.0, abs=1e-13)
+
+
+def test_equal_entries_are_told_apart_by_their_number():
+    """Rounding decides which of two equal entries is the larger one; the first is positive nevertheless."""
+    for rounding in (-1e-12, 1e-12):
+        for sign in (-1.0, 1.0):
+            mode = sign * np.array([[0.6], [-0.6 * (1 + rounding)], [0.53]])
+            assert fixed_basis([4.0], mode)[0] == pytest.approx(0.6)

@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.system.mode_kinds import fixed_basis
 from femgear.system.system import MechanicalSystem, Modes, Response, check_matrices, damping_matrix, freeze
 
 # Eigenvalues of two modes closer than this (relative) are one multiple eigenvalue: never cut through it.
@@ -119,6 +120,7 @@ def solve_modes(
     -------
     Modes
         ``kind`` is ``"rigid"`` or ``"elastic"`` and ``nodal_diameter`` -1: the model knows better names.
+        Signs, and the modes of a multiple eigenvalue, are those of `fixed_basis` in coordinates of unit mass.
 
     Raises
     ------
@@ -435,8 +437,9 @@ def _eigen(mass, stiffness, count, max_frequency):
         while kept < len(values) and values[kept] - values[kept - 1] < _MULTIPLE * abs(values[kept]):
             kept += 1
         values, vectors = values[:kept], vectors[:, :kept]
-    shape = scipy.linalg.solve_triangular(factor, vectors, lower=True, trans=1)
-    return values, shape, _rigid(values, scale, n)
+    rigid = _rigid(values, scale, n)
+    vectors = fixed_basis(np.where(rigid, 0.0, values), vectors)
+    return values, scipy.linalg.solve_triangular(factor, vectors, lower=True, trans=1), rigid
 
 
 def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
