@@ -248,7 +248,7 @@ def _one_diameter(basis: _SectorBasis, n, loads, max_frequency, static_correctio
         extra_values, extra = eigh(rest.conj().T @ force, rest.conj().T @ M @ rest)
         chosen = np.hstack([chosen, rest @ extra])
         omega2 = np.concatenate([omega2, extra_values])
-    # the library chooses signs at will: the largest entry, of those equal to a millionth the first, is positive
+    # signs are the library's choice: the largest entry, the first of those equal to a millionth, is positive
     size = np.abs(chosen)
     largest = np.argmax(size >= (1.0 - 1e-6) * size.max(axis=0), axis=0)
     chosen = chosen * np.sign(chosen[largest, np.arange(chosen.shape[1])])

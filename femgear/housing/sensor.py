@@ -91,6 +91,11 @@ class SensorLines(ReadOnlyArrays):
         return self.order * self.base_speed[..., None] / (2 * np.pi)
 
     @property
+    def velocity(self) -> np.ndarray:
+        """Amplitudes of the velocity of the fixed point [m/s], shape (..., n_orders)."""
+        return 1j * self.order * self.base_speed[..., None] * self.displacement
+
+    @property
     def acceleration(self) -> np.ndarray:
         """Amplitudes of the acceleration of the fixed point [m/s^2], shape (..., n_orders).
 
@@ -112,6 +117,8 @@ class HousingSignal(ReadOnlyArrays):
         Time [s].
     displacement : (..., n_times) array
         Radial displacement [m], positive outwards.
+    velocity : (..., n_times) array
+        Radial velocity of the fixed point [m/s].
     acceleration : (..., n_times) array
         Radial acceleration of the fixed point [m/s^2].
     """
@@ -119,6 +126,7 @@ class HousingSignal(ReadOnlyArrays):
     revolution: np.ndarray
     seconds: np.ndarray
     displacement: np.ndarray
+    velocity: np.ndarray
     acceleration: np.ndarray
 
 
@@ -259,16 +267,16 @@ def heaviside_linear_lines(
 
 
 def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
-    """Synthesise displacement and acceleration over one carrier revolution by inverse FFT of the lines.
+    """Synthesise motion and acceleration over one carrier revolution by inverse FFT of the lines.
 
     There are at least four samples a period of the highest order, and a whole number of them a mesh period.
     """
     count = lines.z_ring * -(-4 * int(lines.order[-1]) // lines.z_ring)
     revolution = np.arange(count) / count
+    motion = (lines.displacement, lines.velocity, lines.acceleration)
     return HousingSignal(
         revolution, 2 * np.pi * revolution / lines.base_speed[..., None],
-        _synthesised(lines.displacement, lines.order, count),
-        _synthesised(lines.acceleration, lines.order, count),
+        *(_synthesised(values, lines.order, count) for values in motion),
     )  # fmt: skip
 
 

@@ -19,16 +19,18 @@ from femgear.report.style import (
     GREY,
     MARKERS,
     SIZE,
+    SMALL,
     VERMILION,
     distinct_lines,
-    excited_to,
     family,
     label,
     legend_below,
     line_style,
+    mesh_harmonics,
     new_figure,
     periodic,
     rpm,
+    stems,
     xy,
 )
 from femgear.system.fourier import fluctuation
@@ -44,24 +46,34 @@ _READ = 500
 _MANY_SPEEDS = 3
 """More speeds are drawn over the speed, too."""
 _DECADES, _MOST_BARS = 1e-5, 60
-"""Spectra end so far below their largest line, and have bars up to so many."""
+"""Spectra end so far below their largest line, and have thick lines up to so many."""
+_POINTS = 2048
+"""Steps of a mesh period, at most."""
+_BEYOND = 1.1
+"""Spectra reach so far beyond the end of the excitation, over it."""
+_DYNAMIC, _STATIC = "dynamic", "static, harmonics of the excitation"
 _CIRCLE = np.linspace(0.0, 2 * np.pi, 241)
-"""Angles of the outlines of bodies [rad]."""
+"""Angles of the outline of the ring [rad]; those of the other bodies are every fourth."""
 MODE_CAPTIONS = {
     "mode_shapes": (
-        "Mode shapes with mean mesh stiffness: bodies with a mark of their rotation, and the outer "
-        "surface of the ring; at rest in grey."
+        "Mode shapes with mean mesh stiffness, one of every pair of equal frequency: bodies with a mark of "
+        "their rotation, and the outer surface of the ring; at rest in grey."
     ),
 }
 """Of `mode_shapes`."""
 RESPONSE_CAPTIONS = {
     "dynamic_transmission_error": (
-        "Dynamic transmission error over one mesh period (thick) beside the static one of the set on its "
-        "supports, both without their mean. The thin static curve has the harmonics of the excitation "
-        "alone: what rings in both curves is the cut series, not vibration. Pale: the whole static curve."
+        "Dynamic transmission error over one mesh period beside the static one of the set on its supports, "
+        "both without their mean: what the dynamic curve has more is vibration. The static curve has the "
+        "harmonics of the excitation alone: what rings in both is the cut series."
+    ),
+    "mesh_forces": (
+        "Mesh forces over one mesh period, and the dynamic factor K_v, largest over mean force: that of the "
+        "mesh of a kind where it is the largest."
     ),
     "dynamic_spectrum": (
-        "Harmonics of the dynamic transmission error, down to five decades below the largest."
+        "Harmonics of the dynamic transmission error, down to five decades below the largest; dotted: end of "
+        "the excitation. Humps at one frequency at several speeds are resonances."
     ),
     "speed_sweep": (
         "Fluctuation of the transmission error over the speed, and the verdicts on the solution: the fixed "
@@ -78,22 +90,34 @@ def mode_shapes(
 
     The modes have ``shape`` (dof, mode), ``frequency`` [Hz], ``kind``, ``nodal_diameter`` and, where there is
     an elastic ring, ``ring_shape_real`` and ``ring_shape_imag`` (mode, circumferential). Those ``shown`` are
-    numbers from 0, by default the first twelve that are no rigid-body motions; ``scale`` is the largest
-    displacement as a share of the ring's outer radius.
+    numbers from 0, by default the first twelve frequencies that are no rigid-body motions, each by its first
+    mode; ``scale`` is the largest displacement as a share of the ring's outer radius.
     """
-    frequency = modes["frequency"].values
-    elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
-    shown = [int(mode) for mode in (elastic[:12] if shown is None else shown)]
+    first = frequency_groups(modes["frequency"].values)
+    elastic = [one for one in first if modes["frequency"].values[one[0]] > 0.0]
+    groups = [(int(mode),) for mode in shown] if shown is not None else elastic[:12]
+    shown = [one[0] for one in groups]
     columns = max(min(4, len(shown)), 1)
     rows = max(-(-len(shown) // columns), 1)
-    figure, axes = new_figure(rows=rows, columns=columns, width=2.5 * columns, height=2.75 * rows + 0.5)
+    figure, axes = new_figure(rows=rows, columns=columns, width=2.0 * columns, height=2.45 * rows + 0.4)
     for ax in axes:
         ax.set_axis_off()
         ax.set_aspect("equal")
-    for ax, mode in zip(axes, shown):
-        _draw_mode(ax, modes, planetary_set, mode, scale)
+    for ax, group in zip(axes, groups):
+        _draw_mode(ax, modes, planetary_set, group[0], scale)
+        names = f"mode{'s' * (len(group) > 1)} {', '.join(str(mode + 1) for mode in group)}"
+        diameter = int(modes["nodal_diameter"].values[group[0]])
+        kind = str(modes["kind"].values[group[0]]) + (f", n = {diameter}" if diameter >= 0 else "")
+        frequency = f"{modes['frequency'].values[group[0]]:.4g} Hz"
+        ax.set_title(f"{names}: {frequency}\n{kind}", fontsize=SMALL)
     legend_below(figure, columns=5)
     return figure
+
+
+def frequency_groups(frequency) -> list[tuple[int, ...]]:
+    """Group the numbers of modes of equal natural frequency, ascending [Hz], to a millionth."""
+    starts = np.flatnonzero(np.diff(frequency) > 1e-6 * frequency[1:]) + 1
+    return [tuple(group.tolist()) for group in np.split(np.arange(len(frequency)), starts)]
 
 
 def _draw_mode(ax, modes, planetary_set, mode, scale):
@@ -129,18 +153,15 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
         if name == "carrier":
             _draw_carrier(ax, planetary_set, moved, factor * turn, colour)
             continue
-        ax.plot(*xy(centre + radius * circle), color="0.8", linewidth=1.0)
+        ax.plot(*xy(centre + radius * circle[::4]), color="0.8", linewidth=1.0)
         ax.plot(*xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
-        ax.plot(*xy(moved + radius * circle), color=colour, linewidth=1.6, label=text)
+        ax.plot(*xy(moved + radius * circle[::4]), color=colour, linewidth=1.6, label=text)
         ax.plot(
             *xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
         )
     span = 1.24 * outer
     ax.set_xlim(-span, span)
     ax.set_ylim(-span, span)
-    diameter = int(modes["nodal_diameter"].values[mode])
-    text = f"mode {mode + 1}: {modes['frequency'].values[mode]:.5g} Hz\n{modes['kind'].values[mode]}"
-    ax.set_title(text + (f", n = {diameter}" if diameter >= 0 else ""), fontsize=SIZE - 1.5)
 
 
 def _draw_carrier(ax, planetary_set, moved, turn, colour):
@@ -201,102 +222,127 @@ def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str
 def transmission_error_period(
     dynamics: xr.Dataset, static: xr.Dataset | None = None, *, together: bool = False
 ) -> Figure:
-    """Draw the fluctuation of the dynamic transmission error over one mesh period, axes for each speed.
+    """Draw the fluctuation of the dynamic transmission error over one mesh period.
 
     The datasets have ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m], of which at most four speeds
-    are drawn, and for comparison ``ste`` (mesh, position) [m]: thin with the harmonics of the excitation
-    alone, so that their cut does not pass for vibration, and faint as a whole. Meshes that differ from planet
-    to planet share axes where ``together`` says so; otherwise each kind has its own.
+    are drawn, and for comparison ``ste`` (mesh, position) [m], thin with the harmonics of the excitation
+    alone, so that their cut does not pass for vibration. A row a speed and a column a kind of mesh, or
+    axes a speed where all meshes are drawn ``together``.
+    """
+    first = np.flatnonzero(dynamics["harmonic"].values > 0)
+    known = None if static is None else (static["position"].values, static["ste"].values)
+
+    def words(dynamic: np.ndarray, quasi: np.ndarray) -> str:
+        beside = f", static {np.ptp(quasi, axis=-1).max():.3g}" if quasi.size else ""
+        return f"peak to peak {np.ptp(dynamic, axis=-1).max():.3g}{beside} µm"
+
+    text = "transmission error\nless its mean [µm]"
+    return _over_period(dynamics.isel(harmonic=first), "dte", 1e6, known, text, words, together=together)
+
+
+def mesh_force_period(dynamics: xr.Dataset, static: tuple[np.ndarray, np.ndarray] | None = None) -> Figure:
+    """Draw the mesh forces over one mesh period, with the dynamic factor K_v of ISO 6336-1 of each kind.
+
+    It is the largest force over the mean one, of the meshes of a kind the largest. The dataset has
+    ``mesh_force_real`` and ``mesh_force_imag`` (speed, mesh, harmonic) [N]; ``static`` are positions (P,) and
+    forces (mesh, P) [N] of the set at rest.
+    """
+
+    def words(dynamic: np.ndarray, quasi: np.ndarray) -> str:
+        return f"K_v = {(dynamic.max(axis=-1) / dynamic[:, :-1].mean(axis=-1)).max():.3f}"
+
+    return _over_period(dynamics, "mesh_force", 1.0, static, "mesh force [N]", words)
+
+
+def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, together: bool = False):
+    """Draw the harmonics of a variable over one mesh period, a row a speed; ``words`` tell the titles.
+
+    The dynamic and static curves of the lines of a panel are given to ``words``, (n, P) each.
     """
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
-    position = np.linspace(0.0, 1.0, max(256, 16 * int(h.max())) + 1)
-    wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
-    errors = 1e6 * np.real(harmonics_of(dynamics.isel(speed=speeds), "dte")[..., h > 0] @ wave)
-    curves = [*errors] if static is None else [*errors, 1e6 * static["ste"].values]
+    position = np.linspace(0.0, 1.0, min(max(256, 16 * int(h.max())), _POINTS) + 1)
+    wave = np.exp(2j * np.pi * np.outer(h, position))
+    values = unit * np.real(harmonics_of(dynamics.isel(speed=speeds), name) @ wave)
+    cuts = [_excited_harmonics(dynamics, s) for s in speeds] if static is not None else []
+    known = [unit * _cut_series(*static, h, cut, position) for cut in cuts]
     # what is one line at one speed need not be one at another: the lines are those of all speeds
-    lines = distinct_lines(dynamics["mesh"].values, np.hstack(curves), partly=together)
-    kinds = [""] if together or len(lines) < 3 else list(dict.fromkeys(family(text) for text, _ in lines))
+    lines = distinct_lines(dynamics["mesh"].values, np.hstack([*values, *known]), partly=together)
+    kinds = [""] if together else list(dict.fromkeys(family(text) for text, _ in lines))
     figure, axes = _panels(len(speeds) * len(kinds), above=1.2 if together else 0.8)
-    for ax, ((s, error), kind) in zip(axes, product(zip(speeds, errors), kinds)):
-        for i, (text, row) in enumerate(lines):
-            if kind not in ("", family(text)):
-                continue
-            style = line_style(i)
-            ax.plot(position, error[row], label=text, linewidth=2.0, **style)
+    for ax, (s, kind) in zip(axes, product(range(len(speeds)), kinds)):
+        own = [(i, *line) for i, line in enumerate(lines) if kind in ("", family(line[0]))]
+        rows = [row for *_, row in own]
+        for i, text, row in own:
+            style = {"color": BLUE} if len(own) == 1 else line_style(i)
+            ax.plot(
+                position, values[s][row], label=_DYNAMIC if len(own) == 1 else text, linewidth=2.0, **style
+            )
             if static is not None:
-                cut = _excited_harmonics(dynamics, s)
-                _draw_static(ax, static["position"], static["ste"].values[row], cut, position, style)
-        frequency = float(dynamics["mesh_frequency"].values[s])
-        title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
-        label(ax, "position in the mesh period [1]", title=f"{title}\n{kind} meshes" if kind else title)
+                style = {"color": BLACK} if len(own) == 1 else style
+                text = _STATIC if len(own) == 1 else "_"
+                ax.plot(position, known[s][row], linewidth=0.9, label=text, **style)
+        title = [rpm(dynamics["speed"].values[speeds[s]]), *[kind] * bool(kind)]
+        quasi = known[s][rows] if static is not None else np.empty(0)
+        label(ax, title=f"{', '.join(title)}\n{words(values[s][rows], quasi)}")
         ax.set_xlim(0.0, 1.0)
+    for ax in axes[-2:]:
+        label(ax, "position in the mesh period [1]")
     for ax in axes[::2]:
-        label(ax, y="transmission error less its mean [µm]")
-    if static is not None:
-        _name_kinds(axes[0], dynamics)
-    legend_below(figure, columns=3)
+        label(ax, y=y)
+    if static is not None and len(lines) > len(kinds):
+        for text, width in ((f"{_DYNAMIC} (thick)", 2.0), (f"{_STATIC} (thin)", 0.9)):
+            axes[0].plot([], [], color=BLACK, label=text, linewidth=width)
+    if static is not None or len(lines) > len(kinds):
+        legend_below(figure, columns=3)
     return figure
 
 
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     """Draw the amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
 
-    The dataset has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m].
+    The dataset has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m]; a row a speed and a column a
+    kind of mesh. A dotted line marks the end of the excitation.
     """
-    from matplotlib.ticker import MaxNLocator
-
-    dynamics = dynamics.isel(speed=_some_speeds(dynamics.sizes["speed"]))
-    figure, axes = _panels(dynamics.sizes["speed"])
-    h = dynamics["harmonic"].values
-    amplitude, h = np.abs(harmonics_of(dynamics, "dte"))[:, :, h > 0] * 1e6, h[h > 0]
-    names, largest = dynamics["mesh"].values, amplitude.max(initial=0.0)
+    speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
+    amplitude = np.abs(harmonics_of(dynamics.isel(speed=speeds), "dte"))[:, :, h > 0] * 1e6
+    names, h, largest = dynamics["mesh"].values, h[h > 0], amplitude.max(initial=0.0)
+    lines = distinct_lines(names, np.hstack([*amplitude]))
+    kinds = list(dict.fromkeys(family(text) for text, _ in lines))
+    figure, axes = _panels(len(speeds) * len(kinds), height=2.9)
     # below are rounding and what the iteration leaves: no line is drawn there
-    floor = _DECADES * largest
-    for s, ax in enumerate(axes):
-        lines = distinct_lines(names, amplitude[s])
-        few = len(lines) * len(h) <= _MOST_BARS
-        for i, (text, row) in enumerate(lines):
-            shown = amplitude[s, row] > floor
-            if few:
-                _bars(ax, h[shown], amplitude[s, row][shown], i, len(lines), text)
+    floor, end = _DECADES * largest, 0.0
+    for ax, (s, kind) in zip(axes, product(range(len(speeds)), kinds)):
+        step = 1e-3 * float(dynamics["mesh_frequency"].values[speeds[s]]) or 1.0
+        own = [(i, *line) for i, line in enumerate(lines) if family(line[0]) == kind]
+        for i, text, row in own:
+            value, shown = amplitude[s, row], amplitude[s, row] > floor
+            if len(own) == 1:
+                stems(ax, step * h, value, floor, text="_", width=2.0 if shown.sum() <= _MOST_BARS else 0.8)
             else:
-                _dots(ax, h[shown], amplitude[s, row][shown], floor, i, text)
+                style = {"color": COLOURS[i % len(COLOURS)], "markersize": 4.0, "label": text}
+                ax.plot(step * h[shown], value[shown], MARKERS[i % len(MARKERS)], **style)
+            if "excitation_limit" not in dynamics:
+                end = max(end, step * (h[shown].max(initial=1) + 0.4))
         if largest > 0.0:
             ax.set_yscale("log")
             ax.set_ylim(floor, 2.0 * largest)
             ax.minorticks_off()
-        # speeds may reach different harmonics: axes end with the last line
-        last = h[(amplitude[s] > floor).any(axis=0)].max(initial=1)
-        ax.set_xlim(0.4, last + 0.6)
-        ax.xaxis.set_major_locator(MaxNLocator(nbins=12, integer=True))
-        title = rpm(dynamics["speed"].values[s]) + excited_to(dynamics, s)
-        label(ax, "harmonic of the mesh frequency [1]", title=title)
+        if "excitation_limit" in dynamics:
+            limit = 1e-3 * float(dynamics["excitation_limit"].values[speeds[s]])
+            ax.axvline(limit, color=GREY, linewidth=1.2, linestyle=":")
+            end = max(end, _BEYOND * limit)
+        mesh_harmonics(ax, step, words=ax in axes[:2])
+        ax.set_title(f"{rpm(dynamics['speed'].values[speeds[s]])}, {kind}", fontsize=SIZE, loc="left", pad=10)
+    for ax in axes:
+        # one frequency axis shows resonances of several speeds below each other
+        ax.set_xlim(0.0, end)
+    for ax in axes[-2:]:
+        label(ax, "frequency [kHz]")
     for ax in axes[::2]:
-        label(ax, y="amplitude of the transmission error [µm]")
-    legend_below(figure)
+        label(ax, y="amplitude [µm]")
+    if len(lines) > len(kinds):
+        legend_below(figure)
     return figure
-
-
-def _bars(ax, h, amplitude, index: int, count: int, text: str) -> None:
-    """Draw bars of one mesh beside those of the others."""
-    width = 0.8 / count
-    ax.bar(
-        h + (index - (count - 1) / 2) * width,
-        amplitude,
-        width,
-        color=COLOURS[index % len(COLOURS)],
-        hatch=("", "///", "...", "xx")[index % 4],
-        edgecolor="white",
-        linewidth=0.5,
-        label=text,
-    )
-
-
-def _dots(ax, h, amplitude, floor, index: int, text: str) -> None:
-    """Draw lines of one mesh as markers on thin stems: many bars would merge."""
-    colour = COLOURS[index % len(COLOURS)]
-    ax.vlines(h, floor, amplitude, color=colour, linewidth=0.5, alpha=0.5)
-    ax.plot(h, amplitude, MARKERS[index % len(MARKERS)], color=colour, markersize=3.5, label=text)
 
 
 def speed_sweep(dynamics: xr.Dataset) -> Figure:
@@ -372,47 +418,25 @@ def _excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
     return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
 
 
-def _name_kinds(ax, dynamics: xr.Dataset) -> None:
-    """Add legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
-    known = "excitation" if "excitation_limit" in dynamics else "response"
-    for text, look in (
-        ("dynamic (thick)", {"linewidth": 2.0}),
-        (f"static, harmonics of the {known} (thin)", {"linewidth": 0.9}),
-        ("static, whole (pale)", {"linewidth": 2.5, "alpha": 0.3}),
-    ):
-        ax.plot([], [], color=BLACK, label=text, **look)
+def _cut_series(at, values, h, highest: int, position):
+    """Sum the harmonics ``h`` up to the highest of records (n, P) of one period at positions (Q,).
 
-
-def _draw_static(ax, at, values, harmonics: int, position, style) -> None:
-    """Draw the static transmission error [m] less its mean: whole record pale, first harmonics thin.
-
-    Of its record ``values`` (P,) at positions ``at`` (P,) of one mesh period; harmonics at ``position`` (Q,).
-    """
-    at, whole, part = _fluctuation(at, values, harmonics, position)
-    ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
-    ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
-
-
-def _fluctuation(at, values, harmonics: int, position):
-    """Reduce a record of one period by its mean, and sum its first harmonics at `position`.
-
-    The record is linear between its positions, which may be closer where it is steep. Harmonics of such a
-    curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
+    The records are linear between their positions ``at`` (P,), which may be closer where they are steep.
+    Harmonics of such a curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
     """
     at, value = periodic(at, values)
-    mean = np.trapezoid(value, at) / (at[-1] - at[0])
     slope = np.diff(value) / np.diff(at)
-    jump, h = slope - np.roll(slope, 1), np.arange(1, harmonics + 1)
-    line = -2.0 * np.exp(-2j * np.pi * np.outer(h, at[:-1])) @ jump / (2.0 * np.pi * h) ** 2
-    return at, value - mean, (line @ np.exp(2j * np.pi * np.outer(h, position))).real
+    jump, above = slope - np.roll(slope, 1, axis=-1), h[(h > 0) & (h <= highest)]
+    line = -2.0 * jump @ np.exp(-2j * np.pi * np.outer(at[:-1], above)) / (2.0 * np.pi * above) ** 2
+    found = np.real(line @ np.exp(2j * np.pi * np.outer(above, position)))
+    # the mean, where it is asked for
+    return found + (h[0] == 0) * np.trapezoid(value, at)[:, None] / (at[-1] - at[0])
 
 
-def _panels(count: int, *, above: float = 0.8):
-    """Make a figure with `count` axes of one vertical scale, two in a row, and room above them [in]."""
+def _panels(count: int, *, above: float = 0.8, height: float = 2.5):
+    """Make a figure with `count` axes [in] of one vertical scale, two in a row, and room above them [in]."""
     rows, columns = -(-count // 2), min(count, 2)
-    figure, axes = new_figure(
-        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=above + 3.6 * rows, sharey=True
-    )
+    figure, axes = new_figure(rows=rows, columns=columns, height=above + height * rows, sharey=True)
     for ax in axes[count:]:
         figure.delaxes(ax)
     return figure, axes[:count]

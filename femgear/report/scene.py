@@ -24,7 +24,7 @@ from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
-from femgear.report.style import PNG_LEVEL
+from femgear.report.style import PNG_LEVEL, SIZE, WIDTH, label, save_figure
 from femgear.storage.files import write_bytes
 
 if sys.platform == "linux":
@@ -46,6 +46,8 @@ _OUTLINE = {
 }
 _LARGEST = 0.03
 """Largest displacement of a picture as a share of the largest radius."""
+_PIXELS, _COLOURS = 900, "YlGnBu"
+"""Sides of a rendered view, and its colours: pale where little moves, as paper is."""
 # address space that VTK needs before it has drawn anything [bytes]
 _MEMORY = 1_100_000_000
 _SECONDS = 6.0
@@ -54,8 +56,8 @@ _LARGEST_ANIMATED = 0.09
 """Largest displacement of an animation as a share of the outer radius."""
 # elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
 _FLANK, _COARSE = 10, 0.4
-_TINTS = 21
-_SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
+_TINTS = 31
+_SUN, _PLANET, _MARK, _SENSOR = "#F2BE9C", "#F7DDA3", "#000000", "#009E73"
 
 
 def load_pyvista():
@@ -196,6 +198,15 @@ def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
     write_bytes(text.encode() if isinstance(text, str) else text, path)
 
 
+@dataclass(frozen=True)
+class View:
+    """A part of a picture of its own: title, centre (2,) and half of its width [m]."""
+
+    title: str
+    centre: Sequence[float]
+    half: float
+
+
 def deformed_picture(
     grid: pv.UnstructuredGrid,
     path: str | os.PathLike,
@@ -204,32 +215,75 @@ def deformed_picture(
     title: str = "",
     colour_label: str = "displacement [µm]",
     colour_factor: float = 1e6,
-    size: int = 900,
+    largest: float | None = None,
+    details: Sequence[View] = (),
 ) -> float:
     """Draw a deformed grid seen from above as PNG, coloured by the size of a field of displacements.
 
     The grid is made by `assemble_set` or `ring_modes_grid`; ``colour_factor`` converts the field to the unit
-    of ``colour_label``, ``size`` is width and height in pixels. Returns the magnification, with which the
-    largest displacement takes 3 % of the largest radius. FemgearError: see `load_pyvista`; StorageError.
+    of ``colour_label``. Returns the magnification, with which the largest displacement takes the length
+    ``largest`` [m], by default 3 % of the largest radius. ``details`` stand beside the whole. FemgearError:
+    see `load_pyvista`; StorageError.
     """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
     u = np.asarray(grid.point_data[field])
     length, radius = np.linalg.norm(u, axis=1), np.abs(grid.points).max()
-    scale = float(_LARGEST * radius / length.max()) if length.max() > 0 else 1.0
+    scale = float((largest or _LARGEST * radius) / length.max()) if length.max() > 0 else 1.0
     surface = _linear_surface(grid)
     rest = surface.extract_feature_edges(**_OUTLINE)
     surface.points = grid.points + scale * u
-    surface.point_data[colour_label] = colour_factor * length
-    plotter = new_plotter(size, size)
-    plotter.add_mesh(rest, color="#A0A0A0", line_width=1.0, lighting=False)
-    add_coloured(plotter, surface, colour_label, size)
-    plotter.add_mesh(surface.extract_feature_edges(**_OUTLINE), color="black", line_width=1.2, lighting=False)
+    surface.point_data["colour"] = colour_factor * length
+    top = colour_factor * float(length.max()) or 1.0
+    plotter = new_plotter(_PIXELS, _PIXELS)
+    plotter.add_mesh(rest, color="#909090", line_width=1.5, lighting=False)
+    look: Any = {"cmap": _COLOURS, "clim": (0.0, top), "lighting": False, "show_scalar_bar": False}
+    plotter.add_mesh(surface, scalars="colour", **look)
+    plotter.add_mesh(surface.extract_feature_edges(**_OUTLINE), color="black", line_width=1.5, lighting=False)
     # a factor below one is that of a normalised shape, which has no magnification
-    text = f"{title}\ndeformation × {rounded(scale)}" if scale >= 1 else title
-    if text:
-        add_text(plotter, text.strip(), size)
-    look_down(plotter, radius * 1.1)
-    write_png(plotter, path)
+    text = f"{title}, magnified {rounded(scale)} times" if scale >= 1 else title
+    try:
+        images = [_seen(plotter, view) for view in (View(text, (0.0, 0.0), 1.04 * radius), *details)]
+    finally:
+        plotter.close()
+    figure, axes = _mosaic(len(details))
+    for ax, image, view in zip(axes, images, (View(text, (), 0.0), *details)):
+        ax.imshow(image, interpolation="antialiased")
+        ax.set_axis_off()
+        label(ax, title=view.title)
+    colours = ScalarMappable(Normalize(0.0, top), _COLOURS)
+    bar = figure.colorbar(colours, ax=axes, location="bottom", shrink=0.6, aspect=40, pad=0.02)
+    bar.set_label(colour_label, fontsize=SIZE)
+    bar.ax.tick_params(labelsize=SIZE - 1)
+    save_figure(figure, path)
     return scale
+
+
+def _mosaic(details: int):
+    """Make a figure with axes for a large picture, and beside it a column of details."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH if details else 5.6, 6.4), layout="constrained")
+    if not details:
+        return figure, [figure.add_subplot()]
+    grid = figure.add_gridspec(details, 2, width_ratios=(details, 1))
+    return figure, [figure.add_subplot(grid[:, 0]), *(figure.add_subplot(grid[i, 1]) for i in range(details))]
+
+
+def _seen(plotter: pv.Plotter, view: View) -> np.ndarray:
+    """Render a part of the plane from above, (n, n, 3)."""
+    scene: Any = plotter  # its methods have decorators that hide what they take
+    scene.set_background("white")
+    scene.view_xy()
+    scene.enable_parallel_projection()
+    x, y = view.centre
+    scene.camera.focal_point, scene.camera.position = (x, y, 0.0), (x, y, 1.0)
+    scene.camera.parallel_scale = view.half
+    scene.reset_camera_clipping_range()
+    # a second picture is a new one only where it is rendered again
+    scene.render()
+    return np.asarray(scene.screenshot(filename=None, return_img=True))
 
 
 def new_plotter(width: int, height: int) -> pv.Plotter:
@@ -382,14 +436,17 @@ def _draw(planetary_set, field, carrier, sensor_angle, title, size):
     largest = float(np.hypot(*displacement).max())
     colour = 1e6 * float(np.abs(displacement[0]).max()) or 1.0
     scale = _LARGEST_ANIMATED * outer / largest if largest > 0 else 1.0
-    words = f"{title}\nring deflection × {rounded(scale)}, triangle: fixed sensor".strip()
+    words = f"{title}: deflection of the ring less its mean,\nmagnified {rounded(scale)} times"
     figure, ax, colours = _stage(size, 1.24 * outer, colour, words)
     ring = PolyCollection([], antialiased=False)
     edges, gears = LineCollection([], colors="#404040", linewidths=0.8), PolyCollection([], linewidths=0.0)
+    arms = LineCollection([], colors="#808080", linewidths=1.5)
     sensor = 1.1 * outer * np.exp(1j * sensor_angle) * np.array([1.0, 1.11 + 0.032j, 1.11 - 0.032j])
     ax.fill(*_xy(sensor).T, color=_SENSOR)
+    place = 1.155 * outer * np.exp(1j * (sensor_angle + 0.07))
+    ax.text(place.real, place.imag, "sensor", color=_SENSOR, fontsize=size / 52, ha="center", va="bottom")
     ax.plot(*_xy(outer * np.exp(1j * np.linspace(0.0, 2 * np.pi, 361))).T, color="#808080", linewidth=0.8)
-    for collection in (ring, edges, gears):
+    for collection in (ring, edges, gears, arms):
         ax.add_collection(collection, autolim=False)
     outlines = _outlines(planetary_set)
     gears.set_facecolor([tint for body in outlines for _, tint in body])
@@ -404,16 +461,17 @@ def _draw(planetary_set, field, carrier, sensor_angle, title, size):
         tints = colours.cmap([tint for _, tint in bands])
         ring.set(facecolor=tints, edgecolor=tints)
         edges.set_segments([_xy(np.append(moved[:, k], moved[0, k])) for k in (0, -1)])
-        bodies = zip(_places(planetary_set, at), outlines, strict=True)
+        places = _places(planetary_set, at)
         gears.set_verts(
             [
                 _xy(centre + points * np.exp(1j * turn))
-                for (centre, turn), body in bodies
+                for (centre, turn), body in zip(places, outlines, strict=True)
                 for points, _ in body
             ]
         )
+        arms.set_segments([_xy(np.array([0j, centre])) for centre, _ in places[1:]])
         canvas.restore_region(background)
-        for collection in (ring, edges, gears):
+        for collection in (ring, edges, gears, arms):
             collection.draw(renderer)
         images.append(np.array(canvas.buffer_rgba())[..., :3])
     return images
@@ -434,14 +492,16 @@ def _stage(size: int, reach: float, colour: float, words: str):
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     figure = Figure(figsize=(size / 100, size / 100), dpi=100)
-    ax = figure.add_axes((0.0, 0.13, 1.0, 0.81))
+    ax = figure.add_axes((0.0, 0.12, 1.0, 0.81))
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     ax.set_axis_off()
     colours = ScalarMappable(Normalize(-colour, colour), colormaps["RdBu_r"].resampled(_TINTS))
-    text = size / 55.0
+    text = size / 52.0
     bar = figure.colorbar(colours, cax=figure.add_axes((0.2, 0.085, 0.6, 0.03)), orientation="horizontal")
+    bar.locator = MaxNLocator(4, steps=[1, 2, 5, 10], symmetric=True)
     bar.set_label("radial displacement [µm]", fontsize=text)
     bar.ax.tick_params(labelsize=text)
     figure.text(0.02, 0.985, words, fontsize=text, verticalalignment="top")

@@ -22,6 +22,12 @@ COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":")
 MARKERS = "osD^vPX*<>"
 SIZE = 11
+WIDTH, SMALL = 8.0, SIZE - 1.5
+"""Width of a figure [in] and its smallest text [pt], which is 8 pt on 170 mm of paper."""
+STEMS = 4000
+"""Lines of a spectrum that can be told apart, at most."""
+_APART = 0.085
+"""Distance of names beside curves, as a share of the height of a panel."""
 _DPI = 120
 PNG_LEVEL = 3  # of zlib: a third faster than 6, files a fifteenth larger
 _LEGEND_ROW = 0.21
@@ -32,7 +38,7 @@ def new_figure(
     *,
     rows: int = 1,
     columns: int = 1,
-    width: float = 8.0,
+    width: float = WIDTH,
     height: float = 4.4,
     sharex: bool = False,
     sharey: bool = False,
@@ -99,6 +105,66 @@ def show_changes(ax, least: float) -> None:
     middle, half = 0.5 * low + 0.5 * high, max(0.5 * high - 0.5 * low, 0.5 * least * max(abs(low), abs(high)))
     ax.set_ylim(middle - half, middle + half)
     ax.ticklabel_format(axis="y", useOffset=False)
+
+
+def name_curves(ax, *, at: float = 0.985) -> None:
+    """Write the names of the curves above their ends, up to a share of the abscissa, in their colours.
+
+    What names have in brackets is left out.
+    """
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    end, step, free = left + at * (right - left), _APART * (high - low), -np.inf
+    named = [line for line in ax.get_lines() if not str(line.get_label()).startswith("_")]
+    texts = [str(line.get_label()).split(" (")[0] for line in named]
+    inches, height = ax.figure.get_figwidth() * ax.get_position().width, list[float]()
+    for line, text in zip(named, texts):
+        # letters are about 0.6 as wide as high
+        reach = end - 0.6 * SMALL / 72.0 * len(text) / inches * (right - left)
+        height.append(float(np.interp(np.linspace(reach, end, 50), line.get_xdata(), line.get_ydata()).max()))
+    for i in np.argsort(height, kind="stable"):
+        free = max(height[i], free + step)
+        look = {"ha": "right", "va": "bottom", "fontsize": SMALL, "color": named[i].get_color()}
+        ax.annotate(texts[i], (end, free), xytext=(0, 3), textcoords="offset points", **look)
+
+
+def stems(ax, x, amplitude, floor: float, *, text: str, colour: str = BLUE, width: float = 1.0) -> None:
+    """Draw the lines of a spectrum that are higher than `floor`, on a logarithmic ordinate from there.
+
+    Of more lines than there are pixels, the highest one of every column is drawn.
+    """
+    x, amplitude = np.asarray(x), np.asarray(amplitude)
+    shown = _highest(x, amplitude, amplitude > floor)
+    # one line with gaps takes a tenth of the time of `vlines`
+    height = np.stack(np.broadcast_arrays(floor, amplitude[shown], np.nan), axis=1)
+    line = {"color": colour, "linewidth": width, "solid_capstyle": "butt"}
+    ax.plot(np.repeat(x[shown], 3), height.ravel(), label=text, **line)
+    ax.set_yscale("log")
+
+
+def _highest(x, amplitude, shown) -> np.ndarray:
+    """Find the numbers of the lines to draw, ascending; see `stems`."""
+    numbers = np.flatnonzero(shown)
+    if len(numbers) <= STEMS:
+        return numbers
+    column = ((x[numbers] - x[0]) * (STEMS / np.ptp(x))).astype(int)
+    # the last of a column in ascending order is its highest
+    ranked = np.lexsort((amplitude[numbers], column))
+    last = np.append(np.diff(column[ranked]) > 0, True)
+    return numbers[ranked[last]]
+
+
+def mesh_harmonics(ax, step: float, *, words: bool = True) -> None:
+    """Mark the harmonics of the mesh frequency above axes whose abscissa has them every `step`."""
+    from matplotlib.ticker import MaxNLocator
+
+    top = ax.secondary_xaxis("top", functions=(lambda x: x / step, lambda h: h * step))
+    # so many that no number covers another
+    nbins = max(int(20 * ax.get_position().width), 4)
+    top.xaxis.set_major_locator(MaxNLocator(nbins, steps=[1, 2, 2.5, 5, 10], integer=True, prune="lower"))
+    top.tick_params(labelsize=SMALL)
+    top.set_zorder(3)
+    if words:
+        top.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
 
 
 def line_style(index: int) -> dict[str, str]:

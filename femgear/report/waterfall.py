@@ -51,7 +51,7 @@ _DYNAMIC = 80.0
 """Range of the waterfall [dB]."""
 _PIXELS = (400, 640)
 _CUTS, _NAMED = 6, 8
-_KIND = {"rotational": BLUE, "translational": VERMILION, "planet": GREEN, "mixed": PURPLE}
+KIND_COLOURS = {"rotational": BLUE, "translational": VERMILION, "planet": GREEN, "mixed": PURPLE}
 _MESHES = (BLUE, VERMILION)
 
 
@@ -65,7 +65,7 @@ def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset) -> Figure:
     for frequency, kind in zip(modes["frequency"].values * 1e-3, map(str, modes["kind"].values)):
         if 0.0 < frequency <= top:
             name = kind.removeprefix("ring, ")
-            style = {"color": _KIND.get(name, GREY), "linestyle": "--" if name != kind else "-"}
+            style = {"color": KIND_COLOURS.get(name, GREY), "linestyle": "--" if name != kind else "-"}
             ax.axhline(frequency, linewidth=1.2, label=f"{kind} mode", **style)
     for h in range(1, _RAYS + 1):
         ax.plot(speed, h * mesh, color="0.55", linewidth=0.9)

@@ -14,7 +14,7 @@ By stage:
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,14 +25,16 @@ from femgear.case.quantities import RPM
 from femgear.contact.bodies import active_flank_load
 from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
-from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
+from femgear.housing.orders import OrderSpectrum, analyse_band
 from femgear.housing.sensor import SensorLines, fixed_sensor_signal, stored_lines
 from femgear.housing.sound import REFERENCE_PRESSURE, nodal_diameters, stored_sound
 from femgear.report.explorer import EXPLORER, explorer
 from femgear.report.response import (
     MODE_CAPTIONS,
     RESPONSE_CAPTIONS,
+    frequency_groups,
     harmonics_of,
+    mesh_force_period,
     mode_shapes,
     response_figures,
     shown_speeds,
@@ -42,21 +44,24 @@ from femgear.report.scene import animate_operating_deflection, deformed_picture,
 from femgear.report.style import (
     BLACK,
     BLUE,
-    COLOURS,
-    MARKERS,
-    ORANGE,
+    GREEN,
+    GREY,
     SIZE,
     SKY,
+    SMALL,
     VERMILION,
+    WIDTH,
     excited_to,
     label,
     legend_below,
+    mesh_harmonics,
     new_figure,
     rpm,
+    stems,
 )
-from femgear.report.waterfall import RUNUP_CAPTIONS, runup_figures
+from femgear.report.waterfall import KIND_COLOURS, RUNUP_CAPTIONS, runup_figures
 from femgear.storage.files import write_text
-from femgear.trains.elastic.results import run_up_lines
+from femgear.trains.elastic.results import hanning_spectrum, run_up_lines
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import picture_sectors
@@ -70,45 +75,74 @@ if TYPE_CHECKING:
 
 _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 
-# share of the height below the strongest line that a letter above it takes
-_ROOM = 0.068
-# numbers along an axis, and lines of a spectrum that can be told apart, at most
-_TICKS, _STEMS = 20, 4000
+_MARKS = {"rotational": "o", "translational": "s", "planet": "^"}
+# modes whose numbers are written
+_NUMBERED = 24
+# steps of an envelope over a turn, at most
+_ANGLES = 1440
+_QUANTITIES = (("acceleration", "m/s²", 1.0), ("velocity", "mm/s", 1e3), ("displacement", "µm", 1e6))
+# share of the height below the strongest line that the label above it takes
+_ROOM = 0.36
+# numbers along an axis, at most
+_TICKS = 20
 # between ticks, times powers of ten
 _STEPS = [1, 2, 2.5, 5, 10]
 # lines of a band that are labelled, at most
 _LABELS = 12
 _LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
-_ACCELERATION = "acceleration [m/s²]"
+_ACCELERATION = "amplitude [m/s²]"
 _ACCELEROMETER, _MICROPHONE = "accelerometer", "microphone"
 # lowest level of a line of a band that is shown [dB]
 _BAND_FLOOR = -50.0
 
 
 def natural_frequencies(modes: xr.Dataset) -> Figure:
-    """Draw the natural frequencies of modes.nc over the nodal diameters of the ring, by kind of mode."""
-    figure, (ax,) = new_figure(height=5.0)
-    kinds = np.array([str(kind) for kind in modes["kind"].values])
-    frequency, diameter = modes["frequency"].values, modes["nodal_diameter"].values
-    for i, kind in enumerate(dict.fromkeys(kinds)):
-        rows = kinds == kind
+    """Draw the natural frequencies of modes.nc over the nodal diameters of the ring, by kind of mode.
+
+    One mark for a pair of equal frequency; rigid-body motions are left out. Numbers are those of the modes
+    that stand alone. Above the end of the excitation modes only yield.
+    """
+    figure, (ax,) = new_figure(height=5.2)
+    hertz, names = modes["frequency"].values, [str(kind) for kind in modes["kind"].values]
+    groups = [group for group in frequency_groups(hertz) if hertz[group[0]] > 0.0]
+    first = np.array([group[0] for group in groups], int)
+    frequency, diameter = hertz[first] * 1e-3, modes["nodal_diameter"].values[first]
+    for kind in dict.fromkeys(names[mode] for mode in first):
+        rows = [i for i, mode in enumerate(first) if names[mode] == kind]
+        member = kind.removeprefix("ring, ")
+        # as in the Campbell diagram; filled where the bodies move, open where the ring does
         ax.plot(
-            diameter[rows],
-            frequency[rows] * 1e-3,
-            MARKERS[i % len(MARKERS)],
-            color=COLOURS[i % len(COLOURS)],
-            markersize=6,
-            markerfacecolor="none",
-            markeredgewidth=1.6,
-            label=f"{kind} ({np.count_nonzero(rows)})",
-        )
+            diameter[rows], frequency[rows], _MARKS.get(member, "D"), color=KIND_COLOURS.get(member, GREY),
+            markersize=6, markerfacecolor="none" if member != kind else None, markeredgewidth=1.5,
+            label=f"{kind} ({sum(len(groups[i]) for i in rows)})",
+        )  # fmt: skip
+    ax.set_yscale("log")
+    ax.set_ylim(0.6 * frequency.min(initial=1.0), 1.7 * frequency.max(initial=1.0))
+    ax.yaxis.set_major_formatter("{x:g}")
+    _number_modes(ax, diameter, frequency, groups)
     ticks = np.unique(diameter)
     if len(ticks) <= 25:
-        ax.set_xticks(ticks, ["none" if n < 0 else str(n) for n in ticks])
-    ax.set_ylim(bottom=0)
-    label(ax, "nodal diameters of the ring [1]", "natural frequency [kHz]")
+        ax.set_xticks(ticks, ["–" if n < 0 else str(n) for n in ticks])
+    title, reach = f"{sum(map(len, groups))} modes up to {frequency.max(initial=0.0):.4g} kHz", modes.attrs
+    if "excitation_reach" in reach:
+        end = 1e-3 * float(reach["excitation_reach"])
+        ax.axhspan(end, ax.get_ylim()[1], color="0.94", zorder=0)
+        below = sum(len(group) for group, one in zip(groups, frequency) if one < end)
+        title += f", {below} of them below the end of the excitation at {end:.4g} kHz (grey: above)"
+    label(ax, "nodal diameters of the ring [1] (–: ring at rest)", "natural frequency [kHz]", title)
     legend_below(figure, columns=4)
     return figure
+
+
+def _number_modes(ax, diameter, frequency, groups) -> None:
+    """Write the numbers of the modes beside their marks, from the lowest, where they cover no other one."""
+    placed = list[tuple[int, float]]()
+    for n, value, group in zip(diameter, frequency, groups):
+        if all(n != other or value > 1.4 * height for other, height in placed):
+            placed.append((int(n), float(value)))
+            style = {"xytext": (5, 0), "textcoords": "offset points", "va": "center", "fontsize": SMALL}
+            if group[0] < _NUMBERED:
+                ax.annotate(str(group[0] + 1), (n, value), **style)
 
 
 def ring_mean_deflection(dynamics: xr.Dataset, planetary_set: PlanetarySet) -> Figure:
@@ -147,12 +181,6 @@ def _free_angle(angles) -> float:
     return float(np.degrees(sorted_angles[widest] + gaps[widest] / 2))
 
 
-def _shown_harmonics(housing: xr.Dataset) -> tuple[int, ...]:
-    """The first mesh harmonic, and the one with the strongest line where that is another one."""
-    spectrum = _spectrum(housing)
-    return tuple(sorted({1, *_strongest_bands(spectrum.order, spectrum.amplitude, _ring_teeth(housing), 1)}))
-
-
 def _ring_teeth(housing: xr.Dataset) -> int:
     return int(housing.attrs["ring_teeth"])
 
@@ -163,62 +191,44 @@ def _spectrum(housing: xr.Dataset, form: str | None = None) -> OrderSpectrum:
     return OrderSpectrum(lines.order, lines.acceleration)
 
 
-def _band(housing: xr.Dataset, harmonic: int) -> BandAnalysis:
-    """Lines, signal, envelope and lobes around one mesh harmonic; see `analyse_band`."""
-    return analyse_band(_spectrum(housing), _ring_teeth(housing), harmonic)
+def _strongest_bands(housing: xr.Dataset) -> list[int]:
+    """The two mesh harmonics whose bands hold the strongest lines at the first speed, ascending."""
+    spectrum = _spectrum(housing)
+    harmonics = np.rint(spectrum.order / _ring_teeth(housing)).astype(int)
+    peaks = {int(h): spectrum.amplitude[harmonics == h].max() for h in np.unique(harmonics) if h > 0}
+    ranked = sorted((h for h in peaks if peaks[h] > 0), key=lambda h: (-peaks[h], h))
+    return sorted(ranked[:2])
 
 
-def housing_signal(housing: xr.Dataset, *, harmonics: Sequence[int] | None = None) -> Figure:
-    """Draw the acceleration of housing.nc over one carrier revolution at its first speed.
+def housing_signal(housing: xr.Dataset) -> Figure:
+    """Draw acceleration, velocity and displacement of the sensor of housing.nc at its first speed.
 
-    Whole, and around mesh harmonics with its envelope: those given, or the first and that of the strongest
-    line.
+    Over one carrier revolution the largest and smallest value within a mesh period, and the signal itself
+    over four mesh periods about the largest acceleration.
     """
-    harmonics = _shown_harmonics(housing) if harmonics is None else harmonics
-    speed, count = rpm(housing["speed"].values[0]), 1 + len(harmonics)
-    figure, axes = new_figure(rows=count, width=9.5, height=1.0 + 2.5 * count, sharex=True)
-    signal = fixed_sensor_signal(stored_lines(housing.isel(speed=0))).acceleration
-    text = "largest and smallest within a mesh period"
-    around = _extremes(signal, _ring_teeth(housing))
-    title = f"{speed}{excited_to(housing, 0)}: all orders"
-    _draw_signal(axes[0], signal, around, title, text=text, colour=ORANGE)
-    for ax, harmonic in zip(axes[1:], harmonics):
-        found = _band(housing, harmonic)
-        around = found.envelope, -found.envelope
-        _draw_signal(ax, found.signal, around, _band_title(speed, found))
-        lobes = found.lobes
-        # an empty set of markers that are not clipped would upset the layout
-        if len(lobes.position):
-            ax.plot(lobes.position, lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False)
-    axes[-1].set_xlim(0, 1)
-    label(axes[-1], "carrier revolutions [1]")
-    legend_below(figure)
+    lines = stored_lines(housing.isel(speed=0))
+    signal, teeth = fixed_sensor_signal(lines), lines.z_ring
+    figure, axes = new_figure(rows=3, columns=2, height=6.6)
+    period, turn = len(signal.revolution) // teeth, np.arange(teeth + 1) / teeth
+    middle = int(np.abs(signal.acceleration).argmax())
+    shown = (middle + np.arange(-2 * period, 2 * period + 1)) % len(signal.revolution)
+    time = 1e3 * 2.0 * np.pi / float(lines.base_speed) * np.arange(len(shown)) / len(signal.revolution)
+    for (left, right), (name, unit, factor) in zip(zip(axes[::2], axes[1::2]), _QUANTITIES):
+        values = factor * getattr(signal, name)
+        # a period has a whole number of samples; the last value closes the steps
+        each = values.reshape(teeth, period)[[*range(teeth), -1]]
+        left.fill_between(turn, each.min(axis=1), each.max(axis=1), color=BLUE, step="post", linewidth=0)
+        right.plot(time, values[shown], color=BLUE, linewidth=1.1, label="_")
+        around = values - values.mean()
+        size = f"{np.sqrt(np.mean(around**2)):.4g} {unit} r.m.s., {np.ptp(values):.4g} peak to peak"
+        label(left, y=f"{name} [{unit}]", title=size)
+        left.set_xlim(0.0, 1.0)
+        right.set_xlim(0.0, time[-1])
+        right.sharey(left)
+    label(axes[-2], "carrier revolutions [1]")
+    label(axes[-1], "time, four mesh periods [ms]")
+    figure.suptitle(f"Fixed sensor, {rpm(housing['speed'].values[0])}{excited_to(housing, 0)}", fontsize=12)
     return figure
-
-
-def _draw_signal(ax, signal, around, title, *, text="envelope", colour=VERMILION):
-    at = np.arange(len(signal)) / len(signal)
-    ax.plot(at, signal, color=BLUE, linewidth=0.5, label="acceleration of the fixed point")
-    for side in around:
-        at = np.append(np.arange(len(side)) / len(side), 1.0)
-        ax.plot(at, np.append(side, side[0]), color=colour, linewidth=1.3, label=text)
-    label(ax, y=_ACCELERATION, title=title)
-
-
-def _extremes(signal, ring_teeth):
-    """Largest and smallest value within one mesh period around every sample: signals may lack symmetry."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
-    size = max(len(signal) // ring_teeth, 1)
-    return maximum_filter1d(signal, size, mode="wrap"), minimum_filter1d(signal, size, mode="wrap")
-
-
-def _band_title(speed: str, found: BandAnalysis) -> str:
-    count, threshold = len(found.lobes.position), found.lobes.threshold
-    return (
-        f"{speed}: orders {found.low} to {found.high}, mesh harmonic {found.harmonic}: {count} lobes "
-        f"(prominence above {threshold:.0%} of the largest)"
-    )
 
 
 def order_spectrum(housing: xr.Dataset) -> Figure:
@@ -227,102 +237,63 @@ def order_spectrum(housing: xr.Dataset) -> Figure:
     Below are the strongest bands with their lines labelled: one of harmonic ``h`` and nodal diameter ``n``
     stands at order ``h z_ring - n``.
     """
-    from matplotlib.ticker import MaxNLocator
-
     spectrum, only, ring_teeth = _spectrum(housing), _spectrum(housing, "exact"), _ring_teeth(housing)
     order, linear, exact = spectrum.order, spectrum.amplitude, np.zeros(len(spectrum.order))
     exact[np.searchsorted(order, only.order)] = only.amplitude
-    bands = _strongest_bands(order, linear, ring_teeth, 2)
-    figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.8 * len(bands))
+    bands = _strongest_bands(housing)
+    figure, axes = new_figure(rows=1 + len(bands), height=2.6 + 2.7 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
     # what stands for the ring between its points is said where it is not the ring itself
     form = _EXACT if housing.attrs["form"] == "exact" else _LINEAR
-    _stems(axes[0], order, linear, floor, text=form)
+    hertz = 1e-3 * abs(float(housing["carrier_speed"][0])) / (2.0 * np.pi)
+    stems(axes[0], hertz * order, linear, floor, text=form)
     # the record may reach further than the excitation at this speed
     end = order[np.maximum(linear, exact) > floor].max(initial=ring_teeth)
-    axes[0].set_xlim(0, end + 0.5 * ring_teeth)
-    top = axes[0].secondary_xaxis("top", functions=(lambda x: x / ring_teeth, lambda h: h * ring_teeth))
-    # at most twenty numbers, that none covers another
-    top.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=_STEPS, integer=True, prune="lower"))
-    top.tick_params(labelsize=SIZE - 2)
-    top.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
-    label(axes[0], "carrier order [1]", _ACCELERATION)
+    axes[0].set_xlim(0, hertz * (end + 0.5 * ring_teeth))
     axes[0].set_ylim(floor, 2.5 * largest)
     axes[0].minorticks_off()
+    mesh_harmonics(axes[0], hertz * ring_teeth)
+    label(axes[0], "frequency [kHz]")
     for ax, harmonic in zip(axes[1:], bands):
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
+    label(axes[-1], "carrier order [1]")
+    for ax in axes:
+        label(ax, y=_ACCELERATION)
     speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
-    figure.suptitle(f"Order spectrum of the fixed sensor, {speed}", fontsize=12)
-    legend_below(figure)
+    level = np.sqrt(0.5 * (linear[order > 0] ** 2).sum())
+    figure.suptitle(f"Order spectrum of the fixed sensor, {speed}: {level:.4g} m/s² r.m.s.", fontsize=12)
+    if form != _EXACT:
+        legend_below(figure)
     return figure
 
 
-def _strongest_bands(order, amplitude, ring_teeth, count: int) -> list[int]:
-    """So many mesh harmonics whose bands hold the strongest lines, ascending."""
-    harmonics = np.rint(order / ring_teeth).astype(int)
-    peaks = {int(h): amplitude[harmonics == h].max() for h in np.unique(harmonics) if h > 0}
-    ranked = sorted((h for h in peaks if peaks[h] > 0), key=lambda h: (-peaks[h], h))
-    return sorted(ranked[:count])
-
-
-def _stems(ax, order, amplitude, floor, *, text, width=1.0):
-    shown = _highest(order, amplitude, amplitude > floor)
-    # one line with gaps takes a tenth of the time of `vlines`
-    height = np.stack(np.broadcast_arrays(floor, amplitude[shown], np.nan), axis=1)
-    line = {"color": BLUE, "linewidth": width, "solid_capstyle": "butt"}
-    ax.plot(np.repeat(order[shown], 3), height.ravel(), label=text, **line)
-    ax.set_yscale("log")
-
-
-def _highest(order, amplitude, shown) -> np.ndarray:
-    """Numbers of the lines to draw: of more than there are pixels, the highest one of every column."""
-    numbers = np.flatnonzero(shown)
-    if len(numbers) <= _STEMS:
-        return numbers
-    column = ((order[numbers] - order[0]) * (_STEMS / np.ptp(order))).astype(int)
-    # the last of a column in ascending order is its highest
-    ranked = np.lexsort((amplitude[numbers], column))
-    last = np.append(np.diff(column[ranked]) > 0, True)
-    return numbers[ranked[last]]
-
-
 def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
+    """Draw the lines around a mesh harmonic, the strongest with their order and the distance from it."""
     centre = harmonic * ring_teeth
     own = np.rint(order / ring_teeth) == harmonic
     largest = max(linear[own].max(initial=0.0), exact[own].max(initial=0.0)) or 1.0
-    floor = 3e-4 * largest
+    floor = 1e-3 * largest
     # the images that the interpolation makes far from the centre are left to the upper diagram
     reach = int(np.abs(order[own & (exact > floor)] - centre).max(initial=4.0)) + 2
     inside = np.abs(order - centre) <= reach
-    _stems(ax, order[inside], linear[inside], floor, text=form, width=2.5)
+    stems(ax, order[inside], linear[inside], floor, text=form, width=2.5)
     if form != _EXACT:
         shown = inside & (exact > floor)
         ax.plot(order[shown], exact[shown], "o", markerfacecolor="none", color=VERMILION, label=_EXACT)
     peak = np.maximum(linear, exact)
-    limit, longest = peak[inside].max(initial=floor), 0
-    multiple = str(ring_teeth) if harmonic == 1 else f"{harmonic}·{ring_teeth}"
-    for k in _labelled(order, peak, inside & (peak > floor), spacing=reach / 22):
-        offset = round(order[k]) - centre
-        text = f"{order[k]:g}" if offset == 0 else f"{order[k]:g} = {multiple} {offset:+d}"
-        longest = max(longest, len(text))
-        ax.annotate(
-            text.replace("-", "−"),
-            (order[k], peak[k]),
-            xytext=(0, 7),
-            textcoords="offset points",
-            rotation=90,
-            ha="center",
-            va="bottom",
-            fontsize=SIZE - 2.5,
-        )
-    decades = np.arange(np.ceil(np.log10(floor)), np.floor(np.log10(2 * limit)) + 1)
-    ax.set_yticks(10.0**decades)
-    ax.minorticks_off()
+    for k in _labelled(order, peak, inside & (peak > floor), spacing=0.025 * len(str(centre)) * reach):
+        beside = round(order[k]) - centre
+        text = f"{order[k]:g}" + (f"\n{'+' if beside > 0 else '−'}{abs(beside)}" if beside else "")
+        style = {"xytext": (0, 4), "textcoords": "offset points", "ha": "center", "va": "bottom"}
+        ax.annotate(text, (order[k], peak[k]), fontsize=SMALL, linespacing=1.0, **style)
     # room above the strongest line for its label on the logarithmic axis
-    ax.set_ylim(floor, limit * (limit / floor) ** (_ROOM * longest) if limit > floor else 10 * floor)
+    ax.set_ylim(floor, largest * (largest / floor) ** _ROOM)
+    ax.minorticks_off()
     ax.set_xlim(centre - reach, centre + reach)
-    label(ax, "carrier order [1]", _ACCELERATION, f"around mesh harmonic {harmonic} (order {centre})")
+    strongest = int(np.argmax(np.where(own, peak, -1.0)))
+    title = f"mesh harmonic {harmonic} (order {harmonic}·{ring_teeth} = {centre})"
+    label(ax, title=f"{title}: largest line {order[strongest]:g} with {peak[strongest]:.3g} m/s²")
 
 
 def _labelled(order, amplitude, candidates, *, spacing):
@@ -334,72 +305,90 @@ def _labelled(order, amplitude, candidates, *, spacing):
     return chosen[:_LABELS]
 
 
-def modulation_polar(housing: xr.Dataset) -> Figure:
-    """Draw the envelope of the acceleration of housing.nc over the angle of the carrier at its first speed.
+def modulation_polar(
+    housing: xr.Dataset, planet_angles=(), *, windowed: OrderSpectrum | None = None
+) -> Figure:
+    """Draw envelopes of the acceleration of housing.nc over the sensor's angle to the carrier.
 
-    One polar diagram for each of the mesh harmonics that `housing_signal` shows.
+    At the first speed, around the two mesh harmonics with the strongest lines, as if the carrier, drawn with
+    its planets (N,) [rad], stood still and the sensor went round it. Beside them those of the Hanning-window
+    model, ``windowed``, to the same largest value: every planet is heard while it passes the sensor
+    (M. Inalpolat and A. Kahraman, J. Sound Vib. 323, 2009, 677-696).
     """
     from matplotlib.ticker import MaxNLocator
+    from scipy.ndimage import uniform_filter1d
 
-    harmonics = _shown_harmonics(housing)
-    speed = rpm(housing["speed"].values[0])
-    figure, axes = new_figure(columns=len(harmonics), width=5.2 * len(harmonics), height=6.2, polar=True)
-    for i, (ax, harmonic) in enumerate(zip(axes, harmonics)):
-        found = _band(housing, harmonic)
-        lobes, angle = found.lobes, np.linspace(0.0, 2 * np.pi, len(found.envelope) + 1)
-        value = np.append(found.envelope, found.envelope[0])
-        ax.plot(angle, value, color=COLOURS[i % len(COLOURS)], linewidth=2.0)
-        # a polygon would search the extremes of every one of its sides
-        ax.fill_between(angle, 0.0, value, color=COLOURS[i % len(COLOURS)], alpha=0.15, linewidth=0)
-        ax.plot(2 * np.pi * lobes.position, lobes.height, "v", color=BLACK, markersize=6, label="lobe")
-        ax.yaxis.set_major_locator(MaxNLocator(4, steps=_STEPS, prune="lower"))
-        ax.set_ylim(0, 1.12 * value.max(initial=0.0) or 1.0)
-        for text in ax.get_yticklabels():
-            text.set_bbox({"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0})
+    harmonics, spectrum = _strongest_bands(housing) or [1], _spectrum(housing)
+    figure, axes = new_figure(
+        columns=len(harmonics), width=0.5 * WIDTH * len(harmonics), height=4.9, polar=True
+    )
+    start, turn = float(housing.attrs["sensor_angle"]), np.sign(float(housing["carrier_speed"][0]))
+    for ax, harmonic in zip(axes, harmonics):
+        found = analyse_band(spectrum, _ring_teeth(housing), harmonic)
+        lobes, (angle, value) = found.lobes, _around_carrier(found.envelope, start, turn)
+        largest = value.max(initial=0.0) or 1.0
+        ax.plot(angle, value, color=BLUE, linewidth=2.0, label="envelope")
         # the scale stands where the curve is lowest, so that it hides nothing
-        ax.set_rlabel_position(float(np.degrees(angle[np.argmin(_around(found.envelope))])))
-        ax.set_title(
-            f"{speed}, mesh harmonic {harmonic}: {len(lobes.position)} lobes\n"
-            "envelope of the acceleration [m/s²] over the carrier angle",
-            fontsize=SIZE,
-            pad=14,
+        lowest = angle[np.argmin(uniform_filter1d(value, max(len(value) // 15, 1), mode="wrap"))]
+        # a polygon would search the extremes of every one of its sides
+        ax.fill_between(angle, 0.0, value, color=BLUE, alpha=0.15, linewidth=0)
+        if windowed is not None and windowed.order[-1] >= (harmonic - 0.5) * _ring_teeth(housing):
+            model = analyse_band(windowed, _ring_teeth(housing), harmonic).envelope
+            angle, model = _around_carrier(model, start, turn)
+            size = model * (largest / (model.max(initial=0.0) or 1.0))
+            ax.plot(angle, size, "--", color=BLACK, linewidth=1.1, label="Hanning-window model, scaled")
+        for n, psi in enumerate(np.asarray(planet_angles, float)):
+            ax.plot([psi, psi], [0.0, 1.12 * largest], color=VERMILION, linewidth=1.2, label="carrier arms")
+            ax.text(psi, 1.12 * largest, str(n + 1), bbox=_BADGE, ha="center", va="center", fontsize=SMALL)
+        ax.plot([start], [1.28 * largest], "^", color=GREEN, markersize=9, label="sensor at the start")
+        ax.set_ylim(0, 1.36 * largest)
+        ax.set_yticks(
+            [tick for tick in MaxNLocator(3, steps=_STEPS).tick_values(0.0, largest) if 0 < tick <= largest]
         )
-    legend_below(figure)
+        ax.set_rlabel_position(float(np.degrees(lowest)))
+        text = f"mesh harmonic {harmonic}: {len(lobes.position)} lobes up to {largest:.3g} m/s²"
+        ax.set_title(f"{text}\nenvelope [m/s²] over angle in the carrier frame", fontsize=SIZE - 1, pad=12)
+    figure.suptitle(f"Modulation at the fixed sensor, {rpm(housing['speed'].values[0])}", fontsize=12)
+    legend_below(figure, columns=4)
     return figure
 
 
-def _around(values):
-    """Mean over the fifteenth of a turn around every value."""
-    from scipy.ndimage import uniform_filter1d
+def _around_carrier(envelope, start: float, turn: float):
+    """Angles of the sensor in the carrier frame [rad], ascending, and the envelope (n,) there, closed.
 
-    return uniform_filter1d(values, max(len(values) // 15, 1), mode="wrap")
+    The carrier turns in the sense ``turn`` (+-1) past the sensor, which stands at ``start`` [rad].
+    """
+    count = len(envelope)
+    place = np.linspace(0, count, min(count, _ANGLES) + 1).astype(int)[:: -1 if turn > 0 else 1]
+    return start - turn * 2.0 * np.pi * place / count, envelope[place % count]
 
 
 def microphone_spectrum(housing: xr.Dataset) -> Figure:
-    """Draw the lines of accelerometer and microphone of housing.nc over the frequency at its first speed.
+    """Draw the lines of the microphone of housing.nc over the frequency at its first speed.
 
-    Below are the first mesh harmonic and that of the strongest line: what the air filters is the difference
-    between the two levels of an order, each relative to the strongest line of the band at its sensor.
+    Below are the two mesh harmonics with the strongest lines: what the air filters is the difference between
+    the levels of an order at accelerometer and microphone, each relative to the strongest line of the band
+    at its sensor.
     """
     lines, pressure = stored_sound(housing.isel(speed=0))
     acceleration, pressure = np.abs(lines.acceleration), np.abs(pressure)
-    bands = _shown_harmonics(housing)
-    figure, axes = new_figure(rows=2 + len(bands), width=9.5, height=4.6 + 3.0 * len(bands))
-    frequency, floor = lines.frequency * 1e-3, 1e-4 * (acceleration.max() or 1.0)
-    _stems(axes[0], frequency, acceleration, floor, text=_ACCELEROMETER)
+    bands = _strongest_bands(housing)
+    figure, axes = new_figure(rows=1 + len(bands), height=2.8 + 2.4 * len(bands))
     level = 20 * np.log10(np.maximum(pressure, 1e-30) / (np.sqrt(2) * REFERENCE_PRESSURE))
     root = min(0.0, level.max() - 40.0)  # the threshold of hearing
-    shown = _highest(lines.order, level, level > root)
-    axes[1].vlines(frequency[shown], root, level[shown], color=VERMILION, linewidth=1.0, label=_MICROPHONE)
-    axes[1].set_ylim(bottom=root)
-    label(axes[0], "frequency [kHz]", _ACCELERATION)
+    frequency = lines.frequency * 1e-3
+    stems(axes[0], frequency, level, root, text="_", colour=VERMILION)
+    axes[0].set_yscale("linear")
+    axes[0].set_ylim(root, 1.08 * max(level.max(), root + 40.0))
+    axes[0].set_xlim(0.0, 1.02 * frequency[level > root].max(initial=frequency[-1] * 1e-3))
+    mesh_harmonics(axes[0], 1e-3 * lines.z_ring * float(lines.base_speed) / (2.0 * np.pi))
     total, place = float(housing["pressure_level"][0]), housing.attrs["microphone_distance"]
-    label(axes[1], "frequency [kHz]", "sound pressure level [dB]", f"{total:.1f} dB(A) at {place:g} m")
-    axes[1].sharex(axes[0])
-    for ax, harmonic in zip(axes[2:], bands):
+    label(axes[0], "frequency [kHz]", "sound pressure level\n[dB re 20 µPa]")
+    for ax, harmonic in zip(axes[1:], bands):
         _draw_sensors(ax, lines, {_ACCELEROMETER: acceleration, _MICROPHONE: pressure}, harmonic)
+    label(axes[-1], "carrier order [1]")
     speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
-    figure.suptitle(f"Accelerometer and microphone, {speed}", fontsize=12)
+    figure.suptitle(f"Microphone at {place:g} m, {speed}: {total:.1f} dB(A)", fontsize=12)
     legend_below(figure)
     return figure
 
@@ -418,13 +407,13 @@ def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], 
         highest = np.maximum(highest, level)
     shown = highest > _BAND_FLOOR
     for k in np.flatnonzero(shown):
-        ax.text(order[k], highest[k] + 1.0, str(n[k]), ha="center", fontsize=SIZE - 2)
+        ax.text(order[k], highest[k] + 1.0, str(n[k]), ha="center", fontsize=SMALL)
     reach = np.abs(order[shown] - harmonic * lines.z_ring).max(initial=4) + 2
     ax.set_xlim(harmonic * lines.z_ring - reach, harmonic * lines.z_ring + reach)
     ax.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=_STEPS, integer=True))
-    ax.set_ylim(_BAND_FLOOR, 8)
-    title = f"around mesh harmonic {harmonic} (order {harmonic * lines.z_ring}); numbers: nodal diameters"
-    label(ax, "carrier order [1]", "level [dB]", title)
+    ax.set_ylim(_BAND_FLOOR, 10)
+    title = f"mesh harmonic {harmonic} (order {harmonic * lines.z_ring}); numbers: nodal diameters"
+    label(ax, y="level [dB re\nlargest line]", title=title)
 
 
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
@@ -469,12 +458,16 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
 
 
 def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
-    dynamics, data = drawn.data["dynamics"], drawn.data
+    dynamics, modes = drawn.data["dynamics"], drawn.data.get("modes")
+    rest = None
+    if modes is not None and "supported_force" in modes:
+        rest = modes["supported_position"].values, modes["supported_force"].values
     return response_figures(
         dynamics,
         dynamic_transmission_error=transmission_error_period(
-            dynamics, _on_supports(data.get("modes"), data.get("static"))
+            dynamics, _on_supports(modes, drawn.data.get("static"))
         ),
+        mesh_forces=mesh_force_period(dynamics, rest),
         ring_static_deflection=ring_mean_deflection(dynamics, planetary_set(drawn.case)),
     )
 
@@ -511,17 +504,17 @@ def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
 
 
 def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
-    figures, housing = {}, drawn.data["housing"]
-    drawings = (
-        ("housing_signal", housing_signal),
-        ("order_spectrum", order_spectrum),
-        ("modulation", modulation_polar),
-        ("microphone_spectrum", microphone_spectrum),
-    )
+    figures, housing, dynamics = {}, drawn.data["housing"], drawn.data.get("dynamics")
+    angles = planetary_set(drawn.case).planet_angles
     for s in shown_speeds(housing):
-        one = housing.isel(speed=[s])
-        for name, draw in drawings:
-            figures[f"{name}_{round(float(one['speed'][0]))}_rpm"] = draw(one)
+        one, speed = housing.isel(speed=[s]), f"{round(float(housing['speed'][s]))}_rpm"
+        model = None if dynamics is None else hanning_spectrum(dynamics, housing, angles, s)
+        figures |= {
+            f"housing_signal_{speed}": housing_signal(one),
+            f"order_spectrum_{speed}": order_spectrum(one),
+            f"modulation_{speed}": modulation_polar(one, angles, windowed=model),
+            f"microphone_spectrum_{speed}": microphone_spectrum(one),
+        }
     return figures
 
 
@@ -529,7 +522,11 @@ FIGURES = STATIC | {
     "modes": Figures(
         MODE_CAPTIONS
         | {
-            "natural_frequencies": "Natural frequencies over the nodal diameters of the ring.",
+            "natural_frequencies": (
+                "Natural frequencies over the nodal diameters of the ring, one mark for a pair of equal "
+                "frequency, with the numbers of the first modes; filled where the bodies hold most of the "
+                "kinetic energy, open where the ring does."
+            ),
             "ring_mode": "A mode of the toothed ring on its foundation, on the finite-element grid.",
         },
         draw=_modes_figures,
@@ -552,19 +549,25 @@ FIGURES = STATIC | {
     "housing": Figures(
         {
             "housing_signal": (
-                "Acceleration at the fixed sensor during one carrier revolution: all orders with the "
-                "largest and the smallest value within a mesh period, and the band around a mesh harmonic "
-                "with its envelope and lobes ({})."
+                "Acceleration, velocity and displacement of the fixed point during one carrier revolution "
+                "({}): largest and smallest value within a mesh period, and four mesh periods about the "
+                "largest acceleration. The displacement is mostly the static deflection that turns with the "
+                "carrier, the acceleration the meshes."
             ),
             "order_spectrum": (
-                "Carrier orders at the fixed sensor ({}): a wave of n nodal diameters at mesh harmonic h is "
-                "heard at order h z − n, z the teeth of the ring, when the carrier turns counter-clockwise."
+                "Lines at the fixed sensor ({}): a wave of n nodal diameters at mesh harmonic h is heard at "
+                "carrier order h z − n, z the teeth of the ring, when the carrier turns counter-clockwise; "
+                "under the order its distance from the mesh harmonic."
             ),
-            "modulation": "Envelope around a mesh harmonic over the angle of the carrier ({}).",
+            "modulation": (
+                "Envelope around a mesh harmonic while the sensor goes round the carrier ({}). Where lobes "
+                "stand between the planets, or are not as many as these, waves of the ring make the "
+                "modulation and not the passing of the planets, which the Hanning-window model has alone."
+            ),
             "microphone_spectrum": (
-                "Lines of the accelerometer and of a microphone beside it ({}), and their levels around mesh "
-                "harmonics, each relative to its strongest line there: waves of many nodal diameters hardly "
-                "radiate at low frequency, so that the microphone hears other side bands."
+                "Lines of a microphone beside the ring ({}), and levels of both sensors around "
+                "mesh harmonics, each relative to its strongest line there: waves of many nodal diameters "
+                "hardly radiate at low frequency, so that the microphone hears other side bands."
             ),
         },
         draw=_housing_figures,

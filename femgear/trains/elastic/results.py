@@ -505,7 +505,9 @@ def mesh_bands(results: Results) -> Block:
     for s in checked_speeds(housing.sizes["speed"], _FEW):
         lines = stored_lines(housing.isel(speed=s))
         spectrum = OrderSpectrum(lines.order, lines.acceleration)
-        windowed = _hanning_spectrum(results, s)
+        windowed = None
+        if "dynamics" in results.stages:
+            windowed = hanning_spectrum(results.dynamics, housing, planetary_set(case).planet_angles, s)
         rpm = float(housing["speed"][s])
         for h in _shown_harmonics(spectrum, teeth, case.dynamics.mesh_harmonics):
             found = analyse_band(spectrum, teeth, h, count=3)
@@ -541,18 +543,13 @@ def _shown_harmonics(spectrum, teeth: int, given: int | None) -> list[int]:
     return sorted({*range(1, min(_FIRST, highest) + 1), *strongest.tolist()})
 
 
-def _hanning_spectrum(results: Results, speed: int):
-    """Order spectrum of the Hanning-window model with the planet-ring forces of the dynamic solution."""
-    if "dynamics" not in results.stages:
-        return None
-    data = results.dynamics
-    ring = [str(name).endswith("ring") for name in data["mesh"].values]
-    force = harmonics_of(data.isel(speed=speed), "mesh_force")[ring]
-    teeth = int(results.housing.attrs["ring_teeth"])
-    field = hanning_model(force, planetary_set(results.case).planet_angles)
+def hanning_spectrum(dynamics: xr.Dataset, housing: xr.Dataset, planet_angles, speed: int) -> OrderSpectrum:
+    """Compute the order spectrum of the Hanning-window model with the planet-ring forces of dynamics.nc."""
+    ring = [str(name).endswith("ring") for name in dynamics["mesh"].values]
+    force = harmonics_of(dynamics.isel(speed=speed), "mesh_force")[ring]
     lines = component_lines(
-        field, teeth, 2 * np.pi * float(data["mesh_frequency"][speed]) / teeth,
-        float(results.housing.attrs["sensor_angle"]),
+        hanning_model(force, planet_angles), int(housing.attrs["ring_teeth"]),
+        float(dynamics["carrier_speed"][speed]), float(housing.attrs["sensor_angle"]),
     )  # fmt: skip
     return OrderSpectrum(lines.order, lines.acceleration)
 

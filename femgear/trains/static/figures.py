@@ -25,8 +25,8 @@ from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.gears.deviations import SetDeviations, loaded_flanks
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import form_deviation
-from femgear.gears.planetary import PlanetarySet
-from femgear.report.scene import Body, assemble_set, deformed_picture, placed, whole_field, write_vtu
+from femgear.gears.planetary import PlanetarySet, mesh_names
+from femgear.report.scene import Body, View, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.solid import SOLID, solid
 from femgear.report.style import (
     BLACK,
@@ -40,6 +40,7 @@ from femgear.report.style import (
     label,
     legend_below,
     line_style,
+    name_curves,
     new_figure,
     periodic,
 )
@@ -58,22 +59,31 @@ _TENSION, _COMPRESSION = "root of the loaded flank, largest stress", "root of th
 # tangent of the critical section after ISO 6336-3, external and internal gears
 _CRITICAL_SLOPE = {False: 30.0, True: 60.0}
 _KINDS = ("sun-planet", "planet-ring")
+# largest displacement of the deformed set [modules]: teeth bend and do not cross
+_SHOWN = 0.25
 
 
 def static_transmission_error(static: xr.Dataset) -> Figure:
     """Draw the static transmission error of every mesh, and of sun to ring over every planet (static.nc)."""
-    figure, (left, right) = new_figure(columns=2, width=9.5, sharex=True)
-    names = static["mesh"].values
-    drawn = distinct_lines(names, static["ste"])
+    figure, (left, right) = new_figure(columns=2, height=3.6, sharex=True)
+    drawn = distinct_lines(static["mesh"].values, static["ste"])
+    position, each = periodic(static["position"], static["ste"].values * 1e6)
     for i, (text, row) in enumerate(drawn):
-        left.plot(*periodic(static["position"], static["ste"][row] * 1e6), label=text, **line_style(i))
-    label(left, _POSITION, "transmission error [µm]", "each mesh, along its line of action")
-    position, overall = periodic(static["position"], static["ste_overall"] * 1e6)
-    for row, text in enumerate(_of_planets(static, overall)):
+        left.plot(position, each[row], label=text, **line_style(i))
+    overall = periodic(static["position"], static["ste_overall"].values * 1e6)[1]
+    planets = _of_planets(static, overall)
+    for row, text in enumerate(planets):
         right.plot(position, overall[row], label=f"sun to ring over {text}", **line_style(row + len(drawn)))
-    label(right, _POSITION, "sum of both meshes [µm]", "sun to ring")
     right.set_xlim(0, position[-1])
-    legend_below(figure, columns=2)
+    size = " and ".join(f"{np.ptp(each[row]):.3g}" for _, row in drawn[:: max(len(drawn) - 1, 1)])
+    size = size if len(drawn) == 2 else f"up to {np.ptp(each, axis=1).max():.3g}"
+    label(left, _POSITION, "transmission error [µm]", f"each mesh\npeak to peak {size} µm")
+    size = f"{'up to ' * (len(planets) > 1)}{np.ptp(overall, axis=1).max():.3g}"
+    label(right, _POSITION, "sum of both meshes [µm]", f"sun to ring\npeak to peak {size} µm")
+    if len(drawn) == 2 and len(planets) == 1:
+        name_curves(left)
+    else:
+        legend_below(figure, columns=2)
     return figure
 
 
@@ -102,27 +112,38 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
         label(ax, y="mesh stiffness [N/µm]", title=f"{kind} meshes" if kind else "")
         if factor:
             second = ax.secondary_yaxis("right", functions=(lambda k: k * factor, lambda c: c / factor))
-            second.set_ylabel("per face width [N/(mm µm)]", fontsize=11)
-            second.tick_params(labelsize=10)
+            second.set_ylabel("per face width [N/(mm µm)]", fontsize=SIZE)
+            second.tick_params(labelsize=SIZE - 1)
     legend_below(figure, columns=2 if len(lines) < 4 else 4)
     return figure
 
 
 def load_sharing(static: xr.Dataset) -> Figure:
-    """Draw the share of every planet in the sun's torque over the mesh period (static.nc)."""
-    figure, (ax,) = new_figure(height=3.8)
-    position, share = periodic(static["position"], static["load_share"] * 100)
-    for i, text in enumerate(_of_planets(static, share)):
+    """Draw the share of every planet in the sun's torque over the mesh period (static.nc).
+
+    The title tells the planet load factor K_gamma of ISO 6336-1, the largest share over the equal one.
+    """
+    position, share = periodic(static["position"], static["load_share"].values * 100)
+    equal, names = 100.0 / len(share), _of_planets(static, share)
+    factor = share.max() / equal
+    figure, (ax,) = new_figure(height=2.4 if len(names) == 1 else 3.6)
+    for i, text in enumerate(names):
         ax.plot(position, share[i], label=text, linewidth=2.0, **line_style(i))
-    equal = 100.0 / len(share)
-    ax.axhline(equal, color="0.4", linewidth=0.8, linestyle=(0, (1, 3)), label=f"equal share {equal:.4g} %")
-    spread = np.abs(share - equal).max()
-    if spread < 0.05 * equal:
-        ax.set_ylim(0.94 * equal, 1.06 * equal)
     ax.set_xlim(0, position[-1])
-    title = f"largest departure from equal shares: {spread:.3g} %" if spread > 1e-6 else "equal shares"
+    if len(names) == 1:
+        ax.set_ylim(0.0, 1.5 * equal)
+        title = f"all {len(share)} planets carry {share[0].max():.4g} % at every position: K_γ = {factor:.3f}"
+    else:
+        ax.axhline(equal, color=GREY, linewidth=1.2, linestyle=":", label=f"equal share {equal:.4g} %")
+        most = int(share.max(axis=1).argmax())
+        title = (
+            f"planet {static['planet'].values[most]} carries up to {share.max():.4g} %: K_γ = {factor:.3f}"
+        )
     label(ax, _POSITION, "share of the torque [%]", title)
-    legend_below(figure, columns=4)
+    if len(names) > 1:
+        legend_below(figure, columns=4)
+    else:
+        name_curves(ax)
     return figure
 
 
@@ -133,7 +154,7 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     to the next place with every mesh period: from period to period and place to place the loads are the
     history of one pair. The meshes are those of the first planet.
     """
-    figure, axes = new_figure(columns=2, width=9.5, sharey=True)
+    figure, axes = new_figure(columns=2, sharey=True)
     names = [str(name) for name in static["mesh"].values]
     position, largest = static["position"].values, 0.0
     periods = int(static.attrs.get("mesh_periods", 1))
@@ -212,12 +233,12 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
         label(ax, "arc from the end of the flank [mm]")
         return title
 
-    return _four_panels(draw, "stress [MPa]", columns=3)
+    return _four_panels(draw, "stress [MPa]", columns=2)
 
 
 def contact_pressure(stress: xr.Dataset) -> Figure:
     """Draw the contact pressure of a tooth pair over its path (stress.nc), on the planet with the largest."""
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6)
+    figure, axes = new_figure(rows=2, columns=2, height=6.0)
     top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
     # at the end of a flank the pressure grows as cells shrink: it only decides where there is no other
     edge = stress["pressure_distribution"].max(("pair", "cell", "position")).values
@@ -229,7 +250,7 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
         _nominal(upper, row, "iso_contact_stress", "σ_H0 of ISO 6336-2")
         upper.set_ylim(0.0, 1.6 * top)
         largest = float(row["contact_pressure"].max()) * 1e-6
-        label(upper, title=f"{row['mesh'].item()}: {largest:.4g} MPa away from flank ends")
+        label(upper, title=f"{row['mesh'].item()}\n{largest:.4g} MPa away from flank ends")
         image = lower.pcolormesh(
             np.broadcast_to(path, place.shape),
             place,
@@ -268,7 +289,7 @@ def _along_path(row):
 
 def load_spectrum(stress: xr.Dataset) -> Figure:
     """Draw the load spectrum of the teeth in both meshes of the planet with the largest load (stress.nc)."""
-    figure, axes = new_figure(columns=2, width=9.5, sharex=True, sharey=True)
+    figure, axes = new_figure(columns=2, sharex=True, sharey=True)
     edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
     time = stress["load_time_share"].values
     planet = _worst_planet(stress, (edges[1:] * (time > 0.0)).max(axis=1), time @ edges[1:])
@@ -354,7 +375,7 @@ def _crossing(slope, arc, angle) -> float | None:
 
 def _four_panels(draw: Callable[[int, Any], str], y: str, *, columns: int, sharex: bool = False) -> Figure:
     """Draw sun, planets (either side) and ring in panels of one scale; ``draw(panel, axes)`` gives titles."""
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharex=sharex, sharey=True)
+    figure, axes = new_figure(rows=2, columns=2, height=6.0, sharex=sharex, sharey=True)
     for number, ax in enumerate(axes):
         label(ax, title=draw(number, ax))
     for ax in axes[::2]:
@@ -522,12 +543,24 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         bodies = [_reflected(body) for body in bodies]
     grid = assemble_set(bodies)
     write_vtu(grid, folder / "deformed_set.vtu")
-    title = "static deflection, position 0"
-    deformed_picture(grid, folder / "deformed_set.png", title=title)
+    deformed_picture(
+        grid, folder / "deformed_set.png", title=f"deflection under {static.sun_torque:.4g} N m on the sun",
+        largest=_SHOWN * gears.sun.module, details=_mesh_views(static.planetary_set),
+    )  # fmt: skip
     grids = {kind: getattr(sectors, kind).grid for kind in ("sun", "planet", "ring")}
     model = solid(gears, grids, deformed, material_of(case), drawn.data.get("modes"))
     write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SOLID)
     return ["deformed_set.vtu", "deformed_set.png", SOLID]
+
+
+def _mesh_views(gears: PlanetarySet) -> list[View]:
+    """Look at the pitch points of both meshes of the first planet, three pitches to either side."""
+    arm, along = gears.centre_distance, np.exp(1j * float(gears.planet_angles[0]))
+    sun, planet, ring = gears.sun.teeth, gears.planet.teeth, gears.ring.teeth
+    radii = (arm * sun / (sun + planet), arm * ring / (ring - planet))
+    places = zip(mesh_names(1), (radius * along for radius in radii))
+    half = 3.0 * math.pi * gears.sun.module
+    return [View(f"mesh {name}", (at.real, at.imag), half) for name, at in places]
 
 
 def _left_flanks_loaded(static: StaticResult, case: Case) -> tuple[PlanetarySet, MeshCycle]:
@@ -569,14 +602,20 @@ _STATIC = Figures(
             "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (thick) and secant F/δ "
             "(thin)."
         ),
-        "load_sharing": "Share of every planet in the torque of the sun.",
+        "load_sharing": (
+            "Share of every planet in the torque of the sun, and the planet load factor K_γ: the largest "
+            "share over the equal one."
+        ),
         "tooth_loads": "Load of one tooth pair from its first to its last contact.",
         "profile_deviations": (
             "Deviations of the loaded flanks from the involute over the roll angle, positive with more "
             "material."
         ),
         "pitch_deviations": "Cumulative pitch deviations of the loaded flanks over the tooth number.",
-        "deformed_set": "Deformed set under the static load, magnified; at rest in grey.",
+        "deformed_set": (
+            "Deformed set under the static load at position 0, whole and both meshes of the first planet; at "
+            "rest in grey. The teeth that carry bend; what is pale hardly moves."
+        ),
     },
     draw=_static_figures,
     write=(_write_deformed_set,),
