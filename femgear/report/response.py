@@ -264,22 +264,20 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
     wave = np.exp(2j * np.pi * np.outer(h, position))
     values = unit * np.real(harmonics_of(dynamics.isel(speed=speeds), name) @ wave)
     cuts = [_excited_harmonics(dynamics, s) for s in speeds] if static is not None else []
-    known = [unit * _cut_series(*static, h, cut, position) for cut in cuts]
+    known = [unit * _cut_series(static, h, cut, position) for cut in cuts]
     # what is one line at one speed need not be one at another: the lines are those of all speeds
     lines = distinct_lines(dynamics["mesh"].values, np.hstack([*values, *known]), partly=together)
     kinds = [""] if together else list(dict.fromkeys(family(text) for text, _ in lines))
+    alike = len(lines) == len(kinds) and not together
     figure, axes = _panels(len(speeds) * len(kinds), above=1.2 if together else 0.8)
     for ax, (s, kind) in zip(axes, product(range(len(speeds)), kinds)):
         own = [(i, *line) for i, line in enumerate(lines) if kind in ("", family(line[0]))]
         rows = [row for *_, row in own]
         for i, text, row in own:
-            style = {"color": BLUE} if len(own) == 1 else line_style(i)
-            ax.plot(
-                position, values[s][row], label=_DYNAMIC if len(own) == 1 else text, linewidth=2.0, **style
-            )
+            style, text = ({"color": BLUE}, _DYNAMIC) if alike else (line_style(i), text)
+            ax.plot(position, values[s][row], label=text, linewidth=2.0, **style)
             if static is not None:
-                style = {"color": BLACK} if len(own) == 1 else style
-                text = _STATIC if len(own) == 1 else "_"
+                style, text = ({"color": BLACK}, _STATIC) if alike else (style, "_")
                 ax.plot(position, known[s][row], linewidth=0.9, label=text, **style)
         title = [rpm(dynamics["speed"].values[speeds[s]]), *[kind] * bool(kind)]
         quasi = known[s][rows] if static is not None else np.empty(0)
@@ -289,10 +287,10 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
         label(ax, "position in the mesh period [1]")
     for ax in axes[::2]:
         label(ax, y=y)
-    if static is not None and len(lines) > len(kinds):
+    if static is not None and not alike:
         for text, width in ((f"{_DYNAMIC} (thick)", 2.0), (f"{_STATIC} (thin)", 0.9)):
             axes[0].plot([], [], color=BLACK, label=text, linewidth=width)
-    if static is not None or len(lines) > len(kinds):
+    if static is not None or not alike:
         legend_below(figure, columns=3)
     return figure
 
@@ -418,13 +416,14 @@ def _excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
     return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
 
 
-def _cut_series(at, values, h, highest: int, position):
-    """Sum the harmonics ``h`` up to the highest of records (n, P) of one period at positions (Q,).
+def _cut_series(records, h, highest: int, position):
+    """Sum the harmonics ``h`` up to the highest of records of one period at positions (Q,).
 
-    The records are linear between their positions ``at`` (P,), which may be closer where they are steep.
-    Harmonics of such a curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
+    The records (n, P) are linear between their own positions (P,), which stand first and may be closer where
+    they are steep. Harmonics of such a curve are those of its second derivative, jumps of the slope, over
+    ``-(2 pi h)^2``.
     """
-    at, value = periodic(at, values)
+    at, value = periodic(*records)
     slope = np.diff(value) / np.diff(at)
     jump, above = slope - np.roll(slope, 1, axis=-1), h[(h > 0) & (h <= highest)]
     line = -2.0 * jump @ np.exp(-2j * np.pi * np.outer(at[:-1], above)) / (2.0 * np.pi * above) ** 2
@@ -436,7 +435,9 @@ def _cut_series(at, values, h, highest: int, position):
 def _panels(count: int, *, above: float = 0.8, height: float = 2.5):
     """Make a figure with `count` axes [in] of one vertical scale, two in a row, and room above them [in]."""
     rows, columns = -(-count // 2), min(count, 2)
-    figure, axes = new_figure(rows=rows, columns=columns, height=above + height * rows, sharey=True)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, height=above + height * rows, sharex=True, sharey=True
+    )
     for ax in axes[count:]:
         figure.delaxes(ax)
     return figure, axes[:count]

@@ -263,8 +263,10 @@ def deformed_picture(
 def _mosaic(details: int):
     """Make a figure with axes for a large picture, and beside it a column of details."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(WIDTH if details else 5.6, 6.4), layout="constrained")
+    engine = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.1)
+    figure = Figure(figsize=(WIDTH if details else 5.6, 6.4), layout=engine)
     if not details:
         return figure, [figure.add_subplot()]
     grid = figure.add_gridspec(details, 2, width_ratios=(details, 1))

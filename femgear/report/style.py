@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 from functools import cache
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def new_figure(
     columns: int = 1,
     width: float = WIDTH,
     height: float = 4.4,
-    sharex: bool = False,
+    sharex: bool | Literal["col"] = False,
     sharey: bool = False,
     polar: bool = False,
 ):
@@ -128,7 +128,7 @@ def name_curves(ax, *, at: float = 0.985) -> None:
 
 
 def stems(ax, x, amplitude, floor: float, *, text: str, colour: str = BLUE, width: float = 1.0) -> None:
-    """Draw the lines of a spectrum that are higher than `floor`, on a logarithmic ordinate from there.
+    """Draw the lines of a spectrum that are higher than `floor`, from there.
 
     Of more lines than there are pixels, the highest one of every column is drawn.
     """
@@ -138,7 +138,6 @@ def stems(ax, x, amplitude, floor: float, *, text: str, colour: str = BLUE, widt
     height = np.stack(np.broadcast_arrays(floor, amplitude[shown], np.nan), axis=1)
     line = {"color": colour, "linewidth": width, "solid_capstyle": "butt"}
     ax.plot(np.repeat(x[shown], 3), height.ravel(), label=text, **line)
-    ax.set_yscale("log")
 
 
 def _highest(x, amplitude, shown) -> np.ndarray:

@@ -17,9 +17,11 @@ from femgear.report.style import (
     ORANGE,
     PURPLE,
     SIZE,
+    SMALL,
     VERMILION,
     label,
     legend_below,
+    name_curves,
     new_figure,
 )
 
@@ -57,7 +59,7 @@ _MESHES = (BLUE, VERMILION)
 
 def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset) -> Figure:
     """Draw modes and mesh harmonics over the speeds of runup.nc, the excited crossings marked."""
-    figure, (ax,) = new_figure(width=9.5, height=6.4)
+    figure, (ax,) = new_figure(height=5.8)
     speed, mesh = runup["speed"].values, runup["mesh_frequency"].values * 1e-3
     top = min(float(runup["excitation_limit"].max()) * 1e-3, (_RAYS - 2) * mesh[-1])
     ax.set_xlim(speed[0], speed[-1])
@@ -72,7 +74,7 @@ def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset) -> Figure:
         inside = h * mesh[-1] <= top
         at = (speed[-1], h * mesh[-1]) if inside else (top * speed[-1] / (h * mesh[-1]), top)
         side = {"xytext": (4, 0), "va": "center"} if inside else {"xytext": (0, 3), "ha": "center"}
-        ax.annotate(f"h = {h}", at, textcoords="offset points", fontsize=SIZE - 2, color="0.35", **side)
+        ax.annotate(f"h = {h}", at, textcoords="offset points", fontsize=SMALL, color="0.35", **side)
     rows = (runup["mesh_harmonic"].values <= _RAYS) & (runup["frequency"].values * 1e-3 <= top)
     level = runup["resonance_alone"].values[rows]
     place = runup["resonance_speed"].values[rows], runup["frequency"].values[rows] * 1e-3
@@ -97,7 +99,7 @@ def _name_modes(ax, crossings: xr.Dataset, speed: np.ndarray) -> None:
             before = frequency if column < 0.1 else -np.inf
             ax.annotate(
                 f"mode {mode}", (column, frequency), xycoords=("axes fraction", "data"), va="center",
-                fontsize=SIZE - 2, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+                fontsize=SMALL, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
             )  # fmt: skip
 
 
@@ -110,7 +112,7 @@ def _operating(ax, runup: xr.Dataset) -> None:
 
 def waterfall(runup: xr.Dataset) -> Figure:
     """Draw the level [dB re 1e-6 m/s^2] of runup.nc over speed and frequency, and over speed and order."""
-    figure, axes = new_figure(columns=2, width=12.0, height=5.8, sharey=True)
+    figure, axes = new_figure(columns=2, height=4.8, sharey=True)
     order, speed = runup["order"].values, runup["speed"].values
     power = 0.5 * (
         runup["lines_real"].values.astype(float) ** 2 + runup["lines_imag"].values.astype(float) ** 2
@@ -152,7 +154,7 @@ def waterfall(runup: xr.Dataset) -> Figure:
     upper.set_xticks(range(1, _RAYS + 1))
     upper.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
     bar = figure.colorbar(shown, ax=axes, pad=0.02)
-    bar.set_label("level of the acceleration [dB re 1e-6 m/s²]", fontsize=SIZE)
+    bar.set_label("level of the acceleration [dB re 1 µm/s²]", fontsize=SIZE)
     return figure
 
 
@@ -166,9 +168,7 @@ def order_cuts(runup: xr.Dataset) -> Figure:
         if band[k] > 0 and len(chosen) < _CUTS:
             chosen.setdefault(int(band[k]), int(k))
     rows = max(-(-len(chosen) // 3), 1)
-    figure, axes = new_figure(
-        rows=rows, columns=3, width=11.0, height=0.6 + 2.7 * rows, sharex=True, sharey=True
-    )
+    figure, axes = new_figure(rows=rows, columns=3, height=0.6 + 2.2 * rows, sharex=True, sharey=True)
     for ax in axes[len(chosen) :]:
         ax.set_axis_off()
     largest = max((peak[k] for k in chosen.values()), default=1.0)
@@ -190,7 +190,7 @@ def order_cuts(runup: xr.Dataset) -> Figure:
 
 def runup_levels(runup: xr.Dataset) -> Figure:
     """Draw level, fluctuation of the mesh forces and dynamic factors of runup.nc over the speed."""
-    figure, axes = new_figure(rows=3, width=9.5, height=8.6, sharex=True)
+    figure, axes = new_figure(rows=3, height=7.4, sharex=True)
     speed, level = runup["speed"].values, runup["level"].values
     axes[0].plot(speed, level, color=BLACK, linewidth=1.6)
     axes[0].set_ylim(0.0, 1.45 * level.max(initial=0.0) or 1.0)
@@ -202,20 +202,13 @@ def runup_levels(runup: xr.Dataset) -> Figure:
     for ax, name in zip(axes[1:], ("force_rms", "dynamic_factor")):
         curves = runup[name].values.T
         for curve, text, colour in zip(curves, names, _MESHES):
-            ax.plot(speed, curve, color=colour, linewidth=1.6)
+            ax.plot(speed, curve, color=colour, linewidth=1.6, label=text)
             ax.plot(operating, np.interp(operating, speed, curve), "o", color=ORANGE, markersize=7, zorder=3)
-            # apart where the curves end together
-            up = 5 if curve[-1] >= curves[:, -1].max() else -5
-            side = {
-                "xytext": (5, up),
-                "textcoords": "offset points",
-                "va": "center",
-                "annotation_clip": False,
-            }
-            ax.annotate(text, (speed[-1], curve[-1]), color=colour, fontsize=SIZE - 1, **side)
     axes[1].set_ylim(bottom=0.0)
     axes[2].set_ylim(bottom=1.0)
     axes[0].set_xlim(speed[0], speed[-1])
+    for ax in axes[1:]:
+        name_curves(ax)
     label(axes[0], y="level, r.m.s. [m/s²]")
     label(axes[1], y="mesh force, r.m.s.\nabout its mean [N]")
     label(axes[2], "speed of the input [rpm]", "dynamic factor K_v [1]")
@@ -234,7 +227,7 @@ def _name_resonances(ax, runup: xr.Dataset) -> None:
             style = {"arrowstyle": "-", "color": "0.5", "linewidth": 0.8}
             ax.annotate(
                 text, at, xytext=(0, 16), textcoords="offset points", rotation=90, ha="center", va="bottom",
-                fontsize=SIZE - 2, arrowprops=style,
+                fontsize=SMALL, arrowprops=style,
             )  # fmt: skip
 
 

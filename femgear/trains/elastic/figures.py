@@ -208,7 +208,7 @@ def housing_signal(housing: xr.Dataset) -> Figure:
     """
     lines = stored_lines(housing.isel(speed=0))
     signal, teeth = fixed_sensor_signal(lines), lines.z_ring
-    figure, axes = new_figure(rows=3, columns=2, height=6.6)
+    figure, axes = new_figure(rows=3, columns=2, height=6.2, sharex="col")
     period, turn = len(signal.revolution) // teeth, np.arange(teeth + 1) / teeth
     middle = int(np.abs(signal.acceleration).argmax())
     shown = (middle + np.arange(-2 * period, 2 * period + 1)) % len(signal.revolution)
@@ -217,7 +217,7 @@ def housing_signal(housing: xr.Dataset) -> Figure:
         values = factor * getattr(signal, name)
         # a period has a whole number of samples; the last value closes the steps
         each = values.reshape(teeth, period)[[*range(teeth), -1]]
-        left.fill_between(turn, each.min(axis=1), each.max(axis=1), color=BLUE, step="post", linewidth=0)
+        left.fill_between(turn, each.min(axis=1), each.max(axis=1), color=BLUE, step="post", linewidth=1.0)
         right.plot(time, values[shown], color=BLUE, linewidth=1.1, label="_")
         around = values - values.mean()
         size = f"{np.sqrt(np.mean(around**2)):.4g} {unit} r.m.s., {np.ptp(values):.4g} peak to peak"
@@ -248,6 +248,7 @@ def order_spectrum(housing: xr.Dataset) -> Figure:
     form = _EXACT if housing.attrs["form"] == "exact" else _LINEAR
     hertz = 1e-3 * abs(float(housing["carrier_speed"][0])) / (2.0 * np.pi)
     stems(axes[0], hertz * order, linear, floor, text=form)
+    axes[0].set_yscale("log")
     # the record may reach further than the excitation at this speed
     end = order[np.maximum(linear, exact) > floor].max(initial=ring_teeth)
     axes[0].set_xlim(0, hertz * (end + 0.5 * ring_teeth))
@@ -257,7 +258,6 @@ def order_spectrum(housing: xr.Dataset) -> Figure:
     label(axes[0], "frequency [kHz]")
     for ax, harmonic in zip(axes[1:], bands):
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
-    label(axes[-1], "carrier order [1]")
     for ax in axes:
         label(ax, y=_ACCELERATION)
     speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
@@ -278,6 +278,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     reach = int(np.abs(order[own & (exact > floor)] - centre).max(initial=4.0)) + 2
     inside = np.abs(order - centre) <= reach
     stems(ax, order[inside], linear[inside], floor, text=form, width=2.5)
+    ax.set_yscale("log")
     if form != _EXACT:
         shown = inside & (exact > floor)
         ax.plot(order[shown], exact[shown], "o", markerfacecolor="none", color=VERMILION, label=_EXACT)
@@ -293,7 +294,11 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     ax.set_xlim(centre - reach, centre + reach)
     strongest = int(np.argmax(np.where(own, peak, -1.0)))
     title = f"mesh harmonic {harmonic} (order {harmonic}·{ring_teeth} = {centre})"
-    label(ax, title=f"{title}: largest line {order[strongest]:g} with {peak[strongest]:.3g} m/s²")
+    label(
+        ax,
+        "carrier order [1]",
+        title=f"{title}: largest line {order[strongest]:g} with {peak[strongest]:.3g} m/s²",
+    )
 
 
 def _labelled(order, amplitude, candidates, *, spacing):
@@ -378,7 +383,6 @@ def microphone_spectrum(housing: xr.Dataset) -> Figure:
     root = min(0.0, level.max() - 40.0)  # the threshold of hearing
     frequency = lines.frequency * 1e-3
     stems(axes[0], frequency, level, root, text="_", colour=VERMILION)
-    axes[0].set_yscale("linear")
     axes[0].set_ylim(root, 1.08 * max(level.max(), root + 40.0))
     axes[0].set_xlim(0.0, 1.02 * frequency[level > root].max(initial=frequency[-1] * 1e-3))
     mesh_harmonics(axes[0], 1e-3 * lines.z_ring * float(lines.base_speed) / (2.0 * np.pi))
@@ -386,7 +390,6 @@ def microphone_spectrum(housing: xr.Dataset) -> Figure:
     label(axes[0], "frequency [kHz]", "sound pressure level\n[dB re 20 µPa]")
     for ax, harmonic in zip(axes[1:], bands):
         _draw_sensors(ax, lines, {_ACCELEROMETER: acceleration, _MICROPHONE: pressure}, harmonic)
-    label(axes[-1], "carrier order [1]")
     speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
     figure.suptitle(f"Microphone at {place:g} m, {speed}: {total:.1f} dB(A)", fontsize=12)
     legend_below(figure)
@@ -413,7 +416,7 @@ def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], 
     ax.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=_STEPS, integer=True))
     ax.set_ylim(_BAND_FLOOR, 10)
     title = f"mesh harmonic {harmonic} (order {harmonic * lines.z_ring}); numbers: nodal diameters"
-    label(ax, y="level [dB re\nlargest line]", title=title)
+    label(ax, "carrier order [1]", "level [dB re\nlargest line]", title)
 
 
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:

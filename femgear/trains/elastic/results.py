@@ -549,7 +549,7 @@ def hanning_spectrum(dynamics: xr.Dataset, housing: xr.Dataset, planet_angles, s
     force = harmonics_of(dynamics.isel(speed=speed), "mesh_force")[ring]
     lines = component_lines(
         hanning_model(force, planet_angles), int(housing.attrs["ring_teeth"]),
-        float(dynamics["carrier_speed"][speed]), float(housing.attrs["sensor_angle"]),
+        float(housing["carrier_speed"][speed]), float(housing.attrs["sensor_angle"]),
     )  # fmt: skip
     return OrderSpectrum(lines.order, lines.acceleration)
 

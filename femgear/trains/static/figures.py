@@ -209,7 +209,7 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
         _nominal(ax, row, "iso_root_stress", "σ_F0 of ISO 6336-3")
         if number > 1:
             label(ax, "path from the pitch point [base pitches]")
-        return f"{title}: {tension.max() * 1e-6:.3g} and {compression.min() * 1e-6:.3g} MPa"
+        return f"{title}: {tension.max() * 1e-6:.3g} and {compression.min() * 1e-6:.3g} MPa".replace("-", "−")
 
     return _four_panels(draw, "stress [MPa]", columns=2, sharex=True)
 
