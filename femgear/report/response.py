@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.report.style import (
+    ALIKE,
     BLACK,
     BLUE,
     COLOURS,
@@ -265,9 +266,14 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
     values = unit * np.real(harmonics_of(dynamics.isel(speed=speeds), name) @ wave)
     cuts = [_excited_harmonics(dynamics, s) for s in speeds] if static is not None else []
     known = [unit * _cut_series(static, h, cut, position) for cut in cuts]
-    # what is one line at one speed need not be one at another: the lines are those of all speeds
-    lines = distinct_lines(dynamics["mesh"].values, np.hstack([*values, *known]), partly=together)
-    kinds = [""] if together else list(dict.fromkeys(family(text) for text, _ in lines))
+    # what is one line at one speed need not be one at another: the lines are those of all speeds; equal
+    # planets that mesh one after the other have equal spectra
+    names = [str(name) for name in dynamics["mesh"].values]
+    lines, kinds = _told_apart(names, np.hstack([*values, *known])), list(dict.fromkeys(map(family, names)))
+    size = np.abs(harmonics_of(dynamics.isel(speed=speeds), name))
+    same = _told_apart(names, np.hstack([*size]))
+    shifted = len(lines) > len(kinds) == len(same) and not together
+    lines, kinds = same if shifted else lines, [""] if together else kinds
     alike = len(lines) == len(kinds) and not together
     figure, axes = _panels(len(speeds) * len(kinds), above=1.2 if together else 0.8)
     for ax, (s, kind) in zip(axes, product(range(len(speeds)), kinds)):
@@ -279,6 +285,7 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
             if static is not None:
                 style, text = ({"color": BLACK}, _STATIC) if alike else (style, "_")
                 ax.plot(position, known[s][row], linewidth=0.9, label=text, **style)
+        kind = f"{names[rows[0]]}, others shifted" if shifted and kind else kind
         title = [rpm(dynamics["speed"].values[speeds[s]]), *[kind] * bool(kind)]
         quasi = known[s][rows] if static is not None else np.empty(0)
         label(ax, title=f"{', '.join(title)}\n{words(values[s][rows], quasi)}")
@@ -291,8 +298,13 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
         for text, width in ((f"{_DYNAMIC} (thick)", 2.0), (f"{_STATIC} (thin)", 0.9)):
             axes[0].plot([], [], color=BLACK, label=text, linewidth=width)
     if static is not None or not alike:
-        legend_below(figure, columns=3)
+        legend_below(figure, columns=2)
     return figure
+
+
+def _told_apart(names, values) -> list[tuple[str, int]]:
+    """Choose the meshes whose curves or spectra can be told apart, with their legend texts."""
+    return distinct_lines(names, values, partly=True, within=ALIKE)
 
 
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
@@ -304,11 +316,11 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
     amplitude = np.abs(harmonics_of(dynamics.isel(speed=speeds), "dte"))[:, :, h > 0] * 1e6
     names, h, largest = dynamics["mesh"].values, h[h > 0], amplitude.max(initial=0.0)
-    lines = distinct_lines(names, np.hstack([*amplitude]))
-    kinds = list(dict.fromkeys(family(text) for text, _ in lines))
-    figure, axes = _panels(len(speeds) * len(kinds), height=2.9)
     # below are rounding and what the iteration leaves: no line is drawn there
-    floor, end = _DECADES * largest, 0.0
+    floor = _DECADES * (largest or 1.0)
+    lines = _told_apart(names, np.hstack([*np.log10(np.maximum(amplitude / floor, 1.0))]))
+    kinds = list(dict.fromkeys(family(text) for text, _ in lines))
+    figure, axes = _panels(len(speeds) * len(kinds), height=2.9, sharex="row")
     for ax, (s, kind) in zip(axes, product(range(len(speeds)), kinds)):
         step = 1e-3 * float(dynamics["mesh_frequency"].values[speeds[s]]) or 1.0
         own = [(i, *line) for i, line in enumerate(lines) if family(line[0]) == kind]
@@ -319,8 +331,6 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
             else:
                 style = {"color": COLOURS[i % len(COLOURS)], "markersize": 4.0, "label": text}
                 ax.plot(step * h[shown], value[shown], MARKERS[i % len(MARKERS)], **style)
-            if "excitation_limit" not in dynamics:
-                end = max(end, step * (h[shown].max(initial=1) + 0.4))
         if largest > 0.0:
             ax.set_yscale("log")
             ax.set_ylim(floor, 2.0 * largest)
@@ -328,13 +338,12 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
         if "excitation_limit" in dynamics:
             limit = 1e-3 * float(dynamics["excitation_limit"].values[speeds[s]])
             ax.axvline(limit, color=GREY, linewidth=1.2, linestyle=":")
-            end = max(end, _BEYOND * limit)
+            ax.set_xlim(0.0, _BEYOND * limit)
+        else:
+            last = h[(amplitude[s] > floor).any(axis=0)].max(initial=1)
+            ax.set_xlim(0.0, step * (last + 0.4))
         mesh_harmonics(ax, step, words=ax in axes[:2])
         ax.set_title(f"{rpm(dynamics['speed'].values[speeds[s]])}, {kind}", fontsize=SIZE, loc="left", pad=10)
-    for ax in axes:
-        # one frequency axis shows resonances of several speeds below each other
-        ax.set_xlim(0.0, end)
-    for ax in axes[-2:]:
         label(ax, "frequency [kHz]")
     for ax in axes[::2]:
         label(ax, y="amplitude [µm]")
@@ -432,11 +441,11 @@ def _cut_series(records, h, highest: int, position):
     return found + (h[0] == 0) * np.trapezoid(value, at)[:, None] / (at[-1] - at[0])
 
 
-def _panels(count: int, *, above: float = 0.8, height: float = 2.5):
+def _panels(count: int, *, above: float = 0.8, height: float = 2.5, sharex: Any = True):
     """Make a figure with `count` axes [in] of one vertical scale, two in a row, and room above them [in]."""
     rows, columns = -(-count // 2), min(count, 2)
     figure, axes = new_figure(
-        rows=rows, columns=columns, height=above + height * rows, sharex=True, sharey=True
+        rows=rows, columns=columns, height=above + height * rows, sharex=sharex, sharey=True
     )
     for ax in axes[count:]:
         figure.delaxes(ax)

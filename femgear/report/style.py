@@ -26,6 +26,8 @@ WIDTH, SMALL = 8.0, SIZE - 1.5
 """Width of a figure [in] and its smallest text [pt], which is 8 pt on 170 mm of paper."""
 STEMS = 4000
 """Lines of a spectrum that can be told apart, at most."""
+_IDENTICAL, ALIKE = 1e-6, 2e-3
+"""Shares of the largest value by which curves differ that are identical, or cannot be told apart."""
 _APART = 0.085
 """Distance of names beside curves, as a share of the height of a panel."""
 _DPI = 120
@@ -40,7 +42,7 @@ def new_figure(
     columns: int = 1,
     width: float = WIDTH,
     height: float = 4.4,
-    sharex: bool | Literal["col"] = False,
+    sharex: bool | Literal["row", "col"] = False,
     sharey: bool = False,
     polar: bool = False,
 ):
@@ -214,20 +216,22 @@ def family(name: str) -> str:
     return "planet-ring" if "ring" in name else "sun-planet"
 
 
-def distinct_lines(names, values, *, partly: bool = False) -> list[tuple[str, int]]:
+def distinct_lines(
+    names, values, *, partly: bool = False, within: float = _IDENTICAL
+) -> list[tuple[str, int]]:
     """Choose the rows of `values` to draw, with their legend texts: one for a family of meshes, else each.
 
-    The family is drawn as one where its rows (n, ...) differ by less than a millionth of the largest value;
-    ``partly`` does so for some meshes of a family, too.
+    The family is drawn as one where its rows (n, ...) differ by less than a millionth of the largest value,
+    or another share ``within`` of it; ``partly`` does so for some meshes of a family, too.
     """
     values, names = np.asarray(values), [str(name) for name in names]
-    limit = 1e-6 * np.abs(values).max(initial=0.0)
+    largest = np.abs(values).max(initial=0.0)
     lines = []
     for kind in dict.fromkeys(family(name) for name in names):
         rows = [i for i, name in enumerate(names) if family(name) == kind]
         groups: list[list[int]] = []
         for row in rows:
-            alike = (one for one in groups if np.abs(values[row] - values[one[0]]).max() <= limit)
+            alike = (one for one in groups if np.abs(values[row] - values[one[0]]).max() <= within * largest)
             if (group := next(alike, None)) is None:
                 groups.append([row])
             else:
@@ -235,8 +239,10 @@ def distinct_lines(names, values, *, partly: bool = False) -> list[tuple[str, in
         if len(groups) > 1 and not partly:
             groups = [[row] for row in rows]
         for group in groups:
+            same = np.abs(values[group] - values[group[0]]).max() <= _IDENTICAL * largest
+            word = "identical" if same else "alike"
             whole = f"all {kind} meshes" if len(group) == len(rows) else ", ".join(names[i] for i in group)
-            lines.append((f"{whole} (identical)" if len(group) > 1 else names[group[0]], group[0]))
+            lines.append((f"{whole} ({word})" if len(group) > 1 else names[group[0]], group[0]))
     return lines
 
 

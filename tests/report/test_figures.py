@@ -582,6 +582,35 @@ def test_a_tooth_pair_is_followed_through_several_mesh_periods():
     assert np.all(np.diff(ste) > 0) and ste[-1] == 3.0
 
 
+def test_equal_planets_that_mesh_one_after_the_other_are_drawn_once():
+    """Curves of one shape: the first of a kind, and the page says so; another shape is drawn beside it."""
+    dynamics, h = synthetic.dynamics(), synthetic.dynamics()["harmonic"].values
+    lines = np.zeros(dynamics["dte_real"].shape, complex)
+    lines[..., 1:4] = np.array([3e-6, 2e-6, 1e-6])
+    lines *= np.exp(2j * np.pi * h * np.tile(np.arange(3) / 3, 2)[:, None])
+    for change, count in ((1.0, 1), (1.0005, 1), (1.02, 3)):
+        lines[0, 1] *= change
+        dynamics["dte_real"].values[:], dynamics["dte_imag"].values[:] = lines.real, lines.imag
+        figure = response.transmission_error_period(dynamics)
+        ax = figure.axes[0]
+        assert len([line for line in ax.get_lines() if len(line.get_xdata())]) == count
+        assert ("others shifted" in ax.get_title(loc="left")) == (count == 1)
+
+
+@pytest.mark.parametrize(
+    ("defect", "words"), [(0.0, "all 3 planets carry 33.33 %"), (0.2, "planet 3 carries up")]
+)
+def test_load_sharing_says_what_the_planets_carry(defect, words):
+    static = synthetic.static(defect=defect)
+    ax = static_figures.load_sharing(static).axes[0]
+    share = static["load_share"].values
+    title = ax.get_title(loc="left")
+    factor = float(title.rpartition("= ")[2])
+    assert factor == pytest.approx(3.0 * share.max(), abs=6e-4)
+    most = int(share.max(axis=1).argmax()) + 1
+    assert title.startswith(words.replace("planet 3", f"planet {most}"))
+
+
 def test_the_whole_signal_lies_between_its_extremes():
     """An unsymmetric signal: its largest values above, its smallest below, no mirror image of either."""
     housing = heard({TEETH: 1.0, 2 * TEETH: 0.5, 2 * TEETH + 3: 0.1}).isel(speed=[1])

@@ -121,8 +121,8 @@ def natural_frequencies(modes: xr.Dataset) -> Figure:
     ax.yaxis.set_major_formatter("{x:g}")
     _number_modes(ax, diameter, frequency, groups)
     ticks = np.unique(diameter)
-    if len(ticks) <= 25:
-        ax.set_xticks(ticks, ["–" if n < 0 else str(n) for n in ticks])
+    ticks = ticks if len(ticks) <= 25 else ticks[(ticks < 0) | (ticks % 5 == 0)]
+    ax.set_xticks(ticks, ["–" if n < 0 else str(n) for n in ticks])
     title, reach = f"{sum(map(len, groups))} modes up to {frequency.max(initial=0.0):.4g} kHz", modes.attrs
     if "excitation_reach" in reach:
         end = 1e-3 * float(reach["excitation_reach"])

@@ -29,6 +29,7 @@ from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.report.scene import Body, View, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.solid import SOLID, solid
 from femgear.report.style import (
+    ALIKE,
     BLACK,
     BLUE,
     COLOURS,
@@ -66,14 +67,14 @@ _SHOWN = 0.25
 def static_transmission_error(static: xr.Dataset) -> Figure:
     """Draw the static transmission error of every mesh, and of sun to ring over every planet (static.nc)."""
     figure, (left, right) = new_figure(columns=2, height=3.6, sharex=True)
-    drawn = distinct_lines(static["mesh"].values, static["ste"])
+    drawn = distinct_lines(static["mesh"].values, static["ste"], partly=True, within=ALIKE)
     position, each = periodic(static["position"], static["ste"].values * 1e6)
     for i, (text, row) in enumerate(drawn):
         left.plot(position, each[row], label=text, **line_style(i))
     overall = periodic(static["position"], static["ste_overall"].values * 1e6)[1]
     planets = _of_planets(static, overall)
-    for row, text in enumerate(planets):
-        right.plot(position, overall[row], label=f"sun to ring over {text}", **line_style(row + len(drawn)))
+    for i, (text, row) in enumerate(planets, len(drawn)):
+        right.plot(position, overall[row], label=f"sun to ring over {text}", **line_style(i))
     right.set_xlim(0, position[-1])
     size = " and ".join(f"{np.ptp(each[row]):.3g}" for _, row in drawn[:: max(len(drawn) - 1, 1)])
     size = size if len(drawn) == 2 else f"up to {np.ptp(each, axis=1).max():.3g}"
@@ -92,7 +93,7 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
 
     The face width [m] adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
     """
-    lines = distinct_lines(static["mesh"].values, static["mesh_stiffness"])
+    lines = distinct_lines(static["mesh"].values, static["mesh_stiffness"], partly=True, within=ALIKE)
     # two families of curves that differ from planet to planet would cover one another
     kinds = list(dict.fromkeys(family(text) for text, _ in lines)) if len(lines) > 2 else [""]
     figure, axes = new_figure(rows=len(kinds), height=1.6 + 3.2 * len(kinds), sharex=True)
@@ -127,18 +128,18 @@ def load_sharing(static: xr.Dataset) -> Figure:
     equal, names = 100.0 / len(share), _of_planets(static, share)
     factor = share.max() / equal
     figure, (ax,) = new_figure(height=2.4 if len(names) == 1 else 3.6)
-    for i, text in enumerate(names):
-        ax.plot(position, share[i], label=text, linewidth=2.0, **line_style(i))
+    for i, (text, row) in enumerate(names):
+        ax.plot(position, share[row], label=text, linewidth=2.0, **line_style(i))
     ax.set_xlim(0, position[-1])
     if len(names) == 1:
         ax.set_ylim(0.0, 1.5 * equal)
         title = f"all {len(share)} planets carry {share[0].max():.4g} % at every position: K_γ = {factor:.3f}"
     else:
         ax.axhline(equal, color=GREY, linewidth=1.2, linestyle=":", label=f"equal share {equal:.4g} %")
-        most = int(share.max(axis=1).argmax())
-        title = (
-            f"planet {static['planet'].values[most]} carries up to {share.max():.4g} %: K_γ = {factor:.3f}"
-        )
+        highest = share.max(axis=1)
+        most = f"planet {static['planet'].values[highest.argmax()]}"
+        most = "every planet" if np.ptp(highest) < ALIKE * highest.max() else most
+        title = f"{most} carries up to {share.max():.4g} %: K_γ = {factor:.3f}"
     label(ax, _POSITION, "share of the torque [%]", title)
     if len(names) > 1:
         legend_below(figure, columns=4)
@@ -177,11 +178,11 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     return figure
 
 
-def _of_planets(static: xr.Dataset, rows) -> list[str]:
-    """Label the lines to draw of the rows of all planets: the first alone where they agree."""
-    if np.abs(rows - rows[0]).max() <= 1e-6 * np.abs(rows).max(initial=0.0):
-        return ["every planet (identical)"]
-    return [f"planet {planet}" for planet in static["planet"].values]
+def _of_planets(static: xr.Dataset, rows) -> list[tuple[str, int]]:
+    """Choose the lines to draw of the rows of all planets, with their texts: one of those that are alike."""
+    names = [f"planet {planet}" for planet in static["planet"].values]
+    found = distinct_lines(names, rows, partly=True, within=ALIKE)
+    return [(text.replace("all sun-planet meshes", "every planet"), row) for text, row in found]
 
 
 def _while_loaded(loaded: np.ndarray) -> slice:
@@ -543,8 +544,9 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         bodies = [_reflected(body) for body in bodies]
     grid = assemble_set(bodies)
     write_vtu(grid, folder / "deformed_set.vtu")
+    title = f"deflection under {static.sun_torque:.4g} N m on the sun".replace("-", "−")
     deformed_picture(
-        grid, folder / "deformed_set.png", title=f"deflection under {static.sun_torque:.4g} N m on the sun",
+        grid, folder / "deformed_set.png", title=title,
         largest=_SHOWN * gears.sun.module, details=_mesh_views(static.planetary_set),
     )  # fmt: skip
     grids = {kind: getattr(sectors, kind).grid for kind in ("sun", "planet", "ring")}
