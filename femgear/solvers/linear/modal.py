@@ -119,8 +119,7 @@ def solve_modes(
     Returns
     -------
     Modes
-        ``kind`` is ``"rigid"`` or ``"elastic"`` and ``nodal_diameter`` -1: the model knows better names.
-        Signs, and the modes of a multiple eigenvalue, are those of `fixed_basis` in coordinates of unit mass.
+        With the signs of `fixed_basis`; ``kind`` is ``"rigid"`` or ``"elastic"``, ``nodal_diameter`` -1.
 
     Raises
     ------
