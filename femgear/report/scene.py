@@ -438,7 +438,7 @@ def _draw(planetary_set, field, carrier, sensor_angle, title, size):
     largest = float(np.hypot(*displacement).max())
     colour = 1e6 * float(np.abs(displacement[0]).max()) or 1.0
     scale = _LARGEST_ANIMATED * outer / largest if largest > 0 else 1.0
-    words = f"{title}: deflection of the ring less its mean,\nmagnified {rounded(scale)} times"
+    words = f"{title}: deflection of the ring less its mean,\nmagnified {rounded(scale)} times".lstrip(": ")
     figure, ax, colours = _stage(size, 1.24 * outer, colour, words)
     ring = PolyCollection([], antialiased=False)
     edges, gears = LineCollection([], colors="#404040", linewidths=0.8), PolyCollection([], linewidths=0.0)

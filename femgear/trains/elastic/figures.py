@@ -126,7 +126,7 @@ def natural_frequencies(modes: xr.Dataset) -> Figure:
     title, reach = f"{sum(map(len, groups))} modes up to {frequency.max(initial=0.0):.4g} kHz", modes.attrs
     if "excitation_reach" in reach:
         end = 1e-3 * float(reach["excitation_reach"])
-        ax.axhspan(end, ax.get_ylim()[1], color="0.94", zorder=0)
+        ax.axhspan(end, ax.get_ylim()[1], color="0.5", alpha=0.12, linewidth=0, zorder=0)
         below = sum(len(group) for group, one in zip(groups, frequency) if one < end)
         title += f", {below} of them below the end of the excitation at {end:.4g} kHz (grey: above)"
     label(ax, "nodal diameters of the ring [1] (–: ring at rest)", "natural frequency [kHz]", title)
@@ -351,9 +351,9 @@ def modulation_polar(
             [tick for tick in MaxNLocator(3, steps=_STEPS).tick_values(0.0, largest) if 0 < tick <= largest]
         )
         ax.set_rlabel_position(float(np.degrees(lowest)))
-        text = f"mesh harmonic {harmonic}: {len(lobes.position)} lobes up to {largest:.3g} m/s²"
-        ax.set_title(f"{text}\nenvelope [m/s²] over angle in the carrier frame", fontsize=SIZE - 1, pad=12)
-    figure.suptitle(f"Modulation at the fixed sensor, {rpm(housing['speed'].values[0])}", fontsize=12)
+        speed = rpm(housing["speed"].values[0])
+        text = f"{speed}, mesh harmonic {harmonic}: {len(lobes.position)} lobes up to {largest:.3g} m/s²"
+        ax.set_title(f"{text}\nenvelope [m/s²] over angle in the carrier frame", fontsize=SMALL, pad=12)
     legend_below(figure, columns=4)
     return figure
 

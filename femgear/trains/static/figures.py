@@ -133,7 +133,8 @@ def load_sharing(static: xr.Dataset) -> Figure:
     ax.set_xlim(0, position[-1])
     if len(names) == 1:
         ax.set_ylim(0.0, 1.5 * equal)
-        title = f"all {len(share)} planets carry {share[0].max():.4g} % at every position: K_γ = {factor:.3f}"
+        size = f"{'up to ' * ('alike' in names[0][0])}{share.max():.4g} %"
+        title = f"all {len(share)} planets carry {size} at every position: K_γ = {factor:.3f}"
     else:
         ax.axhline(equal, color=GREY, linewidth=1.2, linestyle=":", label=f"equal share {equal:.4g} %")
         highest = share.max(axis=1)
