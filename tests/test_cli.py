@@ -27,7 +27,7 @@ from femgear.trains.reading import open_results, parse_case, read_case, to_toml,
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
-STAGES = ("static", "stress", "modes", "dynamics", "housing", "runup")
+STAGES = ("static", "stress", "modes", "runup", "dynamics", "housing")
 
 
 def synthetic():

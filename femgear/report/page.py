@@ -216,16 +216,14 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
+    known = f'<p class="warn"><a href="#warnings">Warnings: {len(warnings)}</a></p>\n' if warnings else ""
     head = "".join(
         (
             f"<h1>{escape(case.title)}</h1>\n",
             f'<p class="lead">{escape(_lead(results))}</p>\n',
-            "".join(map(table, train.verdict(results))),
             _contents(sections, numbers, pictures),
-            _warnings(warnings),
-            '<h2 id="gears">Gears and operation</h2>\n',
-            part_of("solid") if "solid" in data else "",
-            "".join(map(table, train.describe(case))),
+            known,
+            _gears(train.describe(case), tuple(train.verdict(results)), "solid" in data, static),
         )
     )
     charts = data.get("charts", {})
@@ -233,7 +231,7 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     body = "".join(
         _section(name, numbers, pictures, charts, train, results, parts.get(name, "")) for name in sections
     )
-    main = f"{head}{body}{_provenance(results, numbers)}"
+    main = f"{head}{body}{_trust(results, numbers, warnings, static)}"
     return document(case.title, main, {"charts": charts} | data if data else None)
 
 
@@ -287,7 +285,7 @@ def _lead(results: Results) -> str:
 def _contents(sections, numbers, pictures) -> str:
     """Link to the sections that there are."""
     shown = [name for name in sections if name in numbers or any(p.section == name for p in pictures)]
-    links = [("gears", "Gears"), *((_anchor(name), name) for name in shown), ("provenance", "Provenance")]
+    links = [("gears", "Gears"), *((_anchor(name), name) for name in shown), ("trust", "Trust")]
     return "<nav>" + " ".join(f'<a href="#{key}">{escape(text)}</a>' for key, text in links) + "</nav>\n"
 
 
@@ -296,12 +294,25 @@ def _anchor(name: str) -> str:
     return name.lower().replace(" ", "-")
 
 
-def _warnings(warnings) -> str:
-    """List all warnings."""
-    if not warnings:
-        return ""
-    items = "".join(f"<li>{escape(str(warning))}</li>\n" for warning in warnings)
-    return '<ul class="warnings">\n' + items + "</ul>\n"
+def _gears(gears: Sequence[Block], verdict: Sequence[Block], drawn: bool, static: bool) -> str:
+    """Show the gears in space beside the verdict, and what they are, which a verdict folds away."""
+    tables = "".join(map(table, gears))
+    if not verdict:
+        place = part_of("solid").format("") if drawn else ""
+        return f'<h2 id="gears">Gears and operation</h2>\n{place}{tables}'
+    first, rest = ("".join(map(table, part)) for part in (verdict[:2], verdict[2:]))
+    if drawn:
+        place = part_of("solid").format(escape("; ".join(gears[0].notes[:2]) + "."))
+        first = f'<div class="top">\n{place}<div>\n{first}</div>\n</div>\n'
+    return f"{first}{rest}{_folded('gears', 'Gears and operation', tables, static)}"
+
+
+def _folded(key: str, title: str, content: str, shown: bool) -> str:
+    """Fold a section away under its title; paper, and pages without scripts, show it."""
+    return (
+        f'<details id="{key}"{" open" * shown}>\n<summary><h2>{escape(title)}</h2></summary>\n{content}'
+        "</details>\n"
+    )
 
 
 def part_of(name: str) -> str:
@@ -435,15 +446,22 @@ def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
     return len(captions), _OTHER, re.sub("[_-]+", " ", stem)
 
 
-def _provenance(results: Results, numbers) -> str:
-    """Show time, versions, checksums, and the case as run."""
+def _trust(results: Results, numbers, warnings: Sequence[Any], static: bool) -> str:
+    """Show warnings, what the solvers say of their results, time, versions, checksums, the case as run."""
     manifest = results.manifest
+    items = "".join(f"<li>{escape(str(warning))}</li>\n" for warning in warnings) or "<li>none</li>\n"
+    said = tuple(
+        (stage, name.replace("_", " "), f"{value:.3g}" if isinstance(value, float) else str(value))
+        for stage, verdict in manifest.convergence.items()
+        for name, value in (verdict or {}).items()
+    )
     versions = Block("Versions", ("", "version"), tuple(manifest.versions.items()))
     files = tuple((name, digest) for name, digest in manifest.files.items() if name != "report.html")
-    blocks = [numbers["Time"]] if "Time" in numbers else []
-    blocks += [versions, Block("Files", ("file", "SHA-256"), files)]
-    tables = "".join(table(block) for block in blocks)
-    return (
-        f'<h2 id="provenance">Provenance</h2>\n{tables}<h3>Case as run</h3>\n'
-        f'<pre tabindex="0">{escape(results.case.source)}</pre>\n'
+    blocks = [Block("Solvers", ("stage", "", "value"), said)] if said else []
+    blocks += [numbers["Time"]] if "Time" in numbers else []
+    tables = "".join(map(table, [*blocks, versions, Block("Files", ("file", "SHA-256"), files)]))
+    content = (
+        f'<h3 id="warnings">Warnings</h3>\n<ul class="warnings">\n{items}</ul>\n{tables}'
+        f'<h3>Case as run</h3>\n<pre tabindex="0">{escape(results.case.source)}</pre>\n'
     )
+    return _folded("trust", "Trust: warnings, residuals, checksums, case", content, static)

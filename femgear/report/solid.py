@@ -6,6 +6,7 @@ Every gear is one sector of its grid and the number of copies; the browser makes
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -82,7 +83,26 @@ def solid(
         },
         "bodies": found,
         "modes": [] if modes is None else _modes(modes),
+        "paths": _paths(planetary_set),
     }
+
+
+def _paths(s: PlanetarySet) -> list[list[float]]:
+    """Ends (x, y, x, y) [mm] of the paths of contact of all meshes, from the first contact to the last one.
+
+    The line of action stands at the working pressure angle to the common tangent of the pitch circles.
+    """
+    found = []
+    for gear, angle, path, sense in (
+        (s.sun, s.working_pressure_angle_sun_planet, s.path_sun_planet, 1.0),
+        (s.ring, s.working_pressure_angle_planet_ring, s.path_planet_ring, -1.0),
+    ):
+        pitch, along = gear.base_radius / math.cos(angle), np.array([math.sin(angle), sense * math.cos(angle)])
+        ends = np.array([[pitch, 0.0]]) + np.array(path)[:, None] * along
+        for psi in s.planet_angles:
+            turn = np.array([[math.cos(psi), math.sin(psi)], [-math.sin(psi), math.cos(psi)]])
+            found.append([round(1e3 * float(x), 4) for x in (ends @ turn).ravel()])
+    return found
 
 
 class _Sector:

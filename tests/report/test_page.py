@@ -175,6 +175,25 @@ def test_verdicts_are_warnings(tmp_path):
     assert "<li>the periodic solution is unstable at 250 rpm</li>" in text
 
 
+def test_verdict_stands_before_the_stages_and_trust_is_folded_away_at_the_end(tmp_path):
+    def change(stage, data):
+        if stage == "dynamics":
+            data["converged"].values[1] = False
+
+    results = open_results(make_run(tmp_path / "out", change=change))
+    for static in (False, True):
+        text = html(ELASTIC, results, static=static)
+        keys = ("<caption>Verdict", '<details id="gears"', *(f'id="{one}"' for one in (
+            "static", "modes", "dynamics", "housing", "trust", "warnings")))  # fmt: skip
+        places = [text.index(key) for key in (*keys, "did not converge at 3100 rpm", "Case as run")]
+        assert places == sorted(places) and text.count("did not converge at 3100 rpm") == 1
+        assert 'href="#warnings">Warnings: ' in text[: places[0]]
+        # what is folded away is on paper, and where no script opens it
+        assert text.count("<details") == 2 and text.count(" open>") == 2 * static
+    titles = [stage.title for stage in ELASTIC.stages]
+    assert titles == ["Static", "Stresses", "Modes", "Run-up", "Dynamics", "Housing"]
+
+
 def test_static_results_alone_make_a_page(tmp_path):
     page = Page(html(ELASTIC, open_results(make_run(tmp_path / "out", stages=("static",)))))
     assert "static" in page.ids and "housing" not in page.ids

@@ -150,8 +150,12 @@ page.start = async () => {
   const redraw = () => document.querySelectorAll(".chart[data-drawn]").forEach(page.draw);
   dark.addEventListener("change", () => { page.dark = dark.matches; redraw(); });
   // paper is white, and shows all charts
-  addEventListener("beforeprint", () => { document.documentElement.classList.add("paper"); page.dark = false; page.drawAll(); });
-  addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); page.dark = dark.matches; redraw(); });
+  addEventListener("beforeprint", () => { document.documentElement.classList.add("paper"); page.dark = false;
+    document.querySelectorAll("details").forEach((one) => { one.dataset.open = one.open; one.open = true; });
+    page.drawAll(); });
+  addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); page.dark = dark.matches;
+    document.querySelectorAll("details").forEach((one) => { one.open = one.dataset.open === "true"; });
+    redraw(); });
   page.parts.forEach((part) => part());
   document.documentElement.dataset.ready = "yes";
 };

@@ -68,6 +68,20 @@ page.solid = () => {
     return { ...body, rest, field, stress: unpack(body.stress), nodes, shape, position, colour };
   });
 
+  // paths of contact and, thinner, their lines of action, in front of the faces
+  const stroke = (a, b, c, d, width) => {
+    const side = (width * radius) / Math.hypot(c - a, d - b), x = side * (b - d), y = side * (c - a), z = 0.53 * model.width;
+    return [a + x, b + y, z, a - x, b - y, z, c - x, d - y, z, c - x, d - y, z, c + x, d + y, z, a + x, b + y, z];
+  };
+  const corners = (model.paths || []).flatMap(([a, b, c, d]) => {
+    const x = c - a, y = d - b;
+    return [...stroke(a, b, c, d, 0.011), ...stroke(a - x, b - y, c + x, d + y, 0.004)];
+  });
+  const strokes = new THREE.BufferGeometry();
+  strokes.setAttribute("position", new THREE.BufferAttribute(new Float32Array(corners), 3));
+  strokes.computeVertexNormals();
+  group.add(new THREE.Mesh(strokes, new THREE.MeshLambertMaterial({ color: 0x000000, emissive: 0x0072b2 })));
+
   const move = (body, field, factor) => {
     for (let copy = 0; copy < 4; copy++) {
       for (let i = 0; i < body.nodes; i++) {

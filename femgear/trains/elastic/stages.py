@@ -587,17 +587,6 @@ ELASTIC = Train(
             check=lambda case: check_dynamic_case(case, planetary_set(case)),
         ),
         Stage(
-            name="dynamics", title="Dynamics", solve=solve_dynamics, parts=dynamics_parts,
-            takes=("static", "modes"), options=("progress",), verdict=response_verdict,
-            describe=lambda results: describe_response(results.dynamics), warnings=dynamics_warnings,
-        ),
-        Stage(
-            name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
-            verdict=lambda result: {"form": result.form},
-            describe=lambda results: describe_housing(results.housing),
-            tables=lambda results: (mesh_bands(results),),
-        ),
-        Stage(
             name="runup",
             title="Run-up",
             solve=solve_runup,
@@ -607,6 +596,17 @@ ELASTIC = Train(
             describe=lambda results: describe_runup(results.runup),
             warnings=runup_warnings,
             unavailable=lambda case: "" if case.runup.count else "runup.count is 0",
+        ),
+        Stage(
+            name="dynamics", title="Dynamics", solve=solve_dynamics, parts=dynamics_parts,
+            takes=("static", "modes"), options=("progress",), verdict=response_verdict,
+            describe=lambda results: describe_response(results.dynamics), warnings=dynamics_warnings,
+        ),
+        Stage(
+            name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
+            verdict=lambda result: {"form": result.form},
+            describe=lambda results: describe_housing(results.housing),
+            tables=lambda results: (mesh_bands(results),),
         ),
     ),
     describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,

@@ -55,7 +55,7 @@ def library(case):
 
 
 def test_a_run_has_the_stage_between_static_and_modes(results):
-    assert results.stages == ("static", "stress", "modes", "dynamics", "housing", "runup")
+    assert results.stages == ("static", "stress", "modes", "runup", "dynamics", "housing")
     assert list(results.manifest.timings)[:3] == ["static", "stress", "modes"]
     assert results.manifest.convergence["stress"]["root_points"] > 100
 
@@ -98,7 +98,7 @@ def test_variables_belong_together(results, library):
 
 
 def test_stages_with_and_without_the_key(case):
-    without, others = coarse(**{"static.stresses": False}), ("modes", "dynamics", "housing", "runup")
+    without, others = coarse(**{"static.stresses": False}), ("modes", "runup", "dynamics", "housing")
     assert case.static.stresses and not without.static.stresses
 
     def names(*given):
