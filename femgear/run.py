@@ -308,6 +308,10 @@ def export_results(results: Results, folder: Path, formats: Collection[str], sam
             )  # fmt: skip
     if "csv" in formats:
         found += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
+        if recorded is not None and {"runup", "housing"} <= {*results.stages}:
+            header, rows = recorded.cuts(results, sampling.level)
+            write_csv(folder / "order_cuts.csv", header, ([float(x) for x in row] for row in rows))
+            found.append("order_cuts.csv")
     if "xlsx" in formats:
         tables = (table for stage in results for table in tables_of(results[stage], stage))
         if long := write_workbook(tables, folder / "results.xlsx"):

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.errors import CaseError, StorageError, nvh_library, printable
+from femgear.housing.sound import LEVELS
 from femgear.storage.files import replaced_file
 
 if TYPE_CHECKING:
@@ -44,6 +45,8 @@ class Sampling:
         Full scale of WAV files of sound pressure [Pa]: the sample 1.0 stands for it.
     acceleration_scale
         Full scale of WAV files of acceleration [m/s^2].
+    level
+        Unit and detector of order_cuts.csv: "mm/s rms", "g peak", "um peak", "dB rms" (re 1e-6 m/s^2), ...
     """
 
     rate: int = 48000
@@ -51,10 +54,16 @@ class Sampling:
     run_up: float = 30.0
     pressure_scale: float = 1.0
     acceleration_scale: float = 1.0
+    level: str = LEVELS[0]
 
     def __post_init__(self):
+        if self.level not in LEVELS:
+            raise CaseError(
+                "no such level", code="E-CHOICE", key="--level", value=self.level, limit=", ".join(LEVELS),
+                remedy="leave it out for the default",
+            )  # fmt: skip
         for name, value in vars(self).items():
-            if not 0.0 < value < np.inf:
+            if name != "level" and not 0.0 < value < np.inf:
                 raise CaseError(
                     "no such sampling", code="E-RANGE", key=f"--{name.replace('_', '-')}", value=value,
                     limit="a number above zero", remedy="leave it out for the default",

@@ -30,6 +30,10 @@ from femgear.errors import CaseError, nvh_library
 from femgear.housing.sensor import SensorLines, stored_lines
 
 REFERENCE_PRESSURE, REFERENCE_POWER = 20e-6, 1e-12  # 20 uPa and 1 pW (ISO 1683)
+REFERENCE_ACCELERATION = 1e-6  # m/s^2 (ISO 1683)
+_UNITS = {"m/s^2": (0, 1.0), "g": (0, 1 / 9.80665), "mm/s": (1, 1e3), "um": (2, 1e6), "dB": (0, None)}
+"""Times that the acceleration is integrated, and units in the SI one, by unit of levels."""
+LEVELS = tuple(f"{unit} {one}" for unit in _UNITS for one in ("rms", "peak") if (unit, one) != ("dB", "peak"))
 RATE = 48e3  # samples a second of a signal
 _WIDTH, _OVERSAMPLING = 14, 2
 """Of the kernel that interpolates between the samples of a turn: 1e-12 of the sum of the amplitudes."""
@@ -223,6 +227,20 @@ def sound_power(lines: SensorLines, cylinder: Cylinder, *, equivalent: bool = Fa
 def _velocity(lines: SensorLines) -> np.ndarray:
     """Radial velocity of the surface at the sensor [m/s], complex, (..., n_orders)."""
     return 1j * lines.order * lines.base_speed[..., None] * lines.displacement
+
+
+def levels_of(acceleration, frequency, form: str) -> np.ndarray:
+    """Convert peak amplitudes of lines of the acceleration (..., n) [m/s^2] to levels of a form of `LEVELS`.
+
+    Frequencies (..., n) in Hz, above zero. The last column is the level of all lines: the root of the sum of
+    their squares, of which the peak is sqrt(2) r.m.s.
+    """
+    (integrated, scale), (_, detector) = _UNITS[form.split()[0]], form.split()
+    rms = np.abs(acceleration) * np.sqrt(0.5) / (2 * np.pi * np.asarray(frequency)) ** integrated
+    rms = np.concatenate([rms, np.linalg.norm(rms, axis=-1, keepdims=True)], axis=-1)
+    if scale is None:
+        return _decibels(rms**2, REFERENCE_ACCELERATION**2)
+    return rms * scale * (np.sqrt(2) if detector == "peak" else 1.0)
 
 
 def a_weighting(frequency) -> np.ndarray:

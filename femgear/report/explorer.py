@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 EXPLORER = "runup.json"
 """File of what the page walks through."""
+DRAWN = ("waterfall", "order_cuts")
+"""Figures that the page draws of it, in any unit."""
 _ORDERS, _SPEEDS = 160, 240
 """Lines and speeds that are kept, at most."""
 _HARMONICS = 8

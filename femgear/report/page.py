@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 from femgear.errors import FemgearError, printable
 from femgear.report.charts import chart
-from femgear.report.explorer import EXPLORER
+from femgear.report.explorer import DRAWN, EXPLORER
 from femgear.report.solid import SOLID
 from femgear.report.style import png_bytes
 from femgear.report.tables import Block
@@ -213,6 +213,9 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     case = results.case
     pictures, skipped = _pictures(train, results)
     data = {} if static else shown_data(results)
+    if "runup" in data:
+        pictures = [one for one in pictures if one.name not in DRAWN]
+        data["charts"] = {name: one for name, one in data.get("charts", {}).items() if name not in DRAWN}
     warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]

@@ -160,11 +160,15 @@ class Stage:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a test bench would record of a run: signals of every sensor, their spectra, modes at points."""
+    """What a test bench would record of a run: signals of every sensor, spectra, modes at points, order cuts.
+
+    ``cuts`` takes results and a form of `femgear.housing.sound.LEVELS`, and gives header and rows of a table.
+    """
 
     signals: Callable[[Results, Sampling], Iterator[Signal]]
     spectra: Callable[[Results], Iterator[Spectrum]]
     shapes: Callable[[Results], Shapes]
+    cuts: Callable[[Results, str], tuple[Sequence[str], Iterable[Sequence[float]]]]
 
 
 @dataclass(frozen=True)

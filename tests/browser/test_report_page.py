@@ -1,5 +1,6 @@
 """The page of a run of every train in Chromium: silent, without requests, accessible, drawn and heard."""
 
+import math
 import shutil
 from pathlib import Path
 
@@ -135,6 +136,56 @@ def test_hover_tells_the_line(opened):
     tab.wait_for_selector("[data-part=spectrum] .hovertext")
     text = tab.locator("[data-part=spectrum] .hovertext").text_content()
     assert "order" in text and "Hz" in text and "m/s²" in text
+
+
+def test_page_goes_from_the_gears_to_what_its_results_rest_on(opened):
+    tab = opened(DEMO)
+    titles = tab.locator("main :is(h2, caption)").all_text_contents()
+    wanted = ("Verdict", "Gears and operation", "Static", "Stresses", "Modes", "Run-up", "Housing")
+    places = [titles.index(one) for one in wanted]
+    assert places == sorted(places) and titles[-1] == "Files"
+    boxes = [tab.locator(one).first.bounding_box() for one in ("#solid-place canvas", ".top caption")]
+    assert all(0 < box["y"] and box["y"] + box["height"] < 900 for box in boxes)
+    assert not tab.locator("#trust pre").is_visible()
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert tab.locator("#trust pre").is_visible()
+    tab.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert not tab.locator("#trust pre").is_visible()
+
+
+def test_one_switch_changes_the_levels_of_the_whole_run_up(opened):
+    """A line of amplitude 3 m/s^2 at 50 Hz; r.m.s. is 1/sqrt(2) of it, velocity 1/(2 pi f)."""
+    tab = opened(DEMO)
+    tab.wait_for_function("document.querySelector('[data-part=cuts]').data")
+    tab.select_option("[data-part=source]", "acceleration")
+    tab.evaluate(DRAW)
+    speed, power = 2 * math.pi * 50.0, 3.0 / math.sqrt(2)
+    forms = {
+        "m/s² r.m.s.": (power, "acceleration, r.m.s. [m/s²]"),
+        "m/s² peak": (3.0, "acceleration, peak [m/s²]"),
+        "g peak": (3.0 / 9.80665, "acceleration, peak [g]"),
+        "mm/s r.m.s.": (1e3 * power / speed, "velocity, r.m.s. [mm/s]"),
+        "µm peak": (3e6 / speed**2, "displacement, peak [µm]"),
+        "dB": (20 * math.log10(power / 1e-6), "acceleration level, r.m.s. [dB re 1e-6 m/s²]"),
+    }
+    titles = """() => { const part = (name) => document.querySelector(`[data-part=${name}]`);
+        return [part('spectrum').layout.yaxis.title.text, part('cuts').layout.yaxis.title.text,
+            part('level').layout.yaxis.title.text, part('waterfall').data[0].colorbar.title.text,
+            document.querySelector('[data-chart=run_up_levels]').layout.yaxis.title.text]; }"""
+    value = "document.querySelector('.runup').explorer.shownOf([{ hertz: 50, size: 3 }])"
+    both = f"({value}) / ({value.replace('}]', '}, { hertz: 50, size: 3 }]')})"
+    for form, (wanted, words) in forms.items():
+        tab.select_option("[data-part=form]", label=form)
+        assert tab.evaluate(value) == pytest.approx(wanted, rel=1e-12)
+        assert form == "dB" or tab.evaluate(both) == pytest.approx(1 / math.sqrt(2), rel=1e-12)
+        found = [one.replace("<br>", " ") for one in tab.evaluate(titles)]
+        assert found == [words, words, *[words.replace("peak", "peak = √2 r.m.s.")] * 3]
+    level = "document.querySelector('[data-chart=run_up_levels]').data[0].y"
+    in_decibels = tab.evaluate(level)
+    tab.select_option("[data-part=form]", label="m/s² r.m.s.")
+    plain = tab.evaluate(level)
+    wanted = [20 * math.log10(one / 1e-6) for one in plain]
+    assert in_decibels == pytest.approx(wanted, abs=1e-6)
 
 
 def test_speed_moves_all_pictures_and_the_sound(opened):

@@ -1,5 +1,6 @@
 """Signals and run-ups of lines, and what a cylinder radiates, against sums and forms written out by hand."""
 
+import math
 import sys
 
 import numpy as np
@@ -12,6 +13,7 @@ from femgear.housing.sound import (
     Cylinder,
     Microphone,
     a_weighting,
+    levels_of,
     microphone_lines,
     nodal_diameters,
     power_level,
@@ -295,3 +297,22 @@ def test_loudness_needs_all_that_is_heard():
         with pytest.raises(CaseError) as caught:
             sound_quality(np.zeros(48_000), rate)
         assert caught.value.code == "E-RANGE" and "48 kHz" in caught.value.limit
+
+
+@pytest.mark.parametrize(("form", "expected"), [
+    ("m/s^2 rms", lambda a, w: a / math.sqrt(2)),
+    ("m/s^2 peak", lambda a, w: a),
+    ("g peak", lambda a, w: a / 9.80665),
+    ("mm/s rms", lambda a, w: 1e3 * a / (w * math.sqrt(2))),
+    ("mm/s peak", lambda a, w: 1e3 * a / w),
+    ("um peak", lambda a, w: 1e6 * a / w**2),
+    ("dB rms", lambda a, w: 20 * math.log10(a / math.sqrt(2) / 1e-6)),
+])  # fmt: skip
+def test_levels_of_sines(form, expected):
+    """A sine of amplitude a at f has a/sqrt(2) r.m.s. and the velocity a/(2 pi f); two add their powers."""
+    a, f = np.array([[3.0, 4.0j]]), np.array([50.0, 80.0])
+    found = levels_of(a, f, form)[0]
+    assert found[0] == pytest.approx(expected(3.0, 100 * math.pi), rel=1e-12)
+    assert found[1] == pytest.approx(expected(4.0, 160 * math.pi), rel=1e-12)
+    together = 10 * np.log10(np.sum(10 ** (found[:2] / 10))) if "dB" in form else np.hypot(*found[:2])
+    assert found[2] == pytest.approx(together, rel=1e-12)

@@ -8,7 +8,28 @@ page.explorer = (root) => {
     return Float32Array.from(whole, (value, i) => value * unit[(i >> 1) % count]);
   };
   const lines = Object.fromEntries(Object.entries(data.lines).map(([name, packed]) => [name, unpack(packed)]));
-  const units = { acceleration: "m/s²", pressure: "Pa" };
+  // levels: unit, quantity, reference of decibels, times the acceleration is integrated, units a SI unit
+  const forms = [["m/s²", "acceleration", 0, 0, 1], ["g", "acceleration", 0, 0, 1 / 9.80665], ["mm/s", "velocity", 0, 1, 1e3],
+    ["µm", "displacement", 0, 2, 1e6], ["dB re 1e-6 m/s²", "acceleration level", 1e-6, 0, 1]]
+    .flatMap((one) => (one[2] ? [false] : [false, true]).map((peak) => [...one, peak]));
+  const chosen = () => {
+    const [unit, quantity, reference, integrated, scale, peak] = forms[Number(part("form").value)];
+    if (source.value === "acceleration") return { unit, quantity, reference, integrated, scale, peak };
+    return reference ? { unit: "dB re 20 µPa", quantity: "sound pressure level", reference: 20e-6, integrated: 0, scale: 1, peak }
+      : { unit: "Pa", quantity: "sound pressure", reference: 0, integrated: 0, scale: 1, peak };
+  };
+  const words = (sum) => {
+    const { unit, quantity, peak } = chosen();
+    return `${quantity}, ${peak ? (sum ? "peak = √2 r.m.s." : "peak") : "r.m.s."} [${unit}]`;
+  };
+  // the value shown of a line, and of the sum of the powers of several
+  const shownOf = (found) => {
+    const { reference, integrated, scale, peak } = chosen();
+    const square = found.reduce((sum, one) => (one.hertz > 0 ? sum + 0.5 * (one.size / (2 * Math.PI * one.hertz) ** integrated) ** 2 : sum), 0);
+    return reference ? 20 * Math.log10(Math.sqrt(square) / reference) : Math.sqrt(square * (peak ? 2 : 1)) * scale;
+  };
+  const told = (value) => `${value.toPrecision(4)} ${chosen().unit}`;
+  forms.forEach((_, i) => part("form").add(new Option("", String(i))));
   const slider = part("speed"), shown = part("value"), source = part("source"), play = part("play"), volume = part("volume");
   slider.max = data.speed.length - 1;
   Object.keys(lines).forEach((name) => source.add(new Option({ acceleration: "accelerometer", pressure: "microphone" }[name], name)));
@@ -21,8 +42,6 @@ page.explorer = (root) => {
     const re = lines[name][2 * (i * count + k)], im = lines[name][2 * (i * count + k) + 1];
     return { order, re, im, size: Math.hypot(re, im), hertz: order * data.carrier[i] };
   });
-  const rms = (i, name) => Math.sqrt(at(i, name).reduce((sum, one) => sum + 0.5 * one.size ** 2, 0));
-
   const look = (title) => ({ paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 62, r: 14, t: 34, b: 50 }, height: 330,
     font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: 12, color: page.style("--ink") }, showlegend: false, hovermode: "closest",
     title: { text: page.wrapped(title, root.clientWidth > 800 ? root.clientWidth / 2 - 80 : root.clientWidth - 70).text, x: 0, xref: "paper", font: { size: 13 } } });
@@ -50,23 +69,82 @@ page.explorer = (root) => {
       xanchor: "left", yanchor: "top", showarrow: false, font: { color: page.colour(colour), size: 11 }, bgcolor: page.style("--paper") }));
     Plotly.react(part("campbell"), traces, { ...layout, xaxis: axis("speed [rpm]", { range: speeds }), yaxis: axis("frequency [Hz]", { range: [0, top] }) }, quiet);
   };
+  // an axis of levels with its lower end, some decades or the same in decibels below the largest value
+  const scaled = (largest, decades, sum) => chosen().reference
+    ? { low: largest - 20 * decades, axis: axis(lined(words(sum)), { range: [largest - 20 * decades, largest + 6] }) }
+    : { low: largest * 10 ** -decades, axis: axis(lined(words(sum)), { type: "log", range: [Math.log10(largest) - decades, Math.log10(largest) + 0.3] }) };
+  const lined = (text) => text.replace(" [", "<br>[");
+  const finite = (values) => values.filter(Number.isFinite).reduce((a, b) => Math.max(a, b), -1e30);
   const levels = () => {
-    const name = source.value, values = data.speed.map((_, i) => rms(i, name));
+    const values = data.speed.map((_, i) => shownOf(at(i, source.value)));
+    const end = finite(values), deep = chosen().reference ? (end - Math.min(...values)) / 20 : Math.log10(end / Math.min(...values));
     Plotly.react(part("level"), [{ x: data.speed, y: values, mode: "lines", line: { color: page.colour("#0072b2"), width: 1.8 }, hovertemplate: "%{x:.5g} rpm: %{y:.4g}<extra></extra>" }],
-      { ...look("Level over the speed"), xaxis: axis("speed [rpm]", { range: speeds }), yaxis: axis(`r.m.s. [${units[name]}]`, { type: "log" }) }, quiet);
+      { ...look("Level over the speed"), xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(end, deep + 0.2, true).axis }, quiet);
   };
   const spectrum = () => {
-    const found = at(index, source.value), x = [], y = [], largest = Math.max(...found.map((one) => one.size)) || 1;
-    found.forEach((one) => { x.push(one.hertz, one.hertz, null); y.push(largest * 1e-4, Math.max(one.size, largest * 1e-4), null); });
-    const tips = found.map((one) => `order ${one.order}, ${one.hertz.toFixed(1)} Hz<br>${one.size.toPrecision(4)} ${units[source.value]}`);
-    const loud = found.filter((one) => one.size > largest * 1e-4);
+    const found = at(index, source.value), x = [], y = [], values = found.map((one) => shownOf([one])), { low, axis: upright } = scaled(finite(values), 4, false);
+    found.forEach((one, k) => { x.push(one.hertz, one.hertz, null); y.push(low, Math.max(values[k], low), null); });
+    const tips = found.map((one, k) => `order ${one.order}, ${one.hertz.toFixed(1)} Hz<br>${told(values[k])}`);
+    const loud = found.filter((_, k) => values[k] > low);
     Plotly.react(part("spectrum"), [{ x, y, mode: "lines", line: { color: page.colour("#0072b2"), width: 1.4 }, hoverinfo: "skip" },
-      { x: found.map((one) => one.hertz), y: found.map((one) => Math.max(one.size, largest * 1e-4)), mode: "markers", marker: { size: 4, color: page.colour("#0072b2") }, text: tips, hovertemplate: "%{text}<extra></extra>" }],
-      { ...look("Lines at this speed"), xaxis: axis("frequency [Hz]", { range: [0, Math.max(...loud.map((one) => one.hertz)) * 1.03] }),
-        yaxis: axis(`amplitude [${units[source.value]}]`, { type: "log", range: [Math.log10(largest * 1e-4), Math.log10(largest * 2)] }) }, quiet);
+      { x: found.map((one) => one.hertz), y: values.map((one) => Math.max(one, low)), mode: "markers", marker: { size: 4, color: page.colour("#0072b2") }, text: tips, hovertemplate: "%{text}<extra></extra>" }],
+      { ...look("Lines at this speed"), xaxis: axis("frequency [Hz]", { range: [0, Math.max(...loud.map((one) => one.hertz)) * 1.03] }), yaxis: upright }, quiet);
+  };
+  // the strongest orders around the strongest mesh harmonics, over the speed
+  const cuts = () => {
+    const all = data.speed.map((_, i) => at(i, source.value)), peak = data.order.map((_, k) => finite(all.map((one) => shownOf([one[k]])))), bands = new Map();
+    data.order.map((_, k) => k).sort((a, b) => peak[b] - peak[a]).forEach((k) => {
+      const h = Math.round(data.order[k] / data.teeth);
+      if (h > 0 && bands.size < 6 && !bands.has(h)) bands.set(h, k);
+    });
+    const colours = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+    const traces = [...bands].sort((a, b) => a[0] - b[0]).map(([h, k], i) => {
+      const beside = data.order[k] - h * data.teeth, name = `${data.order[k]} = ${h}·${data.teeth}${beside ? (beside > 0 ? " + " : " − ") + Math.abs(beside) : ""}`;
+      return { x: data.speed, y: all.map((one) => shownOf([one[k]])), name, mode: "lines", line: { color: page.colour(colours[i]), width: 1.6 }, hovertemplate: `order ${name}<br>%{x:.5g} rpm: %{y:.4g}<extra></extra>` };
+    });
+    Plotly.react(part("cuts"), traces, { ...look("Order cuts"), height: 390, showlegend: true, legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom" }, margin: { l: 62, r: 14, t: 34, b: 110 },
+      xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(finite([...bands.values()].map((k) => peak[k])), 4, false).axis }, quiet);
+  };
+  const waterfall = () => {
+    const columns = 300, end = Math.max(...data.mesh) * (data.harmonics + 0.5), { reference, unit } = chosen();
+    const rows = data.speed.map((_, i) => {
+      const found = Array.from({ length: columns }, () => []);
+      at(i, source.value).forEach((one) => { if (one.hertz < end) found[Math.floor((one.hertz / end) * columns)].push(one); });
+      return found.map((some) => (reference ? shownOf(some) : Math.log10(shownOf(some))));
+    });
+    const top = finite(rows.map(finite)), deep = reference ? 80 : 4, z = rows.map((row) => row.map((one) => Math.max(one, top - deep)));
+    const steps = Array.from({ length: 5 }, (_, i) => Math.floor(top) - i), ticks = reference ? {} : { tickvals: steps, ticktext: steps.map((one) => `10<sup>${one}</sup>`) };
+    Plotly.react(part("waterfall"), [{ type: "heatmap", x0: end / columns / 2, dx: end / columns, y: data.speed, z, zmin: top - deep, zmax: top, colorscale: "Cividis",
+      text: reference ? undefined : z.map((row) => row.map((one) => (10 ** one).toPrecision(3))),
+      hovertemplate: `%{x:.5g} Hz, %{y:.5g} rpm<br>%{${reference ? "z:.4g" : "text"}} ${unit}<extra></extra>`,
+      colorbar: { title: { text: lined(words(true)), side: "right" }, thickness: 12, ...ticks } }],
+      { ...look("Waterfall"), xaxis: axis("frequency [Hz]", {}), yaxis: axis("speed [rpm]", {}) }, quiet);
+  };
+  // the level among the charts below follows: its points have the ratio of this form to acceleration, r.m.s.
+  const follow = () => {
+    const chart = root.dataset.run === "runup" && page.data.charts.run_up_levels, panel = chart && chart.panels[0];
+    if (!panel || !/\[m\/s²\]$/.test((chart.plain ||= structuredClone(panel)).y.title)) return;
+    const before = source.value;
+    source.value = "acceleration";
+    const { plain } = chart, plainly = (i) => Math.sqrt(at(i, "acceleration").reduce((sum, one) => sum + 0.5 * one.size ** 2, 0));
+    const { reference, unit } = chosen(), ratio = data.speed.map((_, i) => (reference ? 1 / reference : shownOf(at(i, "acceleration")) / plainly(i)));
+    const value = (x, y) => {
+      const j = Math.max(data.speed.findIndex((one) => one >= Math.min(x, speeds[1])), 1), a = data.speed[j - 1], b = data.speed[j];
+      const share = Math.min(Math.max((x - a) / (b - a), 0), 1), found = y * (ratio[j - 1] * (1 - share) + ratio[j] * share);
+      return y === null ? null : reference ? 20 * Math.log10(Math.max(found, 1e-12)) : found;
+    };
+    const xs = (trace) => trace.x || trace.y.map((_, i) => trace.x0 + i * trace.dx);
+    panel.traces = plain.traces.map((trace) => ({ ...trace, y: trace.y.map((y, i) => value(xs(trace)[i], y)) }));
+    panel.words = plain.words.map((word) => (word.paper ? word : { ...word, y: value(word.x, word.y) }));
+    const all = panel.traces.flatMap((trace) => trace.y), end = finite(all);
+    panel.y = { ...plain.y, title: words(true), range: reference ? [Math.min(...all.filter(Number.isFinite)) - 3, end + 20] : [0, 1.45 * end] };
+    source.value = before;
+    document.querySelectorAll('.chart[data-chart="run_up_levels"][data-drawn]').forEach(page.draw);
   };
   const lobes = () => {
-    const found = at(index, source.value), bands = new Map();
+    const { reference, integrated, scale, peak } = chosen(), to = (one) => (reference ? 1 : scale * (peak ? 1 : Math.SQRT1_2)) / (one.hertz > 0 ? (2 * Math.PI * one.hertz) ** integrated : 1);
+    const value = (r) => told(reference ? 20 * Math.log10((r * Math.SQRT1_2) / reference) : r);
+    const found = at(index, source.value).map((one) => ({ ...one, re: one.re * to(one), im: one.im * to(one), size: one.size * to(one) })), bands = new Map();
     found.forEach((one) => { const h = Math.round(one.order / data.teeth); bands.set(h, Math.max(bands.get(h) || 0, one.size)); });
     const harmonic = [...bands].sort((a, b) => b[1] - a[1])[0][0], own = found.filter((one) => Math.round(one.order / data.teeth) === harmonic);
     const angle = Array.from({ length: 361 }, (_, i) => (2 * Math.PI * i) / 360);
@@ -79,8 +157,8 @@ page.explorer = (root) => {
     const flat = { visible: false, range: [-reach, reach] };
     Plotly.react(part("lobes"), [circle(reach / 1.15), circle(reach / 2.3),
       { x: envelope.map((r, i) => r * Math.cos(angle[i])), y: envelope.map((r, i) => r * Math.sin(angle[i])), mode: "lines", fill: "toself", fillcolor: "rgba(0,114,178,0.15)", line: { color: page.colour("#0072b2"), width: 2 },
-        text: envelope.map((r, i) => `${Math.round((angle[i] * 180) / Math.PI)}°: ${r.toPrecision(3)} ${units[source.value]}`), hovertemplate: "%{text}<extra></extra>" }],
-      { ...look(`Envelope of mesh harmonic ${harmonic} over the carrier's angle; outer circle ${(reach / 1.15).toPrecision(3)} ${units[source.value]}`), xaxis: flat, yaxis: { ...flat, scaleanchor: "x" } }, quiet);
+        text: envelope.map((r, i) => `${Math.round((angle[i] * 180) / Math.PI)}°: ${value(r)}`), hovertemplate: "%{text}<extra></extra>" }],
+      { ...look(`Envelope of mesh harmonic ${harmonic} over the carrier's angle; outer circle ${value(reach / 1.15)} ${peak ? "peak" : "r.m.s."}`), xaxis: flat, yaxis: { ...flat, scaleanchor: "x" } }, quiet);
   };
 
   // sound: whole turns of the carrier, looped; one scale for all speeds, so that louder is louder
@@ -137,8 +215,8 @@ page.explorer = (root) => {
 
   const walk = () => {
     index = Number(slider.value);
-    const name = source.value, mesh = data.mesh[index];
-    shown.value = `${data.speed[index].toPrecision(6)} rpm, mesh ${mesh.toPrecision(5)} Hz, ${rms(index, name).toPrecision(3)} ${units[name]} r.m.s.`;
+    const mesh = data.mesh[index];
+    shown.value = `${data.speed[index].toPrecision(6)} rpm, mesh ${mesh.toPrecision(5)} Hz, ${told(shownOf(at(index, source.value)))} ${chosen().peak ? "peak" : "r.m.s."}`;
     slider.setAttribute("aria-valuetext", shown.value);
     const cursor = [{ type: "line", x0: data.speed[index], x1: data.speed[index], yref: "paper", y0: 0, y1: 1, line: { color: page.colour("#d55e00"), width: 1.5 } }];
     const campbellDiv = part("campbell");
@@ -152,14 +230,23 @@ page.explorer = (root) => {
     lobes();
     if (audio.node) sound();
   };
-  const all = () => { campbell(); levels(); walk(); };
+  const over = () => {
+    [...part("form").options].forEach((one, i) => {
+      const [unit, , reference, , , peak] = forms[i], air = source.value === "pressure";
+      one.hidden = air && i > 1 && !reference;
+      one.text = reference ? "dB" : `${air ? "Pa" : unit} ${peak ? "peak" : "r.m.s."}`;
+    });
+    levels(); waterfall(); cuts(); follow(); walk();
+  };
+  const all = () => { campbell(); over(); };
   slider.addEventListener("input", walk);
-  source.addEventListener("change", () => { levels(); walk(); });
+  source.addEventListener("change", over);
+  part("form").addEventListener("change", over);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setTimeout(all));
   let width = 0;
   new ResizeObserver(() => { if (Math.abs(root.clientWidth - width) > 4) { width = root.clientWidth; all(); } }).observe(root);
   addEventListener("beforeprint", all);
   addEventListener("afterprint", () => setTimeout(all));
-  root.explorer = { turns, linesAt: at };
+  root.explorer = { turns, linesAt: at, shownOf, words };
 };
 page.parts.push(() => document.querySelectorAll(".runup").forEach(page.explorer));

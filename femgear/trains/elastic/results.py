@@ -32,6 +32,7 @@ from femgear.housing.sensor import (
 from femgear.housing.sound import (
     Cylinder,
     Microphone,
+    levels_of,
     microphone_lines,
     power_level,
     pressure_level,
@@ -70,7 +71,7 @@ if TYPE_CHECKING:
 # what lines of many speeds are rounded to, over the largest acceleration of their speed, and from how many on
 _ROUNDED, _MANY = 1e-5, 40
 # speeds, and bands at each of them, that are listed
-_FEW = 4
+_FEW, _CUTS = 4, 24
 _FIRST, _STRONGEST = 6, 4
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _NEAR, _COUNTS = 10.0, 0.05
@@ -448,6 +449,18 @@ def run_up_lines(runup: xr.Dataset, known: Mapping[str, Any]) -> tuple[SensorLin
     place = float(known["sensor_angle"]), int(known["ring_teeth"])
     lines = SensorLines(order, displacement, carrier, *place, "exact")
     return lines, microphone_lines(lines, known)
+
+
+def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:
+    """Tabulate levels of the sensor over the speeds of runup.nc: of all lines, and of the strongest orders."""
+    lines = run_up_lines(results.runup, results.housing.attrs)[0]
+    heard = lines.order > 0
+    levels = levels_of(lines.acceleration[:, heard], lines.frequency[:, heard], form)
+    strongest = np.sort(np.argsort(-np.abs(lines.acceleration[:, heard]).max(axis=0), kind="stable")[:_CUTS])
+    unit = form.replace("dB", "dB re 1e-6 m/s^2")
+    names = (f"order {order} [{unit}]" for order in lines.order[heard][strongest])
+    header = ["speed [rpm]", f"all lines [{unit.replace('peak', 'peak = sqrt(2) rms')}]", *names]
+    return header, np.column_stack([results.runup["speed"].values, levels[:, -1], levels[:, strongest]])
 
 
 def sensor_spectra(results: Results) -> Iterator[Spectrum]:

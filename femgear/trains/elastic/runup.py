@@ -16,6 +16,7 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.housing.orders import order_level
+from femgear.housing.sound import REFERENCE_ACCELERATION
 from femgear.report.tables import Block, tabulate
 from femgear.solvers.linear.resonances import EXCITED
 from femgear.storage.results import complex_entries, coordinates, dataset, declared
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from femgear.system.system import Modes, Response
 
 KINDS = ("sun-planet", "planet-ring")
-REFERENCE = 1e-6
-"""Acceleration of 0 dB [m/s^2] (ISO 1683)."""
 _SILENT = 1e-6
 """Lines below this share of the largest one of all speeds are left out."""
 _REFINED = 40
@@ -245,7 +244,7 @@ class RunupResult:
                 "title": "run-up: sensor, mesh forces and resonances over the speed",
                 "sensor_angle": self.sensor_angle,
                 "ring_teeth": self.ring_teeth,
-                "reference_acceleration": REFERENCE,
+                "reference_acceleration": REFERENCE_ACCELERATION,
                 "operating_speeds": self.operating_speeds / RPM,
                 "unresolved_resonances": self.unresolved,
             },

@@ -85,6 +85,7 @@ from femgear.trains.elastic.results import (
     ModesResult,
     describe_housing,
     mesh_bands,
+    order_cuts,
     ring_shapes,
     sensor_signals,
     sensor_spectra,
@@ -610,5 +611,5 @@ ELASTIC = Train(
         ),
     ),
     describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,
-    recorded=Recorded(sensor_signals, sensor_spectra, ring_shapes),
+    recorded=Recorded(sensor_signals, sensor_spectra, ring_shapes, order_cuts),
 )  # fmt: skip
