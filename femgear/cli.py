@@ -72,6 +72,8 @@ class Progress:
         self._bars = progress.Progress(
             progress.TextColumn("{task.description}", markup=False),
             progress.BarColumn(),
+            progress.TaskProgressColumn(),
+            progress.MofNCompleteColumn(),
             progress.TimeElapsedColumn(),
             progress.TimeRemainingColumn(),
             console=self._console,
@@ -112,12 +114,14 @@ def _print(blocks) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from femgear.report.tables import merged
+
     console = Console(markup=False, highlight=False, emoji=False)
     if not console.is_terminal:
         console.width = 120
     for block in blocks:
         console.print(f"\n{printable(block.title)}")
-        rows = [[printable(cell) for cell in row] for row in block.rows]
+        rows = [[printable(cell) for cell in row] for row in merged(block.rows)]
         for columns in _fitting(block.header, rows, console.width) if rows else ():
             table = Table(box=box.SIMPLE_HEAD if block.header else None, show_header=bool(block.header))
             for index, name, least in columns:
@@ -204,19 +208,21 @@ def _show_warning(message, category, filename, lineno, file=None, line=None) -> 
 
 
 @app.command
-def check(case: Path, /) -> int:
+def check(case: Path, /, *, neighbours: Annotated[bool, Parameter(negative="")] = False) -> int:
     """Read a case, check its gears and print what they are.
 
     Parameters
     ----------
     case
         TOML case file.
+    neighbours
+        Print which neighbouring tooth numbers would fit, too.
     """
     from femgear.trains.reading import read_case
     from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
-    _print(train_of(data).describe_case(data))
+    _print(block for block in train_of(data).describe_case(data) if neighbours or not block.beside)
     try:
         check_case(data)
     except FemgearError as error:
@@ -392,14 +398,16 @@ def export(
     if not named:
         known = ", ".join(f"--{name}" for name in vars(Formats()))
         raise CaseError("no format is named", code="E-ARGUMENTS", limit=known, remedy="femgear export --help")
+    wanted = named, sampling or Sampling()
     if output is None:
-        with folder_lock(folder), additions(folder) as new:
+        with folder_lock(folder), additions(folder) as new, Progress() as progress:
             list_own(new / EXPORTED)
-            names = export_results(open_results(folder), new / EXPORTED, named, sampling or Sampling())
+            names = export_results(open_results(folder), new / EXPORTED, *wanted, progress=progress)
     else:
         results = open_results(folder)  # refused before the other folder is touched
         own_files(output, ())
-        names = export_results(results, output, named, sampling or Sampling())
+        with Progress() as progress:
+            names = export_results(results, output, *wanted, progress=progress)
     _say(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
     return 0
 
@@ -450,7 +458,7 @@ def sweep(
     from femgear.case.gear_set import need_set
     from femgear.run import grid_cache
     from femgear.study.runner import open_runner
-    from femgear.study.sweep import sweep_into
+    from femgear.study.sweep import describe_sweep, sweep_into
     from femgear.trains.reading import read_case
 
     data = read_case(case)
@@ -459,6 +467,7 @@ def sweep(
         options = {"speeds": speeds, "cache": grid_cache(), "progress": progress, "runner": runner}
         found, names = sweep_into(data, output, over=over, of=of, **options)
     failed = sum(bool(error) for error in found.errors)
+    _print([describe_sweep(found)])
     print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")
     _say(f"files in {output}: {', '.join(names)}")
     return 0

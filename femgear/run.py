@@ -7,10 +7,10 @@ import os
 import time
 import warnings
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -116,6 +116,10 @@ def _options(stage: Stage, progress: Progress) -> dict[str, Any]:
     """Options of a stage: folder of grids, and whom to tell how far it has come."""
     known = {"cache": grid_cache(), "progress": progress}
     return {name: known[name] for name in stage.options}
+
+
+_LOSS = -0.1
+"""Change of the level that is told when a rate leaves lines out [dB]."""
 
 
 @dataclass
@@ -291,7 +295,14 @@ def report_again(folder: Path, *, static: bool = False) -> None:
             write_text(page(train, results, static=static), new / "report.html")
 
 
-def export_results(results: Results, folder: Path, formats: Collection[str], sampling: Sampling) -> list[str]:
+def export_results(
+    results: Results,
+    folder: Path,
+    formats: Collection[str],
+    sampling: Sampling,
+    *,
+    progress: Progress = silent,
+) -> list[str]:
     """Write a run in formats of "csv", "xlsx", "mat", "uff", "wav" and "quality", what is heard of its sound.
 
     The folder was made ready by `own_files` or `list_own`. Returns the names of the files. FemgearError: the
@@ -321,14 +332,44 @@ def export_results(results: Results, folder: Path, formats: Collection[str], sam
     if "mat" in formats:
         write_matlab({stage: results[stage] for stage in results}, folder / "results.mat")
         found.append("results.mat")
+    if recorded is not None and not {"wav", "uff", "quality"}.isdisjoint(formats):
+        sampling = _scaled(sampling, recorded.extent(results, sampling.rate))
     if recorded is not None and "uff" in formats:
         signals = (one for one in recorded.signals(results, sampling) if one.steady)
         write_functions(signals, recorded.spectra(results), folder / "signals.uff")
         write_modes(recorded.shapes(results), folder / "modes.uff")
         found += ["signals.uff", "modes.uff"]
     if recorded is not None and not {"wav", "quality"}.isdisjoint(formats):
-        found += _export_sound(recorded.signals(results, sampling), folder, formats, sampling)
+        steps = 2 * results["housing"].sizes["speed"] + 2 * ("runup" in results.stages)
+        signals = _told(recorded.signals(results, sampling), partial(progress, "sound"), steps)
+        found += _export_sound(signals, folder, formats, sampling)
     return found
+
+
+def _told(
+    signals: Iterable[Signal], progress: Callable[[float, float], None], steps: int
+) -> Iterator[Signal]:
+    """Give signals, and tell how many of them have been used up."""
+    progress(0, steps)
+    for done, one in enumerate(signals, 1):
+        yield one
+        progress(done, steps)
+
+
+def _scaled(sampling: Sampling, extent: Mapping[str, tuple[float, float, float]]) -> Sampling:
+    """Give WAV files full scales that nothing exceeds, and warn of lines that the rate leaves out."""
+    for unit, (most, lost, level) in extent.items():
+        name = "pressure_scale" if unit == "Pa" else "acceleration_scale"
+        if getattr(sampling, name) is None:
+            sampling = replace(sampling, **{name: float(f"{1.05 * most or 1.0:.1e}")})
+        left = 10.0 * np.log10(max(1.0 - (lost / (level or 1.0)) ** 2, 1e-20))
+        if left < _LOSS:
+            text = (
+                f"lines at {sampling.rate / 2:g} Hz and above are left out: up to {lost:.3g} {unit} r.m.s. "
+                f"of {level:.3g}, {left:+.2g} dB of the level"
+            )
+            warnings.warn(str(Finding("W-RATE", "", text, remedy="raise --rate to hear them")), stacklevel=4)
+    return sampling
 
 
 def _export_sound(
@@ -336,7 +377,7 @@ def _export_sound(
 ) -> list[str]:
     """Write signals as WAV files, what is heard of those of microphones as a table; returns their names."""
     found, rows, peaks = list[str](), list[list](), dict[str, float]()
-    scales = {"Pa": sampling.pressure_scale, "m/s^2": sampling.acceleration_scale}
+    scales = {"Pa": sampling.pressure_scale or 1.0, "m/s^2": sampling.acceleration_scale or 1.0}
     for signal in signals:
         if "wav" in formats:
             peaks[signal.unit] = max(peaks.get(signal.unit, 0.0), float(np.abs(signal.values).max()))

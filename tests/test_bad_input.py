@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from validation.reference.plane_elasticity import edge_load
 
-from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.case.gear_set import material_of, planetary_set, set_deviations
+from femgear.case.quantities import RPM
 from femgear.cli import main
-from femgear.contact.bodies import flank_load_columns, flank_stations
+from femgear.contact.bodies import flank_load_columns, flank_stations, make_sectors
 from femgear.contact.solve import solve_contact
-from femgear.errors import ContactError, FemgearError, GridError
+from femgear.errors import CaseError, ContactError, FemgearError, GridError
 from femgear.fe.compliance import condense_sector, dof_pairs, interpolation
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror
@@ -20,6 +21,7 @@ from femgear.fe.meshing import mesh_outline
 from femgear.gears.checks import check_set
 from femgear.gears.deviations import check_deviations
 from femgear.gears.tooth import half_sector
+from femgear.storage.results import coordinates
 from femgear.trains.reading import read_case, with_value, with_values
 from femgear.trains.static.results import describe_static
 from femgear.trains.static.stages import solve_static
@@ -295,3 +297,47 @@ def test_an_active_set_that_is_cut_short_falls_back_to_the_general_solver():
         assert whole.iterations <= 3 * 200 + 50
         assert replace(whole).residual < 1e-9
     assert fallen >= 10
+
+
+# --- what a message names ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("change", "key", "line_with", "words"), [
+    (("[material]\n", '[material]\nroot_stress_limit = "1 Pa"\n'), "material.root_stress_limit",
+     "root_stress_limit", "a stress of 1e-06 MPa"),
+    (("[housing]\n", '[housing]\nmicrophone = {distance = "-1 m"}\n'), "housing.microphone.distance",
+     "microphone", "a length"),
+    (('speeds = ["250 rpm", "3100 rpm"]', 'speeds = {from = "250 rpm", to = "3100 rpm", count = 1}'),
+     "operation.speeds.count", "count = 1}", "out of range"),
+])  # fmt: skip
+def test_a_refusal_names_quantity_and_line(change, key, line_with, words, tmp_path):
+    text = edited(change)
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(CaseError, match=words) as caught:
+        read_case(tmp_path / "case.toml")
+    lines = [number for number, line in enumerate(text.splitlines(), 1) if line.startswith(line_with)]
+    lines += [number for number, line in enumerate(text.splitlines(), 1) if line_with in line]
+    assert caught.value.key == key and caught.value.file.endswith(f"case.toml:{lines[0]}")
+
+
+def test_a_grid_that_a_thin_rim_spoils_names_the_rim(tmp_path):
+    case = read_case(case_of(tmp_path, edited(('outer_radius = "100 mm"', 'outer_radius = "82.9 mm"'))))
+    with pytest.raises(GridError) as caught:
+        make_sectors(planetary_set(case), material_of(case))
+    assert caught.value.key == "ring.outer_radius"
+    assert "rim is 0.017 modules thick" in caught.value.remedy
+
+
+def test_an_empty_file_of_tolerances_is_no_case_file(tmp_path, capsys):
+    (tmp_path / "tolerances.toml").write_text("")
+    file, out = str(tmp_path / "tolerances.toml"), str(tmp_path / "out")
+    assert main(["samples", str(CASE), "--tolerances", file, "-o", out]) == 2
+    said = capsys.readouterr().err
+    assert "tolerances.toml: the file is empty" in said and "case file" not in said
+
+
+def test_speeds_are_stored_as_they_are_written():
+    speeds = np.arange(1.0, 5001.0)
+    found = coordinates(speed=speeds * RPM / RPM)["speed"][1]
+    assert (speeds * RPM / RPM != speeds).any() and (found == speeds).all()
+    assert coordinates(speed=[1000.0 / 3.0])["speed"][1] == pytest.approx(1000.0 / 3.0, rel=1e-12)

@@ -16,7 +16,7 @@ from rich.console import Console
 from femgear import cli
 from femgear import run as run_module
 from femgear.errors import CaseError, Finding, StorageError
-from femgear.report.tables import Block
+from femgear.report.tables import Block, merged
 from femgear.storage.files import checked_name
 from femgear.trains.reading import open_results, read_case
 
@@ -46,7 +46,8 @@ def printed_in(encoding: str, monkeypatch, command) -> tuple[int, str, str]:
 
 def _nothing(*_, progress, **__):
     progress("static ±", 1, 1)
-    return SimpleNamespace(points=(), computed=0, errors=()), ["±.csv"]
+    found = SimpleNamespace(points=(), computed=0, errors=(), keys=("sun.teeth",), quantities=(), values=())
+    return found, ["±.csv"]
 
 
 @pytest.mark.parametrize(("encoding", "title"), [
@@ -232,3 +233,64 @@ def test_no_number_of_a_table_breaks_in_a_narrow_terminal(width, capsys, monkeyp
     for cell in (cell for row in rows for cell in row[:-1]):
         assert re.search(rf"(?<![\d.]){re.escape(cell)}(?![\d.])", text)
     assert text.count("speed") == {60: 3, 80: 2, 120: 1}[width]
+
+
+class Narrow(Console):
+    """A terminal of 80 columns."""
+
+    def __init__(self, **options):
+        super().__init__(width=80, force_terminal=True, **options)
+
+
+def test_equal_rows_that_follow_one_another_are_one(capsys):
+    rows = (
+        *(("sun-planet 1", "4.02"), ("sun-planet 2", "4.02"), ("sun-planet 3", "4.02")),
+        *(("planet 1-ring", "2.7"), ("planet 2-ring", "2.7"), ("planet 3-ring", "2.8")),
+        *(("12", "1"), ("14", "1"), ("250.5", "1"), ("x", "1"), ("x", "1"), ("", "1")),
+    )
+    assert [row[0] for row in merged(rows)] == [
+        "sun-planet 1..3", "planet 1..2-ring", "planet 3-ring", "12", "14", "250.5", "x", "x", "",
+    ]  # fmt: skip
+    assert len({row[1] for row in merged(rows)}) == 4
+    cli._print([Block("Static", ("mesh", "STE [um]"), rows[:3])])
+    out = capsys.readouterr().out
+    assert out.count("4.02") == 1 and "sun-planet 1..3" in out
+
+
+def test_neighbouring_tooth_numbers_are_printed_on_request(capsys):
+    assert cli.main(["check", str(CASE)]) == 0
+    assert "Neighbouring" not in capsys.readouterr().out
+    assert cli.main(["check", str(CASE), "--neighbours"]) == 0
+    assert "Neighbouring tooth numbers" in capsys.readouterr().out
+
+
+def test_a_sweep_prints_its_table(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("rich.console.Console", Narrow)
+    over = "sun.profile_shift=0.50,0.52,9.0"
+    command = ["sweep", str(CASE), "-o", str(tmp_path / "out"), "--of", "contact ratio sun-planet"]
+    code = cli.main([*command, "--over", over.removesuffix(",9.0")])
+    out = re.sub("\x1b[^m]*m", "", capsys.readouterr().out)
+    assert code == 0 and "Sweep" in out and "2 cases, 2 computed now" in out
+    table = (tmp_path / "out" / "sweep.csv").read_text().splitlines()
+    for line in table[1:]:
+        shift, ratio = line.split(",")[:2]
+        assert re.search(rf"{shift}\s+{float(ratio):.5g}\s", out)
+    assert max(map(len, out.split(" cases, ")[0].splitlines())) <= 80
+
+
+def test_progress_tells_per_cent_count_and_time_left(monkeypatch, capsys):
+    monkeypatch.setattr("rich.console.Console", Narrow)
+    with cli.Progress() as progress:
+        progress("sound", 0, 40)
+        progress("sound", 10, 40)
+    shown = re.sub("\x1b\\[[^a-zA-Z]*[a-zA-Z]", "", capsys.readouterr().err)
+    last = [line for line in re.split("[\r\n]+", shown) if "sound" in line][-1]
+    assert "25%" in last and "10/40" in last and last.count(":") >= 2 and len(last.rstrip()) <= 80
+
+
+def test_progress_is_one_line_a_stage_in_a_file(capsys):
+    with cli.Progress() as progress:
+        for done in range(3):
+            progress("pictures", done, 2)
+        progress("sound", 0, 1)
+    assert capsys.readouterr().err.split() == ["pictures", "sound"]

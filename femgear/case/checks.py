@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
+from femgear.case.quantities import SPEED
 from femgear.case.sections import (
     LARGEST_DEVIATION,
     ROUNDING,
@@ -49,6 +50,15 @@ def _check_operation(case: Case):
         yield CaseError(
             "a speed is given twice", code="E-DUPLICATE", key="operation.speeds", remedy="keep one of them"
         )
+    start, to = runup_range(case)
+    if case.runup.count and not start < to:
+        name, value = ("from", start) if case.runup.to is None else ("to", to)
+        yield CaseError(
+            "the run-up ends where it begins, or before", code="E-RANGE", key=f"runup.{name}",
+            value=SPEED.show(value),
+            limit=f"below {SPEED.show(to)}" if name == "from" else f"above {SPEED.show(start)}",
+            remedy="give runup.from below runup.to; defaults are around operation.speeds",
+        )  # fmt: skip
     if 0.0 < abs(operation.torque) < LEAST_TORQUE:
         yield CaseError(
             "the torque is too small to be told from none", code="E-RANGE", key="operation.torque",
@@ -61,6 +71,12 @@ def _check_operation(case: Case):
             key="ring.foundation_tangential", value="0 N/m^3", limit="above 0 N/m^3",
             remedy="give a tangential foundation, or hold another member",
         )  # fmt: skip
+
+
+def runup_range(case: Case) -> tuple[float, float]:
+    """Find the first and the last speed of the run-up [rad/s], as the case gives them or by default."""
+    speeds, section = case.operation.speeds, case.runup
+    return section.start or min(0.8 * min(speeds), 0.25 * max(speeds)), section.to or 1.25 * max(speeds)
 
 
 def _check_set(case: Case):

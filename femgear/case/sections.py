@@ -27,6 +27,7 @@ from femgear.case.quantities import (
     RPM,
     SPEED,
     STIFFNESS,
+    STRESS,
     TORQUE,
     TORSION,
     Count,
@@ -252,8 +253,8 @@ class MaterialSection(Section):
         ),
     ]
     density: Annotated[float, Quantity(DENSITY, 100.0, 25000.0)]
-    root_stress_limit: Annotated[float, Quantity(MODULUS, 1e6, 5e9)] | None = None
-    contact_stress_limit: Annotated[float, Quantity(MODULUS, 1e6, 5e9)] | None = None
+    root_stress_limit: Annotated[float, Quantity(STRESS, 1e6, 5e9)] | None = None
+    contact_stress_limit: Annotated[float, Quantity(STRESS, 1e6, 5e9)] | None = None
 
 
 class ShaftPart(Section):

@@ -69,7 +69,7 @@ def read_text(path: str | os.PathLike) -> str:
     if len(data) > _MAX_BYTES:
         raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{_MAX_BYTES} bytes")
     if not data.strip():
-        remedy = "femgear schema prints what a case file holds"
+        remedy = "write into it what is needed, or name another file"
         raise CaseError("the file is empty", code="E-FILE", file=name, remedy=remedy)
     try:
         return data.decode("utf-8-sig")
@@ -206,7 +206,11 @@ def line_of(text: str, key: str) -> int | None:
     lines = _lines(text)
     table = key.rpartition("]")
     wanted = (key, re.sub(r"(\[\d+\])+$", "", key), table[0] + table[1], key.split("[")[0], f"{key}[0]")
-    return next((lines[name] for name in wanted if name in lines), None)
+    found = next((lines[name] for name in wanted if name in lines), None)
+    if found is None and "." in key:  # an entry of a table in braces stands in the line of the table
+        above = line_of(text, key.rpartition(".")[0])
+        found = above if above and "=" in text.splitlines()[above - 1] else None
+    return found
 
 
 @lru_cache(maxsize=2)

@@ -20,7 +20,7 @@ import numpy as np
 
 from femgear.contact.flank_pairs import LEFT, RIGHT, mesh_pairs
 from femgear.contact.local_compliance import TipCorner, depth_displacement, tip_corner
-from femgear.errors import CaseError
+from femgear.errors import CaseError, GridError
 from femgear.fe.compliance import (
     FreeSector,
     SectorSchur,
@@ -41,6 +41,8 @@ from femgear.gears.tooth import half_sector
 # external gears are slender along the axis only; the ring's rim is thin and free at its faces
 TEETH_STATE = "plane strain"
 RING_STATE = {"tooth": "plane strain", "body": "plane stress"}
+_THIN = 0.5
+"""Thickness of a rim in modules below which a grid that fails is put down to it."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,15 @@ def make_sectors(
     """
     gears = (planetary_set.sun, planetary_set.planet, planetary_set.ring)
     halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in gears]
-    grids = mesh_outlines(halves, cache=cache)
+    try:
+        grids = mesh_outlines(halves, cache=cache)
+    except GridError as error:
+        rim = [abs(gear.root_radius - gear.rim_radius) / gear.module for gear in gears]
+        thin = int(np.argmin(rim))
+        if rim[thin] < _THIN:
+            error.key = f"{gears[thin].name}.{'outer' if gears[thin].internal else 'bore'}_radius"
+            error.remedy = f"the rim is {rim[thin]:.2g} modules thick; give it {_THIN:g} or more"
+        raise
     sectors = []
     for gear, grid in zip(gears, grids, strict=True):
         whole = mirror(grid)

@@ -26,6 +26,7 @@ _QUANTITIES = {"m/s^2": 12, "Pa": 15}
 """Specific data type of a unit: universal file, dataset 58, record 9."""
 _SAMPLES = 50_000_000
 """Samples of a signal, at most: 17 minutes at 48 kHz."""
+_SLOWEST = 1000  # samples a second: a file of fewer holds no gear noise, and few players take it
 _ROWS = 1_048_576  # of a sheet: ECMA-376 leaves it open, Excel has no more
 
 
@@ -36,15 +37,16 @@ class Sampling:
     Parameters
     ----------
     rate
-        Samples a second [Hz].
+        Samples a second [Hz], 1000 or more; lines at half of it and above are left out.
     duration
         Of every signal at one speed [s]; whole turns of the carrier come nearest to it.
     run_up
         Duration of the run-up from the first to the last of its speeds [s].
     pressure_scale
-        Full scale of WAV files of sound pressure [Pa]: the sample 1.0 stands for it.
+        Full scale of WAV files of sound pressure [Pa]: the sample 1.0 stands for it. Default: one for all
+        files, which the sum of the amplitudes of no speed exceeds.
     acceleration_scale
-        Full scale of WAV files of acceleration [m/s^2].
+        Full scale of WAV files of acceleration [m/s^2], with the same default.
     level
         Unit and detector of order_cuts.csv: "mm/s rms", "g peak", "um peak", "dB rms" (re 1e-6 m/s^2), ...
     """
@@ -52,8 +54,8 @@ class Sampling:
     rate: int = 48000
     duration: float = 10.0
     run_up: float = 30.0
-    pressure_scale: float = 1.0
-    acceleration_scale: float = 1.0
+    pressure_scale: float | None = None
+    acceleration_scale: float | None = None
     level: str = LEVELS[0]
 
     def __post_init__(self):
@@ -63,10 +65,12 @@ class Sampling:
                 remedy="leave it out for the default",
             )  # fmt: skip
         for name, value in vars(self).items():
-            if name != "level" and not 0.0 < value < np.inf:
+            least = _SLOWEST if name == "rate" else 0.0
+            if name != "level" and value is not None and not (least <= value < np.inf and value > 0.0):
                 raise CaseError(
                     "no such sampling", code="E-RANGE", key=f"--{name.replace('_', '-')}", value=value,
-                    limit="a number above zero", remedy="leave it out for the default",
+                    limit=f"{least:g} Hz or more" if least else "a number above zero",
+                    remedy="leave it out for the default",
                 )  # fmt: skip
         samples = self.rate * max(self.duration, self.run_up)
         if samples > _SAMPLES:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from femgear.storage.results import Results
     from femgear.trains.protocol import Train
 
+_MEETING = ("operating [rpm]", "mode", "kind", "mesh harmonic")
+"""Columns that tell which resonance a row is."""
 _FADED = 0.55
 """Opacity of the curves of the second run."""
 
@@ -49,13 +51,22 @@ def _flat(entries: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 def _differences(first: Block, second: Block) -> Block:
     """Cells of two tables that differ, with the change where both are numbers."""
-    if first.header != second.header or [row[0] for row in first.rows] != [row[0] for row in second.rows]:
+    names = [name for name in _MEETING if "mesh harmonic" in first.header and name in first.header]
+    own = [first.header.index(name) for name in names] or [0]
+    a, b = ({tuple(row[i] for i in own): row for row in block.rows} for block in (first, second))
+    alone = [key for key in [*a, *b] if (key in a) != (key in b)]
+    whole = (len(a), len(b)) == (len(first.rows), len(second.rows))
+    if first.header != second.header or not whole or (alone and not names):
         return Block(first.title, notes=("the tables have other rows; see the reports",))
     rows = []
-    for one, other in zip(first.rows, second.rows):
-        for name, x, y in zip(first.header[1:], one[1:], other[1:]):
-            if x != y:
-                rows.append((" ".join((first.header[0], one[0])).strip(), name, x, y, _change(x, y)))
+    for key in dict.fromkeys([*a, *b]):
+        what = ", ".join(f"{first.header[i]} {text}".strip() for i, text in zip(own, key))
+        if key in alone:
+            rows.append((what, "", *(("listed", "-") if key in a else ("-", "listed")), ""))
+            continue
+        for i, (x, y) in enumerate(zip(a[key], b[key])):
+            if x != y and i not in own:
+                rows.append((what, first.header[i], x, y, _change(x, y)))
     header = ("row", "column", "first", "second", "change") if rows else ()
     return Block(first.title, header, tuple(rows), () if rows else ("the same",))
 

@@ -22,6 +22,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from html import escape
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,17 +57,24 @@ _PARTS = {"solid": ("three.min.js", "solid.js"), "runup": ("explorer.js",)}
 
 
 def write_figures(
-    folder: Path, train: Train, drawn: Drawn, beside: Callable[[], object] = lambda: None
+    folder: Path,
+    train: Train,
+    drawn: Drawn,
+    beside: Callable[[], object] = lambda: None,
+    told: Callable[[], object] = lambda: None,
 ) -> list[str]:
     """Write the figures of the stages whose data are there, and of the case; returns the file names.
 
-    They are drawn in two processes where there are two cores, and in this one ``beside()`` comes first. What
-    their charts on the page show is written with them.
+    They are drawn in two processes where there are two cores, and in this one ``beside()`` comes first;
+    ``told()`` is called after every part that this one draws. What their charts on the page show is written
+    with them.
     """
     import matplotlib.backends.backend_agg  # noqa: F401  before the process is copied
 
     def pictures(stage: Figures) -> dict[str, tuple[bytes, Any]]:
-        return {name: (png_bytes(figure), chart(figure)) for name, figure in stage.draw(drawn).items()}
+        found = {name: (png_bytes(figure), chart(figure)) for name, figure in stage.draw(drawn).items()}
+        told()  # to nobody from a second process
+        return found
 
     tasks = [partial(pictures, stage) for stage in _drawn(train, drawn)]
     found = {name: both for part in _shared(tasks, beside) for name, both in part.items()}
@@ -167,16 +175,21 @@ def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progre
 
     ``train`` is that of the case, ``progress`` is called with (stage, done, total).
     """
-    others, names = [write for stage in _drawn(train, drawn) for write in stage.write], []
-    steps = 1 + len(others)
+    stages, names, done, here = _drawn(train, drawn), [], count(1), os.getpid()
+    others = [write for stage in stages for write in stage.write]
+    steps = len(stages) + len(others)
+
+    def told() -> None:
+        if os.getpid() == here:
+            progress("pictures", next(done), steps)
 
     def write_others() -> None:
-        for done, write in enumerate(others):
-            progress("pictures", done, steps)
+        progress("pictures", 0, steps)
+        for write in others:
             names.extend(write(drawn, folder))
-        progress("pictures", len(others), steps)
+            told()
 
-    figures = write_figures(folder, train, drawn, write_others)
+    figures = write_figures(folder, train, drawn, write_others, told)
     progress("pictures", steps, steps)
     return figures + names
 

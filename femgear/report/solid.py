@@ -97,8 +97,8 @@ def _paths(s: PlanetarySet) -> list[list[float]]:
         (s.sun, s.working_pressure_angle_sun_planet, s.path_sun_planet, 1.0),
         (s.ring, s.working_pressure_angle_planet_ring, s.path_planet_ring, -1.0),
     ):
-        pitch, along = gear.base_radius / math.cos(angle), np.array([math.sin(angle), sense * math.cos(angle)])
-        ends = np.array([[pitch, 0.0]]) + np.array(path)[:, None] * along
+        pitch, cosine = gear.base_radius / math.cos(angle), sense * math.cos(angle)
+        ends = np.array([[pitch, 0.0]]) + np.array(path)[:, None] * np.array([math.sin(angle), cosine])
         for psi in s.planet_angles:
             turn = np.array([[math.cos(psi), math.sin(psi)], [-math.sin(psi), math.cos(psi)]])
             found.append([round(1e3 * float(x), 4) for x in (ends @ turn).ravel()])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -19,18 +20,40 @@ MANY = 8
 """Rows of a table that shows the speeds, and speeds that a warning names."""
 _MODES = 16
 """Rows of the table of modes."""
+_NUMBERED = re.compile(r"(.*?)((?<![\d.])\d{1,9}(?![\d.]))?(\D*)", re.DOTALL)
+"""A name with its last whole number."""
 _NOTHING = 1e-3
 """Pull that is no more than the end of the harmonics, in mean mesh forces."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """A titled table with notes under it; its header names the columns, or is empty."""
+    """A titled table with notes under it; its header names the columns, or is empty.
+
+    One ``beside`` the point is printed where it is asked for alone.
+    """
 
     title: str
     header: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
     notes: tuple[str, ...] = ()
+    beside: bool = False
+
+
+def merged(rows: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
+    """Join rows in succession that differ in a running number of their name alone: "sun-planet 1..3"."""
+    found = list[tuple[tuple[str, ...], str, int, int, str]]()
+    for row in map(tuple, rows):
+        head, number, tail = _NUMBERED.fullmatch(row[0] if row else "").groups()  # type: ignore[union-attr]
+        last, value = found[-1] if found else None, int(number or -1)
+        if last and number and last[1:] == (head, last[2], value - 1, tail) and last[0][1:] == row[1:]:
+            found[-1] = (*last[:3], value, tail)
+        else:
+            found.append((row, head, value, value, tail))
+    return [
+        row if first == last else (f"{head}{first}..{last}{tail}", *row[1:])
+        for row, head, first, last, tail in found
+    ]
 
 
 def tabulate(

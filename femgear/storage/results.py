@@ -113,7 +113,14 @@ def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
 
 def coordinates(**values: Any) -> dict[str, tuple]:
     """Make entries of `dataset` for coordinates by name: axis, harmonic, mesh, speed [rpm] and others."""
+    if "speed" in values:
+        values["speed"] = as_written(values["speed"])
     return {name: (name, values[name], *_COORDINATES[name]) for name in values}
+
+
+def as_written(values) -> np.ndarray:
+    """Round values to 13 digits: 3100 rpm, which rad/s make 3099.9999999999995, are 3100 again."""
+    return np.array([float(f"{value:.13g}") for value in np.asarray(values, float)])
 
 
 def declared(texts: Mapping[str, tuple[str, str, str]], values: Mapping[str, Any]) -> dict[str, tuple]:

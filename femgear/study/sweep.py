@@ -19,6 +19,7 @@ import numpy as np
 from femgear.case.sections import Case
 from femgear.errors import CaseError, Finding
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
+from femgear.report.tables import Block
 from femgear.storage.files import own_files, resumable, write_csv
 from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
@@ -29,6 +30,8 @@ from femgear.trains.reading import with_value
 
 _LARGEST, _MANY, _TIMED = 100_000, 1000, 3
 """Combinations at most, those from which their time is estimated and said, and those that it is made from."""
+_SHOWN = 12
+"""Rows of the printed table from either end."""
 _JOURNAL, _TABLE, _FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 """Files of a sweep."""
 _WITHOUT_EFFECT = {"title", "format"}
@@ -246,6 +249,21 @@ def sweep_into(
         write_csv(folder / _TABLE, found.header, found.records())
         _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
     return found, [_TABLE, _JOURNAL, _FIGURE]
+
+
+def describe_sweep(found: Sweep) -> Block:
+    """Tabulate a sweep in the units of messages; of many cases the first and the last ones."""
+    units = [quantity.dimension for quantity in found.quantities]
+    header = (*found.keys, *(f"{q.name} [{q.dimension.shown}]" for q in found.quantities))
+    rows = [
+        (*map(str, point), *(f"{value / unit.scale:.5g}" for value, unit in zip(values, units)))
+        for point, values in zip(found.points, found.values)
+    ]
+    if len(rows) > 2 * _SHOWN:
+        gap = ("...", *("" for _ in header[1:]))
+        rows = [*rows[:_SHOWN], gap, *rows[-_SHOWN:]]
+    notes = tuple(dict.fromkeys(f"cannot be computed: {error}" for error in found.errors if error))
+    return Block("Sweep", header, tuple(rows), notes[:_SHOWN])
 
 
 def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:

@@ -162,13 +162,16 @@ class Stage:
 class Recorded:
     """What a test bench would record of a run: signals of every sensor, spectra, modes at points, order cuts.
 
-    ``cuts`` takes results and a form of `femgear.housing.sound.LEVELS`, and gives header and rows of a table.
+    ``cuts`` takes results and a form of `femgear.housing.sound.LEVELS`, and gives header and rows of a table;
+    ``extent`` takes results and a rate [Hz], and gives by unit the largest sum of the amplitudes of a speed,
+    and the largest level that lines at half the rate and above have, with that of all lines, r.m.s.
     """
 
     signals: Callable[[Results, Sampling], Iterator[Signal]]
     spectra: Callable[[Results], Iterator[Spectrum]]
     shapes: Callable[[Results], Shapes]
     cuts: Callable[[Results, str], tuple[Sequence[str], Iterable[Sequence[float]]]]
+    extent: Callable[[Results, float], Mapping[str, tuple[float, float, float]]]
 
 
 @dataclass(frozen=True)

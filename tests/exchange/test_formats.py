@@ -1,14 +1,16 @@
 """Files for other programs, read back by the libraries that other programs use."""
 
+import re
 import struct
 import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.io import loadmat, wavfile
 
-from femgear import cli, open_results
+from femgear import cli, open_results, run
 from femgear.errors import CaseError, StorageError
 from femgear.exchange import formats
 from femgear.exchange.formats import (
@@ -23,8 +25,9 @@ from femgear.exchange.formats import (
     write_workbook,
 )
 from femgear.housing.sound import run_up_signal, stored_sound
+from femgear.storage.files import own_files
 from femgear.storage.results import dataset, tables_of
-from femgear.trains.elastic.results import sensor_signals
+from femgear.trains.elastic.results import run_up_lines, sensor_signals
 from femgear.trains.reading import read_case, to_toml, with_values
 
 CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
@@ -54,6 +57,8 @@ def out(tmp_path_factory):
         "2.4",
         "--pressure-scale",
         "0.5",
+        "--acceleration-scale",
+        "1",
     ]
     assert cli.main(["export", str(folder / "out"), *options]) == 0
     return folder / "out"
@@ -110,6 +115,52 @@ def test_samples_beyond_the_full_scale_are_warned_of(out, tmp_path, capsys):
     assert said.count("W-CLIPPING") == 1 and "raise --pressure-scale" in said
     assert cli.main([*options, "--pressure-scale", "1e3", "--acceleration-scale", "1e5"]) == 0
     assert "W-CLIPPING" not in capsys.readouterr().err
+    # no scale is named: one for all files, which nothing exceeds
+    assert cli.main(options) == 0 and "W-CLIPPING" not in capsys.readouterr().err
+    for sensor in ("microphone", "accelerometer"):
+        files, scales, peaks = list((tmp_path / "a").glob(f"{sensor}*.wav")), set(), []
+        for path in files:
+            scales.add(re.search(rb"1.0 = (\S+) ", path.read_bytes())[1])
+            peaks.append(np.abs(wavfile.read(path)[1]).max())
+        assert len(files) >= 2 and len(scales) == 1 and 0.05 < max(peaks) < 1.0
+
+
+def test_what_a_rate_leaves_out_is_told_with_its_size(out, results, tmp_path, capsys):
+    options = ["export", str(out), "--wav", "--duration", "0.1", "-o", str(tmp_path / "a")]
+    assert cli.main([*options, "--rate", "2000"]) == 0
+    said = [line for line in capsys.readouterr().err.splitlines() if "m/s^2 r.m.s." in line]
+    lines = run_up_lines(results.runup, results.housing.attrs)[0]  # it has the loudest speed
+    power = 0.5 * np.abs(lines.acceleration) ** 2
+    lost, level = np.sqrt(max(zip((power * (lines.frequency >= 1000.0)).sum(axis=1), power.sum(axis=1))))
+    assert len(said) == 1 and "[W-RATE] lines at 1000 Hz and above are left out" in said[0]
+    left = 10 * np.log10(1 - (lost / level) ** 2)
+    assert f"up to {lost:.3g} m/s^2 r.m.s. of {level:.3g}, {left:+.2g} dB of the level" in said[0]
+    assert cli.main(options) == 0 and "W-RATE" not in capsys.readouterr().err
+    assert cli.main([*options, "--rate", "1"]) == 2
+    assert "--rate: no such sampling" in capsys.readouterr().err
+
+
+def test_progress_counts_the_signals(results, tmp_path):
+    told = []
+    own_files(tmp_path / "a", ())
+    options = Sampling(duration=0.1, run_up=0.1)
+    names = run.export_results(
+        results, tmp_path / "a", ["wav"], options, progress=lambda *one: told.append(one)
+    )
+    assert told == [("sound", done, len(names)) for done in range(len(names) + 1)]
+
+
+def test_order_cuts_are_written_in_the_level_that_is_asked_for(results, tmp_path):
+    own_files(tmp_path / "a", ())
+    for form, factor in (("m/s^2 rms", 1.0), ("m/s^2 peak", np.sqrt(2)), ("g peak", np.sqrt(2) / 9.80665)):
+        run.export_results(results, tmp_path / "a", ["csv"], Sampling(level=form))
+        table = pd.read_csv(tmp_path / "a" / "order_cuts.csv")
+        assert table["speed [rpm]"].to_numpy() == pytest.approx(results.runup["speed"].values)
+        assert table.iloc[:, 1].to_numpy() == pytest.approx(factor * results.runup["level"].values, rel=1e-5)
+        assert all(f"{form}" in name for name in table.columns[1:])
+    with pytest.raises(CaseError) as caught:
+        Sampling(level="mm")
+    assert caught.value.key == "--level" and "mm/s rms" in caught.value.limit
 
 
 @pytest.mark.parametrize("key", ["rate", "duration", "run_up", "pressure_scale", "acceleration_scale"])

@@ -22,6 +22,21 @@ def test_cells_that_differ_come_with_their_change():
     assert "other rows" in compare._differences(first, other).notes[0]
 
 
+def test_resonances_are_paired_by_mode_kind_and_harmonic():
+    header = ("speed [rpm]", "mode", "kind", "[Hz]", "mesh harmonic", "alone [m/s²]")
+    one = (("2000.0", "11", "rotational", "3137.6", "4", "60"), ("2500.0", "33", "ring", "9000.0", "3", "50"))
+    two = (("2550.0", "33", "ring", "9180.0", "3", "55"), ("2600.0", "33", "ring", "9180.0", "5", "9"))
+    found = compare._differences(Block("Run-up", header, one), Block("Run-up", header, two)).rows
+    same = "mode 33, kind ring, mesh harmonic 3"
+    assert found == (
+        ("mode 11, kind rotational, mesh harmonic 4", "", "listed", "-", ""),
+        (same, "speed [rpm]", "2500.0", "2550.0", "+2 %"),
+        (same, "[Hz]", "9000.0", "9180.0", "+2 %"),
+        (same, "alone [m/s²]", "50", "55", "+10 %"),
+        ("mode 33, kind ring, mesh harmonic 5", "", "-", "listed", ""),
+    )
+
+
 def test_curves_lie_over_each_other_within_joint_limits():
     def chart(low, high, name):
         axis = {"title": "", "log": False, "range": [low, high]}

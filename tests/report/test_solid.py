@@ -1,4 +1,4 @@
-"""The set in space: its paths of contact lie on lines that touch the base circles, between the tip circles."""
+"""The set in space: paths of contact on lines that touch the base circles, between the tip circles."""
 
 import math
 from pathlib import Path

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.checks import check_floating
+from femgear.case.checks import check_floating, runup_range
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case, output_member
@@ -117,28 +117,17 @@ def slowest_wave(ring_modes: CyclicModes) -> tuple[float, int]:
 
 
 def runup_ends(case: Case) -> tuple[float, float]:
-    """Find the first and the last speed of the run-up [rad/s], as the case gives them or by default.
+    """Find the first and the last speed of the run-up [rad/s], see `femgear.case.checks.runup_range`.
 
-    CaseError: they are not in this order, or the last one is beyond what the model means anything for.
+    CaseError: the last one is beyond what the model means anything for.
     """
-    speeds, section, gears = case.operation.speeds, case.runup, planetary_set(case)
-    to = section.to or 1.25 * max(speeds)
-    start = section.start or min(0.8 * min(speeds), 0.25 * max(speeds))
-    if not start < to:
-        raise CaseError(
-            "the run-up ends where it begins, or before",
-            code="E-RANGE",
-            key="runup.from" if section.to is None else "runup.to",
-            value=f"{(start if section.to is None else to) / RPM:.6g} rpm",
-            limit=f"from {start / RPM:.6g} to {to / RPM:.6g} rpm",
-            remedy="give runup.from below runup.to; defaults are around operation.speeds",
-        )
+    (start, to), section, gears = runup_range(case), case.runup, planetary_set(case)
     if section.to is not None:
         operation = case.operation.model_copy(update={"speeds": (section.to,)})
         try:
             fastest_mesh_frequency(case.model_copy(update={"operation": operation}), gears)
         except CaseError as error:
-            error.key = "runup.to"
+            error.key, error.file = "runup.to", case.location("runup.to")
             raise
     return start, to
 

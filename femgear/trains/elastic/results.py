@@ -390,7 +390,7 @@ def _near_resonances(runup: xr.Dataset) -> Block:
         found += own[np.argsort(np.abs(value["distance"][own]), kind="stable")[:_FEW]].tolist()
     columns = {
         "operating [rpm]": lambda i: f"{value['operating_speed'][i]:.6g}",
-        "resonance": lambda i: f"{value['distance'][i]:+.1f} %",
+        "resonance": lambda i: f"{np.round(value['distance'][i], 1) + 0.0:+.1f} %",
         **meeting_columns(value),
         "alone [m/s²]": lambda i: f"{value['operating_alone'][i]:.3g}",
     }
@@ -451,8 +451,29 @@ def run_up_lines(runup: xr.Dataset, known: Mapping[str, Any]) -> tuple[SensorLin
     return lines, microphone_lines(lines, known)
 
 
+def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
+    """Find by unit the largest sum of amplitudes of a speed, and what half a rate [Hz] and above has of it.
+
+    That is the largest root mean square of these lines, with the one of all lines at that speed.
+    """
+    parts = [(unit, order, np.array([speed]), v[None]) for speed, _, unit, order, v in _recordings(results)]
+    if "runup" in results.stages:
+        lines, pressure = run_up_lines(results.runup, results.housing.attrs)
+        heard = ("m/s^2", lines.acceleration), ("Pa", pressure)
+        parts += [(unit, lines.order, lines.base_speed, values) for unit, values in heard]
+    found = dict[str, tuple[float, float, float]]()
+    for unit, order, speed, values in parts:
+        power, above = 0.5 * np.abs(values) ** 2, order * speed[:, None] >= np.pi * rate
+        lost, (most, least, _) = (power * above).sum(axis=1), found.get(unit, (0.0, 0.0, 0.0))
+        worst = int(lost.argmax())
+        level = (float(np.sqrt(lost[worst])), float(np.sqrt(power[worst].sum())))
+        sums = max(most, float(np.abs(values).sum(axis=1).max()))
+        found[unit] = (sums, *(level if level[0] >= least else found[unit][1:]))
+    return found
+
+
 def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:
-    """Tabulate levels of the sensor over the speeds of runup.nc: of all lines, and of the strongest orders."""
+    """Tabulate levels of the sensor over the speeds of runup.nc: of all lines, of the strongest orders."""
     lines = run_up_lines(results.runup, results.housing.attrs)[0]
     heard = lines.order > 0
     levels = levels_of(lines.acceleration[:, heard], lines.frequency[:, heard], form)

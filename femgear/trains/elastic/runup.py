@@ -19,7 +19,7 @@ from femgear.housing.orders import order_level
 from femgear.housing.sound import REFERENCE_ACCELERATION
 from femgear.report.tables import Block, tabulate
 from femgear.solvers.linear.resonances import EXCITED
-from femgear.storage.results import complex_entries, coordinates, dataset, declared
+from femgear.storage.results import as_written, complex_entries, coordinates, dataset, declared
 from femgear.system.fourier import fluctuation, sample
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def resonances(modes: Modes, forces: ModalForces, met: Crossings, speed, operati
         "frequency": forces.frequency[met.row],
         "resonance_speed": speed / RPM,
         "share": forces.share[met.row, met.harmonic - 1],
-        "operating_speed": operating / RPM,
+        "operating_speed": as_written(operating / RPM),
         "distance": 100.0 * (speed / operating - 1.0),
     }
 
@@ -245,7 +245,7 @@ class RunupResult:
                 "sensor_angle": self.sensor_angle,
                 "ring_teeth": self.ring_teeth,
                 "reference_acceleration": REFERENCE_ACCELERATION,
-                "operating_speeds": self.operating_speeds / RPM,
+                "operating_speeds": as_written(self.operating_speeds / RPM),
                 "unresolved_resonances": self.unresolved,
             },
         )
@@ -269,7 +269,7 @@ def describe_runup(data: xr.Dataset) -> Block:
     value = {str(name): one.values for name, one in data.items() if one.dims[:1] == ("resonance",)}
     columns = {
         "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
-        "from operating": lambda i: f"{value['distance'][i]:+.1f} %",
+        "from operating": lambda i: f"{np.round(value['distance'][i], 1) + 0.0:+.1f} %",
         **meeting_columns(value),
         "force share": lambda i: f"{value['share'][i]:.3f}",
         "alone [m/s²]": lambda i: f"{value['resonance_alone'][i]:.4g}",

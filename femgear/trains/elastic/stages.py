@@ -89,6 +89,7 @@ from femgear.trains.elastic.results import (
     ring_shapes,
     sensor_signals,
     sensor_spectra,
+    signal_extent,
     verdict,
 )
 from femgear.trains.elastic.runup import (
@@ -611,5 +612,5 @@ ELASTIC = Train(
         ),
     ),
     describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,
-    recorded=Recorded(sensor_signals, sensor_spectra, ring_shapes, order_cuts),
+    recorded=Recorded(sensor_signals, sensor_spectra, ring_shapes, order_cuts, signal_extent),
 )  # fmt: skip

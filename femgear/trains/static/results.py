@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -649,7 +649,8 @@ def _neighbours(s: PlanetarySet) -> Block:
     }
     near = f"{len(found)} within {_DISTANCE} teeth and {100 * _TOLERANCE:g} % of the ratio"
     notes = (f"{near}; room: unshifted tips",)
-    return tabulate("Neighbouring tooth numbers", range(min(len(found), _ROWS)), columns, notes)
+    block = tabulate("Neighbouring tooth numbers", range(min(len(found), _ROWS)), columns, notes)
+    return replace(block, beside=True)
 
 
 def _kinds(kinds: list[str]) -> str:

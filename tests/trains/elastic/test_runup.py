@@ -15,7 +15,7 @@ from femgear.trains.elastic.checks import runup_ends
 from femgear.trains.elastic.results import verdict
 from femgear.trains.elastic.runup import describe_runup, runup_warnings, unresolved
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
-from femgear.trains.reading import read_case, with_value, with_values
+from femgear.trains.reading import parse_case, read_case, to_toml, with_value, with_values
 from femgear.trains.registry import check_case, stages_of
 from femgear.trains.static.stages import solve_static, solve_stress
 
@@ -146,8 +146,14 @@ def test_default_ends_and_refusals(case):
     one = with_values(default, {"operation.speeds": ["3100 rpm"], "housing.published": None})
     assert np.array(runup_ends(one)) / RPM == pytest.approx([775.0, 3875.0])
     with pytest.raises(CaseError, match="ends where it begins") as error:
-        check_case(with_values(case, {"runup.from": "3500 rpm"}))
-    assert error.value.key == "runup.to"
+        with_values(case, {"runup.from": "3500 rpm"})
+    assert error.value.key == "runup.to" and error.value.limit == "above 3500 rpm"
+    text = to_toml(with_value(case, "runup", None)) + '\n[runup]\nfrom = "4000 rpm"\n'
+    with pytest.raises(CaseError) as error:
+        parse_case(text, name="a.toml")
+    line = 1 + text[: text.index('from = "4000 rpm"')].count("\n")
+    assert error.value.key == "runup.from" and error.value.file == f"a.toml:{line}"
+    assert error.value.value == "4000 rpm" and error.value.limit == "below 3875 rpm" and error.value.remedy
     with pytest.raises(CaseError) as error:
         check_case(with_values(case, {"runup.to": "300000 rpm"}))
     assert error.value.key == "runup.to" and error.value.code == "E-RANGE"
