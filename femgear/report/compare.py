@@ -58,15 +58,15 @@ def _differences(first: Block, second: Block) -> Block:
     whole = (len(a), len(b)) == (len(first.rows), len(second.rows))
     if first.header != second.header or not whole or (alone and not names):
         return Block(first.title, notes=("the tables have other rows; see the reports",))
-    rows = []
+    rows, columns = [], first.header or [""] * max(map(len, first.rows), default=0)
     for key in dict.fromkeys([*a, *b]):
-        what = ", ".join(f"{first.header[i]} {text}".strip() for i, text in zip(own, key))
+        what = ", ".join(f"{columns[i]} {text}".strip() for i, text in zip(own, key))
         if key in alone:
             rows.append((what, "", *(("listed", "-") if key in a else ("-", "listed")), ""))
             continue
         for i, (x, y) in enumerate(zip(a[key], b[key])):
             if x != y and i not in own:
-                rows.append((what, first.header[i], x, y, _change(x, y)))
+                rows.append((what, columns[i], x, y, _change(x, y)))
     header = ("row", "column", "first", "second", "change") if rows else ()
     return Block(first.title, header, tuple(rows), () if rows else ("the same",))
 

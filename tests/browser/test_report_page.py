@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from femgear.cli import main
+from femgear.trains.reading import read_case, to_toml, with_value
 
 pytest.importorskip("playwright", reason="make test-browser installs it")
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -213,6 +214,43 @@ def test_sound_has_the_power_of_the_lines(opened):
         return [whole.reduce((sum, one) => sum + one * one, 0) / whole.length, power]; }"""
     heard, wanted = tab.evaluate(powers)
     assert heard == pytest.approx(wanted, rel=1e-4)
+
+
+def test_two_runs_are_heard_one_after_the_other_on_one_scale(chromium, report, tmp_path):
+    """Both sounds of a comparison: rendered by the browser they are finite, heard and not clipped."""
+    case = with_value(read_case(CASES / f"{DEMO}.toml"), "operation.torque", "60 N m")
+    (tmp_path / "case.toml").write_text(to_toml(case), "utf-8")
+    assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "b")]) == 0
+    assert main(["compare", str(report(DEMO).parent), str(tmp_path / "b"), "-o", str(tmp_path / "c")]) == 0
+    tab = chromium.new_page()
+    messages = []
+    tab.on("console", lambda message: messages.append(message.text))
+    tab.on("pageerror", lambda error: messages.append(str(error)))
+    tab.goto((tmp_path / "c" / "compare.html").as_uri())
+    tab.wait_for_function("document.querySelectorAll('.runup').length === 2")
+    tab.wait_for_function("[...document.querySelectorAll('.runup')].every((one) => one.explorer)")
+    rendered = """async (root) => { const { turns, scaleOf } = root.explorer;
+        const speed = Number(root.querySelector('[data-part=speed]').value);
+        const name = root.querySelector('[data-part=source]').value, { samples } = turns(speed, 48000);
+        const context = new OfflineAudioContext(1, samples.length, 48000);
+        const node = context.createBufferSource();
+        node.buffer = context.createBuffer(1, samples.length, 48000);
+        node.buffer.copyToChannel(samples.map((one) => one * scaleOf(name)), 0);
+        node.connect(context.destination); node.start();
+        const heard = (await context.startRendering()).getChannelData(0);
+        const top = heard.reduce((most, one) => Math.max(most, Math.abs(one)), 0);
+        return [scaleOf(name), top, heard.every(Number.isFinite)]; }"""
+    roots = tab.locator(".runup").all()
+    found = [root.evaluate(rendered) for root in roots]
+    assert found[0][0] == found[1][0]  # louder is louder
+    assert all(0.01 < top <= 1.0 and finite for _, top, finite in found) and found[0][1] > found[1][1]
+    playing = [root.locator("[data-part=play]") for root in roots]
+    for one, other in ((0, 1), (1, 0)):
+        playing[one].click()
+        assert playing[one].get_attribute("aria-pressed") == "true"
+        assert playing[other].get_attribute("aria-pressed") == "false"
+    tab.close()
+    assert messages == []
 
 
 def test_size_and_static_form(report):

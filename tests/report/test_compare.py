@@ -22,6 +22,11 @@ def test_cells_that_differ_come_with_their_change():
     assert "other rows" in compare._differences(first, other).notes[0]
 
 
+def test_a_table_without_header_is_compared_too():
+    runs = (Block("Verdict", rows=(("K_v", value), ("K_gamma", "1.0"))) for value in ("1.1", "1.2"))
+    assert compare._differences(*runs).rows == (("K_v", "", "1.1", "1.2", "+9.09 %"),)
+
+
 def test_resonances_are_paired_by_mode_kind_and_harmonic():
     header = ("speed [rpm]", "mode", "kind", "[Hz]", "mesh harmonic", "alone [m/s²]")
     one = (("2000.0", "11", "rotational", "3137.6", "4", "60"), ("2500.0", "33", "ring", "9000.0", "3", "50"))

@@ -180,9 +180,13 @@ page.explorer = (root) => {
   };
   let loudest = {};
   const full = (name) => loudest[name] ||= Math.max(...data.speed.map((_, i) => at(i, name).reduce((sum, one) => sum + one.size, 0)));
+  // two runs on one page have one scale, and are heard one after the other
+  const player = { full: (name) => (lines[name] ? full(name) : 0), silence: () => { if (audio.node) play.click(); } };
+  (page.players ||= []).push(player);
+  const scaleOf = (name) => 1 / Math.max(...page.players.map((one) => one.full(name)));
   const sound = () => {
     if (!audio.context) return;
-    const { samples } = turns(index, audio.context.sampleRate), scale = 1 / full(source.value);
+    const { samples } = turns(index, audio.context.sampleRate), scale = scaleOf(source.value);
     const buffer = audio.context.createBuffer(1, samples.length - 1, audio.context.sampleRate);
     buffer.copyToChannel(samples.subarray(0, -1).map((value) => value * scale), 0);
     const node = audio.context.createBufferSource(), gain = audio.context.createGain(), now = audio.context.currentTime;
@@ -205,6 +209,7 @@ page.explorer = (root) => {
   };
   play.addEventListener("click", () => {
     if (audio.node) { stop(audio.context.currentTime); play.textContent = "Listen"; play.setAttribute("aria-pressed", "false"); return; }
+    page.players.forEach((one) => one.silence());
     audio.context ||= new AudioContext();
     audio.context.resume();
     sound();
@@ -247,6 +252,6 @@ page.explorer = (root) => {
   new ResizeObserver(() => { if (Math.abs(root.clientWidth - width) > 4) { width = root.clientWidth; all(); } }).observe(root);
   addEventListener("beforeprint", all);
   addEventListener("afterprint", () => setTimeout(all));
-  root.explorer = { turns, linesAt: at, shownOf, words };
+  root.explorer = { turns, linesAt: at, shownOf, words, scaleOf };
 };
 page.parts.push(() => document.querySelectorAll(".runup").forEach(page.explorer));
