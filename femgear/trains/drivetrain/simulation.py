@@ -11,7 +11,7 @@ the largest Floquet exponent, at any load.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,11 +61,13 @@ class Records:
     """What a run keeps of its steps: one record of ``every`` so many.
 
     With ``lowpass`` they are low-passed (`Decimator`), so that nothing beyond half their rate appears as
-    something else; otherwise they are the motion at these instants as it is.
+    something else; otherwise they are the motion at these instants as it is. ``told`` is called with the
+    share of the steps that are done.
     """
 
     every: int = 1
     lowpass: bool = False
+    told: Callable[[float], object] = lambda share: None
 
 
 @dataclass(frozen=True)
@@ -183,6 +185,7 @@ def march_drivetrain(
             balances.check(states, block, first, free=motion.free, contact_loss=contact_loss)
             record.take(first, states, block)
             motion.state = balances.without_drift(states[-1])
+            records.told(min(first + _BLOCK, count) / count)
     return DrivetrainRun(
         outputs=tuple(outputs), **record.columns(step), meshes=model.meshes, energy_balance=balances.works(),
         drift=balances.drift, momentum=balances.momentum_error(), steps=count, step=step,

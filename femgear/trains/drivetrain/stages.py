@@ -91,12 +91,12 @@ def solve_transient_run(case: DrivetrainCase, *, progress: Progress = silent) ->
     for done, variant in enumerate(variants):
         model = models[variant] = case_model(case, variant)
         torques = torque_histories(case, model.ratio)
-        runs[variant] = _run(case, variant, model, torques)
-        progress("transient", done + 1, len(variants))
+        told = lambda share, done=done: progress("transient", done + share, len(variants))  # noqa: E731
+        runs[variant] = _run(case, variant, model, torques, told)
     return TransientResult(models, runs, torques)
 
 
-def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
+def _run(case: DrivetrainCase, variant: str, model, torques, told) -> DrivetrainRun:
     s = case.simulation
     try:
         run = march_drivetrain(
@@ -107,7 +107,7 @@ def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
             speed=case.operation.speed,
             start=s.start,
             outputs=[f"{body.name}: rotation" for body in model.train.bodies],
-            records=Records(record_every(case, model), lowpass=True),
+            records=Records(record_every(case, model), lowpass=True, told=told),
             contact_loss=s.contact_loss,
         )
     except ConvergenceError as error:

@@ -38,7 +38,7 @@ from femgear.trains.drivetrain.stages import (
     solve_spectrum,
     solve_transient_run,
 )
-from femgear.trains.reading import open_results, parse_case, read_case, with_value
+from femgear.trains.reading import open_results, parse_case, read_case, with_value, with_values
 from femgear.trains.registry import stages_of as stages_of_case
 
 ROOT = Path(__file__).parents[3]
@@ -427,3 +427,14 @@ def test_results_page_names_every_attribute(results, heading, stage):
     section, data = section_of("results.md", heading), results[stage]
     for attribute in set(data.attrs) - {"title", "unknowns", "femgear_format", "femgear_version"}:
         assert f"`{attribute}`" in section, attribute
+
+
+def test_progress_within_a_motion(own):
+    """Blocks of its steps, torsional variant included."""
+    told = []
+    case = with_values(own, {"simulation.duration": "0.3 s", "simulation.torsional": True})
+    solve_transient_run(case, progress=lambda *one: told.append(one))
+    shares = [done for _, done, _ in told]
+    assert {(stage, total) for stage, _, total in told} == {("transient", 2)}
+    assert shares == sorted(shares) and shares[-1] == 2.0 and 1.0 in shares
+    assert any(0.0 < share < 1.0 for share in shares) and any(1.0 < share < 2.0 for share in shares)
