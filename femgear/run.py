@@ -7,10 +7,10 @@ import os
 import time
 import warnings
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -296,12 +296,7 @@ def report_again(folder: Path, *, static: bool = False) -> None:
 
 
 def export_results(
-    results: Results,
-    folder: Path,
-    formats: Collection[str],
-    sampling: Sampling,
-    *,
-    progress: Progress = silent,
+    results: Results, folder: Path, formats: Collection[str], how: Sampling, *, progress: Progress = silent
 ) -> list[str]:
     """Write a run in formats of "csv", "xlsx", "mat", "uff", "wav" and "quality", what is heard of its sound.
 
@@ -320,7 +315,7 @@ def export_results(
     if "csv" in formats:
         found += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
         if recorded is not None and {"runup", "housing"} <= {*results.stages}:
-            header, rows = recorded.cuts(results, sampling.level)
+            header, rows = recorded.cuts(results, how.level)
             write_csv(folder / "order_cuts.csv", header, ([float(x) for x in row] for row in rows))
             found.append("order_cuts.csv")
     if "xlsx" in formats:
@@ -332,28 +327,26 @@ def export_results(
     if "mat" in formats:
         write_matlab({stage: results[stage] for stage in results}, folder / "results.mat")
         found.append("results.mat")
-    if recorded is not None and not {"wav", "uff", "quality"}.isdisjoint(formats):
-        sampling = _scaled(sampling, recorded.extent(results, sampling.rate))
+    if recorded is not None and {"wav", "uff", "quality"} & {*formats}:
+        how = _scaled(how, recorded.extent(results, how.rate))
     if recorded is not None and "uff" in formats:
-        signals = (one for one in recorded.signals(results, sampling) if one.steady)
+        signals = (one for one in recorded.signals(results, how) if one.steady)
         write_functions(signals, recorded.spectra(results), folder / "signals.uff")
         write_modes(recorded.shapes(results), folder / "modes.uff")
         found += ["signals.uff", "modes.uff"]
     if recorded is not None and not {"wav", "quality"}.isdisjoint(formats):
         steps = 2 * results["housing"].sizes["speed"] + 2 * ("runup" in results.stages)
-        signals = _told(recorded.signals(results, sampling), partial(progress, "sound"), steps)
-        found += _export_sound(signals, folder, formats, sampling)
+        signals = _told(recorded.signals(results, how), progress, steps)
+        found += _export_sound(signals, folder, formats, how)
     return found
 
 
-def _told(
-    signals: Iterable[Signal], progress: Callable[[float, float], None], steps: int
-) -> Iterator[Signal]:
+def _told(signals: Iterable[Signal], progress: Progress, steps: int) -> Iterator[Signal]:
     """Give signals, and tell how many of them have been used up."""
-    progress(0, steps)
+    progress("sound", 0, steps)
     for done, one in enumerate(signals, 1):
         yield one
-        progress(done, steps)
+        progress("sound", done, steps)
 
 
 def _scaled(sampling: Sampling, extent: Mapping[str, tuple[float, float, float]]) -> Sampling:

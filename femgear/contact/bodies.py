@@ -153,11 +153,11 @@ def make_sectors(
     try:
         grids = mesh_outlines(halves, cache=cache)
     except GridError as error:
-        rim = [abs(gear.root_radius - gear.rim_radius) / gear.module for gear in gears]
-        thin = int(np.argmin(rim))
-        if rim[thin] < _THIN:
-            error.key = f"{gears[thin].name}.{'outer' if gears[thin].internal else 'bore'}_radius"
-            error.remedy = f"the rim is {rim[thin]:.2g} modules thick; give it {_THIN:g} or more"
+        thin = min(gears, key=lambda gear: abs(gear.root_radius - gear.rim_radius))
+        rim = abs(thin.root_radius - thin.rim_radius) / thin.module
+        if rim < _THIN:
+            error.key = f"{thin.name}.{'outer' if thin.internal else 'bore'}_radius"
+            error.remedy = f"the rim is {rim:.2g} modules thick; give it {_THIN:g} or more"
         raise
     sectors = []
     for gear, grid in zip(gears, grids, strict=True):

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from femgear.trains.protocol import Drawn, Figures, Progress, Train
 
 
+_Call = Callable[[], object]
 _LARGEST_PICTURE = 8_000_000
 """Bytes of a picture on the page."""
 _OTHER = "Other pictures"
@@ -57,11 +58,7 @@ _PARTS = {"solid": ("three.min.js", "solid.js"), "runup": ("explorer.js",)}
 
 
 def write_figures(
-    folder: Path,
-    train: Train,
-    drawn: Drawn,
-    beside: Callable[[], object] = lambda: None,
-    told: Callable[[], object] = lambda: None,
+    folder: Path, train: Train, drawn: Drawn, beside: _Call = lambda: None, told: _Call = lambda: None
 ) -> list[str]:
     """Write the figures of the stages whose data are there, and of the case; returns the file names.
 

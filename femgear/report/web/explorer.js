@@ -18,10 +18,8 @@ page.explorer = (root) => {
     return reference ? { unit: "dB re 20 µPa", quantity: "sound pressure level", reference: 20e-6, integrated: 0, scale: 1, peak }
       : { unit: "Pa", quantity: "sound pressure", reference: 0, integrated: 0, scale: 1, peak };
   };
-  const words = (sum) => {
-    const { unit, quantity, peak } = chosen();
-    return `${quantity}, ${peak ? (sum ? "peak = √2 r.m.s." : "peak") : "r.m.s."} [${unit}]`;
-  };
+  const detector = (sum) => (chosen().peak ? (sum ? "peak = √2 r.m.s." : "peak") : "r.m.s.");
+  const words = (sum) => `${chosen().quantity}, ${detector(sum)} [${chosen().unit}]`;
   // the value shown of a line, and of the sum of the powers of several
   const shownOf = (found) => {
     const { reference, integrated, scale, peak } = chosen();
@@ -124,17 +122,16 @@ page.explorer = (root) => {
   const follow = () => {
     const chart = root.dataset.run === "runup" && page.data.charts.run_up_levels, panel = chart && chart.panels[0];
     if (!panel || !/\[m\/s²\]$/.test((chart.plain ||= structuredClone(panel)).y.title)) return;
-    const before = source.value;
+    const before = source.value, { plain } = chart;
     source.value = "acceleration";
-    const { plain } = chart, plainly = (i) => Math.sqrt(at(i, "acceleration").reduce((sum, one) => sum + 0.5 * one.size ** 2, 0));
+    const plainly = (i) => Math.sqrt(at(i, "acceleration").reduce((sum, one) => sum + 0.5 * one.size ** 2, 0));
     const { reference, unit } = chosen(), ratio = data.speed.map((_, i) => (reference ? 1 / reference : shownOf(at(i, "acceleration")) / plainly(i)));
     const value = (x, y) => {
       const j = Math.max(data.speed.findIndex((one) => one >= Math.min(x, speeds[1])), 1), a = data.speed[j - 1], b = data.speed[j];
       const share = Math.min(Math.max((x - a) / (b - a), 0), 1), found = y * (ratio[j - 1] * (1 - share) + ratio[j] * share);
       return y === null ? null : reference ? 20 * Math.log10(Math.max(found, 1e-12)) : found;
     };
-    const xs = (trace) => trace.x || trace.y.map((_, i) => trace.x0 + i * trace.dx);
-    panel.traces = plain.traces.map((trace) => ({ ...trace, y: trace.y.map((y, i) => value(xs(trace)[i], y)) }));
+    panel.traces = plain.traces.map((trace) => ({ ...trace, y: trace.y.map((y, i) => value(trace.x ? trace.x[i] : trace.x0 + i * trace.dx, y)) }));
     panel.words = plain.words.map((word) => (word.paper ? word : { ...word, y: value(word.x, word.y) }));
     const all = panel.traces.flatMap((trace) => trace.y), end = finite(all);
     panel.y = { ...plain.y, title: words(true), range: reference ? [Math.min(...all.filter(Number.isFinite)) - 3, end + 20] : [0, 1.45 * end] };
@@ -158,7 +155,7 @@ page.explorer = (root) => {
     Plotly.react(part("lobes"), [circle(reach / 1.15), circle(reach / 2.3),
       { x: envelope.map((r, i) => r * Math.cos(angle[i])), y: envelope.map((r, i) => r * Math.sin(angle[i])), mode: "lines", fill: "toself", fillcolor: "rgba(0,114,178,0.15)", line: { color: page.colour("#0072b2"), width: 2 },
         text: envelope.map((r, i) => `${Math.round((angle[i] * 180) / Math.PI)}°: ${value(r)}`), hovertemplate: "%{text}<extra></extra>" }],
-      { ...look(`Envelope of mesh harmonic ${harmonic} over the carrier's angle; outer circle ${value(reach / 1.15)} ${peak ? "peak" : "r.m.s."}`), xaxis: flat, yaxis: { ...flat, scaleanchor: "x" } }, quiet);
+      { ...look(`Envelope of mesh harmonic ${harmonic} over the carrier's angle; outer circle ${value(reach / 1.15)} ${detector(false)}`), xaxis: flat, yaxis: { ...flat, scaleanchor: "x" } }, quiet);
   };
 
   // sound: whole turns of the carrier, looped; one scale for all speeds, so that louder is louder
@@ -221,7 +218,7 @@ page.explorer = (root) => {
   const walk = () => {
     index = Number(slider.value);
     const mesh = data.mesh[index];
-    shown.value = `${data.speed[index].toPrecision(6)} rpm, mesh ${mesh.toPrecision(5)} Hz, ${told(shownOf(at(index, source.value)))} ${chosen().peak ? "peak" : "r.m.s."}`;
+    shown.value = `${data.speed[index].toPrecision(6)} rpm, mesh ${mesh.toPrecision(5)} Hz, ${told(shownOf(at(index, source.value)))} ${detector(false)}`;
     slider.setAttribute("aria-valuetext", shown.value);
     const cursor = [{ type: "line", x0: data.speed[index], x1: data.speed[index], yref: "paper", y0: 0, y1: 1, line: { color: page.colour("#d55e00"), width: 1.5 } }];
     const campbellDiv = part("campbell");
@@ -236,12 +233,11 @@ page.explorer = (root) => {
     if (audio.node) sound();
   };
   const over = () => {
-    [...part("form").options].forEach((one, i) => {
-      const [unit, , reference, , , peak] = forms[i], air = source.value === "pressure";
-      one.hidden = air && i > 1 && !reference;
-      one.text = reference ? "dB" : `${air ? "Pa" : unit} ${peak ? "peak" : "r.m.s."}`;
+    forms.forEach(([unit, , reference, , , peak], i) => {
+      const air = source.value === "pressure", text = reference ? "dB" : `${air ? "Pa" : unit} ${peak ? "peak" : "r.m.s."}`;
+      Object.assign(part("form").options[i], { text, hidden: air && i > 1 && !reference });
     });
-    levels(); waterfall(); cuts(); follow(); walk();
+    [levels, waterfall, cuts, follow, walk].forEach((one) => one());
   };
   const all = () => { campbell(); over(); };
   slider.addEventListener("input", walk);
