@@ -172,7 +172,7 @@ def _sector_modes(gear, diameters, state, *, refine: float = 1.0) -> np.ndarray:
     diameters : sequence of int
     state : dict of region to str
     refine : float
-        Divides the element sizes and multiplies the modes kept inside the sector, 16 in every run.
+        Divides the element sizes and multiplies the motions of the cut whose inertia moves the inside, 6 x 2.
     """
     from femgear.fe.grid import mirror
     from femgear.fe.meshing import mesh_outline
@@ -189,7 +189,7 @@ def _sector_modes(gear, diameters, state, *, refine: float = 1.0) -> np.ndarray:
         mass(grid, material, width),
         count=gear.teeth,
         loads=load,
-        interior_modes=round(16 * refine),
+        interior_shapes=round(6 * refine),
     )
     modes = cyclic_modes(
         basis,
@@ -214,7 +214,8 @@ def whole_ring() -> tuple[Row, ...]:
     """The free toothed ring twice: one sector with quadratic elements, all teeth in one cubic grid.
 
     The gate of a row is the sum of what both still change in plane stress when all element edges are halved
-    (in the sector also twice the modes): where halving at least halves an error, each is below its change.
+    (in the sector also with twice the motions of the cut that move the inside): where halving at least halves
+    an error, each is below its change.
     """
     gear, rows = reference_static().planetary_set.ring, []
     coarse, fine = (whole_grid(gear, refine=refine) for refine in (1, 2))
