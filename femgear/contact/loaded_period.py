@@ -130,8 +130,7 @@ def loaded_period(
             found = {name: np.concatenate([record[name], found[name]], axis=-1) for name in found}
         order = np.argsort(found["position"], kind="stable")
         record = {name: values[..., order] for name, values in found.items()}
-        gaps = _unresolved(record)
-        wanted = 0.5 * (record["position"][gaps] + record["position"][gaps + 1])
+        wanted = _between(record["position"], *_unresolved(record))
     return _whole_period(planetary_set, record, symmetry, parts)
 
 
@@ -151,8 +150,15 @@ def _record(cycle: MeshCycle, base_pitch: float) -> dict[str, np.ndarray]:
     return {name: np.asarray(getattr(cycle, name)) for name in _OVER_POSITIONS} | {"loaded": loaded}
 
 
-def _unresolved(record: dict[str, np.ndarray]) -> np.ndarray:
-    """Numbers of the intervals that need a position in their middle."""
+def _between(position: np.ndarray, smooth: np.ndarray, jumps: np.ndarray) -> np.ndarray:
+    """Middles of some intervals, and positions that quarter others: half as many walks to enclose a jump."""
+    low, high = position[jumps], position[jumps + 1]
+    quarters = [low + share * (high - low) for share in (0.25, 0.5, 0.75)]
+    return np.concatenate([0.5 * (position[smooth] + position[smooth + 1]), *quarters])
+
+
+def _unresolved(record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the intervals that need a position in their middle, and of those that hold a jump."""
     stiffness, deflection, loaded = record["stiffness"], record["deflection"], record["loaded"]
     largest = stiffness.max(axis=1, initial=0.0)[:, None]
     k = stiffness / np.where(largest > 0.0, largest, 1.0)
@@ -168,7 +174,8 @@ def _unresolved(record: dict[str, np.ndarray]) -> np.ndarray:
     jump = np.flatnonzero(steep | other)
     bend[:, np.concatenate([jump, jump + 1])] = 0.0
     missed = (gap**2 / 8.0 * np.maximum(bend[:, 1:], bend[:, :-1])).max(axis=0)
-    return np.flatnonzero(((steep | other) & (gap > SHORTEST)) | ((missed > MISSED) & (gap > SMOOTHEST)))
+    jumping = (steep | other) & (gap > SHORTEST)
+    return np.flatnonzero((missed > MISSED) & (gap > SMOOTHEST) & ~jumping), np.flatnonzero(jumping)
 
 
 def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> LoadedPeriod:

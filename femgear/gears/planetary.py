@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -71,12 +72,12 @@ class PlanetarySet:
         """Names of the 2N meshes in order."""
         return mesh_names(self.n_planets)
 
-    @property
+    @cached_property
     def working_pressure_angle_sun_planet(self) -> float:
         """Working pressure angle of the meshes with the sun [rad]."""
         return working_pressure_angle(self.sun, self.planet, self.centre_distance)
 
-    @property
+    @cached_property
     def working_pressure_angle_planet_ring(self) -> float:
         """Working pressure angle of the meshes with the ring [rad]."""
         return working_pressure_angle(self.planet, self.ring, self.centre_distance)
@@ -117,7 +118,7 @@ class PlanetarySet:
         start = max(self.ring.tip_roll - ring, _undercut_roll(self.planet) - planet)
         return start, self.planet.tip_roll - planet
 
-    @property
+    @cached_property
     def half_angles(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Half-thickness angles [rad] on the working pitch circles: of sun and planet, of planet and ring."""
         return (
@@ -135,7 +136,7 @@ class PlanetarySet:
         """Normal play [m] along the line of action."""
         return _backlash(self.planet, self.ring, self.working_pressure_angle_planet_ring)
 
-    @property
+    @cached_property
     def mesh_phases(self) -> np.ndarray:
         """Phases phi_j in [0, 1) of the 2N meshes, (2N,).
 
@@ -147,7 +148,9 @@ class PlanetarySet:
         psi = np.asarray(self.planet_angles)
         sun_planet = -(psi - psi[0]) * self.sun.teeth / (2.0 * math.pi)
         planet_ring = sun_planet - _planet_lag(self)
-        return _fraction(np.concatenate([sun_planet, planet_ring]))
+        phases = _fraction(np.concatenate([sun_planet, planet_ring]))
+        phases.setflags(write=False)
+        return phases
 
     def equal_positions(self, wanted: int) -> int:
         """Find the number of equidistant positions of a mesh period that meet all planets alike.
