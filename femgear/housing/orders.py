@@ -148,8 +148,6 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
     CaseError: no envelope of one signal, finite and not negative, or a threshold that is not between 0 and 1
     (E-SHAPE).
     """
-    from scipy.signal import find_peaks
-
     values = np.asarray(periodic_envelope, dtype=float)
     usable = values.ndim == 1 and values.size > 2 and np.all(np.isfinite(values)) and np.all(values >= 0)
     if not usable or not 0 < threshold < 1:
@@ -163,10 +161,29 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
         return Lobes(np.empty(0), np.empty(0), threshold)
     start = int(values.argmin())
     turned = np.append(np.roll(values, -start), values[start])
-    peaks, _ = find_peaks(turned, prominence=threshold * largest)
+    peaks = _prominent(turned, threshold * largest)
     place = (peaks + start) % values.size
     by_place = np.argsort(place)
     return Lobes(place[by_place] / values.size, turned[peaks][by_place], threshold)
+
+
+def _prominent(values: np.ndarray, least: float) -> np.ndarray:
+    """Places of maxima, or the middle of them, that stand out by some height of what ends at its lowest.
+
+    As `scipy.signal.find_peaks`, whose package takes longer to load than all envelopes of a run.
+    """
+    first = np.flatnonzero(np.diff(values, prepend=np.nan))  # of equal values
+    level, last = values[first], np.append(first[1:], len(values)) - 1
+    top = 1 + np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] > level[2:]))
+    height, valley = level[top], np.minimum.reduceat(level, np.append(0, top))
+    found = []
+    for k, high in enumerate(height):
+        before, after = np.flatnonzero(height[:k] > high), np.flatnonzero(height[k + 1 :] > high)
+        left = valley[before[-1] + 1 if len(before) else 0 : k + 1].min()
+        right = valley[k + 1 : k + 2 + after[0] if len(after) else None].min()
+        if high - max(left, right) >= least:
+            found.append((first[top[k]] + last[top[k]]) // 2)
+    return np.array(found, int)
 
 
 def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6) -> tuple[Line, ...]:
