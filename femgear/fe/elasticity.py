@@ -106,7 +106,8 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
     dofs = (2 * _element_nodes(grid, scalar)[..., None] + np.array([0, 1])).reshape(m, 12)
     rows, columns = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
     K = scipy.sparse.csc_array((local.ravel(), (rows, columns)), shape=(size, size))
-    return 0.5 * (K + K.T).tocsc()
+    K.data = 0.5 * (K.data + K.T.tocsc().data)  # the pattern is symmetric already
+    return K
 
 
 def mass(grid: Grid, material: Material, thickness=1.0):
