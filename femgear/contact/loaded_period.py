@@ -130,7 +130,11 @@ def loaded_period(
             found = {name: np.concatenate([record[name], found[name]], axis=-1) for name in found}
         order = np.argsort(found["position"], kind="stable")
         record = {name: values[..., order] for name, values in found.items()}
-        wanted = _between(record["position"], *_unresolved(record))
+        smooth, jumps = _unresolved(record)
+        tau, gap = record["position"], np.diff(record["position"])
+        # jumps in quarters: half as many walks to enclose them
+        shares = (smooth, 0.5), (jumps, 0.25), (jumps, 0.5), (jumps, 0.75)
+        wanted = np.concatenate([tau[some] + share * gap[some] for some, share in shares])
     return _whole_period(planetary_set, record, symmetry, parts)
 
 
@@ -148,13 +152,6 @@ def _record(cycle: MeshCycle, base_pitch: float) -> dict[str, np.ndarray]:
         mesh, pair = np.nonzero(cycle.tooth_load[..., p] > 0)
         loaded[p] = frozenset(zip(mesh.tolist(), place[mesh, pair, p].tolist(), strict=True))
     return {name: np.asarray(getattr(cycle, name)) for name in _OVER_POSITIONS} | {"loaded": loaded}
-
-
-def _between(position: np.ndarray, smooth: np.ndarray, jumps: np.ndarray) -> np.ndarray:
-    """Middles of some intervals, and positions that quarter others: half as many walks to enclose a jump."""
-    low, high = position[jumps], position[jumps + 1]
-    quarters = [low + share * (high - low) for share in (0.25, 0.5, 0.75)]
-    return np.concatenate([0.5 * (position[smooth] + position[smooth + 1]), *quarters])
 
 
 def _unresolved(record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

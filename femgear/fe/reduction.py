@@ -1,14 +1,13 @@
 """Modes of a cyclic body from one sector: Craig-Bampton on the sector, one small problem a nodal diameter.
 
 The symmetric and the antisymmetric fields of the sector are condensed on its cut (Craig and Bampton, AIAA J.
-6, 1968) with the static shape of the loads. What inertia adds inside is spanned by the static answer to the
-inertia forces of these shapes, the next term of a series in omega^2 (Craig and Hale, "Block-Krylov component
-synthesis method for structural model reduction", J. Guid. Control Dyn. 11, 1988): a few solutions, and
-frequencies ten times as close as with as many fixed-interface modes. The cut, along which displacements are
-smooth, may be left a few shapes instead of all its nodes (Castanier, Tan and Pierre, AIAA J. 39, 2001): where
-static ones are among them the static response is exact. The cyclic tie of `n` nodal diameters (Thomas 1979)
-leaves one real vector for both kinds of fields, see `femgear.fe.compliance`, and so a real symmetric
-eigenproblem for each `n`, whose nodal diameter is known by construction.
+6, 1968) with the static shape of the loads, and with the static answer to the inertia forces of both, the
+next term of a series in omega^2 (Craig and Hale, "Block-Krylov component synthesis method for structural
+model reduction", J. Guid. Control Dyn. 11, 1988): closer than as many fixed-interface modes. The cut, along
+which displacements are smooth, may be left a few shapes instead of all its nodes (Castanier, Tan and Pierre,
+AIAA J. 39, 2001): where static ones are among them the static response is exact. The cyclic tie of `n` nodal
+diameters (Thomas 1979) leaves one real vector for both kinds of fields, see `femgear.fe.compliance`, and so a
+real symmetric eigenproblem for each `n`, whose nodal diameter is known by construction.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ from femgear.fe.grid import Grid
 
 _CUT_DEGREE = 8
 """Of the polynomials along a cut."""
-_DEPENDENT = 1e-10
-"""Mass of a combination of unit fields below which it is none of its own."""
+_DEPENDENT = 1e-5
+"""Share of a field of its own below which it is a combination of others."""
 _STATIC = 1e-6
 """Share of a static shape of the cut below which nothing is added for it."""
 
@@ -173,27 +172,20 @@ def _reduced(sector: HalfSector, mass, loads: np.ndarray, shapes: np.ndarray, mo
     """
     inner = sector.inner
     M = (sector.fields.T @ mass @ sector.fields).tocsc()
-    K_ii, M_ii = sector.interior, M[:inner, :inner]
     constraint, schur = sector.on_cut(shapes)
     static = sector.held(loads[:inner])
     slow = np.hstack([np.vstack([constraint, shapes]) @ moving, np.pad(static, ((0, len(shapes)), (0, 0)))])
-    fields = sector.held((M @ slow)[:inner])
-    size = np.sqrt(np.einsum("ij,ij->j", fields, M_ii @ fields))
+    fields = np.hstack([static, sector.held((M @ slow)[:inner])])
+    length = np.linalg.norm(fields, axis=0)
     # a load may have no part of this kind
-    fields = fields / np.where(size > 1e-9 * size.max(), size, np.inf)
-    size, axes = np.linalg.eigh(fields.T @ (M_ii @ fields))
-    own = size > _DEPENDENT
-    lagging = (fields @ (axes[:, own] / np.sqrt(size[own])))[:, ::-1]
-    rest = static - lagging @ (lagging.T @ (M_ii @ static))
-    whole, left = (np.sqrt(np.einsum("ij,ij->j", field, M_ii @ field)) for field in (static, rest))
-    new = left > 1e-9 * whole
-    interior = np.hstack([lagging, rest[:, new] / left[new]])
+    fields, left = np.linalg.qr(fields / np.where(length > 0.0, length, 1.0))
+    interior = fields[:, np.abs(left.diagonal()) > _DEPENDENT]
     nb, nv = len(schur), interior.shape[1]
     basis = np.zeros((inner + len(shapes), nb + nv))
     basis[:inner] = np.hstack([constraint, interior])
     basis[inner:, :nb] = shapes
     K = np.zeros((nb + nv, nb + nv))
-    K[:nb, :nb], K[nb:, nb:] = schur, interior.T @ (K_ii @ interior)
+    K[:nb, :nb], K[nb:, nb:] = schur, interior.T @ (sector.interior @ interior)
     reduced = basis.T @ (M @ basis)
     return K, 0.5 * (reduced + reduced.T), sector.fields @ basis, nb
 
@@ -246,7 +238,7 @@ def _one_diameter(basis: _SectorBasis, n, loads, max_frequency, static_correctio
         M[np.ix_(at, at)] += tie[:, None] * mass * tie
         force[at] += np.conj(lag) * tie[:, None] * load
     # the largest 1 / (omega^2 + shift): the lowest omega^2 keep their digits, and a free body is no exception
-    top, shift = (2 * np.pi * max_frequency) ** 2, basis.stiffness[0][nb, nb]
+    top, shift = (2 * np.pi * max_frequency) ** 2, basis.stiffness[0][nb, nb] / basis.mass[0][nb, nb]
     values, chosen = eigh(M, K + shift * M, subset_by_value=(1.0 / (top + shift), np.inf))
     if not len(values):
         values, chosen = eigh(M, K + shift * M, subset_by_index=(size - 1, size - 1))

@@ -136,7 +136,7 @@ class PlanetarySet:
         """Normal play [m] along the line of action."""
         return _backlash(self.planet, self.ring, self.working_pressure_angle_planet_ring)
 
-    @cached_property
+    @property
     def mesh_phases(self) -> np.ndarray:
         """Phases phi_j in [0, 1) of the 2N meshes, (2N,).
 
@@ -148,9 +148,7 @@ class PlanetarySet:
         psi = np.asarray(self.planet_angles)
         sun_planet = -(psi - psi[0]) * self.sun.teeth / (2.0 * math.pi)
         planet_ring = sun_planet - _planet_lag(self)
-        phases = _fraction(np.concatenate([sun_planet, planet_ring]))
-        phases.setflags(write=False)
-        return phases
+        return _fraction(np.concatenate([sun_planet, planet_ring]))
 
     def equal_positions(self, wanted: int) -> int:
         """Find the number of equidistant positions of a mesh period that meet all planets alike.

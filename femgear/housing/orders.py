@@ -168,10 +168,7 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
 
 
 def _prominent(values: np.ndarray, least: float) -> np.ndarray:
-    """Places of maxima, or the middle of them, that stand out by some height of what ends at its lowest.
-
-    As `scipy.signal.find_peaks`, whose package takes longer to load than all envelopes of a run.
-    """
+    """Places of prominent maxima, as SciPy's `find_peaks`, whose package takes long to load."""
     first = np.flatnonzero(np.diff(values, prepend=np.nan))  # of equal values
     level, last = values[first], np.append(first[1:], len(values)) - 1
     top = 1 + np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] > level[2:]))

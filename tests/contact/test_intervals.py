@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femgear.contact.loaded_period import MISSED, SHORTEST, SMOOTHEST, _between, _unresolved
+from femgear.contact.loaded_period import MISSED, SHORTEST, SMOOTHEST, _unresolved
 
 
 def record(position, stiffness, loaded: Any = 0):
@@ -51,11 +51,6 @@ def test_jumps_are_quartered_down_to_the_shortest_interval(gap):
         record(x, [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]),
     ):
         assert [some.tolist() for some in _unresolved(made)] == [[], found]
-
-
-def test_positions_between():
-    x = np.array([0.0, 1.0, 2.0, 6.0])
-    assert sorted(_between(x, np.array([0]), np.array([2]))) == [0.5, 3.0, 4.0, 5.0]
 
 
 def test_a_jump_is_enclosed_in_2_13th_and_a_curve_followed_to_2_10th_of_a_period():
