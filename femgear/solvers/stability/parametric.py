@@ -29,7 +29,7 @@ _RANK = 1e-10
 # Damping ratio up to which modes are followed as turning ones, and the error of the others.
 _TURNING, _CREEPING = 0.999, 1e-9
 # Speeds, and cells of a chart, treated together.
-_SPEEDS_TOGETHER, _CELLS_TOGETHER = 64, 64
+_SPEEDS_TOGETHER, _CELLS_TOGETHER = 128, 64
 
 
 @dataclass(frozen=True)
