@@ -91,7 +91,6 @@ def planetary_set(case: Case) -> PlanetarySet:
         raise
 
 
-@lru_cache(maxsize=8)
 def _checked_set(case: Case) -> PlanetarySet:
     """Gears of a case, closed on their centre distance and checked as a set."""
     closed = _closed_set(case)
