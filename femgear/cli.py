@@ -485,6 +485,7 @@ def samples(
     positions: int = 16,
     method: Literal["spring", "exact"] = "spring",
     index: int | None = None,
+    force: bool = False,
     tasks: Tasks | None = None,
 ) -> int:
     """Compute as-built sets: transmission error, load sharing and mesh stiffness over tolerances.
@@ -507,6 +508,8 @@ def samples(
         Tooth pairs as springs, whose error is stated, or the whole contact problem.
     index
         Write this sample as a case file, sample_INDEX.toml, and compute none.
+    force
+        Replace the results that the folder holds, once the new ones are computed.
     """
     from femgear.run import grid_cache
     from femgear.storage.files import own_files, write_text
@@ -521,7 +524,7 @@ def samples(
     with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
         basis = prepared(data, tolerances, positions=positions, cache=grid_cache())
         if index is None:
-            options = {"count": number, "seed": seed, "exact": method == "exact"}
+            options = {"count": number, "seed": seed, "exact": method == "exact", "force": force}
             blocks, names = samples_into(data, output, basis, **options, progress=progress, runner=runner)
         else:
             blocks, names = [], [f"sample_{index}.toml"]

@@ -256,7 +256,8 @@ def _serve(connection: Any) -> None:
 
 
 def _one_death() -> Any:
-    """Plugin of a scheduler: tasks of femgear are given up with their worker, whatever it allows others."""
+    """Plugin of a scheduler: tasks of femgear are given up with their worker, and nothing is kept of them."""
+    from dask.utils import key_split
     from distributed import SchedulerPlugin
 
     class OneDeath(SchedulerPlugin):
@@ -268,6 +269,14 @@ def _one_death() -> Any:
         def transition(self, key, start, finish, *args, **kwargs):
             if finish == "processing" and _TASK in str(key):
                 self.scheduler.tasks[key].suspicious = self.scheduler.allowed_failures or 0
+
+        def update_graph(self, scheduler, *, keys=(), tasks=(), **kwargs):
+            # a scheduler remembers 100 000 names of tasks, and for good that each was submitted
+            if any(_TASK in str(key) for key in keys):
+                key_split.cache_clear()
+                spans = scheduler.extensions["spans"].spans
+                for group in {scheduler.tasks[key].group for key in tasks}:
+                    spans[group.span_id].metadata["collections"].clear()
 
     return OneDeath()  # of a class that is sent whole: schedulers need no femgear
 

@@ -33,7 +33,7 @@ from femgear.contact.batch import ContactTangents, PairLaws, pair_laws, solve_ba
 from femgear.contact.cycle import check_residual, first_windows
 from femgear.contact.flank_pairs import pair_separations
 from femgear.contact.supports import MovingMembers, moving_members
-from femgear.errors import CaseError, FemgearError
+from femgear.errors import CaseError, FemgearError, StorageError
 from femgear.gears.deviations import (
     Runout,
     SetDeviations,
@@ -536,17 +536,23 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
 @one_blas_thread()
 def samples_into(
     case: Case, folder: Path, basis: tuple[SampleModel, str], *, count: int = 1000, seed: int = 1,
-    exact: bool = False, progress: Progress = silent, runner: Runner | None = None
+    exact: bool = False, force: bool = False, progress: Progress = silent, runner: Runner | None = None
 ) -> tuple[list[Block], list[str]]:  # fmt: skip
     """Compute samples 0 to ``count - 1``; write numbers, a figure and the worst of them as a case file.
 
     The worst has the largest transmission error. ``basis`` is what `prepared` gives. What there is to say
     comes back with the names of the files; what keeps samples from being computed is raised (`Runner.map`).
-    Blocks of samples are kept in a journal until the end: an interrupted command goes on from it.
+    Blocks of samples are kept in a journal until the end: an interrupted command goes on from it. Results that
+    are complete are refused (StorageError, E-OUTPUT), or replaced with ``force``.
     """
     model, text = basis
     checked(count, "--number", 1)
     own_files(folder, FILES)
+    if (folder / FILES[0]).exists() and not (force or (folder / _JOURNAL).exists()):
+        raise StorageError(
+            "the folder holds results already", code="E-OUTPUT", file=str(folder),
+            remedy="name a new folder, or replace them with --force",
+        )  # fmt: skip
     method = "exact" if exact else "spring"
     more = {"tolerances": fingerprint(text), "seed": seed, "method": method, "positions": len(model.position)}
     with resumable(folder), open_journal(folder / _JOURNAL, case, more, _is_block) as journal:

@@ -23,6 +23,7 @@ from femgear.storage.files import read_dataset
 from femgear.study.relief import design_basis
 from femgear.study.runner import Runner, open_runner
 from femgear.study.samples import (
+    FILES,
     Law,
     Tolerances,
     exact_numbers,
@@ -345,7 +346,13 @@ def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, 
     assert main([*words, "--index", str(worst)]) == 0
     again = read_case(out / f"sample_{worst}.toml")
     assert again == read_case(out / "worst.toml")
-    assert main([*words, "--method", "exact", "-n", "2"]) == 0
+    # complete results are replaced with --force alone, whatever the command
+    before = {name: (out / name).read_bytes() for name in FILES}
+    for more in (["-n", "30"], ["--method", "exact", "-n", "2"]):
+        assert main([*words, *more]) == 4
+        assert "E-OUTPUT" in (said := capsys.readouterr().err) and "--force" in said
+    assert before == {name: (out / name).read_bytes() for name in FILES}
+    assert main([*words, "--method", "exact", "-n", "2", "--force"]) == 0
     few = read_dataset(out / "samples.nc")
     np.testing.assert_allclose(few.transmission_error, data.transmission_error[:2], rtol=1e-3)
     assert planetary_set(again).n_planets == 3
@@ -372,8 +379,12 @@ def test_two_processes_and_an_interrupted_command_give_the_same_bits(case, tmp_p
         samples_into(case, tmp_path, basis, count=20, runner=runner)
     expected = read_dataset(tmp_path / "samples.nc")
     assert not journal.exists()
+    for more in ({}, {"seed": 2}, {"count": 10}):
+        with pytest.raises(StorageError, match=r"E-OUTPUT.*results already"):
+            samples_into(case, tmp_path, basis, **{"count": 20, **more})
+    assert expected.identical(read_dataset(tmp_path / "samples.nc")) and not journal.exists()
     with pytest.raises(KeyboardInterrupt) as ended:
-        samples_into(case, tmp_path, basis, count=20, runner=Interrupted(2))
+        samples_into(case, tmp_path, basis, count=20, runner=Interrupted(2), force=True)
     assert "goes on" in ended.value.__notes__[0] and len(journal.read_bytes().splitlines()) == 3
     # of other samples nothing is taken, and nothing is lost
     for more in ({"seed": 2}, {"exact": True}):
