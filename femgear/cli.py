@@ -473,6 +473,26 @@ def sweep(
     return 0
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Drawn:
+    """Samples that a command draws.
+
+    Parameters
+    ----------
+    number
+        Number of samples.
+    seed
+        Sample i of a seed is the same whatever the number of samples.
+    index
+        Write this sample as a case file, sample_INDEX.toml, and compute none.
+    """
+
+    number: Annotated[int, Parameter(name=("--number", "-n"))] = 1000
+    seed: int = 1
+    index: int | None = None
+
+
 @app.command
 def samples(
     case: Path,
@@ -480,12 +500,10 @@ def samples(
     *,
     tolerances: Path,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    number: Annotated[int, Parameter(name=("--number", "-n"))] = 1000,
-    seed: int = 1,
     positions: int = 16,
     method: Literal["spring", "exact"] = "spring",
-    index: int | None = None,
     force: bool = False,
+    drawn: Drawn | None = None,
     tasks: Tasks | None = None,
 ) -> int:
     """Compute as-built sets: transmission error, load sharing and mesh stiffness over tolerances.
@@ -498,16 +516,10 @@ def samples(
         TOML file of the distributions of errors, as in docs/samples.md.
     output
         Folder of samples.nc, samples.png and worst.toml.
-    number
-        Number of samples.
-    seed
-        Sample i of a seed is the same whatever the number of samples.
     positions
         Of one mesh period.
     method
         Tooth pairs as springs, whose error is stated, or the whole contact problem.
-    index
-        Write this sample as a case file, sample_INDEX.toml, and compute none.
     force
         Replace the results that the folder holds, once the new ones are computed.
     """
@@ -517,6 +529,8 @@ def samples(
     from femgear.study.samples import checked, prepared, sample_case, samples_into
     from femgear.trains.reading import read_case, to_toml
 
+    drawn = drawn or Drawn()
+    number, seed, index = drawn.number, drawn.seed, drawn.index
     checked(number, "--number", 1)
     checked(seed, "--seed", 0, 2**32)
     checked(index or 0, "--index", 0)

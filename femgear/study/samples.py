@@ -542,8 +542,8 @@ def samples_into(
 
     The worst has the largest transmission error. ``basis`` is what `prepared` gives. What there is to say
     comes back with the names of the files; what keeps samples from being computed is raised (`Runner.map`).
-    Blocks of samples are kept in a journal until the end: an interrupted command goes on from it. Results that
-    are complete are refused (StorageError, E-OUTPUT), or replaced with ``force``.
+    Blocks of samples are kept in a journal until the end: an interrupted command goes on from it. Complete
+    results are refused (StorageError, E-OUTPUT), or replaced with ``force``.
     """
     model, text = basis
     checked(count, "--number", 1)
