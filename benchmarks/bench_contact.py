@@ -1,13 +1,16 @@
 """Contact with errors and moving members, Monte Carlo, derivatives; growth over planets and positions."""
 
 from functools import cached_property
+from time import process_time
 
 import numpy as np
 import pytest
+from table import growth
 
 ERRORS = "Errors, floating sun, samples (compliance known)"
 PLANETS = "Contact, 64 positions, over the number of planets (36/24/84)"
 POSITIONS = "Contact over the number of positions (reference set)"
+ELEMENTS = "Compliance and contact, 64 positions, over the elements along a flank (reference set)"
 SAMPLES = 10_000
 
 
@@ -131,8 +134,8 @@ def planets():
 
 
 @pytest.fixture(scope="module")
-def first():
-    """Medians of the first row of every group, which the others are compared with."""
+def medians():
+    """Sizes and medians of the rows of every group so far."""
     return {}
 
 
@@ -145,26 +148,40 @@ def walk(benchmark, gears, bodies, positions, rounds=3):
     )
 
 
-def growth(benchmark, first, group, title, size, cycle):
-    """A row whose note says by how much the time grew against how much the problem did."""
-    # without measurement (--benchmark-disable) there is nothing to compare
-    median = benchmark.stats.stats.median if benchmark.stats is not None else 1.0
-    base, start = first.setdefault(group, (median, size))
-    grown = f"{size / start:.3g} times as much takes {median / base:.2f} times as long"
-    note = f"{cycle.unknowns} pressure cells; {grown}"
-    record(benchmark, title, note)
-
-
-@pytest.mark.benchmark(group=PLANETS)
+@pytest.mark.benchmark(group=PLANETS, timer=process_time)
 @pytest.mark.parametrize("n_planets", [3, 4, 5, 6])
-def test_growth_over_planets(benchmark, planets, first, n_planets):
+def test_growth_over_planets(benchmark, planets, medians, n_planets):
     cycle = walk(benchmark, planets.gears(n_planets), planets.bodies, 64)
     np.testing.assert_allclose(cycle.load_share.mean(axis=1), 1 / n_planets, rtol=1e-2)
-    growth(benchmark, first, PLANETS, f"{n_planets} planets, {2 * n_planets} meshes", n_planets, cycle)
+    note = f"{cycle.unknowns} pressure cells" + growth(benchmark, medians, PLANETS, n_planets)
+    record(benchmark, f"{n_planets} planets, {2 * n_planets} meshes", note)
 
 
-@pytest.mark.benchmark(group=POSITIONS)
+@pytest.mark.benchmark(group=POSITIONS, timer=process_time)
 @pytest.mark.parametrize("positions", [16, 32, 64, 128, 256])
-def test_growth_over_positions(benchmark, reference, first, positions):
+def test_growth_over_positions(benchmark, reference, medians, positions):
     cycle = walk(benchmark, reference.gears, reference.bodies, positions)
-    growth(benchmark, first, POSITIONS, f"{positions} positions", positions, cycle)
+    note = f"{cycle.unknowns} pressure cells" + growth(benchmark, medians, POSITIONS, positions)
+    record(benchmark, f"{positions} positions", note)
+
+
+@pytest.mark.benchmark(group=ELEMENTS, timer=process_time)
+@pytest.mark.parametrize("elements", [12, 24, 48, 96])
+def test_growth_over_flank_elements(benchmark, reference, medians, elements):
+    from femgear.contact.bodies import make_bodies, make_sectors
+    from femgear.contact.cycle import walk_mesh_cycle
+
+    options = {"sun_torque": reference.sun_torque, "positions": 64}
+    sectors = make_sectors(
+        reference.gears, reference.material, flank_elements=elements, cache=reference.cache
+    )
+
+    def still():
+        return walk_mesh_cycle(reference.gears, make_bodies(sectors, reference.material), **options)
+
+    cycle = benchmark.pedantic(still, rounds=3, warmup_rounds=1)
+    assert cycle.residual.max() < 1e-9
+    unknowns = sum(2 * len(one.grid.points) for one in (sectors.sun, sectors.planet, sectors.ring))
+    note = f"{unknowns} unknowns of three sectors, mean stiffness of the sun-planet meshes "
+    note += f"{1e-6 * cycle.stiffness[:3].mean():.1f} N/um" + growth(benchmark, medians, ELEMENTS, elements)
+    record(benchmark, f"{elements} elements along a flank", note)

@@ -6,6 +6,7 @@ from time import process_time
 import numpy as np
 import planet_train as train
 import pytest
+from table import growth
 
 # time of one process on one core: what else the machine does must not count
 pytestmark = pytest.mark.benchmark(timer=process_time)
@@ -147,15 +148,6 @@ def test_growth_over_degrees_of_freedom(benchmark, medians, links):
     record(benchmark, f"{dofs} degrees of freedom", note)
 
 
-def grown(benchmark, medians, group: str, size: int) -> str:
-    """Note of a row of growing work: exponent of the time over the size, from the row before."""
-    if benchmark.stats is None:
-        return ""
-    median, before = benchmark.stats.stats.median, medians.get(group)
-    medians[group] = size, median
-    return f"; growth {np.log(median / before[1]) / np.log(size / before[0]):.2f}" if before else ""
-
-
 @pytest.mark.benchmark(group=SPEEDS, timer=process_time)
 @pytest.mark.parametrize("count", [250, 1000, 4000])
 def test_growth_over_speeds(benchmark, reference, medians, count):
@@ -178,7 +170,7 @@ def test_growth_over_speeds(benchmark, reference, medians, count):
     found = benchmark.pedantic(heard, rounds=3 if count < 4000 else 1, warmup_rounds=1 if count < 4000 else 0)
     assert sum(one.sizes["speed"] for one in found) == count
     parts = f"in {len(found)} parts, with Floquet verdicts, without files"
-    record(benchmark, f"{count} speeds", parts + grown(benchmark, medians, SPEEDS, count))
+    record(benchmark, f"{count} speeds", parts + growth(benchmark, medians, SPEEDS, count))
 
 
 @pytest.mark.benchmark(group=DIAMETERS, timer=process_time)
@@ -190,7 +182,7 @@ def test_growth_over_nodal_diameters(benchmark, reference, medians, most, monkey
     args = (reference.case, reference.static)
     found = benchmark.pedantic(stages.solve_modes, args=args, rounds=5, warmup_rounds=1)
     assert found.max_diameter == most
-    note = f"{len(found.model.system.M)} degrees of freedom" + grown(benchmark, medians, DIAMETERS, most)
+    note = f"{len(found.model.system.M)} degrees of freedom" + growth(benchmark, medians, DIAMETERS, most)
     record(benchmark, f"up to {most} nodal diameters", note)
 
 

@@ -5,8 +5,11 @@ from time import process_time
 
 import numpy as np
 import pytest
+from stages import ROOT
+from table import growth
 
 GROUP = "Helical set of 42 dof: 2000 frequencies, 8 phasing cases, 4 harmonics"
+SLICES = "Dynamics at two speeds of a helical set, over the slices of the face width"
 LIMIT = 2.0
 """Seconds that the sum of modes may take."""
 HERTZ = np.linspace(10.0, 15e3, 2000)
@@ -88,3 +91,29 @@ def test_modes(benchmark):
     kinds = {kind: found.kind.count(kind) for kind in sorted(set(found.kind))}
     note = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
     benchmark.extra_info.update(title="matrices, modes and their kinds (femgear)", note=note)
+
+
+@pytest.fixture(scope="module")
+def helical():
+    """Kahraman's train at two speeds, and its static solution, which slices do not change."""
+    from femgear.trains.helical.stages import solve_helical_static
+    from femgear.trains.reading import read_case, with_value
+
+    case = read_case(ROOT / "cases" / "helical_30_20_70.toml")
+    case = with_value(case, "operation.speeds", ["1000 rpm", "3000 rpm"])
+    return case, solve_helical_static(case)
+
+
+@pytest.mark.benchmark(group=SLICES, timer=process_time)
+@pytest.mark.parametrize("slices", [5, 10, 20, 30])
+def test_growth_over_slices(benchmark, helical, medians, slices):
+    from femgear.trains.helical.stages import solve_helical_dynamics, solve_helical_modes
+    from femgear.trains.reading import with_value
+
+    case = with_value(helical[0], "helical.slices", slices)
+    modes = solve_helical_modes(case, helical[1])
+    found = benchmark.pedantic(solve_helical_dynamics, args=(case, modes), rounds=3, warmup_rounds=1)
+    columns = found.response.deflection.shape[1]
+    assert columns == 2 * found.modes.data.n_planets * slices
+    note = f"{columns} springs, with Floquet verdicts" + growth(benchmark, medians, SLICES, slices)
+    benchmark.extra_info.update(title=f"{slices} slices", note=note)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 BASELINE = "baseline"
 
 HEAD = """# Benchmarks
@@ -13,10 +15,12 @@ process with one BLAS thread. Times are medians. Seconds depend on the machine a
 column *ratio* divides them by the time of a fixed piece of work measured in the same run: factor a Laplacian
 of 160 x 160 points with SciPy's `splu` and solve for 8 right-hand sides ({baseline:.1f} ms here). *Peak* is
 the resident memory of a fresh process at its highest during the stage, *added* how much of it came with the
-stage; both contain the libraries that the stage loads. *Limit* is the time that the project promises. The
-groups on the 18-dof set are those of `benchmarks/planet_train.py`.
+stage; both contain the libraries that the stage loads. *Limit* is the time that the project promises.
+*Growth* is the exponent of the time over the size, fitted to the rows up to that one. The groups on the
+18-dof set are those of `benchmarks/planet_train.py`.
 
-This page is written by `make bench ARGS="--page docs/benchmarks.md"`.
+This page is written by `make bench ARGS="--page docs/benchmarks.md"`; rows of ROSS need `pip install
+"femgear[bench]"`.
 
 """
 
@@ -38,6 +42,16 @@ def rows_of(benchmarks) -> list[Row]:
         for b in benchmarks
         if b.stats.rounds
     ]
+
+
+def growth(benchmark, rows: dict, group: str, size: float) -> str:
+    """Note of a row of growing work: exponent of the time over the size, fitted to the rows of the group."""
+    # without measurement (--benchmark-disable) there is nothing to compare
+    if benchmark.stats is None:
+        return ""
+    found = rows.setdefault(group, [])
+    found.append(np.log([size, benchmark.stats.stats.median]))
+    return f"; growth {np.polyfit(*np.transpose(found), 1)[0]:.2f}" if len(found) > 1 else ""
 
 
 def page(rows: list[Row]) -> str:
