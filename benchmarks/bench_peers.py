@@ -13,7 +13,7 @@ DUFFING = "Peers: parametric Duffing oscillator, 12 harmonics, from one start"
 ROTOR = "Peers: linear rotor of 42 dof with two discs (ROSS's matrices), 4 harmonics"
 COUNT, OMEGA = 12, 1.1
 SPEED, FORCES, TORSION = 300.0, {1: 10.0, 2: 5.0, 4: 2.0}, 1e3
-"""Of the rotor: speed [rad/s], forces that turn with its multiples [N], spring against its twist [N m/rad]."""
+"""Of the rotor: speed [rad/s], forces turning with its multiples [N], spring against its twist [N m/rad]."""
 
 
 @pytest.fixture(scope="module")

@@ -665,7 +665,9 @@ def figure(data: xr.Dataset):
     ste, share = 1e6 * data.transmission_error.values, data.largest_share.values
     found, axes = new_figure(columns=3, width=12.0, height=4.2)
     names = "transmission error, peak to peak [µm]", "largest share of a planet [1]"
-    axes[0].plot(share, ste, ".", markersize=3, alpha=0.3, color=BLUE, rasterized=True)
+    # points of tens of thousands of samples would hide one another
+    counts = axes[0].hexbin(share, ste, gridsize=50, bins="log", mincnt=1, cmap="cividis", linewidths=0.2)
+    found.colorbar(counts, ax=axes[0], label="samples in a cell", pad=0.02, format="%d").minorticks_off()
     worst = int(data.attrs["worst"])
     axes[0].plot(share[worst], ste[worst], "D", color=VERMILION, label=f"worst: sample {worst}")
     label(axes[0], names[1], names[0], f"{len(ste)} samples, seed {data.attrs['seed']}")
