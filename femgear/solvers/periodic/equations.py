@@ -37,7 +37,7 @@ from femgear.solvers.periodic.phase_grid import (
     sample_counts,
 )
 from femgear.solvers.periodic.solution import PeriodicSolution
-from femgear.system.force_laws import Element
+from femgear.system.force_laws import Element, GearMeshes
 from femgear.system.fourier import checked_lines, harmonic_lines, line_tail
 from femgear.system.system import NonlinearSystem
 
@@ -184,6 +184,22 @@ class HarmonicBalance:
         mean = np.zeros_like(static)
         mean[:, 0] = static[:, 0]
         return self.unknowns(-self._respond(value, self.forces(mean)[0]))
+
+    def crossed_start(self, frequency) -> np.ndarray | None:
+        """Compute `linear_start` with meshes that the mean load pulls apart on their back flanks.
+
+        None where there is no such mesh: between both flanks nothing tells Newton's method the way.
+        """
+        lines, found = self.lines(self.linear_start(frequency)), False
+        for mesh in self.elements:
+            if isinstance(mesh, GearMeshes) and mesh.separates:
+                column, (deflection, force) = mesh.columns.ravel(), mesh.state
+                carried = force.mean + mesh.stiffness.mean * (np.real(lines[column, 0]) - deflection.mean)
+                backlash = np.asarray(mesh.backlash)
+                pulled = (carried < 0.0) & np.isfinite(backlash)
+                lines[column[pulled], 0] -= backlash[pulled]
+                found |= bool(pulled.any())
+        return self.unknowns(lines) if found else None
 
     def solution(
         self, y, frequency, *, radius: bool = False, forces: Any = None, **what_happened

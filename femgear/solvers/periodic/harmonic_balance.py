@@ -33,6 +33,8 @@ from femgear.system.system import NonlinearSystem
 _SHORTEST, _DECREASE, _FORCED = 1.0 / 256.0, 1e-4, 5
 # Steps of the embedding: first length, shortest, longest (unit: the whole change), and how many.
 _FIRST, _LEAST, _LONGEST, _STEPS = 0.1, 1e-5, 0.5, 400
+# Tolerance below which rounding of the residual is not followed.
+_FINEST = 1e-14
 
 
 def solve_harmonic_balance(
@@ -56,8 +58,9 @@ def solve_harmonic_balance(
         Base frequencies [rad/s], not negative.
     start : PeriodicSolution or (n_columns, L) complex array, optional
         Where to start. Which of several solutions is found depends on it. When not given, the response with
-        reference springs; where Newton's method fails from there, that response is followed while the
-        springs turn into the elements, and the message says so.
+        reference springs; where Newton's method fails from there, the same with meshes that the load pulls
+        apart on their back flanks, and then that response is followed while the springs turn into the
+        elements, and the message says so.
     tolerance : float
         Largest residual relative to the largest deflection.
     max_iterations : int
@@ -90,6 +93,12 @@ def solve_harmonic_balance(
     wanted = {"tolerance": checked_tolerance(tolerance), "radius": stability if radius is None else radius}
     wanted["max_iterations"] = checked_count(max_iterations, "max_iterations", code="E-RANGE")
     found = _newton(balance, frequency, _start(balance, frequency, start), **wanted)
+    crossed = balance.crossed_start(frequency) if start is None and not found.converged else None
+    if crossed is not None:
+        # the play counts in the deflections, of which the residual is a share, and not in the forces
+        finer = max(balance.scale / np.abs(crossed).max(), _FINEST / wanted["tolerance"])
+        finer = wanted | {"tolerance": wanted["tolerance"] * min(finer, 1.0)}
+        found = _newton(balance, frequency, crossed, **finer)
     if start is None and not found.converged:
         found = _embed(balance, frequency, found, **wanted)
     if note := coincidence_note(balance.orders, frequency):
