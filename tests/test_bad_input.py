@@ -14,7 +14,7 @@ from femgear.cli import main
 from femgear.contact.bodies import flank_load_columns, flank_stations, make_sectors
 from femgear.contact.solve import solve_contact
 from femgear.errors import CaseError, ContactError, FemgearError, GridError
-from femgear.fe.compliance import condense_sector, dof_pairs, interpolation
+from femgear.fe.compliance import condense_sector, interpolation, node_dofs
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror
 from femgear.fe.meshing import mesh_outline
@@ -243,7 +243,7 @@ def test_loads_and_points_outside_the_flank(sun):
     assert caught.value.code == "E-GRID" and f"{beyond[0, 0]:.6g}" in str(caught.value)
     assert caught.value.remedy
     loads = flank_load_columns(grid, flank_stations(grid, gear))
-    loads[dof_pairs(np.unique(grid.boundaries["cut_left"]))] = 1.0
+    loads[node_dofs(np.unique(grid.boundaries["cut_left"]))] = 1.0
     with pytest.raises(GridError) as caught:
         condense_sector(grid, matrix, count=27, rim="rim", loads=loads, observations=loads).supported()
     assert caught.value.code == "E-GRID"

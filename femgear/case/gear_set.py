@@ -41,7 +41,10 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import (
+    EndRelief,
     FlankForm,
+    LeadCrowning,
+    LeadSlope,
     MeasuredProfile,
     Modification,
     ProfileCrowning,
@@ -322,6 +325,12 @@ def _modification(section: ModificationSection, gear: Gear) -> Modification:
             return relief(amount, start or 0.0, end, section.exponent)
         case "profile slope":
             return ProfileSlope(amount, start, end)
+        case "lead slope":
+            return LeadSlope(amount)
+        case "lead crowning":
+            return LeadCrowning(amount)
+        case "end relief":
+            return EndRelief(amount, section.length or 0.0)
         case _:
             return ProfileCrowning(amount, start, end)
 

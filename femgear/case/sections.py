@@ -78,6 +78,7 @@ Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM, remedy=_OTHER_FL
 
 _MEASURED = ("file", "roll_angles", "diameters", "deviations")
 _PLACES = ("diameter", "roll_angle", "roll_length")
+OVER_WIDTH = ("lead slope", "lead crowning", "end relief")
 
 
 class ModificationSection(Section):
@@ -87,8 +88,12 @@ class ModificationSection(Section):
     deviations of a measured profile are positive where there is more material, as measuring machines draw.
     """
 
-    kind: Literal["tip relief", "root relief", "profile slope", "profile crowning", "measured profile"]
+    kind: Literal[
+        "tip relief", "root relief", "profile slope", "profile crowning", "measured profile",
+        "lead slope", "lead crowning", "end relief",
+    ]  # fmt: skip
     amount: Deviation | None = None
+    length: Annotated[float, Quantity(LENGTH, 1e-5, 2.5)] | None = None
     start_diameter: Diameter | None = None
     start_roll_angle: RollAngle | None = None
     start_roll_length: RollLength | None = None
@@ -105,10 +110,12 @@ class ModificationSection(Section):
     @model_validator(mode="after")
     def _belongs_together(self):
         measured = self.kind == "measured profile"
-        relief = self.kind.endswith("relief")
+        relief, over_width = self.kind in ("tip relief", "root relief"), self.kind in OVER_WIDTH
         starts, ends = ([f"{end}_{place}" for place in _PLACES] for end in ("start", "end"))
         unused = self.given("amount", *starts, *ends) if measured else self.given(*_MEASURED)
+        unused += self.given(*starts, *ends) if over_width else []
         unused += [] if relief else self.given("shape", "power")
+        unused += [] if self.kind == "end relief" else self.given("length")
         if unused:
             message = f"a {self.kind} has no {' and no '.join(unused)}"
             raise CaseError(message, code="E-MODIFICATION", remedy=f"leave out {', '.join(unused)}")
@@ -118,6 +125,8 @@ class ModificationSection(Section):
             raise CaseError(
                 f"a {self.kind} needs its amount", code="E-KEY-MISSING", remedy='amount = "10 um"'
             )
+        elif self.kind == "end relief" and self.length is None:
+            raise CaseError("an end relief needs its length", code="E-KEY-MISSING", remedy='length = "3 mm"')
         elif relief and not self.given(*starts):
             remedy = "give start_diameter, start_roll_angle or start_roll_length"
             raise CaseError(f"a {self.kind} needs its start", code="E-KEY-MISSING", remedy=remedy)
@@ -384,6 +393,7 @@ class StaticSection(Section):
     stresses: StrictBool = True
     longest_record: Annotated[int, Count(1, 4096)] = 256
     depth: Annotated[float, Quantity(LENGTH, 1e-6, 0.1)] | None = None
+    slices: Annotated[int, Count(0, 200)] = 0
 
 
 class DynamicsSection(Section):

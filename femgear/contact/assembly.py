@@ -265,7 +265,7 @@ class Candidates:
             own, other = getattr(self.bodies, name), getattr(bodies, name)
             parts[name] = None if own is other else replace(other, regular=other.regular - own.regular)
         differing = replace(bodies, **parts)
-        return self.images + _smooth_part(self.setup, differing, self.position, self.mesh, self.pair)
+        return self.images + body_compliance(self.setup, differing, self.position, self.mesh, self.pair)
 
     def touches_window_end(self, active: np.ndarray) -> bool:
         """Whether a contact (P, W, C) ends where its window ends, other than at an end of a flank."""
@@ -532,7 +532,7 @@ def contact_candidates(
         candidate=candidate,
         polynomials=polynomials,
         local=local,
-        images=_smooth_part(setup, bodies, positions, mesh, pair),
+        images=body_compliance(setup, bodies, positions, mesh, pair),
         approach=approach,
         supports=supports,
     )
@@ -545,7 +545,7 @@ def assemble_contact(
     return contact_candidates(setup, bodies, [position], members).problem(0)
 
 
-def _smooth_part(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> np.ndarray:
+def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> np.ndarray:
     """Regular compliance between the nodes of all windows, as `Candidates.images` has it."""
     N, (P, W) = setup.n_planets, pair.shape
     smooth = np.zeros((setup.images, P, W, 3, W, 3))

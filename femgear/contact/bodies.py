@@ -195,7 +195,9 @@ def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:
     ring = bodies.ring
     assert ring.free is not None
     compliance, surface = _seen(ring.free.supported(ring_foundation), len(ring.roll))
-    return replace(bodies, ring=replace(ring, regular=_regular(compliance, ring.local), surface=surface))
+    return replace(
+        bodies, ring=replace(ring, regular=regular_compliance(compliance, ring.local), surface=surface)
+    )
 
 
 def flank_compliance(
@@ -229,8 +231,7 @@ def flank_compliance(
     CaseError
         When the depth reaches out of the tooth or the sector can move freely.
     """
-    stations = flank_stations(grid, gear)
-    depths, loads, observations = _observed(grid, gear, stations, depth)
+    stations, depths, loads, observations = observed_flanks(grid, gear, depth)
     along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
     observations = np.hstack([observations, loads if along is None else along.columns])
     free = condense_sector(
@@ -330,14 +331,16 @@ def station_weights(roll, stations):
     return first[..., None] + np.arange(4), weight
 
 
-def _observed(grid, gear, stations, depth) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Joining depths (n, 1) [m], unit loads (2n, n) and what both depths tell of the surface, (2n, n)."""
+def observed_flanks(grid, gear, depth=None):
+    """Find stations, depths (n, 1) [m], unit loads (2n, n), and what both depths tell of the surface."""
+    stations = flank_stations(grid, gear)
     depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
     _check_depth(depth, stations)
     once, twice = (
         interpolation(grid, stations.points + factor * depths * stations.normals) for factor in (1.0, 2.0)
     )
-    return depths, flank_load_columns(grid, stations), directional(2.0 * once - twice, stations.normals)
+    seen = directional(2.0 * once - twice, stations.normals)
+    return stations, depths, flank_load_columns(grid, stations), seen
 
 
 def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:
@@ -357,7 +360,7 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> 
     return FlankCompliance(
         roll=stations.roll,
         base_radius=gear.base_radius,
-        regular=_regular(compliance, local),
+        regular=regular_compliance(compliance, local),
         depth=depths[:, 0],
         corner=corner,
         local=local,
@@ -365,7 +368,7 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> 
     )
 
 
-def _regular(compliance: np.ndarray, local: np.ndarray) -> np.ndarray:
+def regular_compliance(compliance: np.ndarray, local: np.ndarray) -> np.ndarray:
     """Compliance (teeth, 2n, 2n) without the local part (n, n) on the same flank, made reciprocal [m/N]."""
     regular, n = compliance.copy(), len(local)
     for side in (LEFT, RIGHT):

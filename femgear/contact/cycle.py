@@ -24,8 +24,9 @@ from femgear.contact.assembly import (
     in_windows,
     mesh_windows,
 )
-from femgear.contact.batch import BatchState, ContactTangents, check_definite, solve_batch
+from femgear.contact.batch import BatchState, ContactTangents, check_definite, pair_laws, solve_batch
 from femgear.contact.bodies import Bodies
+from femgear.contact.slices import WidthWaves, solve_slices
 from femgear.contact.supports import (
     RIGID,
     BearingSprings,
@@ -36,7 +37,7 @@ from femgear.contact.supports import (
     pin_forces,
 )
 from femgear.errors import ContactError
-from femgear.gears.deviations import SetDeviations, mirrored_deviations
+from femgear.gears.deviations import SetDeviations, lead_separation, mirrored_deviations
 from femgear.gears.kinematics import rotation_approach
 from femgear.gears.planetary import PlanetarySet, mirrored_set
 
@@ -44,6 +45,8 @@ LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""
 _TOGETHER = 64
 """Positions that are solved at once."""
+_FORCES, _LEAST = 64, 1e-4
+"""Of the curves of tooth pairs in slices: their number, and the share of the torque at which they begin."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,11 @@ class CycleOptions:
     held_bodies : Bodies, optional
         The bodies with the ring held at its outer surface: keep stiffness and compliance between all meshes
         of the same contact with these bodies.
+    waves, held_waves : WidthWaves, optional
+        Solve the contact in slices over the width, whose bodies these are, and `held_bodies`; drive flanks
+        alone, and no clearance in the bearings of planets.
+    slices : int
+        Their number.
     progress : callable, optional
         Called with (positions done, positions).
     """
@@ -73,6 +81,9 @@ class CycleOptions:
     both_flanks: bool = False
     pressures: bool = False
     held_bodies: Bodies | None = None
+    waves: WidthWaves | None = None
+    held_waves: WidthWaves | None = None
+    slices: int = 1
     progress: Callable[[int, int], None] | None = None
 
 
@@ -144,6 +155,8 @@ class MeshCycle:
     held_compliance : (2N, 2N, P) array, optional
         Tangent compliance between the meshes through their common bodies, the ring held, supports left out
         [m/N]; zero where a mesh carries nothing.
+    slice_load : (2N, T, S, P) array, optional
+        Load of each tooth pair in equal slices of the width, times their number [N].
     """
 
     position: np.ndarray
@@ -175,6 +188,24 @@ class MeshCycle:
     pressure_centre: np.ndarray | None = None
     held_stiffness: np.ndarray | None = None
     held_compliance: np.ndarray | None = None
+    slice_load: np.ndarray | None = None
+
+    @property
+    def face_load_factor(self) -> np.ndarray | None:
+        """K_H-beta of every mesh (2N,): largest load per width of a tooth pair over the mean of that pair.
+
+        At the position where the load per width is largest; towards the ends of the width it goes on as
+        between the last two slices.
+        """
+        if self.slice_load is None:
+            return None
+        load = self.slice_load
+        ends = 1.5 * load[:, :, [0, -1]] - 0.5 * load[:, :, [1, -2]]
+        largest = np.concatenate([load, ends], axis=2).max(axis=2).reshape(len(load), -1)
+        at = largest.argmax(axis=1)[:, None]
+        mean = np.take_along_axis(load.mean(axis=2).reshape(len(load), -1), at, axis=1)
+        largest = np.take_along_axis(largest, at, axis=1)
+        return np.divide(largest, mean, out=np.ones(mean.shape), where=mean > 0)[:, 0]
 
     @property
     def overall_deflection(self) -> np.ndarray:
@@ -217,8 +248,9 @@ _AXES = {
     "mmt": ("held_compliance",),
     "msct": ("pressure",),
     "mc": ("pressure_offset",),
+    "mswt": ("slice_load",),
 }
-"""Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, position (time)."""
+"""Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, slice w, position t."""
 _ODD = ("path", "back_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
 """What counts the other way round in the mirror image."""
 
@@ -301,7 +333,7 @@ def walk_mesh_cycle(
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
         springs, images = bearing_springs(solved, supports, members), 1
-        if springs is None and options.planet_gaps is None and not options.both_flanks:
+        if springs is None and options.planet_gaps is None and not options.both_flanks and not options.waves:
             images = math.gcd(planet_symmetry(solved, deviations), solved.sun.teeth)
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
         walk = _Walk(solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options)
@@ -324,13 +356,15 @@ def cycle_without_load(
     pressures, and in how many cells.
     """
     options, N, P = options or CycleOptions(), n_planets, len(position)
-    size = {"g": 2, "m": 2 * N, "n": N, "s": 1, "c": options.cells, "t": P}
+    size = {"g": 2, "m": 2 * N, "n": N, "s": 1, "c": options.cells, "w": options.slices, "t": P}
     kinds = {"tooth": int, "back_tooth": int, "iterations": int, "edge_contact": bool}
     values: dict[str, Any] = {
         name: np.zeros([size[axis] for axis in axes], kinds.get(name, float))
         for axes, names in _AXES.items()
         for name in names
-        if not name.startswith("held") and (options.pressures or name not in _PRESSURES)
+        if not name.startswith("held")
+        and (options.pressures or name not in _PRESSURES)
+        and (options.waves is not None or name != "slice_load")
     }
     values["open_planets"] = np.ones((N, P), bool)
     return MeshCycle(
@@ -453,6 +487,9 @@ class _Walk:
             load[setup.n_planets] = self.sun_torque / self.planetary_set.sun.base_radius / self.images
             state = solve_batch(candidates, load, self.springs)
             found.append(self._at_positions(candidates, state))
+            if options.waves is not None:
+                found[-1] |= self._over_width(candidates, state, load, found[-1])
+                overflow |= found[-1].pop("overflow")
             missed = setup.missed(some, found[-1]["deflection"])
             if empty.contact == "profile" and (missed > nearest).any():
                 return None, share, 1.2 * missed[missed > nearest][0]
@@ -462,7 +499,8 @@ class _Walk:
                 options.progress(int(some[-1]) + 1, P)
         record = self._record(found, setup, unknowns)
         if overflow:
-            share = enlarged(share, max(record.force.max(), record.back_force.max()))
+            largest = 0.0 if record.slice_load is None else record.slice_load.max()
+            share = enlarged(share, max(record.force.max(), record.back_force.max(), largest))
         return record, share, nearest
 
     def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
@@ -510,6 +548,50 @@ class _Walk:
             between, (every, sector) = np.fft.irfft(coupling, n=self.images, axis=0), self._places
             away = (sector - sector[:, None]) % self.images
             values["held_compliance"] = between[away, :, every[:, None], every]
+        return values
+
+    def _over_width(
+        self, found: Candidates, state: BatchState, load, plane: dict[str, Any]
+    ) -> dict[str, Any]:
+        """What slices change in the plane solution of some positions, by the names of `MeshCycle`."""
+        options, N, members, W = self.options, self.sector.n_planets, self.members, len(found.mesh)
+        assert options.waves is not None
+        curves = np.geomspace(_LEAST * load[N] / N, 4.0 * load[N], _FORCES)
+        lead = np.zeros((2, options.slices))
+        if self.deviations is not None:
+            lead = lead_separation(self.deviations, self.sector, options.slices)
+        apart = np.broadcast_to(lead[found.mesh // N].T, (len(found.position), options.slices, W))
+        held = None
+        if options.held_bodies is not None and options.held_waves is not None:
+            held = found.images_of(options.held_bodies).sum(axis=0), options.held_waves
+        laws = pair_laws(found, state, curves)
+        sliced = solve_slices(found, laws, load, options.waves, apart, held)
+        force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
+        motion = np.zeros((len(members.names), len(found.position)))
+        motion[members.free] = sliced.motions.T[N + 1 :]
+        motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung, None]
+        largest, before = sliced.of_meshes().max(axis=1).T, plane["force"]
+        raised = np.divide(largest, before, out=np.zeros(before.shape), where=before > 0)
+        # tangents of the springs change; what they begin at is that of the cells
+        values: dict[str, Any] = {
+            "deflection": rotation_approach(N) @ sliced.motions.T[: N + 1] + members.approach @ motion,
+            "sun_arc": sliced.motions[:, N],
+            "force": force,
+            "member_motion": motion,
+            "tooth_load": found.by_pairs(sliced.force.mean(axis=1)),
+            "slice_load": found.by_pairs(sliced.force.swapaxes(1, 2)),
+            # Hertz: the pressure of a slice grows with the root of its load
+            "max_pressure": plane["max_pressure"] * np.sqrt(raised),
+            "iterations": plane["iterations"] + sliced.iterations,
+            "overflow": sliced.overflows(found, laws),
+        }
+        for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
+            values[name] = plane[name] + tangent.T
+        if held is not None:
+            loaded, between = (force > 0).all(axis=0), np.moveaxis(plane["held_compliance"], -1, 0).copy()
+            changed = np.linalg.inv(between[loaded]) + sliced.tangents[1][loaded]
+            between[loaded] = np.linalg.inv(changed)
+            values["held_compliance"] = np.moveaxis(between, 0, -1)
         return values
 
     def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:

@@ -235,7 +235,7 @@ def profile_form(
 
     `kind` is 0 for the sun-planet and 1 for the planet-ring meshes.
     """
-    if deviations is None or not any(form.modifications for form in deviations.mesh_forms(kind, back)):
+    if deviations is None or not any(form.profile for form in deviations.mesh_forms(kind, back)):
         return None
     return lambda roll_1, roll_2: profile_separation(
         deviations, planetary_set, kind, roll_1, roll_2, back=back

@@ -9,8 +9,7 @@ computed once and the equal planets are equal to rounding.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import gcd
 
 import numpy as np
@@ -96,7 +95,7 @@ def loaded_period(
     contact: str = "profile",
     deviations: SetDeviations | None = None,
     supports: Supports = RIGID,
-    progress: Callable[[int, int], None] | None = None,
+    options: CycleOptions | None = None,
 ) -> LoadedPeriod:
     """Compute the loaded state over one mesh period for errors that stand still in the carrier's frame.
 
@@ -104,11 +103,14 @@ def loaded_period(
     ----------
     planetary_set, bodies, sun_torque, contact, deviations, supports
         As for `walk_mesh_cycle`.
-    held_bodies, progress
+    held_bodies
         See `CycleOptions`.
     positions : int
         Positions over the period at least; more come where the stiffness jumps or is steep.
+    options : CycleOptions, optional
+        Slices over the width, and who is told of the progress.
     """
+    options = replace(options or CycleOptions(), held_bodies=held_bodies)
     symmetry = planet_symmetry(planetary_set, deviations)
     parts = symmetry // gcd(symmetry, planetary_set.sun.teeth)
     first = -(-positions // parts)
@@ -123,7 +125,7 @@ def loaded_period(
             contact=contact,
             deviations=deviations,
             supports=supports,
-            options=CycleOptions(held_bodies=held_bodies, progress=progress),
+            options=options,
         )
         found = _record(cycle, planetary_set.base_pitch)
         if record:

@@ -36,13 +36,16 @@ class SectorSchur:
     count : int
         Number of sectors in the body.
     stiffness : (2, nb, nb) array
-        Schur complements for displacements of the left cut, radial and tangential node by node [N/m].
+        Schur complements for displacements of the left cut, node by node radial, tangential and, of three
+        components, axial [N/m].
     compliance : (2, n_observations, n_loads) array
         With the cut held [m/N].
     load_cut : (2, nb, n_loads) array
         Forces on the held cut per unit load.
     observation_cut : (2, nb, n_observations) array
         Observations per unit displacement of the cut.
+    components : int
+        Of the displacement of a node.
     """
 
     count: int
@@ -50,6 +53,7 @@ class SectorSchur:
     compliance: np.ndarray
     load_cut: np.ndarray
     observation_cut: np.ndarray
+    components: int = 2
 
     def observed(self, some: slice) -> SectorSchur:
         """Give the same sector with some of the observations."""
@@ -88,6 +92,8 @@ class FreeSector:
         Number of those of the cut.
     sizes : (int, int)
         Number of loads and of observations.
+    components : int
+        Of the displacement of a node.
     """
 
     count: int
@@ -96,6 +102,7 @@ class FreeSector:
     schur: tuple[np.ndarray, ...]
     cut: int
     sizes: tuple[int, int]
+    components: int = 2
 
     def supported(self, foundation=None) -> SectorSchur:
         """Hold the rim, or put the sector on a foundation, a sparse matrix (2n, 2n) on the rim [N/m]."""
@@ -113,7 +120,8 @@ class FreeSector:
             nb = len(schur) - len(f) - len(d)
             K, P, C = schur[:nb, :nb], schur[:nb, nb:], -schur[nb:, nb:]
             parts.append((0.5 * (K + K.T), C[np.ix_(d, f)], P[:, f], P[:, d]))
-        return SectorSchur(self.count, *(np.stack(part) for part in zip(*parts, strict=True)))
+        parts = (np.stack(part) for part in zip(*parts, strict=True))
+        return SectorSchur(self.count, *parts, components=self.components)
 
 
 def symmetric_factor(matrix, *, ordering: str = "MMD_AT_PLUS_A") -> SuperLU:
@@ -135,10 +143,9 @@ def symmetric_factor(matrix, *, ordering: str = "MMD_AT_PLUS_A") -> SuperLU:
         ) from error
 
 
-def dof_pairs(nodes) -> np.ndarray:
-    """Degrees of freedom (x then y, node by node) of an array of nodes."""
-    nodes = np.asarray(nodes)
-    return (2 * nodes[:, None] + np.array([0, 1])).ravel()
+def node_dofs(nodes, components: int = 2) -> np.ndarray:
+    """Degrees of freedom (x, y and, of three components, z, node by node) of an array of nodes."""
+    return (components * np.asarray(nodes)[:, None] + np.arange(components)).ravel()
 
 
 def boundary_nodes(grid: Grid, name: str) -> np.ndarray:
@@ -245,8 +252,8 @@ def condense_sector(
     ----------
     grid : Grid
         Sector with boundaries ``cut_left``, ``cut_right`` and `rim`.
-    stiffness : (2n, 2n) sparse matrix
-        [N/m].
+    stiffness : (2n, 2n) or (3n, 3n) sparse matrix
+        [N/m]; of three components as `femgear.fe.elasticity.wave_stiffness` gives it.
     count : int
         Number of sectors.
     rim : str or None
@@ -262,16 +269,17 @@ def condense_sector(
         A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
     cut = np.concatenate([boundary_nodes(grid, f"cut_{side}") for side in ("right", "left")])
-    check_loads(loads, dof_pairs(cut))
+    components = stiffness.shape[0] // grid.n_nodes
+    check_loads(loads, node_dofs(cut, components))
     columns = csc_array(np.hstack([loads, observations]))
-    nodes = dof_pairs(boundary_nodes(grid, rim)) if rim else []
+    nodes = node_dofs(boundary_nodes(grid, rim), components) if rim else []
     edges, on_rim, schurs = [], [], []
-    for fields, inner in _half_sector_fields(grid, None, rim):
+    for fields, inner in _half_sector_fields(grid, None, rim, components):
         schurs.append(_schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner))
         edges.append(fields[:, inner:])
         on_rim.append(abs(csr_array(edges[-1])[nodes]).sum(axis=0) > 0)
-    nb, sizes = 2 * len(boundary_nodes(grid, "cut_left")), (loads.shape[1], observations.shape[1])
-    return FreeSector(count, tuple(edges), tuple(on_rim), tuple(schurs), nb, sizes)
+    nb, sizes = components * len(boundary_nodes(grid, "cut_left")), (loads.shape[1], observations.shape[1])
+    return FreeSector(count, tuple(edges), tuple(on_rim), tuple(schurs), nb, sizes, components)
 
 
 def check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
@@ -292,7 +300,9 @@ def _check_residual(residual: float) -> None:
         )
 
 
-def _half_sector_fields(grid: Grid, held: str | None, last: str | None = None) -> list[tuple[csc_array, int]]:
+def _half_sector_fields(
+    grid: Grid, held: str | None, last: str | None = None, components: int = 2
+) -> list[tuple[csc_array, int]]:
     """Symmetric and antisymmetric displacements of a sector from those of its left half.
 
     Matrices (2n, m) from the unknowns of the half sector, in an order that keeps their factor sparse and the
@@ -312,20 +322,23 @@ def _half_sector_fields(grid: Grid, held: str | None, last: str | None = None) -
     inner = np.flatnonzero(left)
     inner = np.concatenate([inner[_sparse_order(grid.triangles, inner, len(points))], rim])
     cos, sin = points[cut].T / np.hypot(*points[cut].T)
-    # unknowns of the inner nodes, then radial and tangential ones of the cut
-    rows = [dof_pairs(inner), *(np.repeat(2 * cut + c, 2) for c in (0, 1))]
-    at, on_cut = np.split(np.arange(2 * len(inner) + 2 * len(cut)), [2 * len(inner)])
-    values = [np.ones(len(at)), np.column_stack([cos, -sin]).ravel(), np.column_stack([sin, cos]).ravel()]
-    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate([at, on_cut, on_cut]))
-    half = csr_array(entries, shape=(2 * len(points), len(at) + len(on_cut)))
+    # unknowns of the inner nodes, then radial, tangential and axial ones of the cut
+    turn = np.zeros((len(cut), components, components)) + np.eye(components)
+    turn[:, :2, :2] = np.stack([cos, -sin, sin, cos], axis=-1).reshape(-1, 2, 2)
+    at, on_cut = np.split(np.arange(components * (len(inner) + len(cut))), [components * len(inner)])
+    rows = np.concatenate([node_dofs(inner, components), np.repeat(node_dofs(cut, components), components)])
+    columns = np.tile(on_cut.reshape(-1, 1, components), (1, components, 1))
+    entries = np.append(np.ones(len(at)), turn), (rows, np.append(at, columns))
+    half = csr_array(entries, shape=(components * len(points), len(at) + len(on_cut)))
     # of a node on the centre line both are one displacement, and the other one is zero
-    once = diags_array(1.0 / np.repeat(1.0 + on_axis, 2))
+    once = diags_array(1.0 / np.repeat(1.0 + on_axis, components))
+    mirrored = np.array([1.0, -1.0, 1.0])[:components]
     found = []
     for sign in (1.0, -1.0):
-        reflected = diags_array(np.tile([sign, -sign], len(points))) @ half[dof_pairs(image)]
+        reflected = diags_array(np.tile(sign * mirrored, len(points))) @ half[node_dofs(image, components)]
         fields = csc_array(once @ (half + reflected))
         moved = np.flatnonzero(abs(fields).sum(axis=0))
-        found.append((fields[:, moved], int((moved < len(at) - 2 * len(rim)).sum())))
+        found.append((fields[:, moved], int((moved < len(at) - components * len(rim)).sum())))
     return found
 
 
@@ -425,16 +438,18 @@ def half_sectors(grid: Grid, stiffness, held: str | None) -> list[HalfSector]:
     ]
 
 
-def cut_ties(nodal_diameter: float, count: int, size: int) -> np.ndarray:
+def cut_ties(nodal_diameter: float, count: int, size: int, components: int = 2) -> np.ndarray:
     """Displacements (2, size) of a cut per unit of ``w``: symmetric ones, antisymmetric ones over ``i``."""
     turn = np.pi * nodal_diameter / count
-    ties = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    return np.tile(ties, size // 2)
+    cos, sin = np.cos(turn), np.sin(turn)
+    # what moves along the axis is tied as what moves radially: the mirror turns neither round
+    ties = np.array([[cos, -sin, cos], [sin, cos, sin]])[:, :components]
+    return np.tile(ties, size // components)
 
 
 def _tied(schur: SectorSchur, n) -> tuple[np.ndarray, np.ndarray]:
     """Ties (2, nb, 1) of a harmonic, and the stiffness (nb, nb) of its ``w`` [N/m]."""
-    ties = cut_ties(n, schur.count, schur.stiffness.shape[1])[..., None]
+    ties = cut_ties(n, schur.count, schur.stiffness.shape[1], schur.components)[..., None]
     return ties, (ties * schur.stiffness * ties.transpose(0, 2, 1)).sum(axis=0)
 
 

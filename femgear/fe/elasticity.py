@@ -110,6 +110,40 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
     return K
 
 
+def wave_stiffness(grid: Grid, material: Material, *, state="plane strain") -> tuple:
+    """Assemble the stiffness of plane waves across the width, of a body of unit thickness.
+
+    Displacements ``(U cos kz, V cos kz, W sin kz)`` of all wave numbers k [1/m] are independent of one
+    another; the stiffness of one is ``K0 + k K1 + k^2 K2`` (O. C. Zienkiewicz and R. L. Taylor, "The Finite
+    Element Method", semi-analytical elements).
+
+    Returns
+    -------
+    three scipy.sparse.csc_array, shape (3n, 3n)
+        [N/m^2], [N/m], [N], for degrees of freedom ``3 * node + component``.
+    """
+    scalar, m = basis(grid), len(grid.triangles)
+    lam, mu = material.lame(state)
+    slopes = np.array([[*np.asarray(field.grad), field] for (field,) in scalar.basis]) * np.sqrt(scalar.dx)
+    slopes = slopes.transpose(2, 0, 1, 3).reshape(m, 18, -1)
+    # [e, i, a, j, b]: integral of a of N_i times b of N_j, of d/dx, d/dy, 1
+    products = (slopes @ slopes.transpose(0, 2, 1)).reshape(m, 6, 3, 6, 3)
+    local = np.zeros((3, m, 6, 3, 6, 3))
+    for a in range(3):
+        for b in range(3):
+            power = (a == 2) + (b == 2)
+            local[power, :, :, a, :, b] += lam * products[:, :, a, :, b]
+            # the axial slope of what goes with the cosine is minus its sine
+            turned = -mu if power == 1 else mu
+            local[power, :, :, a, :, b] += turned * products[:, :, b, :, a]
+            local[2 * (b == 2), :, :, a, :, a] += mu * products[:, :, b, :, b]
+    dofs = (3 * _element_nodes(grid, scalar)[..., None] + np.arange(3)).reshape(m, 18)
+    rows, columns = np.repeat(dofs, 18, axis=1).ravel(), np.tile(dofs, (1, 18)).ravel()
+    shape = (3 * grid.n_nodes,) * 2
+    found = (scipy.sparse.csc_array((one.ravel(), (rows, columns)), shape=shape) for one in local)
+    return tuple(0.5 * (K + K.T).tocsc() for K in found)
+
+
 def mass(grid: Grid, material: Material, thickness=1.0):
     """Assemble the consistent mass matrix, shape (2n, 2n) [kg]; arguments as in `stiffness`."""
     scalar = basis(grid)

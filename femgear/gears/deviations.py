@@ -21,7 +21,7 @@ import numpy as np
 
 from femgear.gears.gear import Gear, GeometryWarning
 from femgear.gears.kinematics import mesh_normals, orientations
-from femgear.gears.modifications import FlankForm, check_flank, form_deviation
+from femgear.gears.modifications import FlankForm, check_flank, form_deviation, lead_deviation
 from femgear.gears.planetary import PlanetarySet
 
 LONGEST_RECORD = 256
@@ -206,6 +206,19 @@ def profile_separation(
     one, two = deviations.mesh_forms(kind, back)
     gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
     return form_deviation(one, gears[0], roll_1) + form_deviation(two, gears[1], roll_2)
+
+
+def lead_separation(deviations: SetDeviations, planetary_set: PlanetarySet, slices: int) -> np.ndarray:
+    """Compute the separation (2, slices) [m] of sun-planet and planet-ring flanks over the width.
+
+    Means over equal slices, by the modifications of both flanks along the lead.
+    """
+    s, fine = planetary_set, 16
+    width = s.sun.face_width
+    place = width * ((np.arange(slices * fine) + 0.5) / (slices * fine) - 0.5)
+    meshes = (deviations.mesh_forms(kind, back=False) for kind in (0, 1))
+    found = [lead_deviation(one, width, place) + lead_deviation(two, width, place) for one, two in meshes]
+    return np.array(found).reshape(2, slices, fine).mean(axis=2)
 
 
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):

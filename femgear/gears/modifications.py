@@ -96,7 +96,38 @@ class MeasuredProfile:
     removed: tuple[float, ...]
 
 
-Modification = TipRelief | RootRelief | ProfileSlope | ProfileCrowning | MeasuredProfile
+@dataclass(frozen=True)
+class LeadSlope:
+    """Flank turned about the middle of its width.
+
+    The amount [m] is the rise from one end to the other, positive where the end z > 0 has more material (the
+    sign of f_H-beta in ISO 1328-1).
+    """
+
+    amount: float
+
+
+@dataclass(frozen=True)
+class LeadCrowning:
+    """Barrelling over the width: a parabola that takes the amount C_beta (ISO 21771-1) off at both ends."""
+
+    amount: float
+
+
+@dataclass(frozen=True)
+class EndRelief:
+    """Material taken off at both ends of the width: ``amount (1 - e/length)^2`` at a distance e from them.
+
+    Amount at the ends [m], and length of either relief [m] (ISO 21771-1).
+    """
+
+    amount: float
+    length: float
+
+
+ProfileModification = TipRelief | RootRelief | ProfileSlope | ProfileCrowning | MeasuredProfile
+LeadModification = LeadSlope | LeadCrowning | EndRelief
+Modification = ProfileModification | LeadModification
 
 
 @dataclass(frozen=True)
@@ -104,6 +135,31 @@ class FlankForm:
     """All modifications of one flank; they add up."""
 
     modifications: tuple[Modification, ...] = ()
+
+    @property
+    def profile(self) -> tuple[ProfileModification, ...]:
+        """Modifications of the profile, the same over the width."""
+        return tuple(one for one in self.modifications if isinstance(one, ProfileModification))
+
+    @property
+    def lead(self) -> tuple[LeadModification, ...]:
+        """Modifications over the width, the same all over the profile; none of them in its middle."""
+        return tuple(one for one in self.modifications if isinstance(one, LeadModification))
+
+
+def lead_deviation(form: FlankForm, width: float, place) -> np.ndarray:
+    """Compute the material removed from a flank [m] at places from the middle of its width [m], any shape."""
+    place = np.asarray(place, float)
+    total, along = np.zeros(place.shape), 2.0 * place / width
+    for one in form.lead:
+        if isinstance(one, LeadSlope):
+            total = total - 0.5 * one.amount * along
+        elif isinstance(one, LeadCrowning):
+            total = total + one.amount * along**2
+        else:
+            inside = (0.5 * width - np.abs(place)) / one.length
+            total = total + one.amount * np.maximum(1.0 - inside, 0.0) ** 2
+    return total
 
 
 def form_deviation(form: FlankForm, gear: Gear, roll):
@@ -115,12 +171,12 @@ def form_deviation(form: FlankForm, gear: Gear, roll):
     low, high = sorted((gear.form_roll, gear.tip_roll))
     roll = np.clip(np.asarray(roll, float), low, high)
     total = np.zeros(roll.shape)
-    for modification in form.modifications:
+    for modification in form.profile:
         total = total + _removed(modification, gear, roll)
     return total
 
 
-def _removed(modification: Modification, gear: Gear, roll: np.ndarray) -> np.ndarray:
+def _removed(modification: ProfileModification, gear: Gear, roll: np.ndarray) -> np.ndarray:
     """Material removed by one modification [m] at roll lengths on the flank [m]."""
     if isinstance(modification, MeasuredProfile):
         return np.interp(roll, modification.roll, modification.removed)
@@ -133,7 +189,7 @@ def _removed(modification: Modification, gear: Gear, roll: np.ndarray) -> np.nda
     return modification.amount * np.maximum(t, 0.0) ** modification.power
 
 
-def _modification_range(modification: Modification, gear: Gear) -> tuple[float, float]:
+def _modification_range(modification: ProfileModification, gear: Gear) -> tuple[float, float]:
     """Roll lengths [m] of start and end of a law, of the first and the last point of a measured profile."""
     if isinstance(modification, MeasuredProfile):
         return modification.roll[0], modification.roll[-1]
@@ -172,7 +228,8 @@ def roll_at(
 def check_form(form: FlankForm, gear: Gear) -> None:
     """Refuse (E-MODIFICATION) laws that start or end outside the involute or run the wrong way."""
     for number, modification in enumerate(form.modifications):
-        problem = None if isinstance(modification, MeasuredProfile) else _problem(modification, gear)
+        laws = (TipRelief, RootRelief, ProfileSlope, ProfileCrowning)
+        problem = _problem(modification, gear) if isinstance(modification, laws) else None
         if problem is not None:
             message, value, limit = problem
             raise GeometryError(
@@ -182,7 +239,7 @@ def check_form(form: FlankForm, gear: Gear) -> None:
             )  # fmt: skip
 
 
-def _problem(modification: Modification, gear: Gear):
+def _problem(modification: ProfileModification, gear: Gear):
     """Message, value and limit of what is wrong with the ends of a law, or None."""
     start, end = _modification_range(modification, gear)
     low, high = sorted((gear.form_roll, gear.tip_roll))
@@ -239,7 +296,7 @@ def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
     rolls = [np.linspace(gear.form_roll, gear.tip_roll, 1001)]
     # laws are monotonic or parabolas between their ends, profiles straight between their points
     rolls += [
-        m.roll if isinstance(m, MeasuredProfile) else _modification_range(m, gear) for m in form.modifications
+        m.roll if isinstance(m, MeasuredProfile) else _modification_range(m, gear) for m in form.profile
     ]
     roll = np.concatenate(rolls)
     removed = form_deviation(form, gear, roll)

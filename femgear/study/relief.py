@@ -102,6 +102,11 @@ def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
 
     ``cache`` is the folder of generated grids.
     """
+    if case.static.slices > 1:
+        raise CaseError(
+            "this study solves the plane contact", code="E-SLICES", key="static.slices",
+            file=case.location("static.slices"), remedy="leave static.slices and modifications of leads out",
+        )  # fmt: skip
     gears, deviations = planetary_set(case), set_deviations(case)
     bodies = flank_compliances(case, gears, cache=cache)[1]
     own = None if deviations.ideal else deviations

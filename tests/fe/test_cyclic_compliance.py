@@ -13,11 +13,11 @@ from femgear.fe import compliance
 from femgear.fe.compliance import (
     condense_sector,
     cyclic_harmonics,
-    dof_pairs,
     half_sectors,
     interpolation,
     mirror_nodes,
     mirrored_columns,
+    node_dofs,
     static_cut_shapes,
     symmetric_factor,
     tooth_compliance,
@@ -64,7 +64,7 @@ def test_sector_compliance_is_that_of_the_whole_gear(gear, sector, whole):
         condense_sector(sector, K, count=gear.teeth, rim="rim", loads=loads, observations=loads).supported()
     )
     K_whole = stiffness(whole, STEEL, state="plane strain", thickness=THICKNESS)
-    free = np.setdiff1d(np.arange(K_whole.shape[0]), dof_pairs(np.unique(whole.boundaries["rim"])))
+    free = np.setdiff1d(np.arange(K_whole.shape[0]), node_dofs(np.unique(whole.boundaries["rim"])))
     nodes = copy_nodes(sector, gear.teeth)
     both = np.hstack([loads, mirrored_columns(loads, mirror_nodes(sector))])
     n_whole = 2 * len(whole.points)
@@ -214,7 +214,7 @@ def test_a_residual_counts_whatever_its_sign(wrong, monkeypatch):
 def test_load_on_a_cut_is_refused(gear, sector):
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))
-    loads[dof_pairs(np.unique(sector.boundaries["cut_left"]))] = 1.0
+    loads[node_dofs(np.unique(sector.boundaries["cut_left"]))] = 1.0
     with pytest.raises(GridError, match="cut"):
         condense_sector(sector, K, count=18, rim="rim", loads=loads, observations=loads).supported()
 
@@ -324,7 +324,7 @@ def test_displacement_field_of_the_whole_gear(gear, sector, whole):
         _on_tooth(loads[t][:, None], nodes[t], t * gear.pitch_angle, 2 * len(whole.points)) for t in range(18)
     )
     K_whole = stiffness(whole, STEEL, state="plane strain", thickness=THICKNESS)
-    free = np.setdiff1d(np.arange(K_whole.shape[0]), dof_pairs(np.unique(whole.boundaries["rim"])))
+    free = np.setdiff1d(np.arange(K_whole.shape[0]), node_dofs(np.unique(whole.boundaries["rim"])))
     u = np.zeros(K_whole.shape[0])
     u[free] = symmetric_factor(K_whole[free][:, free]).solve(force[free, 0])
     for t in (0, 3, 7):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import ContactError
-from femgear.fe.compliance import dof_pairs, symmetric_factor
+from femgear.fe.compliance import node_dofs, symmetric_factor
 from femgear.fe.elasticity import stiffness
 from femgear.fe.grid import ordered_nodes
 from validation.reference.plane_elasticity import check_solution
@@ -79,7 +79,7 @@ def make_surface(grid, material, boundary: str, *, held, angle: float = 0.0, cen
 
 def boundary_dofs(grid, name: str) -> np.ndarray:
     """Degrees of freedom on a named boundary."""
-    return dof_pairs(np.unique(grid.boundaries[name]))
+    return node_dofs(np.unique(grid.boundaries[name]))
 
 
 def _on_edges(surface, edge, t):

@@ -7,7 +7,7 @@ import numpy as np
 from femgear.contact.bodies import flank_stations, make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.root_stress import root_stress
-from femgear.fe.compliance import dof_pairs, symmetric_factor
+from femgear.fe.compliance import node_dofs, symmetric_factor
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
@@ -123,7 +123,7 @@ def whole_gear_roots(gear: Gear, roll: float, *, flank_elements: int, refine: fl
     first = copy_nodes(one, gear.teeth)[0]
     force = np.zeros(2 * whole.n_nodes)
     force[2 * first[stations.nodes[i]] + np.array([0, 1])] = ROOT_LOAD * stations.normals[i]
-    free = np.setdiff1d(np.arange(len(force)), dof_pairs(np.unique(whole.boundaries["rim"])))
+    free = np.setdiff1d(np.arange(len(force)), node_dofs(np.unique(whole.boundaries["rim"])))
     u = np.zeros(len(force))
     u[free] = symmetric_factor(matrix[free][:, free]).solve(force[free])
     total, count = np.zeros((whole.n_nodes, 3)), np.zeros(whole.n_nodes)

@@ -34,6 +34,7 @@ from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, with_ring
+from femgear.contact.cycle import CycleOptions
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
 from femgear.errors import Finding
@@ -116,7 +117,14 @@ from femgear.trains.protocol import (
 )
 from femgear.trains.rigid import member_speeds, parts_of_speeds
 from femgear.trains.static.results import StaticResult, describe_set
-from femgear.trains.static.stages import STATIC, STRESS, case_supports, mesh_backlash, ring_foundation
+from femgear.trains.static.stages import (
+    STATIC,
+    STRESS,
+    case_supports,
+    mesh_backlash,
+    over_width,
+    ring_foundation,
+)
 
 _LOWEST = 20e3
 """The excitation reaches the end of hearing at least [Hz]."""
@@ -302,7 +310,7 @@ def solve_modes(
             contact=case.static.contact,
             deviations=None if deviations.ideal else deviations,
             supports=linear_supports(case),
-            progress=partial(progress, "modes"),
+            options=CycleOptions(progress=partial(progress, "modes"), **over_width(case, gears, loaded=True)),
         ),
     )
     stiffness = state.resampled("held_stiffness", _RECORD).mean(axis=1)

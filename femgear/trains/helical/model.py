@@ -424,6 +424,11 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
         periods. E-GEOMETRY: virtual gears that cannot be made.
     """
     _check_supports(case, gears)
+    if case.static.slices > 1:
+        raise CaseError(
+            "slices over the width are those of spur teeth", code="E-SLICES", key="static.slices",
+            file=case.location("static.slices"), remedy="leave static.slices and modifications of leads out",
+        )  # fmt: skip
     if case.helical.mesh_stiffness is not None:
         return
     _check_torque(case, gears)

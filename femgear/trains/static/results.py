@@ -60,6 +60,11 @@ STATIC_VARIABLES = {
     "iterations": ("position", "1", "steps of the active set"),
 }
 """Variables of static.nc: dimensions, unit, and what they are."""
+SLICE_VARIABLES = {
+    "slice_load": ("mesh tooth slice position", "N", "load of a tooth pair in a slice, times their number"),
+    "face_load_factor": ("mesh", "1", "K_H-beta: largest load per width over the mean of that tooth pair"),
+}
+"""Further ones of contact in slices over the width."""
 _ATTRIBUTES = {
     "ste": "deflection",
     "ste_overall": "overall_deflection",
@@ -143,11 +148,15 @@ class StaticResult:
         """Collect the contents of static.nc."""
         cycle, gears = self.cycle, self.planetary_set
         bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
-        values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in STATIC_VARIABLES}
+        variables, width = STATIC_VARIABLES, gears.sun.face_width
+        if cycle.slice_load is not None:
+            variables = variables | SLICE_VARIABLES
+        values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in variables}
         teeth, planets = cycle.tooth_load.shape[1], np.arange(1, gears.n_planets + 1)
         found = dataset(
-            declared(STATIC_VARIABLES, values),
-            coords={
+            declared(variables, values),
+            coords=self._over_width(width)
+            | {
                 "member": ("member", list(cycle.member_names), "1", "moving member and direction"),
                 "tooth": ("tooth", np.arange(teeth), "1", "tooth pair in the order of the path"),
                 **coordinates(
@@ -176,6 +185,14 @@ class StaticResult:
         )
         found.attrs["warnings"] = " ".join(map(str, static_warnings(found, gears.sun.module)))
         return found
+
+    def _over_width(self, width: float) -> dict[str, Any]:
+        """Coordinate of the slices, where there are any."""
+        if self.cycle.slice_load is None:
+            return {}
+        count = self.cycle.slice_load.shape[2]
+        place = width * ((np.arange(count) + 0.5) / count - 0.5)
+        return {"slice": ("slice", place, "m", "place of a slice from the middle of the face width")}
 
 
 @dataclass(frozen=True)
@@ -418,6 +435,8 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
         "force [N]": lambda one: f"{one.mesh_force.values.mean():.3f}",
         "p max [MPa]": lambda one: f"{p.max() / 1e6:.1f}" if (p := one.max_pressure.values).any() else "-",
     }
+    if "face_load_factor" in data:
+        columns["K_Hbeta"] = lambda one: f"{float(one.face_load_factor):.3f}"
     notes = [
         f"load share of a planet {share.min():.4f} to {share.max():.4f} "
         f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from femgear.contact.bodies import FlankCompliance, _observed, _without_half_plane, flank_stations
+from femgear.contact.bodies import FlankCompliance, _without_half_plane, observed_flanks
 from femgear.fe.compliance import condense_sector
 from femgear.fe.elasticity import Material
 from femgear.fe.grid import Grid
@@ -16,8 +16,7 @@ def held_sector_compliance(
 
     Parameters and errors are those of `femgear.contact.bodies.flank_compliance`; the result counts one tooth.
     """
-    stations = flank_stations(grid, gear)
-    depths, loads, seen = _observed(grid, gear, stations, depth)
+    stations, depths, loads, seen = observed_flanks(grid, gear, depth)
     sector = condense_sector(grid, stiffness, count=gear.teeth, rim=held, loads=loads, observations=seen)
     even, odd = sector.supported().compliance
     held_compliance = np.block([[even + odd, even - odd], [even - odd, even + odd]])[None]

@@ -11,7 +11,7 @@ from validation.reference.plane_elasticity import rank_check
 from validation.reference.substructure import cut_rotation
 
 from femgear.errors import GeometryError, GridError
-from femgear.fe.compliance import boundary_nodes, dof_pairs, symmetric_factor
+from femgear.fe.compliance import boundary_nodes, node_dofs, symmetric_factor
 
 
 def annulus_support_stiffness(inner: float, outer: float, material, *, state: str, thickness: float) -> float:
@@ -70,12 +70,12 @@ def centre_node_stiffness(grid, stiffness, moved, held=()) -> np.ndarray:
         A boundary that is moved and held, or a body that nothing holds.
     """
     on, fixed = _boundaries(grid, moved, held)
-    rank_check(grid, dof_pairs(np.concatenate([on, fixed])))
+    rank_check(grid, node_dofs(np.concatenate([on, fixed])))
     prescribed = np.zeros((2 * grid.n_nodes, 3))
     prescribed[2 * on, 0] = prescribed[2 * on + 1, 1] = 1.0
     prescribed[2 * on, 2], prescribed[2 * on + 1, 2] = -grid.points[on, 1], grid.points[on, 0]
     free = np.ones(2 * grid.n_nodes, bool)
-    free[dof_pairs(np.concatenate([on, fixed]))] = False
+    free[node_dofs(np.concatenate([on, fixed]))] = False
     K = stiffness.tocsc()
     u = prescribed.copy()
     u[free] = -symmetric_factor(K[free][:, free]).solve((K @ prescribed)[free])
@@ -116,11 +116,11 @@ def cyclic_support_stiffness(grid, stiffness, count: int, moved, held=()) -> flo
     cuts = []
     for name in ("cut_right", "cut_left"):
         nodes = np.setdiff1d(boundary_nodes(grid, name), taken)
-        cuts.append(dof_pairs(nodes[np.argsort(np.hypot(*grid.points[nodes].T))]))
+        cuts.append(node_dofs(nodes[np.argsort(np.hypot(*grid.points[nodes].T))]))
     right, left = cuts
     if len(right) != len(left):
         raise GridError("the two cuts of a sector do not match", code="E-GRID")
-    own = np.setdiff1d(np.arange(2 * grid.n_nodes), np.concatenate([dof_pairs(taken), left]))
+    own = np.setdiff1d(np.arange(2 * grid.n_nodes), np.concatenate([node_dofs(taken), left]))
     place = np.full(2 * grid.n_nodes, -1)
     place[own] = np.arange(len(own))
     tie = np.exp(2j * np.pi / count) * cut_rotation(count, len(right))

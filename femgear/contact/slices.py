@@ -1,0 +1,385 @@
+"""Contact over the face width: slices of the plane contact, joined by what bodies yield across the width.
+
+Load and displacement are sums of cosines over the width b, ``cos(k_m z)``, ``k_m = m pi / b``; its ends are
+mirror planes. A body answers each with a compliance ``h_m`` of its own, a plane problem of three
+displacements (`femgear.fe.elasticity.wave_stiffness`). Between N equal slices, for forces over the whole
+width,
+
+    H = H_plane delta + T^T diag(h_m - h_0) T,    T_ms = sqrt(eps_m / N) cos(k_m z_s),  eps_0 = 1, eps_m = 2,
+
+``T`` being the orthonormal cosine transform. The singular field beside a load is the same in all ``h_m``, so
+that ``h_m - h_0`` is smooth and may come from a coarse grid. Without it every slice were a gear of its own.
+A load ``cos(k z)`` along a line on the half space moves the point at depth d and distance x into it by
+
+    w = (1 + nu)/(pi E) (2 (1 - nu) K0(k r) + d^2 k K1(k r)/r),    r^2 = x^2 + d^2,
+
+the Fourier transform of Boussinesq's point load (K. L. Johnson, "Contact Mechanics", 1985, section 3.2). Its
+limit for long waves is Flamant's line load. As in `femgear.contact.bodies` this part is taken out at depth
+and put back at the surface; there, beside the load, waves yield less than a uniform load by ``ln(k/2) +
+gamma``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+
+from femgear.contact.assembly import Candidates, body_compliance
+from femgear.contact.batch import PairLaws
+from femgear.contact.bodies import (
+    RING_STATE,
+    TEETH_STATE,
+    Bodies,
+    FlankCompliance,
+    Sector,
+    Sectors,
+    observed_flanks,
+    regular_compliance,
+)
+from femgear.contact.local_compliance import depth_displacement, tip_corner
+from femgear.errors import ContactError
+from femgear.fe.compliance import condense_sector, tooth_compliance
+from femgear.fe.elasticity import Material, stiffness, wave_stiffness
+
+_WAVES = 9
+"""Wave numbers at which bodies are computed; between them their compliance is interpolated."""
+_REFRESHED, _BOLD, _MOST = 4, 12, 200
+"""Newton steps for which moments follow forces, after which one slice opens at a time, and in all."""
+_SETTLED = 1e-11
+"""Share of the load by which forces may still change in the last step."""
+_SOFTEST = 1e-13
+"""Spring on every motion, over that of a tooth pair: it holds what no loaded pair holds."""
+_TOGETHER = 8
+"""Positions that are solved at once."""
+
+
+@dataclass(frozen=True)
+class WidthWaves:
+    """Compliance to waves of load across the width, less that to a uniform load.
+
+    Parameters
+    ----------
+    wave_number : (M,) array
+        [1/m], ascending.
+    bodies : tuple of Bodies
+        One for every wave number: what bodies yield beyond the half space.
+    """
+
+    wave_number: np.ndarray
+    bodies: tuple[Bodies, ...]
+
+    @property
+    def local(self) -> np.ndarray:
+        """What the half spaces of both flanks yield beside the load [m/N], (M,)."""
+        material, width = self.bodies[0].material, self.bodies[0].face_width
+        factor = 2 * (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * width)
+        return -factor * (np.log(self.wave_number / 2) + np.euler_gamma)
+
+
+@dataclass(frozen=True)
+class SliceState:
+    """Solution at P positions in N slices of W windows (tooth pairs), of m motions.
+
+    Parameters
+    ----------
+    force : (P, N, W) array
+        Force of a tooth pair, were it the same over the whole width [N]; the mean over slices is that of the
+        pair.
+    motions : (P, m) array
+        [m].
+    mesh : (W,) array
+    iterations : (P,) array
+        Linear solutions.
+    tangents : tuple of (P, meshes, meshes) arrays
+        For every compliance between windows that was asked for: increments of the mesh forces per unit
+        approach of each mesh while the others hold theirs [N/m], less those of the plane solution.
+    own : tuple of (P, meshes) arrays
+        The same of every mesh at constant loads of the others.
+    """
+
+    force: np.ndarray
+    motions: np.ndarray
+    mesh: np.ndarray
+    iterations: np.ndarray
+    tangents: tuple[np.ndarray, ...]
+    own: tuple[np.ndarray, ...]
+
+    def overflows(self, found: Candidates, laws: PairLaws) -> bool:
+        """Whether a slice presses cells at the end of a window that is not the end of a flank."""
+        reached = laws.touching[..., [0, -1]] <= self.force.max(axis=1)[..., None]
+        return bool((reached & ~np.moveaxis(found.at_edge, 0, -1)).any())
+
+    def of_meshes(self) -> np.ndarray:
+        """Force of every mesh per slice over the whole width [N], (P, N, meshes)."""
+        return self.force @ (self.mesh[:, None] == np.arange(self.mesh[-1] + 1))
+
+
+def wave_displacement(x, depth, wave_number: float, material: Material) -> np.ndarray:
+    """Compute the displacement into the half space under a line load ``cos(k z)`` [m per N/m].
+
+    At distances and depths (arrays that broadcast) [m], for a wave number over 0 [1/m]; see the head of the
+    module.
+    """
+    from scipy.special import k0, k1
+
+    r, nu = np.hypot(x, depth), material.poisson_ratio
+    wave = 2 * (1 - nu) * k0(wave_number * r) + depth**2 * wave_number * k1(wave_number * r) / r
+    return (1 + nu) / (np.pi * material.youngs_modulus) * wave
+
+
+def width_waves(sectors: Sectors, material: Material, slices: int, ring_foundation=None) -> WidthWaves:
+    """Compute the compliance to the waves of as many slices, from sector grids that may be coarse.
+
+    ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over the face width, which otherwise is held.
+    """
+    width = sectors.sun.gear.face_width
+    wave_number = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
+    gears = [_wave_compliance(one, None, material, wave_number) for one in (sectors.sun, sectors.planet)]
+    gears.append(_wave_compliance(sectors.ring, ring_foundation, material, wave_number))
+    return WidthWaves(
+        wave_number,
+        tuple(Bodies(sun, planet, ring, material, width) for sun, planet, ring in zip(*gears, strict=True)),
+    )
+
+
+def _wave_compliance(
+    sector: Sector, foundation, material: Material, wave_number: np.ndarray
+) -> list[FlankCompliance]:
+    """Flank compliance of a gear to every wave, less that to a uniform load, beyond the half space."""
+    gear, grid, mu = sector.gear, sector.grid, material.shear_modulus
+    stations, depths, loads, observations = observed_flanks(grid, gear)
+
+    def compliance(matrix, support, loads, observations) -> np.ndarray:
+        options = {"count": gear.teeth, "rim": "rim", "loads": loads, "observations": observations}
+        return tooth_compliance(condense_sector(grid, matrix, **options).supported(support))
+
+    support = None if foundation is None else foundation / gear.face_width
+    state: Any = RING_STATE if gear.internal else TEETH_STATE
+    uniform = compliance(stiffness(grid, material, state=state), support, loads, observations)
+    loads, observations = (
+        np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, observations)
+    )
+    if support is not None:
+        support = coo_array(support)
+        place = tuple(3 * (one // 2) + one % 2 for one in support.coords)
+        support = csc_array((support.data, place), shape=(3 * grid.n_nodes,) * 2)
+    parts, corner = wave_stiffness(grid, material), tip_corner(gear, material)
+    arc = stations.roll**2 / (2 * gear.base_radius)
+    offset, found = arc[:, None] - arc[None, :], []
+    for k in wave_number:
+        matrix = (parts[0] + k * parts[1] + k**2 * parts[2]).tocsc()
+        change = compliance(matrix, support, loads, observations) - uniform
+        once, twice = (
+            wave_displacement(offset, depth, k, material)
+            - depth_displacement(offset, depth, mu, material.poisson_ratio)
+            for depth in (depths, 2 * depths)
+        )
+        local = (2 * once - twice) / gear.face_width
+        regular = regular_compliance(change / gear.face_width, local)
+        found.append(
+            FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0)
+        )
+    return found
+
+
+def solve_slices(
+    found: Candidates,
+    laws: PairLaws,
+    load,
+    waves: WidthWaves,
+    separations: np.ndarray,
+    held: tuple[np.ndarray, WidthWaves] | None = None,
+) -> SliceState:
+    """Solve the contact of all tooth pairs in all slices, which share their motions.
+
+    Newton's method on the pairs as springs (`femgear.contact.batch.PairLaws`). Without separations it is the
+    plane solution that the laws were made of.
+
+    Parameters
+    ----------
+    found : Candidates
+        All windows, with the pairs that the laws are of.
+    load : (m,) array
+        External load on the motions [N].
+    separations : (P, N, W) array
+        What leads, crowning and misalignment add in the slices to whole pairs [m].
+    held : (P, W, 3, W, 3) array and WidthWaves, optional
+        Compliance of other bodies between all windows [m/N], for whose tangents the contact is taken too.
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT: the iteration does not end.
+    """
+    parts, load = [], np.asarray(load, float)
+    for first in range(0, len(separations), _TOGETHER):
+        some = np.arange(first, min(first + _TOGETHER, len(separations)))
+        N = separations.shape[1]
+        across = _across(found, some, waves, N)
+        bodies = [(found.smooth[some], across)]
+        if held is not None:
+            bodies.append((held[0][some], _across(found, some, held[1], N)))
+        newton = _SliceNewton(laws, some, load, across, separations[some], found.smooth[some])
+        before = [part for one in bodies for part in newton.tangents(*one)]
+        solved = newton.solve()
+        after = [part for one in bodies for part in newton.tangents(*one)]
+        parts.append((*solved, *(b - a for a, b in zip(before, after, strict=True))))
+    force, motions, iterations, *tangents = (np.concatenate(part) for part in zip(*parts, strict=True))
+    between, own = tuple(tangents[0::2]), tuple(tangents[1::2])
+    return SliceState(force, motions, laws.mesh, iterations, between, own)
+
+
+def cosines(slices: int) -> np.ndarray:
+    """Make the orthonormal cosine transform over the middles of equal slices, (waves, slices)."""
+    m, z = np.arange(slices)[:, None], (np.arange(slices) + 0.5) / slices
+    return np.sqrt(np.where(m == 0, 1.0, 2.0) / slices) * np.cos(np.pi * m * z)
+
+
+def _across(found: Candidates, some, waves: WidthWaves, slices: int) -> np.ndarray:
+    """Compliance between the slices of all windows beyond the plane one [m/N], (P, N, W, N, W)."""
+    from scipy.interpolate import CubicSpline
+
+    W = len(found.mesh)
+    known = np.array(
+        [
+            body_compliance(found.setup, one, found.position[some], found.mesh, found.pair[some]).sum(axis=0)
+            for one in waves.bodies
+        ]
+    )[:, :, :, 1, :, 1]
+    wanted = np.pi / waves.bodies[0].face_width * np.arange(1, slices)
+    logarithm = np.log(waves.wave_number)
+    change = np.zeros((slices, len(some), W, W))
+    if slices > 1:
+        change[1:] = CubicSpline(logarithm, known)(np.log(wanted))
+        local = replace(waves, wave_number=wanted).local
+        change[1:] += local[:, None, None, None] * np.eye(W)
+    T = cosines(slices)
+    return np.einsum("ms,mt,mpvw->psvtw", T, T, change, optimize=True)
+
+
+class _SliceNewton:
+    """Newton's method of `solve_slices` at some positions; motions and compliances over ``unit``."""
+
+    def __init__(self, laws: PairLaws, some, load, across, separations, smooth):
+        self.laws, self.some, self.load, self.smooth = laws, some, load, smooth
+        P, N, W = separations.shape
+        self.shape, self.size = (P, N, W), N * W
+        self.unit = float(laws.yields[np.isfinite(laws.separation)].mean())
+        self.across = across / self.unit
+        self.S = laws.smooth[some].swapaxes(3, 4).reshape(P, W, 3, -1)
+        plane = laws.loads[some]
+        field = (self.S @ plane.swapaxes(1, 2).reshape(P, 1, -1, 1))[..., 0]
+        self.field = field + (plane.sum(axis=-1) @ laws.supports)[..., None]
+        self.plane, self.motions = plane.sum(axis=-1), laws.motions[some] / self.unit
+        self.apart = np.where(np.isfinite(laws.separation[some]), laws.separation[some], 1.0)[:, None]
+        self.force = np.repeat(self.plane[:, None], N, axis=1)
+        # at the given state the curves miss their own points by their interpolation
+        self.refresh()
+        missed = np.where(self.plane > 0.0, self.gaps(self.force)[0][:, 0], 0.0)
+        self.apart = self.apart - missed[:, None] * self.unit + separations
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Take the moments of the pressures from the forces as they are."""
+        P, N, W = self.shape
+        mu = self._moments(self.force.swapaxes(0, 1))
+        half = (mu.transpose(1, 2, 0, 3) @ self.S).reshape(P, W, N, 3, W)
+        between = (half * mu.transpose(1, 0, 3, 2)[:, None]).sum(axis=-2).transpose(0, 2, 1, 3)
+        self.between = between / self.unit
+        self.bent = (self.apart - (mu * self.field).sum(axis=-1).swapaxes(0, 1)) / self.unit
+
+    def _moments(self, force: np.ndarray) -> np.ndarray:
+        return replace(self.laws, moments=self.laws.moments[self.some]).moments_under(force)
+
+    def gaps(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Separations that are left, and their slope over the own force, (P, N, W) each, over the unit."""
+        P, N, W = self.shape
+        value, slope = self.laws.approaches(force.reshape(-1, W), np.repeat(self.some, N))
+        gap = self.bent + value.reshape(P, N, W) / self.unit + (self.between @ force[..., None])[..., 0]
+        gap += np.einsum("psvtw,ptw->psv", self.across, force)
+        # members on springs move as a whole
+        gap += (force.mean(axis=1) @ self.laws.supports / self.unit)[:, None]
+        return gap - (self.motions @ self.laws.approach.T)[:, None], slope.reshape(P, N, W) / self.unit
+
+    def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Iterate until all positions are solved: forces, motions and steps."""
+        P = len(self.some)
+        steps, limit = np.zeros(P, int), _SETTLED * np.abs(self.load).max()
+        todo = np.ones(P, bool)
+        for step in range(_MOST):
+            if step < _REFRESHED:
+                self.refresh()
+            moved = self.step(careful=step >= _BOLD)
+            steps += todo
+            todo = moved > limit
+            if not todo.any() and step >= _REFRESHED:
+                return self.force, self.motions * self.unit, steps
+        raise ContactError(
+            f"the contact of slices does not settle at {int(todo.sum())} of {P} positions",
+            code="E-CONTACT",
+            remedy="use fewer slices, or reduce modifications and misalignment",
+        )
+
+    def tangents(self, smooth: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Increments of the mesh forces per approach of each mesh, (P, meshes, meshes) [N/m].
+
+        And those of each at constant loads of the others, (P, meshes).
+        """
+        (P, N, W), n, laws = self.shape, self.size, self.laws
+        mu = self._moments(self.force.swapaxes(0, 1)).transpose(1, 0, 2, 3)
+        half = mu.swapaxes(1, 2) @ smooth.swapaxes(3, 4).reshape(P, W, 3, -1)
+        between = (
+            (half.reshape(P, W, N, 3, W) * mu.transpose(0, 1, 3, 2)[:, None]).sum(axis=-2).swapaxes(1, 2)
+        )
+        # the springs contain what bodies yield under their own window
+        own = np.diagonal(self.smooth, axis1=1, axis2=3).transpose(0, 3, 1, 2)
+        between[:, :, range(W), range(W)] -= np.einsum("pswa,pwab,pswb->psw", mu, own, mu)
+        A, window = across / self.unit, np.arange(N)
+        A[:, window, :, window] += between.swapaxes(0, 1) / self.unit
+        A = A.reshape(P, n, n)
+        A[:, range(n), range(n)] += self.gaps(self.force)[1].reshape(P, n)
+        on = (self.force > 0.0).reshape(P, n)
+        A = np.where(on[:, :, None] & on[:, None], A, np.eye(n))
+        mesh, meshes = np.tile(laws.mesh, N), int(laws.mesh[-1]) + 1
+        ones = (mesh[:, None] == np.arange(meshes)) * on[..., None].astype(float)
+        together = ones.swapaxes(1, 2) @ np.linalg.solve(A, ones)
+        alone = []
+        for j in range(meshes):
+            rows = np.flatnonzero(mesh == j)
+            own = ones[:, rows, j]
+            alone.append(
+                (own * np.linalg.solve(A[:, rows[:, None], rows], own[..., None])[..., 0]).sum(axis=1)
+            )
+        return together / (N * self.unit), np.stack(alone, axis=1) / (N * self.unit)
+
+    def step(self, *, careful: bool) -> np.ndarray:
+        """Take a step at all positions; by how much forces change at most [N], (P,)."""
+        (P, N, W), n, m = self.shape, self.size, len(self.load)
+        gap, slope = self.gaps(self.force)
+        on = ((self.force > 0.0) | (gap < 0.0)).reshape(P, n)
+        A, window = self.across + self.laws.supports[:, None] / (N * self.unit), np.arange(N)
+        A[:, window, :, window] += self.between.swapaxes(0, 1)
+        A = A.reshape(P, n, n)
+        A[:, range(n), range(n)] += slope.reshape(P, n)
+        system = np.zeros((P, n + m, n + m))
+        system[:, :n, :n] = np.where(on[:, :, None] & on[:, None], A, np.eye(n))
+        G = np.tile(self.laws.approach, (N, 1)) * on[..., None]
+        system[:, :n, n:], system[:, n:, :n] = -G, G.swapaxes(1, 2) / N
+        system[:, range(n, n + m), range(n, n + m)] = _SOFTEST
+        balance = self.load - self.force.sum(axis=1) @ self.laws.approach / N - _SOFTEST * self.motions
+        right = np.concatenate([np.where(on, -gap.reshape(P, n), 0.0), balance], axis=1)
+        change = np.linalg.solve(system, right[..., None])[..., 0]
+        own, length = change[:, :n].reshape(P, N, W), np.ones(P)
+        if careful:
+            falls = on.reshape(P, N, W) & (own < 0.0)
+            reach = np.divide(
+                -self.force, own, out=np.full(own.shape, np.inf), where=falls & (self.force > 0)
+            )
+            length = np.minimum(reach.reshape(P, -1).min(axis=1), 1.0)
+        force = np.where(on.reshape(P, N, W), np.maximum(self.force + length[:, None, None] * own, 0.0), 0.0)
+        moved = np.abs(force - self.force).reshape(P, -1).max(axis=1)
+        self.force, self.motions = force, self.motions + length[:, None] * change[:, n:]
+        return np.where(length < 1.0, np.inf, moved)
