@@ -281,7 +281,11 @@ def verdict(results: Results) -> Iterator[Block]:
         rows.append(("planet load factor K_gamma", _kinds("{:.3f}", sharing)))
         rows.append(("largest dynamic factor K_v", _kinds("{:.3f}", factors.max(axis=0))))
     if "stress" in stages:
-        rows += _strength(results, sharing * factors.max(axis=0), notes)
+        width, static = np.ones(2), results.static
+        if "face_load_factor" in static:
+            width = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+            rows.append(("face load factor K_Hβ", _kinds("{:.3f}", width)))
+        rows += _strength(results, sharing * width * factors.max(axis=0), notes)
     if "runup" in stages:
         speed, level = results.runup["speed"].values, results.runup["level"].values
         worst = int(level.argmax())
@@ -355,7 +359,8 @@ def _strength(results: Results, factors: np.ndarray, notes: list[str]) -> Iterat
     if limits != (None, None):
         notes.append(
             "S_F and S_H: nominal stresses with K_gamma and K_v alone, long life, planets bent both ways "
-            "(Y_M = 0.7), single pairs in contact (Z_B, Z_D), every other factor 1"
+            "(Y_M = 0.7), single pairs in contact (Z_B, Z_D), of sets in slices K_Hβ (for S_F too, on the "
+            "safe side), every other factor 1"
         )
 
 

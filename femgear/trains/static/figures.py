@@ -179,6 +179,35 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     return figure
 
 
+def face_load(static: xr.Dataset) -> Figure:
+    """Draw the load per width of a tooth pair over path and face width in both meshes of a planet.
+
+    From static.nc of slices; pairs go on as in `tooth_loads`.
+    """
+    figure, axes = new_figure(columns=2, sharey=True)
+    names, place = [str(name) for name in static["mesh"].values], 1e3 * static["slice"].values
+    width, position = static.attrs["face_width"], static["position"].values
+    rows = [next(i for i, name in enumerate(names) if family(name) == kind) for kind in _KINDS]
+    periods = int(static.attrs.get("mesh_periods", 1))
+    largest = static["slice_load"].values[rows].max() * 1e-3 / width
+    for ax, row in zip(axes, rows):
+        load = static["slice_load"].values[row].swapaxes(0, 1) * 1e-3 / width
+        slot = np.arange(load.shape[1])[:, None]
+        each = np.arange(len(position)).reshape(periods, -1)[slot.ravel() % periods]
+        path, load = (slot + position[each] % 1.0).ravel(), load[:, slot, each].reshape(len(place), -1)
+        shown = _while_loaded(load.max(axis=0) > 1e-9 * largest)
+        image = ax.pcolormesh(
+            path[shown] - path[shown][0], place, np.ma.masked_less_equal(load[:, shown], 0.0), cmap="cividis", vmin=0.0, vmax=largest,
+            shading="nearest",
+        )  # fmt: skip
+        factor = float(static["face_load_factor"].values[row])
+        words = "path since the first contact [base pitches]"
+        label(ax, words, title=f"{names[row]}: K_Hβ = {factor:.3f}")
+    label(axes[0], y="place over the face width [mm]")
+    figure.colorbar(image, ax=axes, label="load per width [N/mm]", pad=0.02)
+    return figure
+
+
 def _of_planets(static: xr.Dataset, rows) -> list[tuple[str, int]]:
     """Choose the lines to draw of the rows of all planets, with their texts: one of those that are alike."""
     names = [f"planet {planet}" for planet in static["planet"].values]
@@ -474,7 +503,7 @@ def active_rolls(planetary_set: PlanetarySet) -> tuple[tuple[float, float], ...]
 def _stations(form, gear: Gear) -> np.ndarray:
     """Choose roll lengths [m] for curves, the corners of all laws and the measured points among them."""
     low, high = sorted((gear.form_roll, gear.tip_roll))
-    corners = [getattr(m, "roll", None) or (m.start, m.end) for m in form.modifications]
+    corners = [getattr(m, "roll", None) or (m.start, m.end) for m in form.profile]
     extra = [roll for pair in corners for roll in pair if roll is not None and low < roll < high]
     return np.unique(np.concatenate([np.linspace(low, high, 301), extra]))
 
@@ -487,7 +516,8 @@ def _degrees(gear: Gear, roll):
 def _static_figures(drawn: Drawn) -> dict[str, Figure]:
     """Draw the figures of static.nc."""
     static = drawn.data["static"]
-    return {
+    over_width = {"face_load": face_load(static)} if "slice_load" in static else {}
+    return over_width | {
         "static_transmission_error": static_transmission_error(static),
         "mesh_stiffness": mesh_stiffness(static, face_width=planetary_set(drawn.case).sun.face_width),
         "load_sharing": load_sharing(static),
@@ -610,6 +640,10 @@ _STATIC = Figures(
             "share over the equal one."
         ),
         "tooth_loads": "Load of one tooth pair from its first to its last contact.",
+        "face_load": (
+            "Load per width of one tooth pair from its first to its last contact over the face width, and "
+            "the face load factor K_Hβ: the largest load per width over the mean of that pair."
+        ),
         "profile_deviations": (
             "Deviations of the loaded flanks from the involute over the roll angle, positive with more "
             "material."

@@ -381,6 +381,12 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
             "and is not given"
         )
         yield Finding("W-EDGE", "", text)
+    if "face_load_factor" in data and (factor := data["face_load_factor"].values.max()) > 1.02:
+        text = (
+            f"root stresses are those of the load as a mean over the width, of which up to K_Hbeta = "
+            f"{factor:.2f} times stands at one place"
+        )
+        yield Finding("W-FACE-LOAD", "", text)
     unloaded = (force + back)[: len(force) // 2] <= 0.0
     if unloaded.any() and force.any():
         planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))

@@ -152,29 +152,27 @@ def over_width(
         E-SLICES: modifications along the lead without slices, or slices together with back flanks, with
         clearance in the bearings of planets, or so many that they are thinner than a quarter of a module.
     """
-    static, count = case.static, case.static.slices
+    static, count, width = case.static, case.static.slices, gears.sun.face_width
+    where, remedy = {"code": "E-SLICES", "file": case.location("static.slices")}, "leave static.slices out"
     if count < 2:
         for gear in ("sun", "planet", "ring"):
-            kinds = [one.kind in OVER_WIDTH for one in getattr(case, gear).modifications]
-            if any(kinds):
-                key = f"{gear}.modifications[{kinds.index(True)}]"
-                _refuse_slices(
-                    case,
-                    "without slices over the width nothing is seen of the lead",
-                    key,
-                    "static.slices = 25",
-                )
+            for i, one in enumerate(getattr(case, gear).modifications):
+                if one.kind in OVER_WIDTH:
+                    key = f"{gear}.modifications[{i}]"
+                    raise CaseError(
+                        f"a {one.kind} needs slices over the width", code="E-SLICES", key=key,
+                        file=case.location(key), remedy="give static.slices = 25",
+                    )  # fmt: skip
         return {}
     if static.back_flanks:
-        _refuse_slices(case, "slices have no back flanks", "static.back_flanks", "leave static.slices out")
+        raise CaseError("slices have no back flanks", key="static.back_flanks", remedy=remedy, **where)
     if case.planet.bearing_clearance and static.members == "elastic":
-        _refuse_slices(
-            case, "slices know no clearance", "planet.bearing_clearance", "leave static.slices out"
-        )
-    if gears.sun.face_width < 0.25 * count * gears.sun.module:
-        most = int(4 * gears.sun.face_width / gears.sun.module)
-        remedy = f"at most {most} slices" if most > 1 else "leave static.slices out"
-        _refuse_slices(case, "slices are thinner than a quarter of the module", "static.slices", remedy)
+        raise CaseError("slices know no clearance", key="planet.bearing_clearance", remedy=remedy, **where)
+    if width < 0.25 * count * gears.sun.module:
+        raise CaseError(
+            "slices are thinner than a quarter of the module", key="static.slices", value=count,
+            limit=f"at most {int(4 * width / gears.sun.module)}", **where,
+        )  # fmt: skip
     material = material_of(case)
     # half as fine as in the plane: K_H-beta changes by less than 1e-3
     sectors = make_sectors(gears, material, flank_elements=6, refine=0.5, cache=cache)
@@ -182,10 +180,6 @@ def over_width(
     foundation = ring_foundation(case, sectors.ring) if elastic or loaded else None
     found: dict[str, Any] = {"waves": width_waves(sectors, material, count, foundation), "slices": count}
     return found | ({"held_waves": width_waves(sectors, material, count)} if loaded else {})
-
-
-def _refuse_slices(case: Case, message: str, key: str, remedy: str) -> None:
-    raise CaseError(message, code="E-SLICES", key=key, file=case.location(key), remedy=remedy)
 
 
 @one_blas_thread()
