@@ -88,6 +88,7 @@ CODES = {
     "E-SHAFT": "The parts make no shaft.",
     "E-SHAPE": "Arrays do not have the shapes that belong together.",
     "E-SHIFT": "A profile shift is not possible, or cannot be found.",
+    "E-SLICES": "Slices over the face width are missing, or do not go with something else.",
     "E-SOLVE": "A system of linear equations has no trustworthy solution.",
     "E-SPECTRUM": "No spectrum can be made of this record.",
     "E-SPEED": "Speeds, frequencies and directions do not fit each other, or a speed is critical.",

@@ -197,8 +197,8 @@ def face_load(static: xr.Dataset) -> Figure:
         path, load = (slot + position[each] % 1.0).ravel(), load[:, slot, each].reshape(len(place), -1)
         shown = _while_loaded(load.max(axis=0) > 1e-9 * largest)
         image = ax.pcolormesh(
-            path[shown] - path[shown][0], place, np.ma.masked_less_equal(load[:, shown], 0.0), cmap="cividis", vmin=0.0, vmax=largest,
-            shading="nearest",
+            path[shown] - path[shown][0], place, np.ma.masked_less_equal(load[:, shown], 0.0),
+            cmap="cividis", vmin=0.0, vmax=largest, shading="nearest",
         )  # fmt: skip
         factor = float(static["face_load_factor"].values[row])
         words = "path since the first contact [base pitches]"
