@@ -70,7 +70,9 @@ def main(
         progress("contact maps", 1)
     save_figure(_map_figure(found, play), folder / "tooth_contact.png")
     # stability is not asked for here
-    drawn = [(text, hertz, rms, np.ones(len(rms), int)) for text, hertz, rms, _ in curves]
+    drawn = [
+        (text.replace(" um", " µm"), hertz, rms, np.ones(len(rms), int)) for text, hertz, rms, _ in curves
+    ]
     save_figure(response_branches(drawn, quantity="ring x, r.m.s."), folder / "ring_resonance.png")
     rows = [(text, float(f), float(r)) for text, hertz, rms, _ in curves for f, r in zip(hertz, rms)]
     write_csv(folder / "ring_resonance.csv", ("clearance", "frequency [Hz]", "ring x r.m.s. [m]"), rows)

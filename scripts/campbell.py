@@ -84,12 +84,18 @@ def main(
 
 
 def _figure(found, train):
-    from femgear.report.style import GREY, label, legend_below, line_style, new_figure
+    from femgear.report.style import BLACK, BLUE, GREY, SIZE, label, legend_below, new_figure
 
-    figure, (ax,) = new_figure(width=8.5, height=5.0)
+    figure, (ax,) = new_figure(width=8.5, height=5.6)
     speed = found.speed / RPM
-    for number, values in enumerate(found.frequency.T):
-        ax.plot(speed, values, label=f"mode {number + 1}", **line_style(number))
+    for values in found.frequency.T:
+        ax.plot(speed, values, color=BLUE, label="mode")
+        change = f"{values[0]:.3g} Hz"
+        change += f" to {values[-1]:.3g} Hz" if abs(values[-1] / values[0] - 1.0) > 5e-3 else ""
+        ax.annotate(
+            change, (speed[-1], values[-1]), xytext=(5, 0), textcoords="offset points", va="center",
+            fontsize=SIZE - 1,
+        )  # fmt: skip
     top = 1.1 * found.frequency.max()
     for number, order in enumerate(found.orders):
         teeth = RING_TEETH[train]
@@ -98,8 +104,19 @@ def _figure(found, train):
             speed, order * found.speed / (2.0 * np.pi), color=GREY, linewidth=1.0, label=text,
             linestyle=(0, (6, 2) + (1, 2) * number),
         )  # fmt: skip
+    named = []
     for one in found.critical:
-        ax.plot(one.speed / RPM, one.frequency, "ko", markersize=4)
+        style = {"color": BLACK, "markerfacecolor": "none", "label": "critical speed [rpm]"}
+        ax.plot(one.speed / RPM, one.frequency, "o", **style)
+        place = np.array([one.speed / speed[-1] / RPM, one.frequency / top])
+        if any(np.abs(place - other).max() < 0.05 for other in named):
+            continue
+        named.append(place)
+        ax.annotate(
+            f"{one.speed / RPM:.0f}", (one.speed / RPM, one.frequency), xytext=(6, 4),
+            textcoords="offset points", fontsize=SIZE - 1,
+        )  # fmt: skip
+    ax.set_xlim(0.0, speed[-1])
     ax.set_ylim(0.0, top)
     label(ax, "carrier speed [rpm]", "frequency [Hz]", f"wind turbine set {train}")
     legend_below(figure, columns=4)

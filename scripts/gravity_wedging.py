@@ -81,7 +81,7 @@ def main(
             sweeps, compared = _sweeps(results[0], np.linspace(lowest, highest, sweep), steps)
             progress("integration", 1)
     write_csv(folder / "branches.csv", HEADER, _records(results))
-    curves = [(f"play {text}", hertz, rms, stable) for text, _, _, hertz, rms, stable in results]
+    curves = [(_play(text), hertz, rms, stable) for text, _, _, hertz, rms, stable in results]
     figure = response_branches(curves, sweeps, quantity="carrier x, r.m.s.")
     save_figure(figure, folder / "gravity_wedging.png")
     _details(folder, results[0])
@@ -178,14 +178,19 @@ def _details(folder, result) -> None:
     top, phase = int(np.argmax(rms)), np.linspace(0.0, 2.0 * np.pi, 361)
     wave = np.exp(1j * np.arange(branch.orders[-1, 0] + 1)[:, None] * phase)
     path = (member_lines(problem, [branch.solutions[top]], "carrier")[0] @ wave).real
-    title = f"play {text}, {hertz[top]:.1f} Hz"
+    title = f"{_play(text)}, {hertz[top]:.1f} Hz"
     save_figure(orbits([("carrier", path)], title=title), folder / "carrier_orbit.png")
     forces = bearing_history(problem, branch.solutions[top], phase)
     curves = [(f"planet {n + 1}", force) for n, force in enumerate(forces)]
     save_figure(bearing_forces(phase, curves, title=title), folder / "planet_bearings.png")
     shares = np.array([contact_shares(problem, one)[[0, 3, 6, 9]] for one in branch.solutions])
-    figure = contact_over_frequency(hertz, shares, FLANKS, title=f"play {text}")
+    figure = contact_over_frequency(hertz, shares, FLANKS, title=_play(text))
     save_figure(figure, folder / "tooth_contact.png")
+
+
+def _play(text: str) -> str:
+    """A play as figures write it."""
+    return f"play {text.replace('um', 'µm')}"
 
 
 def _records(results):

@@ -221,7 +221,6 @@ def eccentric_set(eccentricity: float, floating: bool):
 def eccentricity_study(folder: Path, frequencies: int) -> None:
     """Sun eccentricity of a planetary set: mesh force over frequency, path of the sun, spectrum."""
     from femgear.report.style import save_figure
-    from femgear.trains.gear_pair.figures import amplitude_and_mean
     from femgear.trains.planar.figures import orbits
 
     hertz = np.linspace(400.0, 3600.0, frequencies)
@@ -232,21 +231,35 @@ def eccentricity_study(folder: Path, frequencies: int) -> None:
                 continue
             text = f"{'floating' if floating else 'held'} sun, E = {1e6 * eccentricity:.0f} µm"
             rows, path, spectrum = eccentric_response(eccentricity, floating, hertz)
-            curves.append(
-                (text, 1e-3 * hertz, *np.where(rows[2] > 0.0, rows[:2], np.nan), np.ones(len(hertz)))
-            )
+            curves.append((text, *np.where(rows[2] > 0.0, rows[:2], np.nan)))
             records += [(text, *map(float, row)) for row in zip(hertz, *rows)]
             if eccentricity == max(ECCENTRICITIES):
                 paths.append((text, path))
                 spectra.append((text, *spectrum))
     header = ("case", "mesh frequency [Hz]", "amplitude [N]", "mean [N]", "converged")
     write_csv(folder / "eccentricity.csv", header, records)
-    figure = amplitude_and_mean(
-        curves, x="mesh frequency [kHz]", unit="N", title="force of sun-planet mesh 1"
-    )
-    save_figure(figure, folder / "eccentricity.png")
+    save_figure(force_amplitudes(1e-3 * hertz, curves), folder / "eccentricity.png")
     save_figure(orbits(paths, title=f"centre of the sun, {1e-3 * hertz[0]:.1f} kHz"), folder / "sun_path.png")
     save_figure(line_spectrum(spectra, y="force of sun-planet mesh 1 [N]"), folder / "spectrum.png")
+
+
+def force_amplitudes(kilohertz, curves):
+    """Figure of half the peak to peak of a mesh force: curves (text, amplitude (F,), mean (F,)) [N].
+
+    Where it exceeds the mean force, teeth part.
+    """
+    from femgear.report.style import BLACK, label, legend_below, line_style, new_figure
+
+    figure, (ax,) = new_figure(width=8.5, height=5.0)
+    for number, (text, amplitude, _) in enumerate(curves):
+        words = f"{text}: up to {np.nanmax(amplitude):.3g} N"
+        ax.plot(kilohertz, amplitude, marker="o", markersize=4, label=words, **line_style(number))
+    mean = np.nanmean([one for *_, one in curves])
+    ax.axhline(mean, color=BLACK, linewidth=1.0, label=f"mean force {mean:.4g} N: above it teeth part")
+    ax.set_ylim(bottom=0.0)
+    label(ax, "mesh frequency [kHz]", "amplitude of the force [N]", "sun-planet mesh 1, sun eccentric by E")
+    legend_below(figure, columns=2)
+    return figure
 
 
 def eccentric_response(eccentricity: float, floating: bool, hertz):

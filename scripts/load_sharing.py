@@ -200,7 +200,9 @@ def _share_figure(gaps, cycles, planet):
                 position, values, label=f"planet {n + 1}", linewidth=max(4.6 - 1.5 * n, 1.2), **line_style(n)
             )
         ax.set_xlim(0, cycle.periods)
-        label(ax, "position [mesh periods]", title=f"gap {gap * 1e6:g} µm at planet {planet}")
+        factor = 0.01 * len(share) * share.max()
+        title = f"gap {gap * 1e6:g} µm at planet {planet}: $K_\\gamma$ {factor:.3f}"
+        label(ax, "position in the mesh period [1]", title=title)
     highest = max(100 * cycle.load_share.max() for cycle in cycles)
     axes[0].set_ylim(0, 1.1 * highest)
     label(axes[0], y="share of the torque [%]")

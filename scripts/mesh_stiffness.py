@@ -123,10 +123,16 @@ def _figure(torques, results):
                 position, k = periodic(static["position"], static["mesh_stiffness"].values[j] / 1e6)
                 axes[2 + column].plot(position, k, label=text, **line_style(number))
                 number += 1
-        label(axes[column], y="transmission error [µm]", title=f"{kind} meshes")
-        label(axes[2 + column], "position in the mesh period [1]", "tangent stiffness [N/µm]")
+        title, mean = f"{kind} meshes", ""
+        if number == 1:
+            # one curve needs no legend: its title says what it shows
+            title += f", {torques[0]:g} N m: {np.ptp(ste):.3g} µm peak to peak"
+            mean = f"mean {np.mean(k[:-1]):.4g} N/µm, {np.ptp(k):.4g} N/µm peak to peak"
+        label(axes[column], y="transmission error [µm]", title=title)
+        label(axes[2 + column], "position in the mesh period [1]", "tangent stiffness [N/µm]", mean)
     axes[0].set_xlim(0, 1)
-    legend_below(figure, columns=4)
+    if number > 1:
+        legend_below(figure, columns=4)
     return figure
 
 

@@ -237,7 +237,8 @@ def _write(found, data, folder: Path, rough) -> None:
     write_csv(folder / "optimum.csv", ("quantity", "unit", "before", "optimum"), si)
     off = [[t.less[name], t.more[name]] for t in found.tolerances]
     less, more = (np.array(off).T / dimension.scale).reshape(2, -1)
-    labels = [f"{t.variable.name}\n± {t.tolerance:.4g} {t.variable.unit}" for t in found.tolerances]
+    units = [str(t.variable.unit).replace("um", "µm") for t in found.tolerances]
+    labels = [f"{t.variable.name}\n± {t.tolerance:.4g} {unit}" for t, unit in zip(found.tolerances, units)]
     value = found.after[name] / dimension.scale
     bars = tolerance_bars(labels, less, more, value, quantity=name, unit=dimension.shown.replace("um", "µm"))
     save_figure(bars, folder / "tolerances.png")

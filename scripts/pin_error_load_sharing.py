@@ -262,15 +262,15 @@ def sharing_histogram(factors, names, n_planets: int):
     top = min(max(float(np.max(f)) for f in factors) * 1.02 + 0.02, float(n_planets) + 0.02)
     edges = np.linspace(0.99, max(top, 1.05), 80)
     for i, (factor, name) in enumerate(zip(factors, names)):
-        share = 100.0 / len(factor)
+        share, name = 100.0 / len(factor), f"{name}: 95 % below {np.quantile(factor, 0.95):.3f}"
         left.hist(
             factor, edges, weights=np.full(len(factor), share), histtype="step", label=name, **line_style(i)
         )
         ordered = np.sort(factor)
         beyond = 100.0 * (1.0 - np.arange(1, len(ordered) + 1) / len(ordered))
-        right.step(ordered, beyond, where="post", label=name, **line_style(i))
-    label(left, "load sharing factor K_gamma [1]", "samples [%]", "distribution")
-    label(right, "load sharing factor K_gamma [1]", "samples beyond [%]", "probability to exceed")
+        right.step(ordered, beyond, where="post", **line_style(i))
+    label(left, "load sharing factor $K_\\gamma$ [1]", "samples [%]", "distribution")
+    label(right, "load sharing factor $K_\\gamma$ [1]", "samples beyond [%]", "probability to exceed")
     for ax in (left, right):
         ax.set_xlim(edges[0], edges[-1])
     # narrow and wide distributions side by side

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.report.style import BLACK, COLOURS, label, legend_below, new_figure
+from femgear.report.style import BLACK, COLOURS, label, legend_below, line_style, new_figure
 from femgear.trains.planar.figures import STABILITY, pieces
 
 if TYPE_CHECKING:
@@ -52,13 +52,14 @@ def contact_over_frequency(hertz, shares, names: Sequence[str], *, title: str = 
     shares : (p, n) array
     names : (n,) sequence
     """
-    figure, axes = new_figure(rows=len(names), width=8.0, height=1.2 + 1.1 * len(names), sharex=True)
-    for number, (ax, name) in enumerate(zip(axes, names)):
-        ax.plot(hertz, np.asarray(shares)[:, number], color=COLOURS[number % len(COLOURS)])
-        ax.set_ylim(-0.05, 1.05)
-        label(ax, title=name)
-    label(axes[0], title=f"{title}: {names[0]}" if title else names[0])
-    label(axes[-1], "frequency of the weight in the carrier frame [Hz]")
+    figure, (ax,) = new_figure(width=8.5)
+    for number, (name, share) in enumerate(zip(names, np.transpose(shares))):
+        # wide below narrow: lines that coincide are all seen
+        style = line_style(number) | {"linewidth": max(4.5 - 1.2 * number, 1.2)}
+        ax.plot(hertz, share, label=f"{name}: up to {share.max():.2g}", **style)
+    ax.set_ylim(-0.05, 1.05)
+    label(ax, "frequency of the weight in the carrier frame [Hz]", "share of the cycle in contact [1]", title)
+    legend_below(figure, columns=2)
     return figure
 
 
@@ -79,7 +80,7 @@ def contact_map(frequency, clearance, panels: Sequence[tuple], *, line: tuple | 
     from matplotlib import colormaps
 
     figure, axes = new_figure(columns=len(panels), width=5.6 * len(panels), height=4.6, sharey=True)
-    colours = colormaps["viridis"].with_extremes(bad="0.75")
+    colours = colormaps["cividis"].with_extremes(bad="0.75")
     for ax, (title, share) in zip(axes, panels):
         share = np.asarray(share, float)
         low, high = np.nanmin(share, initial=1.0), np.nanmax(share, initial=0.0)

@@ -33,11 +33,12 @@ def test_examples_print_what_the_page_says(outputs, number):
 
 
 def test_pictures_exist_and_come_from_the_script():
-    pictures = re.findall(r"!\[[^\]]+\]\(images/impacts_(\w+)\.png\)", PAGE)
+    pictures = re.findall(r"!\[[^\]]+\]\(images/(impacts|gear_pair\w*)/(\w+)\.png\)", PAGE)
     script = (ROOT / "scripts" / "impacts.py").read_text(encoding="utf-8")
     assert len(pictures) >= 5
-    for name in pictures:
-        assert (ROOT / "docs" / "images" / f"impacts_{name}.png").stat().st_size > 5000
+    # what a case draws as well stands where its pictures are
+    for folder, name in pictures:
+        assert (ROOT / "docs" / "images" / folder / f"{name}.png").stat().st_size > 5000
         assert f'"{name}.png"' in script or f'"{name}"' in script
 
 

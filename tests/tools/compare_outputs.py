@@ -60,9 +60,8 @@ SCRIPTS = {
             *("--of", "contact ratio planet-ring", "--no-check", "--max-designs", "60"),
         ),
     ),
-    "readme_images.py": (("results_0",),),
+    "readme_images.py": (("docs", "--only", "published_four_stages"),),
 }
-FIRST = {"readme_images.py": (*CLI, "run", REFERENCE, "--output", "results_0")}
 OTHERS = {
     "schema": ((*CLI, "schema"), (*CLI, "schema", "--model", "drivetrain")),
     "sweep": ((*CLI, "sweep", REFERENCE, "--over", "operation.torque=50 N m,100 N m", "-o", "results"),),
@@ -312,7 +311,7 @@ def jobs_of(tree: Path) -> dict[str, list[list[str]]]:
         if "__main__" in path.read_text(encoding="utf-8"):
             runs = enumerate(SCRIPTS.get(path.name, ((),)), 1)
             commands = [[f"../tree/scripts/{path.name}", *a, "--output", f"results_{n}"] for n, a in runs]
-            jobs[path.name] = [*([list(FIRST[path.name])] if path.name in FIRST else []), *commands]
+            jobs[path.name] = commands
     return jobs
 
 

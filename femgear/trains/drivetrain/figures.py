@@ -120,7 +120,7 @@ def spectra(
 def _panels(titles: Sequence[str], *, x: str, y: str, title: str):
     """A figure with one pair of axes a title, one below the other, and a title above all."""
     count = len(titles)
-    figure, axes = new_figure(rows=count, width=8.6, height=1.2 + 2.0 * count, sharex=True)
+    figure, axes = new_figure(rows=count, width=8.6, height=max(1.2 + 2.0 * count, 4.2), sharex=True)
     for ax, text in zip(axes, titles):
         label(ax, x if ax is axes[-1] else "", y, text)
     if title:
@@ -197,21 +197,28 @@ def _name_lines(ax, lines: Sequence[tuple], width: float) -> None:
 
 
 def stiffness_figure(model: DrivetrainModel) -> Figure:
-    """Draw the series of the mesh stiffness of every stage over two mesh periods, and the wave itself."""
-    phase, names = np.linspace(0.0, 2.0, 1601), numbered(model.meshes)
+    """Draw the series of the mesh stiffness of every stage over the mesh period, and the wave itself."""
+    phase, names = np.linspace(0.0, 1.0, 801), numbered(model.meshes)
     first = [(row, mesh.section) for row, mesh in enumerate(model.train.meshes) if not mesh.planet]
     first = first[:MOST_PANELS]
-    scales = [(1e-9, "GN/m") if wave.levels[1] > 5e8 else (1e-6, "MN/m") for _, wave in first]
-    figure, axes = new_figure(columns=len(first), width=4.2 * len(first), height=4.0)
-    figure.suptitle(f"series of {model.stiffness.shape[1] - 1} terms", fontsize=SIZE - 1, x=0.01, ha="left")
-    for number, (ax, (row, wave), (scale, unit)) in enumerate(zip(axes, first, scales)):
-        label(ax, "mesh period [1]", f"stiffness [{unit}]", names[row])
+    columns = min(len(first), 2)
+    rows = -(-len(first) // columns)
+    figure, axes = new_figure(rows=rows, columns=columns, width=4.6 * columns + 2.0, height=1.2 + 2.6 * rows)
+    for ax in axes[len(first) :]:
+        figure.delaxes(ax)
+    for ax, (row, wave) in zip(axes, first):
         low, high, share = wave.levels
         inside = (phase + wave.phase + 0.5 * share) % 1.0 < share
-        series = FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]
-        ax.plot(phase, scale * np.where(inside, high, low), color=GREY, linewidth=1.4, label="rectangular")
-        ax.plot(phase, scale * series, color=COLOURS[number % len(COLOURS)], label="series")
+        series = 1e-6 * FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]
+        mean = 1e-6 * float(np.real(model.stiffness[row, 0]))
+        ax.plot(phase, 1e-6 * np.where(inside, high, low), color=GREY, linewidth=1.4, label="rectangular")
+        words = f"series of {model.stiffness.shape[1] - 1} terms"
+        ax.plot(phase, series, color=COLOURS[0], label=words)
+        ax.axhline(mean, color=COLOURS[1], linestyle="--", linewidth=1.2, label="mean")
         ax.set_xlim(phase[0], phase[-1])
+        spread = np.ptp(series) / mean
+        words = f"{names[row]}: mean {mean:.4g} N/µm, peak to peak {spread:.0%} of it"
+        label(ax, "position in the mesh period [1]", "mesh stiffness [N/µm]", words)
     legend_below(figure)
     return figure
 
@@ -266,7 +273,8 @@ def _curves(data: xr.Dataset, name: str, columns, kept=slice(None)) -> list[tupl
     """Names of some bodies or meshes, and the curves (text, values) of a variable, one a variant."""
     (owner,) = {"body", "mesh"} & set(data[name].dims)
     values = data[name].transpose("variant", owner, ...).values[..., kept]
-    variants = [str(text) for text in data["variant"].values]
+    # one variant needs no name
+    variants = [str(text) if data.sizes["variant"] > 1 else "_" for text in data["variant"].values]
     return [
         (str(data[owner].values[i]), [(text, values[v, i]) for v, text in enumerate(variants)])
         for i in columns
@@ -374,7 +382,8 @@ FIGURES = {
             "campbell": "Natural frequencies over the speed of the first body, with gyroscopic terms and "
             "mean mesh stiffness, and the mesh frequencies.",
             "drivetrain_mode": "Mode shape of the drivetrain ({}), by the number in the table, where the "
-            "free spin is the first; magnified, at rest in grey. The rays show how far each wheel turns. "
+            "free spin is the first; magnified, at rest in grey, from blue to yellow the more it moves. The "
+            "rays show how far each wheel turns. "
             "Shafts are drawn as bent beams between the places that the model knows. The drawing is a "
             "scheme: bodies without gears have a radius that is not theirs.",
         },

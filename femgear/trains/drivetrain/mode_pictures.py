@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.report.scene import add_coloured, load_pyvista, new_plotter, write_png
+from femgear.report.scene import load_pyvista, new_plotter, write_png
 from femgear.report.style import VERMILION
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.parts import Drivetrain
@@ -30,10 +30,10 @@ _COLOURS = "displacement over the largest"
 _VIEW = np.array([1.0, 0.55, -0.9])
 # Lines stand this share of the size in front of the faces that they lie on; from afar nothing is shifted.
 _FRONT = 3e-3
-# Height of the picture over its width.
-_HEIGHT = 0.72
-# Shares of the height between which the drivetrain stands.
-_ROOM = (0.22, 0.88)
+# Largest height of the picture over its width, and that of the title.
+_HEIGHT, _TITLE = 0.72, 0.08
+# Relative difference of frequencies of modes of one kind that are drawn as one: bending in both planes.
+_PAIR = 1e-3
 # Largest displacement over the size of the drivetrain.
 _SHARE = 0.12
 
@@ -230,14 +230,14 @@ def draw_motion(
     pv, plotter = load_pyvista(), new_plotter(size, round(_HEIGHT * size))
     plotter.set_background("white")  # type: ignore[call-arg]
     plotter.enable_parallel_projection()  # type: ignore[call-arg]
-    scale, points = _add_shape(pv, plotter, layout, move, turn, shafts, size)
-    _add_texts(plotter, title, layout, size)
-    _frame(plotter, points)
+    scale, points = _add_shape(pv, plotter, layout, move, turn, shafts)
+    height = _frame(plotter, points, size)
+    _add_texts(plotter, title, layout, size, height)
     write_png(plotter, path)
     return scale
 
 
-def _add_shape(pv, plotter, layout: Layout, move, turn, lines, size: int):
+def _add_shape(pv, plotter, layout: Layout, move, turn, lines):
     """Discs and shafts, at rest and moved; the factor of the motion, and all points of the discs (n, 3)."""
     centres, places = layout.centre, [wheel.body for wheel in layout.wheels]
     discs = [_disc(pv, wheel) for wheel in layout.wheels]
@@ -252,7 +252,8 @@ def _add_shape(pv, plotter, layout: Layout, move, turn, lines, size: int):
     whole.points = np.vstack([_moved(disc.points, *own) for disc, own in zip(discs, moves)])
     length = np.concatenate(lengths[: len(discs)])
     whole[_COLOURS] = length / (length.max() or 1.0)
-    add_coloured(plotter, whole, _COLOURS, size, limits=(0.0, 1.0))
+    style = {"cmap": "cividis", "clim": (0.0, 1.0), "lighting": False, "show_scalar_bar": False}
+    plotter.add_mesh(whole, scalars=_COLOURS, **style)
     spokes = [_spoke(wheel) for wheel in layout.wheels]
     turned = [_moved(spoke, *own) for spoke, own in zip(spokes, moves)]
     for mesh, colour, width, front in (
@@ -268,38 +269,41 @@ def _add_shape(pv, plotter, layout: Layout, move, turn, lines, size: int):
     return float(scale), np.vstack([rest.points, whole.points])
 
 
-def _add_texts(plotter, title: str, layout: Layout, size: int) -> None:
-    """Title, names beside the places, and the colour bar where this flat picture has room for it."""
-    height = round(_HEIGHT * size)
-    plotter.scalar_bars[" "].SetPosition(0.2, 0.065)
+def _add_texts(plotter, title: str, layout: Layout, size: int, height: int) -> None:
+    """Title, and names beside the wheels, but for planets."""
     radius = np.zeros(len(layout.centre))
     for wheel in layout.wheels:
         radius[wheel.body] = max(radius[wheel.body], wheel.radius)
+    named = [i for i, name in enumerate(layout.names) if "planet" not in name]
     plotter.add_point_labels(
-        layout.centre + np.array([0.0, 1.0, 0.0]) * radius[:, None] * 1.15, list(layout.names),
-        font_size=max(size // 60, 10), shape="rect", shape_color="white", shape_opacity=0.6, margin=1,
-        show_points=False, text_color="black", always_visible=True,
+        layout.centre[named] + np.array([0.0, 1.0, 0.0]) * radius[named, None] * 1.15,
+        [layout.names[i] for i in named], font_size=max(size // 45, 10), bold=False, shape="rect",
+        shape_color="white", shape_opacity=0.7, margin=1, show_points=False, text_color="black",
+        always_visible=True,
     )  # fmt: skip
     if title:
-        place = (0.02 * size, height - 0.045 * size)
+        place = (0.02 * size, height - 0.6 * _TITLE * size)
         plotter.add_text(title, position=place, font_size=max(size / 75, 7.0), color="black", name="title")
 
 
-def _frame(plotter, points) -> None:
-    """Parallel view that holds all points (n, 3), with room for title and colour bar."""
+def _frame(plotter, points, size: int) -> int:
+    """Parallel view that holds all points (n, 3) and the title; the height of the picture [pixels]."""
     away = _VIEW / np.linalg.norm(_VIEW)
     right = np.cross([0.0, 1.0, 0.0], away)
     right /= np.linalg.norm(right)
     axes = np.array([right, np.cross(away, right), away])
     low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
-    half = 0.5 * (high - low)
-    camera, bottom, top = plotter.camera, *_ROOM
-    scale = max(half[1] / (top - bottom), 1.06 * _HEIGHT * half[0])
-    middle = 0.5 * (low + high) - [0.0, (bottom + top - 1.0) * scale, 0.0]
+    wide, tall, _ = 1.1 * (high - low)
+    pixel = max(wide / size, tall / ((_HEIGHT - _TITLE) * size))
+    height = round(tall / pixel + _TITLE * size)
+    plotter.window_size = [size, height]
+    middle = 0.5 * (low + high) + [0.0, 0.5 * _TITLE * size * pixel, 0.0]
+    camera = plotter.camera
     camera.focal_point = middle @ axes
-    camera.position = camera.focal_point + 10.0 * half.max() * away
-    camera.up, camera.parallel_scale = (0.0, 1.0, 0.0), scale
+    camera.position = camera.focal_point + 10.0 * max(wide, tall) * away
+    camera.up, camera.parallel_scale = (0.0, 1.0, 0.0), 0.5 * height * pixel
     plotter.reset_camera_clipping_range()
+    return height
 
 
 def _moved(points, centre, shift, turn) -> np.ndarray:
@@ -334,14 +338,18 @@ def _polylines(pv, lines):
 def write_mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
     """Draw as many of the lowest elastic modes as PNG files; returns their names.
 
-    Modes have the numbers of the table: the free spin, which is not drawn, is the first.
+    Modes have the numbers of the table: the free spin, which is not drawn, is the first. Two modes of one
+    kind and nearly one frequency, bending in both planes, are drawn as the first of them.
     """
-    layout = drivetrain_layout(model.train)
+    layout, names = drivetrain_layout(model.train), []
     kinds, hertz = modes["kind"].values.astype(str), modes["frequency"].values
-    names = []
-    for mode in np.flatnonzero(kinds != "rigid")[:count].tolist():
-        shape = modes["shape"].values[:, mode]
-        title = f"mode {mode + 1}: {hertz[mode]:.2f} Hz, {kinds[mode]}"
+    elastic = np.flatnonzero(kinds != "rigid")
+    apart = np.diff(hertz[elastic]) > _PAIR * hertz[elastic][1:]
+    apart |= kinds[elastic][1:] != kinds[elastic][:-1]
+    for pair in np.split(elastic, np.flatnonzero(apart) + 1)[:count]:
+        mode, shape = int(pair[0]), modes["shape"].values[:, pair[0]]
+        title = f"mode{'s' * (len(pair) > 1)} {' and '.join(str(one + 1) for one in pair)}"
+        title += f": {hertz[mode]:.2f} Hz, {kinds[mode]}"
         names.append(f"drivetrain_mode_{mode + 1}.png")
         move, turn = layout_motion(model, layout, shape)
         draw_motion(folder / names[-1], layout, move, turn, shaft_lines(model, layout, shape), title=title)

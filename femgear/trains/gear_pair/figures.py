@@ -82,7 +82,7 @@ def state_bands(rows: Sequence[tuple]) -> Figure:
         for number, (low, high) in enumerate(pairwise(edges)):
             ax.barh(place, high - low, left=low, height=0.7, color=STATE_COLOURS[value[number]], linewidth=0)
         if len(at) <= _SPARSE:
-            mark = {"marker": "|", "color": BLACK, "markersize": 5.0, "linestyle": "none"}
+            mark = {"marker": ".", "color": BLACK, "markersize": 2.5, "linestyle": "none"}
             ax.plot(at, np.full(len(at), place), **mark, label=None if marked else "computed ratios")
             marked = True
     present = {int(one) for _, _, state in rows for one in np.unique(state)}
@@ -166,7 +166,11 @@ def _draw_response(drawn: Drawn) -> dict[str, Figure]:
         for n, direction in enumerate(sweep["direction"].values):
             amplitude, mean = (sweep[name].values[n] for name in names[1:])
             sweeps.append((f"sweep {direction}", sweep["ratio"].values, amplitude, mean))
-    return {"amplitude_and_mean": amplitude_and_mean([curve], sweeps)}
+    top = int(np.nanargmax(curve[2]))
+    title = f"largest amplitude {curve[2][top]:.3g} half backlash at {curve[1][top]:.3g}"
+    if len(folds := np.sort(data["ratio"].values[data["fold"].values])):
+        title += f", limit points at {', '.join(f'{one:.3g}' for one in folds)}"
+    return {"amplitude_and_mean": amplitude_and_mean([curve], sweeps, title=title)}
 
 
 def _draw_chaos(drawn: Drawn) -> dict[str, Figure]:

@@ -21,6 +21,7 @@ from femgear.report.response import (
     response_figures,
     transmission_error_period,
 )
+from femgear.report.scene import rounded
 from femgear.report.style import (
     BLACK,
     BLUE,
@@ -33,10 +34,13 @@ from femgear.report.style import (
     VERMILION,
     label,
     legend_below,
+    line_style,
     new_figure,
     periodic,
+    rpm,
     xy,
 )
+from femgear.system.fourier import fluctuation
 from femgear.system.rigid_bodies import CENTRAL, gear_geometry
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
@@ -49,32 +53,17 @@ if TYPE_CHECKING:
 
 _CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
 _BODIES = {"carrier": GREEN, "ring": BLACK, "sun": VERMILION, "planets": BLUE}
-# modes that are shown and that stand in a row, harmonics of mesh forces
-_SHOWN, _COLUMNS, _HARMONICS = 12, 4, 4
-# half heights of the views over the ring's radius, and the largest magnification of small motions
-_FRONT, _SIDE, _MOST = 1.25, 0.4, 1e4
-# widths of lines that lie on each other in the side view
-_WIDTHS = {"carrier": 1.6, "ring": 4.5, "sun": 3.2, "planets": 1.6}
+# shapes that are shown and that stand in a row, harmonics of mesh forces, decades below the largest of them
+_SHOWN, _COLUMNS, _HARMONICS, _DECADES = 8, 4, 4, 1e-4
+# half heights of the views over the ring's radius, and where bodies stand in the one from the side
+_FRONT, _SIDE = 1.25, 0.9
+_ROWS = {"carrier": 0.66, "ring": 0.22, "sun": -0.22, "planets": -0.66}
+# largest ratio of the magnifications of both views
+_MOST = 1e4
+# relative difference of frequencies that are those of one pair of modes
+_PAIR = 1e-6
 
 _MARKS = {"in phase": "o", "counter-phased": "s"}
-
-
-def _draw_mode(front, side, data: SimpleNamespace, moved: np.ndarray, scale: float) -> None:
-    """Draw both views of one mode, each at its own magnification.
-
-    From the front: pitch circles, for the carrier the circle of planet centres, with a spoke that turns.
-    From the side, seen along y: every body as the line of its diameter along x, which tilts about y and moves
-    along z, drawn at the scale of the front view times the factor in the title. ``moved`` (N + 3, 6) are x,
-    y, z, tilts and rotation of every body as arcs, in the axes of the set of `gear_geometry`.
-    """
-    sizes = [np.abs(moved[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
-    # a view without motion shows none
-    views = [scale * data.ring_radius / max(size, max(sizes) / _MOST) for size in sizes]
-    _draw_front(front, data, views[0] * moved)
-    _draw_side(side, data, views[1] * moved)
-    times = views[1] / views[0]
-    times = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
-    side.set_title(f"from the side, scale × {times}", fontsize=SIZE - 3, color="0.4")
 
 
 def _pitch_radii(data) -> tuple[float, float, float]:
@@ -116,13 +105,17 @@ def _draw_front(ax, data, moved: np.ndarray) -> None:
 
 
 def _draw_side(ax, data, moved: np.ndarray) -> None:
-    ax.axhline(0.0, color="0.82", linewidth=1.0)
+    """Draw every body as the line of its diameter along x, which tilts about y and moves along z.
+
+    One row for the carrier, the ring, the sun and the planets each.
+    """
+    ring = _pitch_radii(data)[0]
     for (name, colour, centre, radius, base), (_, _, z, _, tilt, _) in zip(_bodies(data), moved):
-        ends = np.array([-radius, radius])
-        style = {"linestyle": "--"} if name == "carrier" else {}
+        ends, row = np.array([-radius, radius]), _ROWS[name] * ring
         # a turn by phi about y lowers points at positive x
         height = z - tilt / base * ends
-        ax.plot(centre.real + ends, height, color=colour, linewidth=_WIDTHS[name], **style)
+        ax.plot(centre.real + ends, [row, row], color="0.82", linewidth=1.0)
+        ax.plot(centre.real + ends, row + height, color=colour, linewidth=2.2)
     _limits(ax, data, _SIDE)
 
 
@@ -133,15 +126,19 @@ def _limits(ax, data, high: float) -> None:
 
 
 def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float = 0.16) -> Figure:
-    """Draw the first twelve modes that are no rigid-body motions, from the front and, below, from the side.
+    """Draw the first eight shapes that are no rigid-body motions, from the front and, below, from the side.
 
-    The largest displacement of each view is the share ``scale`` of the ring's radius. E-MODES (CaseError):
-    there is no such mode.
+    From the front: pitch circles, for the carrier the circle of planet centres, with a spoke that turns. Each
+    view is magnified so that its largest displacement is the share ``scale`` of the ring's radius; the title
+    of the lower one tells how they compare. Modes of one frequency are drawn once. E-MODES (CaseError): there
+    is no such mode.
     """
     frequency = modes["frequency"].values
-    shown = np.flatnonzero(frequency > 0.0)[:_SHOWN]
-    if not len(shown):
+    elastic = np.flatnonzero(frequency > 0.0)
+    if not len(elastic):
         raise CaseError("no mode to draw", code="E-MODES", limit="a mode that is no rigid-body motion")
+    apart = np.flatnonzero(np.diff(frequency[elastic]) > _PAIR * frequency[elastic][1:]) + 1
+    shown = np.split(elastic, apart)[:_SHOWN]
     data = SimpleNamespace(**gear_geometry(gears))
     planets = [data.planet_radius] * gears.n_planets
     radii = np.array([data.centre_distance, data.ring_radius, data.sun_radius, *planets])
@@ -149,17 +146,28 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
     moved[:, 3:] *= radii[:, None, None]
     columns = min(_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
-    figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=4.3 * rows + 0.6)
+    figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=5.4 * rows + 0.4)
     axes[0].get_gridspec().set_height_ratios([_FRONT, _SIDE] * rows)
     for ax in axes:
         ax.set_axis_off()
         ax.set_aspect("equal")
-    for place, mode in enumerate(shown):
+    for place, pair in enumerate(shown):
         row, column = divmod(place, columns)
         front, side = (axes[(2 * row + i) * columns + column] for i in (0, 1))
-        _draw_mode(front, side, data, moved[:, :, mode], scale)
-        kind, phasing = str(modes["kind"].values[mode]), str(modes["phasing"].values[mode])
-        front.set_title(f"mode {mode + 1}: {frequency[mode]:.6g} Hz\n{kind}\n{phasing}", fontsize=SIZE - 2)
+        # motions of every body x, y, z, tilts and rotation as arcs, in the axes of the set of `gear_geometry`
+        one, first = moved[:, :, pair[0]], pair[0]
+        sizes = [np.abs(one[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
+        # a view without motion shows none
+        inside, across = np.maximum(sizes, max(sizes) / _MOST)
+        _draw_front(front, data, scale * data.ring_radius / inside * one)
+        _draw_side(side, data, scale * data.ring_radius / across * one)
+        kind, phasing = str(modes["kind"].values[first]), str(modes["phasing"].values[first])
+        names = " and ".join(str(mode + 1) for mode in pair)
+        words = f"mode{'s' * (len(pair) > 1)} {names}: {float(f'{frequency[first]:.4g}'):g} Hz"
+        front.set_title(f"{words}\n{kind}\n{phasing}", fontsize=SIZE - 1)
+        side.set_title(
+            f"axial motion, tilt: {rounded(100.0 * across / inside)} % of the above", fontsize=SIZE - 2
+        )
     legend_below(figure, columns=5)
     return figure
 
@@ -186,32 +194,94 @@ def _mesh_stiffness(modes: xr.Dataset, static: xr.Dataset) -> Figure:
 
 
 def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
-    """Draw the transmission errors of dynamics.nc over one mesh period beside the static ones of modes.nc."""
-    static = modes[["helical_ste"]].rename(helical_ste="ste")
-    return transmission_error_period(dynamics, static, together=True)
+    """Draw the transmission errors of planet 1 over one mesh period beside the static ones of modes.nc.
+
+    Those of dynamics.nc; its other planets have the same ones at other positions.
+    """
+    static, first = modes[["helical_ste"]].rename(helical_ste="ste"), [0, dynamics.sizes["mesh"] // 2]
+    return transmission_error_period(dynamics.isel(mesh=first), static.isel(mesh=first), together=True)
 
 
 def _mesh_force_spectra(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
     """Amplitudes of the mesh forces of planet 1 over the frequency of every harmonic; modes are marked."""
     order = np.argsort(dynamics["mesh_frequency"].values)
     hertz = dynamics["mesh_frequency"].values[order]
-    force = np.abs(harmonics_of(dynamics, "mesh_force"))[order]
-    count = min(_HARMONICS, force.shape[-1] - 1)
+    lines = harmonics_of(dynamics, "mesh_force")[order]
+    count = min(_HARMONICS, lines.shape[-1] - 1)
     names, n = [str(name) for name in dynamics["mesh"].values], dynamics.sizes["mesh"] // 2
     figure, axes = new_figure(rows=2, height=7.4, sharex=True)
     top = count * hertz.max()
     for ax, mesh in zip(axes, (0, n)):
-        for h in range(1, count + 1):
-            ax.plot(
-                1e-3 * h * hertz, force[:, mesh, h], DASHES[(h - 1) % 4], color=COLOURS[h - 1],
-                label=f"harmonic {h}",
-            )  # fmt: skip
+        force = np.abs(lines[:, mesh, 1 : count + 1])
+        for h, one in enumerate(force.T, start=1):
+            style = {"color": COLOURS[h - 1], "label": f"harmonic {h}"}
+            ax.plot(1e-3 * h * hertz, one, DASHES[(h - 1) % 4], **style)
         _mark(ax, modes, top)
+        peak, h = np.unravel_index(force.argmax(), force.shape)
+        at = (h + 1) * hertz[peak]
+        where = f"harmonic {h + 1}: {force.max():.3g} N at {1e-3 * at:.4g} kHz"
+        words = f"{names[mesh]}; largest in {where}{_excited(modes, at, lines[peak, :, h + 1])}"
+        ax.plot(1e-3 * at, force.max(), "o", color=BLACK, markerfacecolor="none", markersize=9)
         ax.set_yscale("log")
-        label(ax, y="mesh force [N]", title=names[mesh])
+        ax.set_ylim(_DECADES * force.max(), 3.0 * force.max())
+        label(ax, y="mesh force [N]", title=words)
     axes[0].set_xlim(0.0, 1e-3 * top)
     label(axes[1], "frequency of the harmonic [kHz]")
     legend_below(figure, axes[0], columns=4)
+    return figure
+
+
+def _excited(modes: xr.Dataset, hertz: float, force: np.ndarray) -> str:
+    """Name the mode within 5 % of a frequency [Hz] on which forces (meshes,) [N] do most work, if any."""
+    near = np.flatnonzero(np.abs(modes["frequency"].values - hertz) < 0.05 * hertz)
+    if not len(near):
+        return ""
+    mode = near[np.abs(modes["mesh_deflection"].values[:, near].T @ force).argmax()]
+    return f", mode {mode + 1}: {modes['kind'].values[mode]!s}"
+
+
+def _pin_forces(dynamics: xr.Dataset) -> Figure:
+    """Fluctuation of forces and moments between pins and planets over the speed."""
+    order = np.argsort(dynamics["speed"].values)
+    speed = dynamics["speed"].values[order]
+    figure, axes = new_figure(rows=2, height=7.0, sharex=True)
+    for ax, name, unit in zip(axes, ("force", "moment"), ("N", "N m")):
+        lines = harmonics_of(dynamics, f"pin_{name}")[order]
+        rms, mean = fluctuation(lines).max(axis=1), np.abs(lines[0, :, :, 0]).max(axis=0)
+        # about its own axis the pin does not hold the planet
+        held = np.flatnonzero(rms.max(axis=0) > _PAIR * rms.max())
+        for i in held.tolist():
+            steady = f"{mean[i]:.4g}" if mean[i] > _PAIR * mean.max() else "0"
+            words = f"{name}, {dynamics['direction'].values[i]!s}: mean {steady} {unit}"
+            ax.plot(speed, rms[:, i], label=words, **line_style(i))
+        peak, i = np.unravel_index(rms.argmax(), rms.shape)
+        largest = f"{dynamics['direction'].values[i]!s}, {rms.max():.3g} {unit} at {speed[peak]:.6g} rpm"
+        ax.set_ylim(bottom=0.0)
+        label(ax, y=f"{name} [{unit} r.m.s.]", title=f"largest fluctuation: {largest}")
+    label(axes[1], "input speed [rpm]")
+    legend_below(figure, columns=2)
+    return figure
+
+
+def _slice_forces(dynamics: xr.Dataset) -> Figure:
+    """Load over face width and mesh period of the meshes of planet 1, at the speed where it changes most."""
+    lines, height = harmonics_of(dynamics, "slice_force"), 1e3 * dynamics["slice"].values
+    width = 1e3 * float(dynamics.attrs["face_width"]) / len(height)
+    speed = int(fluctuation(lines).max(axis=(1, 2)).argmax())
+    position = np.linspace(0.0, 1.0, 129)
+    wave = np.exp(2j * np.pi * np.outer(dynamics["harmonic"].values, 0.5 * (position[1:] + position[:-1])))
+    first = [0, dynamics.sizes["mesh"] // 2]
+    loads = np.real(lines[speed, first] @ wave) / width
+    edges = np.append(height - 0.5 * width, height[-1] + 0.5 * width)
+    figure, axes = new_figure(columns=2, width=10.0, sharey=True)
+    for ax, mesh, load in zip(axes, first, loads):
+        style = {"vmin": loads.min(), "vmax": loads.max(), "cmap": "cividis"}
+        field = ax.pcolormesh(position, edges, load, **style)
+        words = f"{dynamics['mesh'].values[mesh]!s}, {rpm(dynamics['speed'].values[speed])}: "
+        words += f"{load.min():.3g} to {load.max():.3g} N/mm"
+        label(ax, "position in the mesh period [1]", title=words)
+    label(axes[0], y="height above mid-face [mm]")
+    figure.colorbar(field, ax=axes, label="load along the tooth normal [N/mm]")
     return figure
 
 
@@ -285,16 +355,18 @@ def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
 
 def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
     dynamics, modes = drawn.data["dynamics"], drawn.data["modes"]
-    return response_figures(
+    slices = {"slice_forces": _slice_forces(dynamics)} if dynamics.sizes["slice"] > 1 else {}
+    return slices | response_figures(
         dynamics,
         dynamic_transmission_error=transmission_errors(dynamics, modes),
         mesh_force_spectra=_mesh_force_spectra(dynamics, modes),
+        pin_forces=_pin_forces(dynamics),
     )
 
 
 FIGURES = {
     "": STATIC[""],
-    # static.nc holds the spur gears of the transverse section: nobody makes them, their set is not drawn
+    # static.nc holds the spur gears of the transverse section: nobody makes them, modes.nc the helical ones
     "static": Figures(
         dict(STATIC["static"].captions)
         | {
@@ -302,13 +374,14 @@ FIGURES = {
             "along the transverse line of action, centres fixed: of the helical meshes (solid), and of the "
             "spur gears of the transverse section (dotted) that the slices come from.",
         },
-        draw=STATIC["static"].draw,
+        draw=lambda drawn: {} if "modes" in drawn.data else STATIC["static"].draw(drawn),
     ),
     "modes": Figures(
         {
             "spatial_mode_shapes": "Mode shapes of the helical set with mean mesh stiffness, from the front "
-            "and, below, from the side, where bodies tilt and move along the axis. Motions of the side view "
-            "are drawn at the scale of the front view times the factor given. At rest in grey.",
+            "and, below, from the side, where bodies tilt and move along the axis, one row a body. Each "
+            "view is magnified for itself; how large the motion of the lower one is stands above it. Two "
+            "modes of one frequency are drawn as one. At rest in grey.",
             "mesh_phasing": "Phases of sun and ring meshes at every planet for the first harmonics of the "
             "mesh frequency, and what is left of equal mesh forces on sun and ring: what cancels excites no "
             "mode of that kind.",
@@ -320,7 +393,12 @@ FIGURES = {
         | {
             "mesh_force_spectra": "Mesh forces of planet 1 along the tooth normals over the frequency of "
             "each harmonic, h times the mesh frequency. Marks along the axis are natural frequencies by the "
-            "phasing of the mode: a harmonic meets modes of its own phasing.",
+            "phasing of the mode: a harmonic meets modes of its own phasing. The largest force is named with "
+            "the mode within 5 % on which the mesh forces do most work.",
+            "pin_forces": "Fluctuation of force and moment between pin and planet over the speed, the "
+            "largest of all planets, and their mean values.",
+            "slice_forces": "Load of the slices over face width and mesh period in the meshes of planet 1, "
+            "per width, at the speed where it changes most.",
         },
         draw=_dynamics_figures,
     ),

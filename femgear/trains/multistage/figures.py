@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure
+from femgear.report.response import harmonics_of
+from femgear.report.style import BLACK, COLOURS, SIZE, label, legend_below, line_style, new_figure, rpm
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 _DASHES = {"rotational": "-", "translational": "--", "planet": ":", "mixed": "-."}
 """Kinds of modes, and of their lines."""
+_PROMINENCE = 0.15
+"""Least height of a peak over its sides, decades."""
 
 
 def stage_energy(modes: xr.Dataset) -> Figure:
@@ -46,30 +49,61 @@ def stage_energy(modes: xr.Dataset) -> Figure:
 
 
 def mesh_orders(modes: xr.Dataset, response: xr.Dataset) -> Figure:
-    """Draw mesh frequencies of response.nc and their harmonics over the speed, with the modes of modes.nc.
+    """Draw a Campbell diagram: mesh harmonics of response.nc over the speed, and the modes of modes.nc.
 
-    Natural frequencies above the highest line are left out.
+    Circles stand where the forces of a harmonic have a peak, beside them the natural frequency within 5 % on
+    which they do most work. Natural frequencies above the highest harmonic are left out.
     """
     speed, mesh = response["speed"].values, response["mesh_frequency"].values
-    harmonics = response.sizes["harmonic"]
-    figure, (ax,) = new_figure(width=8.5, height=5.4)
-    top, low = harmonics * mesh.max(), mesh.min()
-    for hertz, kind in zip(modes["frequency"].values, modes["kind"].values):
-        if low < hertz < top:
-            ax.axhline(hertz, color=GREY, linestyle=_DASHES[kind], linewidth=0.9, label=f"{kind} mode")
+    harmonics, hertz = response["harmonic"].values, modes["frequency"].values
+    figure, (ax,) = new_figure(width=8.5, height=6.0)
+    top, lowest = float(harmonics.max() * mesh.max()), hertz[hertz > 0.0].min(initial=np.inf)
+    for one, kind in zip(hertz, modes["kind"].values):
+        if 0.0 < one < top:
+            style = {"linestyle": _DASHES[kind], "linewidth": 0.8, "label": f"{kind} mode"}
+            ax.axhline(one, color="0.65", **style)
+    below = []
     for stage, line in enumerate(mesh):
-        style = {
-            "color": COLOURS[stage % len(COLOURS)],
-            "label": f"stage {stage + 1}, harmonics 1 to {harmonics}",
-        }
-        for h in range(1, harmonics + 1):
-            ax.plot(speed, h * line, linewidth=2.2 / h, **style)
-    ax.set_yscale("log")
-    ax.set_ylim(low, 1.1 * top)
+        if harmonics.max() * line.max() < lowest:
+            below.append(f"stage {stage + 1}")
+            continue
+        style = {"color": COLOURS[stage % len(COLOURS)], "label": f"stage {stage + 1}, mesh harmonics"}
+        for place, h in enumerate(harmonics):
+            ax.plot(speed, h * line, linewidth=2.0, **style)
+            ax.text(speed[-1], h * line[-1], f" {h} f{stage + 1}", va="center", fontsize=SIZE - 1)
+            for at, mode in _peaks(modes, response, stage, place):
+                ax.plot(
+                    speed[at],
+                    h * line[at],
+                    "o",
+                    color=BLACK,
+                    markerfacecolor="white",
+                    label="peak of the force",
+                )
+                ax.annotate(
+                    f"{hertz[mode]:.0f}", (speed[at], h * line[at]), xytext=(-5, 4), ha="right",
+                    textcoords="offset points", fontsize=SIZE - 2,
+                )  # fmt: skip
     ax.set_xlim(speed.min(), speed.max())
-    label(ax, "speed of the input [1/min]", "frequency [Hz]")
-    legend_below(figure, columns=2)
+    ax.set_ylim(0.0, 1.02 * top)
+    words = f"{' and '.join(below)}: all harmonics below the first mode, {lowest:.4g} Hz" if below else ""
+    label(ax, "input speed [rpm]", "frequency [Hz]", words)
+    legend_below(figure, columns=3)
     return figure
+
+
+def _peaks(modes: xr.Dataset, response: xr.Dataset, stage: int, harmonic: int) -> list[tuple[int, int]]:
+    """Find peaks of the forces that a mesh harmonic of a stage excites: numbers of speed and mode."""
+    from scipy.signal import find_peaks
+
+    force = harmonics_of(response.isel(excited_by=stage, harmonic=harmonic), "mesh_force")
+    hertz = response["harmonic"].values[harmonic] * response["mesh_frequency"].values[stage]
+    size, found = np.log10(np.maximum(np.abs(force).max(axis=1), 1e-300)), []
+    for at in find_peaks(size, prominence=_PROMINENCE)[0].tolist():
+        near = np.flatnonzero(np.abs(modes["frequency"].values / hertz[at] - 1.0) < 0.05)
+        work = np.abs(modes["mesh_deflection"].values[:, near].T @ force[at])
+        found += [(at, int(near[work.argmax()]))] if len(near) else []
+    return found
 
 
 def stage_forces(response: xr.Dataset, balance: xr.Dataset | None = None) -> Figure:
@@ -77,23 +111,23 @@ def stage_forces(response: xr.Dataset, balance: xr.Dataset | None = None) -> Fig
 
     Those of balance.nc stand beside them as circles.
     """
-    speed, forces = response["speed"].values, {"all stages": response["total_force"].values}
-    for n, force in zip(response["excited_by"].values, response["first_force"].values):
-        forces[f"meshes of stage {n}"] = force
+    speed, total = response["speed"].values, response["total_force"].values
     stages = response.sizes["stage"]
     figure, axes = new_figure(rows=stages, width=8.5, height=1.2 + 2.1 * stages, sharex=True)
     for stage, ax in enumerate(axes):
-        largest = max(np.max(force[:, stage]) for force in forces.values())
-        for number, (text, force) in enumerate(forces.items()):
-            ax.plot(speed, force[:, stage], label=text, **line_style(number))
+        ax.plot(speed, total[:, stage], color="0.75", linewidth=4.5, label="all stages")
+        for n, force in zip(response["excited_by"].values, response["first_force"].values):
+            ax.plot(speed, force[:, stage], label=f"meshes of stage {n}", **line_style(int(n) - 1))
         if balance is not None:
             style = {"color": BLACK, "fillstyle": "none", "label": "harmonic balance, k(t) of all meshes"}
             ax.plot(balance["speed"].values, balance["total_force"].values[:, stage], "o", **style)
+        largest, at = total[:, stage].max(), speed[total[:, stage].argmax()]
         ax.set_yscale("log")
-        ax.set_ylim(1e-4 * largest, 2.0 * largest)
-        label(ax, y="force [N r.m.s.]", title=f"sun-planet 1 of stage {stage + 1}")
+        ax.set_ylim(1e-3 * largest, 3.0 * largest)
+        words = f"sun-planet 1 of stage {stage + 1}: at most {largest:.4g} N r.m.s., at {rpm(at)}"
+        label(ax, y="force [N r.m.s.]", title=words)
     axes[0].set_xlim(np.min(speed), np.max(speed))
-    label(axes[-1], "speed of the input [1/min]")
+    label(axes[-1], "input speed [rpm]")
     legend_below(figure, axes[0], columns=3)
     return figure
 
@@ -117,8 +151,9 @@ FIGURES = {
     ),
     "response": Figures(
         {
-            "mesh_orders": "Mesh frequencies of the stages and their harmonics over the speed of the input; "
-            "horizontal lines are natural frequencies.",
+            "mesh_orders": "Campbell diagram: harmonics of the mesh frequency f1, f2, .. of every stage over "
+            "the speed of the input; horizontal lines are natural frequencies. Circles: peaks of the mesh "
+            "forces, with the natural frequency [Hz] on which they do most work.",
             "stage_forces": "Dynamic forces of mesh sun-planet 1 of every stage over the speed of the input, "
             "by the stage whose meshes excite; circles: harmonic balance with the stiffnesses of all meshes.",
         },

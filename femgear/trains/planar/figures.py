@@ -31,6 +31,8 @@ _PALE = "#F6D48F"
 _AXIS = "frequency of the weight in the carrier frame [Hz]"
 # limit points that are labelled, at most
 _LABELS = 4
+# fewer lines are no spectrum; lines end so far below the largest one
+_LEAST_LINES, _FLOOR = 3, 1e-5
 # difference of two curves, relative to the range they are drawn over, that cannot be seen
 _EQUAL = 5e-3
 # instants of a carrier turn in figures of two frequencies, at most
@@ -50,9 +52,11 @@ def pieces(stable, wanted: int) -> list[slice]:
 def orbits(curves: Sequence[tuple], *, title: str = "") -> Figure:
     """Draw paths of a member's centre in the carrier frame: curves (text, path (2, n) [m])."""
     figure, (ax,) = new_figure(width=6.2, height=6.2)
+    # one path is named by the title
+    title = f"{curves[0][0]}, {title}" if title and len(curves) == 1 else title
     for number, (text, path) in enumerate(curves):
         closed = 1e6 * np.concatenate([path, path[:, :1]], axis=1)
-        ax.plot(*closed, label=text, **line_style(number))
+        ax.plot(*closed, label=text if len(curves) > 1 else None, **line_style(number))
     ax.plot(0.0, 0.0, "+", color=GREY)
     ax.set_aspect("equal", adjustable="datalim")
     label(ax, "x [µm]", "y [µm]", title)
@@ -239,15 +243,16 @@ def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
     forces = [1e-3 * (lines[one] @ wave.T).real for one in pair]
     curves = [(names[one], force) for one, force in zip(pair, forces)]
     # one curve would hide the other
+    equal = ""
     if np.abs(forces[1] - forces[0]).max() <= _EQUAL * np.ptp(forces):
-        curves = [(f"{names[0]} and {names[pair[1]]}: equal", forces[0])]
+        equal, curves = f", {names[0]} and {names[pair[1]]}: equal", [("_", forces[0])]
     figure, axes = new_figure(rows=len(panels), width=8.5, height=1.0 + 2.8 * len(panels))
     for number, (text, force) in enumerate(curves):
         for ax, (part, _) in zip(axes, panels):
             ax.plot(360.0 * turn[part], force[part], linewidth=0.8, label=text, **line_style(number))
     title, doubt = f"{float(response['speed'][speed]):.6g} rpm: ", _doubt(_tails(response)[speed])
     for ax, (_, words) in zip(axes, panels):
-        label(ax, "carrier angle [°]", "mesh force [kN]", title + words + doubt)
+        label(ax, "carrier angle [°]", "mesh force [kN]", title + words + equal + doubt)
         title = doubt = ""
     legend_below(figure, axes[0])
     return figure
@@ -265,10 +270,11 @@ def _response_spectrum(response: xr.Dataset, speed: int) -> Figure:
     )
     for ax, (size, text) in zip(axes, quantities):
         # five decades below the largest line there is nothing to see
-        floor = 1e-5 * size[hertz > 0.0].max(initial=0.0)
+        floor = _FLOOR * size[hertz > 0.0].max(initial=0.0)
         shown = (size > floor) & (hertz > 0.0)
         for number, (words, here) in enumerate((("weight", mesh == 0), ("mesh and side bands", mesh != 0))):
             if np.any(here & shown):
+                words = words if np.any(mesh != 0) else "_"
                 ax.vlines(hertz[here & shown], floor, size[here & shown], color=COLOURS[number], label=words)
         if np.any(shown):
             ax.set_yscale("log")
@@ -281,24 +287,25 @@ def _response_spectrum(response: xr.Dataset, speed: int) -> Figure:
 
 
 def _contact(data: xr.Dataset, x: np.ndarray, words: str, parts) -> Figure:
-    """Four panels: both flanks of the meshes of the first planet."""
-    count = data.sizes["mesh"] // 2
-    panels = [(side, mesh) for side in ("drive", "back") for mesh in (0, count)]
-    figure, axes = new_figure(rows=4, width=8.0, height=6.4, sharex=True)
-    for number, (ax, (side, mesh)) in enumerate(zip(axes, panels)):
-        share, colour = data[f"{side}_contact"].values[:, mesh], COLOURS[number]
+    """Both flanks of the meshes of the first planet, one line for those that touch alike."""
+    count, alike = data.sizes["mesh"] // 2, {}
+    for side in ("drive", "back"):
+        for mesh in (0, count):
+            share = data[f"{side}_contact"].values[:, mesh]
+            alike.setdefault(share.tobytes(), (share, []))[1].append(f"{data['mesh'].values[mesh]!s}, {side}")
+    figure, (ax,) = new_figure(width=8.5, height=4.8)
+    for number, (share, flanks) in enumerate(alike.values()):
+        colour, text = COLOURS[number], " and ".join(flanks)
         _mark_tails(ax, x, share, _tails(data))
         if parts is None:
-            ax.plot(x, share, "o-", color=colour, markersize=3)
+            ax.plot(x, share, "o-", color=colour, markersize=3, label=text)
         else:
             for dash, _, part in parts:
                 ax.plot(x[part], share[part], color=colour, linestyle=dash)
-        ax.set_ylim(-0.06, 1.06)
-        ax.set_yticks([0.0, 0.5, 1.0])
-        label(ax, title=f"{data['mesh'].values[mesh]!s}, {side} flanks")
-    label(axes[-1], words)
-    figure.supylabel("share of the time in contact [1]", fontsize=SIZE)
-    legend_below(figure)
+            ax.plot([], [], color=colour, label=text)
+    ax.set_ylim(-0.06, 1.06)
+    label(ax, words, "share of the time in contact [1]")
+    legend_below(figure, columns=2)
     return figure
 
 
@@ -326,8 +333,14 @@ def _response_figures(drawn: Drawn) -> dict[str, Figure]:
     """Figures of the speeds that are shown, and over all speeds where there are several."""
     response, figures = drawn.data["response"], {}
     speed = response["speed"].values
+    force, moving = np.abs(harmonics_of(response, "mesh_force")[:, 0]), response["frequency"].values != 0.0
     for s in shown_speeds(response):
-        figures |= {f"{name}_{round(speed[s])}_rpm": draw(response, s) for name, draw in _OF_A_SPEED.items()}
+        lines = force[s, moving[s]]
+        # a few lines need no spectrum
+        few = np.count_nonzero(lines > _FLOOR * lines.max(initial=0.0)) < _LEAST_LINES
+        for name, draw in _OF_A_SPEED.items():
+            if draw is not _response_spectrum or not few:
+                figures[f"{name}_{round(speed[s])}_rpm"] = draw(response, s)
     if len(speed) > 1:
         order, words = np.argsort(speed), "speed of the input [rpm]"
         figures["contact_over_speed"] = _contact(response.isel(speed=order), speed[order], words, None)

@@ -195,3 +195,27 @@ def test_no_multiple_frequency_is_cut(size, apart, kept):
     modes = solve_modes(system, [0.0], damping_ratio=0.0, count=2)
     wanted = size * np.array([1.0, 2.0, 2.0])[:kept]
     np.testing.assert_allclose((2.0 * np.pi * modes.frequency) ** 2, wanted, rtol=2e-6)
+
+
+def test_rounding_chooses_neither_sign_nor_pair():
+    """Two equal frequencies: the first mode alone moves the coordinate that moves most, forwards."""
+    rng = np.random.default_rng(5)
+    n, values = 7, np.array([1.0, 4.0, 4.0, 9.0, 25.0, 25.0, 25.0])
+    turn, _ = np.linalg.qr(rng.normal(size=(n, n)))
+    K = turn @ np.diag(values) @ turn.T
+    for noise in (0.0, 1e-15):
+        stiffness = 0.5 * (K + K.T) * (1.0 + noise * rng.normal(size=(n, n)))
+        system = MechanicalSystem(
+            M=np.eye(n), C=np.zeros((n, n)), K=0.5 * (stiffness + stiffness.T), W=np.zeros((n, 1)),
+            load=np.zeros(n), dofs=tuple(map(str, range(n))),
+        )  # fmt: skip
+        shape = solve_modes(system, np.ones(1), damping_ratio=0.0).shape
+        for pair in ([0], [1, 2], [3], [4, 5, 6]):
+            # the projector on the space of the modes knows nothing of their choice
+            projector = turn[:, pair] @ turn[:, pair].T
+            row = int(np.argmax(np.diag(projector)))
+            expected = projector[:, row] / np.sqrt(projector[row, row])
+            np.testing.assert_allclose(shape[:, pair[0]], expected, atol=1e-9)
+            np.testing.assert_allclose(shape[row, pair[1:]], 0.0, atol=1e-9)
+            largest = shape[np.abs(shape[:, pair]).argmax(axis=0), pair]
+            assert np.all(largest > 0.0) or len(pair) > 1

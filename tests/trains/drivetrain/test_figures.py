@@ -189,7 +189,11 @@ def test_picture_of_a_mode(tmp_path):
     images = [iio.imread(tmp_path / f"{name}.png") for name in motions]
     # a disc moves by the share of the length, 1.1 m from face to face; or the shaft, which moves most
     assert scales == pytest.approx([0.12 * 1.1, 0.12 * 1.1 / 4.0, 0.0], rel=1e-6)
-    assert all(image.shape[:2] == (216, 300) and np.ptp(image) > 100 for image in images)
+    assert all(image.shape[1] == 300 and np.ptp(image) > 100 for image in images)
+    # a picture is as high as what it shows: title, bodies, and little beside them
+    for image in images:
+        drawn_rows = np.flatnonzero((image[..., :3] < 250).any(axis=(1, 2)))
+        assert len(image) <= 216 and drawn_rows[0] < 24 and drawn_rows[-1] > 0.85 * len(image)
     assert all((one != two).any() for one, two in itertools.pairwise(images))
 
 
@@ -214,6 +218,14 @@ def test_modes_have_the_numbers_of_the_table(tmp_path, monkeypatch):
         "drivetrain_mode_3.png",
     ]
     assert drawn == [("mode 2: 5.00 Hz, bending", 2), ("mode 3: 7.00 Hz, torsional", 2)]
+    # both planes of a bending mode are one picture
+    kinds, hertz = ["bending", "bending", "torsional"], [5.0, 5.001, 5.0011]
+    modes = modes.assign(kind=("mode", kinds), frequency=("mode", hertz))
+    assert write_mode_pictures(tmp_path, model, modes, 3)[1:] == ["drivetrain_mode_3.png"]
+    assert [title for title, _ in drawn[2:]] == [
+        "modes 1 and 2: 5.00 Hz, bending",
+        "mode 3: 5.00 Hz, torsional",
+    ]
 
 
 def test_window_of_the_first_separation(monkeypatch):

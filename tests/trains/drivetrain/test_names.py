@@ -58,7 +58,8 @@ def test_every_mesh_is_found_by_its_name(case):
 def test_every_panel_shows_its_own_series(case):
     panels = stiffness_figure(case_model(case)).axes
     for ax, mean in zip(panels, (300.0, 100.0), strict=True):
-        wave, series = (line.get_ydata() for line in ax.get_lines())
-        assert np.trapezoid(series, dx=1.0 / 800) / 2.0 == pytest.approx(mean, rel=1e-3)
+        wave, series, level = (line.get_ydata() for line in ax.get_lines())
+        assert np.trapezoid(series, dx=1.0 / 800) == pytest.approx(mean, rel=1e-3)
+        assert level[0] == pytest.approx(mean, rel=1e-6) and f"mean {mean:g} N/µm" in ax.get_title(loc="left")
         # the series follows its rectangle
         assert np.mean(np.abs(series - wave)) < 0.05 * np.mean(wave)

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.run import grid_cache, run_case
 from femgear.storage.results import run_folder
 from femgear.system.system import MeshExcitation
-from femgear.trains.helical.figures import transmission_errors
+from femgear.trains.helical.figures import FIGURES, transmission_errors
 from femgear.trains.helical.model import normal_record, section_stiffness, shared_load
 from femgear.trains.helical.results import describe_helical_static
 from femgear.trains.helical.stages import (
@@ -322,12 +323,13 @@ def test_a_run_computes_all_stages_and_shows_them(results):
         "mesh_phasing",
         "helical_mesh_stiffness",
         "mesh_force_spectra",
+        "pin_forces",
         "speed_sweep",
     )
     assert {f"{name}.png" for name in wanted} <= figures
     assert page.count("<figure>") == len(figures) and "Other pictures" not in page
-    # four captions, each of them a text beside the picture too
-    assert page.count("Transverse spur section") == 8
+    # the spur gears of the transverse section have no pictures beside the helical ones
+    assert "Transverse spur section" not in page and "tooth_loads.png" not in figures
     for words in ("from the side", "overlap ratio", "virtual gears 37/25/87", "Mesh forces of planet 1"):
         assert words in page
     assert cli.main(["report", str(results.folder)]) == 0
@@ -364,7 +366,7 @@ def test_static_table_has_the_helical_meshes_beside_the_spur_section(results):
     assert len(alone.header) == len(alone.rows[0])
 
 
-def test_eight_meshes_have_eight_styles(results):
+def test_both_meshes_of_a_planet_have_a_style_each(results):
     dynamics = results.dynamics.copy(deep=True)
     scale = np.arange(1.0, 9.0)[None, :, None]
     for part in ("real", "imag"):
@@ -373,6 +375,53 @@ def test_eight_meshes_have_eight_styles(results):
     lines = [line for line in ax.get_lines() if len(line.get_xdata())]
     drawn = [line for line in lines if line.get_label() in results.modes["mesh"].values]
     # each beside its static curves, cut and whole
-    assert len(lines) == 24 and len(drawn) == 8 == len(
+    assert len(lines) == 6 and len(drawn) == 2 == len(
         {(line.get_color(), line.get_linestyle()) for line in drawn}
     )
+
+
+def drawn_dynamics(results, dynamics):
+    drawn = SimpleNamespace(data={"dynamics": dynamics, "modes": results.modes})
+    return FIGURES["dynamics"].draw(drawn)
+
+
+def test_pin_forces_are_fluctuations_about_the_mean(results):
+    dynamics = results.dynamics.sortby("speed")
+    figure = drawn_dynamics(results, dynamics)["pin_forces"]
+    for ax, name in zip(figure.axes, ("force", "moment"), strict=True):
+        values = dynamics[f"pin_{name}_real"].values + 1j * dynamics[f"pin_{name}_imag"].values
+        rms = np.sqrt(0.5 * (np.abs(values[..., 1:]) ** 2).sum(axis=-1)).max(axis=1)
+        lines = {line.get_label().split(":")[0]: line.get_ydata() for line in ax.get_lines()}
+        for i, direction in enumerate(dynamics["direction"].values):
+            if f"{name}, {direction}" in lines:
+                np.testing.assert_allclose(lines[f"{name}, {direction}"], rms[:, i])
+            else:
+                assert rms[:, i].max() <= 1e-6 * rms.max()
+        assert f"{rms.max():.3g} N" in ax.get_title(loc="left")
+    # the torque of the carrier hangs on four pins
+    mean = float(np.abs(dynamics["pin_force_real"].values[0, :, 1, 0]).max())
+    assert f"tangential: mean {mean:.4g} N" in " ".join(
+        line.get_label() for line in figure.axes[0].get_lines()
+    )
+
+
+def test_slices_show_their_load_per_width(results):
+    """Three slices, of which the middle one carries twice as much: loads over the mesh period by position."""
+    one = results.dynamics
+    assert "slice_forces" not in drawn_dynamics(results, one)
+    height = 1e-3 * np.array([-8.0, 0.0, 8.0])
+    share = np.array([1.0, 2.0, 1.0])[:, None]
+    dynamics = one.isel(slice=[0, 0, 0]).assign_coords(slice=height)
+    for part in ("real", "imag"):
+        dynamics[f"slice_force_{part}"] = dynamics[f"slice_force_{part}"] * share
+    sun, ring, _ = drawn_dynamics(results, dynamics)["slice_forces"].axes
+    lines = one["slice_force_real"].values + 1j * one["slice_force_imag"].values
+    fluctuations = np.sqrt(0.5 * (np.abs(lines[..., 1:]) ** 2).sum(axis=-1))
+    speed = int(fluctuations.max(axis=(1, 2)).argmax())
+    width = 1e3 * one.attrs["face_width"] / 3.0
+    for ax, mesh in ((sun, 0), (ring, 4)):
+        load = np.asarray(ax.collections[0].get_array()).reshape(3, -1)
+        np.testing.assert_allclose(load[1], 2.0 * load[0])
+        np.testing.assert_allclose(load[0].mean(), lines[speed, mesh, 0, 0].real / width)
+        expected = (lines[speed, mesh, 0] * np.exp(2j * np.pi * np.arange(lines.shape[-1]) * 0.5 / 128)).sum()
+        np.testing.assert_allclose(load[0, 0], expected.real / width)

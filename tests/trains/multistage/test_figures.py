@@ -13,6 +13,7 @@ MODES = xr.Dataset(
         "frequency": ("mode", [0.0, 10.0, 20.0, 20.0, 30.0]),
         "kind": ("mode", KINDS),
         "energy": (("stage", "mode"), SHARE),
+        "mesh_deflection": (("mesh", "mode"), [[0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0, 1.0]]),
     }
 )
 
@@ -20,6 +21,8 @@ MODES = xr.Dataset(
 def response(speed, excited_by=(1,), **variables):
     """Contents of response.nc as far as the figures read them."""
     dims = {"mesh_frequency": ("excited_by", "speed"), "first_force": ("excited_by", "speed", "stage")}
+    force = ("excited_by", "speed", "harmonic", "mesh")
+    dims |= {"mesh_force_real": force, "mesh_force_imag": force}
     data = {name: (dims.get(name, ("speed", "stage")), value) for name, value in variables.items()}
     return xr.Dataset(data, coords={"speed": speed, "harmonic": [1, 2], "excited_by": list(excited_by)})
 
@@ -36,13 +39,24 @@ def test_bars_stack_the_shares_and_double_modes_stand_once():
 
 
 def test_lines_of_mesh_frequencies_and_modes_in_reach():
-    speed = np.array([100.0, 200.0])
-    mesh = np.array([[8.0, 2.0], [16.0, 4.0]])
-    (ax,) = mesh_orders(MODES, response(speed, (1, 2), mesh_frequency=mesh.T)).axes
-    levels = [line.get_ydata()[0] for line in ax.lines if len(set(line.get_ydata())) == 1]
+    speed = np.array([100.0, 120.0, 200.0])
+    mesh = np.array([[8.0, 2.0], [9.8, 2.4], [16.0, 4.0]])
+    force = np.ones((2, 3, 2, 2))
+    # harmonic 1 of stage 1 has a peak near the mode at 10 Hz, in the mesh that the mode moves
+    force[0, 1, 0, 0] = 50.0
+    data = response(
+        speed, (1, 2), mesh_frequency=mesh.T, mesh_force_real=force, mesh_force_imag=np.zeros_like(force)
+    )
+    (ax,) = mesh_orders(MODES, data).axes
+    levels = [line.get_ydata()[0] for line in ax.lines if len(line.get_ydata()) == 2]
     assert levels == [10.0, 20.0, 20.0, 30.0]
-    slopes = [line.get_ydata() for line in ax.lines if len(set(line.get_ydata())) > 1]
-    assert slopes == pytest.approx(np.array([[8, 16], [16, 32], [2, 4], [4, 8]], float))
+    # stage 2 stays below all modes: it is told, not drawn
+    slopes = [line.get_ydata() for line in ax.lines if len(line.get_ydata()) == 3]
+    assert slopes == pytest.approx(np.array([[8, 9.8, 16], [16, 19.6, 32]], float))
+    assert "stage 2: all harmonics below the first mode, 10 Hz" in ax.get_title(loc="left")
+    (peak,) = [line for line in ax.lines if len(line.get_ydata()) == 1]
+    assert (peak.get_xdata()[0], peak.get_ydata()[0]) == (120.0, 9.8)
+    assert [text.get_text() for text in ax.texts] == [" 1 f1", "10", " 2 f1"]
 
 
 def test_forces_of_every_stage_with_points_beside_them():
@@ -54,4 +68,5 @@ def test_forces_of_every_stage_with_points_beside_them():
         assert ax.lines[0].get_ydata() == pytest.approx(total[:, stage])
         assert ax.lines[2].get_ydata() == pytest.approx([3.0 * 10.0**stage])
         assert ax.get_ylim()[1] > 50.0 if stage else ax.get_ylim()[1] < 50.0
-    assert figure.axes[0].get_title(loc="left") == "sun-planet 1 of stage 1"
+    words = "sun-planet 1 of stage 1: at most 5 N r.m.s., at 200 rpm"
+    assert figure.axes[0].get_title(loc="left") == words

@@ -34,8 +34,8 @@ def test_forces_are_sizes_in_kilonewton():
 def test_contact_figures_show_every_flank_and_point():
     share = np.array([[0.0, 1.0], [0.5, 0.25], [1.0, 0.0]])
     figure = contact_over_frequency([1.0, 2.0, 3.0], share, ("drive", "back"))
-    for axes, column in zip(figure.axes, share.T):
-        np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), column)
+    for line, column in zip(figure.axes[0].get_lines(), share.T, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), column)
     figure = contact_map([1.0, 2.0, 3.0], [1e-6, 2e-6], [("back", share)], line=("rigid", 1.5e-6))
     np.testing.assert_array_equal(figure.axes[0].collections[0].get_array().reshape(2, 3), share.T)
     assert figure.axes[0].get_lines()[0].get_ydata()[0] == 1.5

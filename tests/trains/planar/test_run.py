@@ -503,8 +503,11 @@ def test_figures_mark_what_too_few_harmonics_make_doubtful(results):
     branch["force_tail"].values[top:] = 0.3
     assert figures() == {name: name not in ("weight_response", "carrier_orbit") for name in FIGURES}
     # along the curve the mark is where the tail is
-    (mark,) = (one for one in contact_over_branch(branch).axes[0].get_lines() if "W-TAIL" in one.get_label())
-    assert np.flatnonzero(np.isfinite(mark.get_ydata())).tolist() == list(range(top, count))
+    lines = contact_over_branch(branch).axes[0].get_lines()
+    marks = [one for one in lines if "W-TAIL" in one.get_label()]
+    assert marks
+    for mark in marks:
+        assert np.flatnonzero(np.isfinite(mark.get_ydata())).tolist() == list(range(top, count))
     branch["tail"].values[:] = 0.3
     assert all(figures().values())
 
@@ -533,8 +536,9 @@ def test_a_branch_that_ran_out_of_points_says_which_entry_to_raise(pgb):
 def test_equal_forces_are_drawn_once(results):
     figure = response_mesh_forces(results.response, 0)
     assert len(figure.axes) == 1
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts == ["sun-planet 1 and planet 1-ring: equal"]
+    # one curve needs no legend
+    assert not figure.legends
+    assert figure.axes[0].get_title(loc="left").endswith(", sun-planet 1 and planet 1-ring: equal")
     # as they are
     lines = results.response["mesh_force_real"].values[0] + 1j * results.response["mesh_force_imag"].values[0]
     assert np.abs(lines[3] - lines[0])[1:].sum() < 5e-3 * np.abs(lines[0])[1:].sum()
