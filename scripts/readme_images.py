@@ -49,6 +49,14 @@ def _script(command: str, title: str, **says: str) -> Run:
 
 RUNS = {
     "planetary_27_40_108": _case("planetary_27_40_108", "Reference set 27/40/108, elastic ring"),
+    "misaligned": Run(
+        "femgear run cases/planetary_27_40_108.toml --only stress", "Misaligned and crowned sun, 25 slices",
+        entry=(
+            "[static]\n",
+            '[[sun.modifications]]\nkind = "lead slope"\namount = "10 um"\n\n'
+            '[[sun.modifications]]\nkind = "lead crowning"\namount = "5 um"\n\n[static]\nslices = 25\n',
+        ),
+    ),
     "modulation_paper": _case("modulation_paper", "Set of the modulation paper"),
     "helical_30_20_70": _case("helical_30_20_70", "Helical set 30/20/70"),
     "helical_slices": Run(
