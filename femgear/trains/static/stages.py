@@ -82,7 +82,8 @@ def solve_static(
         periods=periods,
         options=CycleOptions(
             both_flanks=case.static.back_flanks,
-            pressures=case.static.stresses and periods == 1,
+            # pressures of the plane contact are not those of slices
+            pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
             progress=partial(progress, "contact"),
             **over_width(case, gears, cache=cache),
         ),
