@@ -487,10 +487,12 @@ class _Walk:
             load[setup.n_planets] = self.sun_torque / self.planetary_set.sun.base_radius / self.images
             state = solve_batch(candidates, load, self.springs)
             found.append(self._at_positions(candidates, state))
+            reach = found[-1]["deflection"]
             if options.waves is not None:
-                found[-1] |= self._over_width(candidates, state, load, found[-1])
-                overflow |= found[-1].pop("overflow")
-            missed = setup.missed(some, found[-1]["deflection"])
+                sliced = self._over_width(candidates, state, load, found[-1])
+                overflow, reach = overflow | sliced.pop("overflow"), sliced.pop("reach")
+                found[-1] |= sliced
+            missed = setup.missed(some, reach)
             if empty.contact == "profile" and (missed > nearest).any():
                 return None, share, 1.2 * missed[missed > nearest][0]
             unknowns = max(unknowns, self.images * int(candidates.candidate.sum(axis=(1, 2)).max()))
@@ -570,8 +572,18 @@ class _Walk:
         motion = np.zeros((len(members.names), len(found.position)))
         motion[members.free] = sliced.motions.T[N + 1 :]
         motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung, None]
-        largest, before = sliced.of_meshes().max(axis=1).T, plane["force"]
-        raised = np.divide(largest, before, out=np.zeros(before.shape), where=before > 0)
+        thinnest = sliced.contact_width(found, laws)
+        if self.bodies.face_width / options.slices < thinnest:
+            raise ContactError(
+                f"contacts of {thinnest * 1e3:.3g} mm along the profile are wider than slices",
+                code="E-SLICES", key="static.slices", value=options.slices,
+                limit=f"at most {int(self.bodies.face_width / thinnest)}",
+                remedy="use fewer slices or reduce operation.torque",
+            )  # fmt: skip
+        # by Hertz's law the largest pressure of a slice grows with the root of its force
+        pressure, before = _equal_cell_pressure(found, state.loads).max(axis=2), state.loads.sum(axis=-1)
+        raised = np.divide(sliced.largest(), before, out=np.zeros(before.shape), where=before > 0)
+        inner = np.where(found.at_flank_end(state.active), 0.0, pressure * np.sqrt(raised))
         # tangents of the springs change; what they begin at is that of the cells
         values: dict[str, Any] = {
             "deflection": rotation_approach(N) @ sliced.motions.T[: N + 1] + members.approach @ motion,
@@ -580,11 +592,13 @@ class _Walk:
             "member_motion": motion,
             "tooth_load": found.by_pairs(sliced.force.mean(axis=1)),
             "slice_load": found.by_pairs(sliced.force.swapaxes(1, 2)),
-            # Hertz: the pressure of a slice grows with the root of its load
-            "max_pressure": plane["max_pressure"] * np.sqrt(raised),
+            "max_pressure": found.by_pairs(inner).max(axis=1),
+            "residual": np.maximum(plane["residual"], sliced.residual),
             "iterations": plane["iterations"] + sliced.iterations,
             "overflow": sliced.overflows(found, laws),
         }
+        # the slice that comes nearest decides which pairs may touch
+        values["reach"] = values["deflection"] - lead.min(axis=1)[np.arange(2 * N) // N, None]
         for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
             values[name] = plane[name] + tangent.T
         if held is not None:
@@ -657,6 +671,7 @@ def _seen_from_front(cycle: MeshCycle, planetary_set: PlanetarySet, order) -> Me
     """Results of the mirror image in the order of planets and positions of the original."""
     planet, angle = np.argsort(order), planetary_set.planet_angles[0]
     own = {"m": np.concatenate([planet, planet + len(order)]), "n": planet, "g": np.arange(2)}
+    own["w"] = slice(None)
     found = {}
     for name, axes in ((name, axes) for axes, names in _AXES.items() for name in names):
         values = getattr(cycle, name)

@@ -46,10 +46,12 @@ from femgear.fe.elasticity import Material, stiffness, wave_stiffness
 
 _WAVES = 9
 """Wave numbers at which bodies are computed; between them their compliance is interpolated."""
-_REFRESHED, _BOLD, _MOST = 4, 12, 200
-"""Newton steps for which moments follow forces, after which one slice opens at a time, and in all."""
-_SETTLED = 1e-11
-"""Share of the load by which forces may still change in the last step."""
+_REFRESHED, _BOLD, _MOST = 4, 20, 500
+"""Newton steps for which moments follow forces, after which slices change sides one by one, and in all."""
+_SETTLED, _ROUNDED = 1e-11, 1e-12
+"""Shares of the load, and of what separations would take to close, by which forces may still change."""
+_FAINT = 1e-9
+"""Share of the load below which a force is rounding."""
 _SOFTEST = 1e-13
 """Spring on every motion, over that of a tooth pair: it holds what no loaded pair holds."""
 _TOGETHER = 8
@@ -91,8 +93,8 @@ class SliceState:
     motions : (P, m) array
         [m].
     mesh : (W,) array
-    iterations : (P,) array
-        Linear solutions.
+    iterations, residual : (P,) arrays
+        Linear solutions, and largest violation of the contact conditions over the largest displacement.
     tangents : tuple of (P, meshes, meshes) arrays
         For every compliance between windows that was asked for: increments of the mesh forces per unit
         approach of each mesh while the others hold theirs [N/m], less those of the plane solution.
@@ -104,8 +106,22 @@ class SliceState:
     motions: np.ndarray
     mesh: np.ndarray
     iterations: np.ndarray
+    residual: np.ndarray
     tangents: tuple[np.ndarray, ...]
     own: tuple[np.ndarray, ...]
+
+    def largest(self) -> np.ndarray:
+        """Largest force of a tooth pair in any slice (P, W) [N], towards the ends as in the last slices."""
+        force = self.force
+        if force.shape[1] < 2:
+            return force.max(axis=1)
+        ends = 1.5 * force[:, [0, -1]] - 0.5 * force[:, [1, -2]]
+        return np.concatenate([force, ends], axis=1).max(axis=1)
+
+    def contact_width(self, found: Candidates, laws: PairLaws) -> float:
+        """Largest width of a contact along the profile [m]."""
+        touched = (laws.touching <= self.force.max(axis=1)[..., None]).sum(axis=-1)
+        return float((touched * found.setup.cell[found.mesh]).max(initial=0.0))
 
     def overflows(self, found: Candidates, laws: PairLaws) -> bool:
         """Whether a slice presses cells at the end of a window that is not the end of a flank."""
@@ -227,9 +243,11 @@ def solve_slices(
         solved = newton.solve()
         after = [part for one in bodies for part in newton.tangents(*one)]
         parts.append((*solved, *(b - a for a, b in zip(before, after, strict=True))))
-    force, motions, iterations, *tangents = (np.concatenate(part) for part in zip(*parts, strict=True))
+    force, motions, iterations, residual, *tangents = (
+        np.concatenate(part) for part in zip(*parts, strict=True)
+    )
     between, own = tuple(tangents[0::2]), tuple(tangents[1::2])
-    return SliceState(force, motions, laws.mesh, iterations, between, own)
+    return SliceState(force, motions, laws.mesh, iterations, residual, between, own)
 
 
 def cosines(slices: int) -> np.ndarray:
@@ -276,6 +294,7 @@ class _SliceNewton:
         self.plane, self.motions = plane.sum(axis=-1), laws.motions[some] / self.unit
         self.apart = np.where(np.isfinite(laws.separation[some]), laws.separation[some], 1.0)[:, None]
         self.force = np.repeat(self.plane[:, None], N, axis=1)
+        self.closed = self.force > 0.0
         # at the given state the curves miss their own points by their interpolation
         self.refresh()
         missed = np.where(self.plane > 0.0, self.gaps(self.force)[0][:, 0], 0.0)
@@ -304,23 +323,32 @@ class _SliceNewton:
         gap += (force.mean(axis=1) @ self.laws.supports / self.unit)[:, None]
         return gap - (self.motions @ self.laws.approach.T)[:, None], slope.reshape(P, N, W) / self.unit
 
-    def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Iterate until all positions are solved: forces, motions and steps."""
-        P = len(self.some)
-        steps, limit = np.zeros(P, int), _SETTLED * np.abs(self.load).max()
+    def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Iterate until all positions are solved: forces, motions, steps and residuals.
+
+        Slices that pull open and slices that overlap close, all at once; after `_BOLD` steps the last one
+        alone (K. G. Murty, Linear Algebra Appl. 7, 1974), which ends for every linear problem.
+        """
+        P, steps, load = len(self.some), np.zeros(len(self.some), int), np.abs(self.load).max()
+        # separations that are large against the load leave their rounding in it
+        limit = max(_SETTLED * load, _ROUNDED * np.abs(self.apart).max() / self.unit)
         todo = np.ones(P, bool)
         for step in range(_MOST):
             if step < _REFRESHED:
                 self.refresh()
-            moved = self.step(careful=step >= _BOLD)
+            moved = self.step(single=step >= _BOLD)
             steps += todo
             todo = moved > limit
             if not todo.any() and step >= _REFRESHED:
-                return self.force, self.motions * self.unit, steps
+                self.force = np.where(self.force > _FAINT * load, self.force, 0.0)
+                gap = self.gaps(self.force)[0]
+                missed = np.where(self.force > 0.0, np.abs(gap), np.maximum(-gap, 0.0))
+                residual = missed.reshape(P, -1).max(axis=1) / np.abs(self.force).max(initial=load)
+                return self.force, self.motions * self.unit, steps, residual
         raise ContactError(
             f"the contact of slices does not settle at {int(todo.sum())} of {P} positions",
             code="E-CONTACT",
-            remedy="use fewer slices, or reduce modifications and misalignment",
+            remedy="look for modifications, clearances or stiffnesses of very different size",
         )
 
     def tangents(self, smooth: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -355,11 +383,19 @@ class _SliceNewton:
             )
         return together / (N * self.unit), np.stack(alone, axis=1) / (N * self.unit)
 
-    def step(self, *, careful: bool) -> np.ndarray:
-        """Take a step at all positions; by how much forces change at most [N], (P,)."""
+    def step(self, *, single: bool) -> np.ndarray:
+        """Take a step at all positions; by how much forces change at most [N], endless while sides change."""
         (P, N, W), n, m = self.shape, self.size, len(self.load)
+        gap = self.gaps(self.force)[0]
+        wrong = np.where(self.closed, self.force < 0.0, gap < 0.0).reshape(P, n)
+        changed = wrong.any(axis=1)
+        if single:
+            last = n - 1 - wrong[:, ::-1].argmax(axis=1)
+            wrong &= np.arange(n) == last[:, None]
+        self.closed = self.closed ^ wrong.reshape(P, N, W)
+        before, self.force = self.force, np.where(self.closed, self.force, 0.0)
         gap, slope = self.gaps(self.force)
-        on = ((self.force > 0.0) | (gap < 0.0)).reshape(P, n)
+        on = self.closed.reshape(P, n)
         A, window = self.across + self.laws.supports[:, None] / (N * self.unit), np.arange(N)
         A[:, window, :, window] += self.between.swapaxes(0, 1)
         A = A.reshape(P, n, n)
@@ -372,14 +408,8 @@ class _SliceNewton:
         balance = self.load - self.force.sum(axis=1) @ self.laws.approach / N - _SOFTEST * self.motions
         right = np.concatenate([np.where(on, -gap.reshape(P, n), 0.0), balance], axis=1)
         change = np.linalg.solve(system, right[..., None])[..., 0]
-        own, length = change[:, :n].reshape(P, N, W), np.ones(P)
-        if careful:
-            falls = on.reshape(P, N, W) & (own < 0.0)
-            reach = np.divide(
-                -self.force, own, out=np.full(own.shape, np.inf), where=falls & (self.force > 0)
-            )
-            length = np.minimum(reach.reshape(P, -1).min(axis=1), 1.0)
-        force = np.where(on.reshape(P, N, W), np.maximum(self.force + length[:, None, None] * own, 0.0), 0.0)
-        moved = np.abs(force - self.force).reshape(P, -1).max(axis=1)
-        self.force, self.motions = force, self.motions + length[:, None] * change[:, n:]
-        return np.where(length < 1.0, np.inf, moved)
+        # pulls stay until the next step: motions belong to them
+        self.force = np.where(self.closed, self.force + change[:, :n].reshape(P, N, W), 0.0)
+        self.motions = self.motions + change[:, n:]
+        moved = np.abs(self.force - before).reshape(P, -1).max(axis=1)
+        return np.where(changed, np.inf, moved)

@@ -7,7 +7,7 @@ import pytest
 from contact.test_cycle import STEEL, TORQUE, reference_set
 from scipy.spatial import KDTree
 
-from femgear.contact import slices
+from femgear.contact import cycle, slices
 from femgear.contact.bodies import flank_load_columns, flank_stations, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.slices import _SliceNewton, cosines, wave_displacement, width_waves
@@ -264,3 +264,54 @@ def test_leads_of_both_flanks_of_a_mesh_add_up(gears):
     sun, ring = lead_separation(deviations, gears, 4)
     assert sun == pytest.approx(8e-6 * np.array([3, 1, -1, -3]) / 8, abs=1e-15)
     assert ring == pytest.approx(sun / 4, abs=1e-15)
+
+
+def test_a_negative_torque_keeps_the_ends_of_the_width(gears, bodies, waves):
+    """More material at z > 0 carries more there, whichever flanks carry."""
+    for sign in (1, -1):
+        cycle = walk(gears, bodies, waves, LeadSlope(8e-6), sun_torque=sign * TORQUE)
+        over_width = cycle.slice_load[:3].sum(axis=(0, 1, 3))
+        assert over_width[-1] > 2 * over_width[0]
+
+
+def test_a_planet_that_carries_nothing_is_open_in_slices_too(gears, bodies, waves):
+    pins = np.array([[0.0, 10e-6], [0.0, 0.0], [0.0, 0.0]])
+    options = {
+        "sun_torque": 10.0,
+        "positions": 4,
+        "deviations": replace(no_deviations(gears), pin_errors=pins),
+    }
+    sliced = walk_mesh_cycle(gears, bodies, **options, options=CycleOptions(waves=waves, slices=SLICES))
+    plane = walk_mesh_cycle(gears, bodies, **options)
+    assert plane.open_planets.any() and np.array_equal(sliced.open_planets, plane.open_planets)
+    assert np.abs(sliced.stiffness - plane.stiffness).max() < 1e-9 * plane.stiffness.max()
+
+
+@pytest.mark.parametrize("sun", [0.0, 1e7, 5e7])
+@pytest.mark.parametrize("error", [1e-6, 10e-6])
+def test_errors_on_soft_supports_settle(gears, bodies, waves, sun, error):
+    """Slices that lift move the members, which bring them back: sides change until all conditions hold."""
+    pins = np.array([[0.0, error], [0.0, 0.0], [0.0, 0.0]])
+    deviations = replace(no_deviations(gears), sun=FlankForm((LeadSlope(10e-6),)), pin_errors=pins)
+    supports = Supports(sun=sun, planet=3e8, carrier=2e8)
+    cycle = walk_mesh_cycle(
+        gears, bodies, sun_torque=TORQUE, positions=4, deviations=deviations, supports=supports,
+        options=CycleOptions(waves=waves, slices=SLICES),
+    )  # fmt: skip
+    assert cycle.residual.max() < 1e-9 and cycle.slice_load.min() >= 0.0
+    assert cycle.force[:3].sum(axis=0) * gears.sun.base_radius == pytest.approx(TORQUE, rel=1e-9)
+
+
+def test_pairs_that_only_an_end_reaches_are_candidates(gears, bodies, waves, monkeypatch):
+    """A slope of 280 um: the end that stands out meets pairs that the mean does not reach."""
+    found = walk(gears, bodies, waves, LeadSlope(280e-6), positions=8)
+    first = cycle.first_windows
+
+    def wide(*arguments):
+        share, nearest = first(*arguments)
+        return share, 20 * nearest
+
+    monkeypatch.setattr(cycle, "first_windows", wide)
+    expected = walk(gears, bodies, waves, LeadSlope(280e-6), positions=8)
+    # what loads lift at the far end is not looked for
+    assert np.abs(found.sun_arc - expected.sun_arc).max() < 1e-5 * np.abs(expected.sun_arc).max()

@@ -120,6 +120,8 @@ _HARMONICS, _ROWS = 6, 8
 """Harmonics whose phasing is listed, and neighbouring sets."""
 _DISTANCE, _TOLERANCE = 3, 0.02
 """How far teeth and ratio of neighbouring sets may lie away."""
+_LAST_SLICE = 0.1
+"""Rise of the load within a slice that deserves more of them."""
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
 
 
@@ -387,6 +389,12 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
             f"{factor:.2f} times stands at one place"
         )
         yield Finding("W-FACE-LOAD", "", text)
+        load = data["slice_load"].values
+        ends, inside = 1.5 * load[:, :, [0, -1]] - 0.5 * load[:, :, [1, -2]], load.max(axis=(1, 2, 3))
+        rise = float((ends.max(axis=(1, 2, 3)) / np.where(inside > 0, inside, 1.0)).max()) - 1.0
+        if rise > _LAST_SLICE:
+            text = f"the load rises by {100 * rise:.0f} % within the last slice: take more slices"
+            yield Finding("W-FACE-LOAD", "static.slices", text)
     unloaded = (force + back)[: len(force) // 2] <= 0.0
     if unloaded.any() and force.any():
         planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
