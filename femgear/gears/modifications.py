@@ -230,6 +230,13 @@ def check_form(form: FlankForm, gear: Gear) -> None:
     for number, modification in enumerate(form.modifications):
         laws = (TipRelief, RootRelief, ProfileSlope, ProfileCrowning)
         problem = _problem(modification, gear) if isinstance(modification, laws) else None
+        if isinstance(modification, EndRelief) and 2 * modification.length > gear.face_width:
+            raise GeometryError(
+                f"{gear.name}: both end reliefs overlap", code="E-MODIFICATION",
+                key=f"{gear.name}.modifications[{number}]", value=f"{modification.length * 1e3:.4g} mm",
+                limit=f"at most half the face width, {gear.face_width * 500:.4g} mm",
+                remedy="a crowning takes off more than that over the whole width",
+            )  # fmt: skip
         if problem is not None:
             message, value, limit = problem
             raise GeometryError(

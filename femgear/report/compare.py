@@ -66,17 +66,20 @@ def _differences(first: Block, second: Block) -> Block:
             continue
         for i, (x, y) in enumerate(zip(a[key], b[key])):
             if x != y and i not in own:
-                rows.append((what, columns[i], x, y, _change(x, y)))
+                unit = f"{first.title} {what} {columns[i]}"
+                rows.append((what, columns[i], x, y, _change(x, y, decibels="dB" in unit)))
     header = ("row", "column", "first", "second", "change") if rows else ()
     return Block(first.title, header, tuple(rows), () if rows else ("the same",))
 
 
-def _change(first: str, second: str) -> str:
-    """Change in per cent, nothing where a cell is no number."""
+def _change(first: str, second: str, *, decibels: bool) -> str:
+    """Change in per cent, of levels in dB, nothing where a cell is no number."""
     try:
         x, y = float(first), float(second)
     except ValueError:
         return ""
+    if decibels:
+        return f"{y - x:+.3g} dB"
     return f"{100.0 * (y / x - 1.0):+.3g} %" if x else ""
 
 

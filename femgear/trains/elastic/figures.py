@@ -453,7 +453,7 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
         grid,
         folder / "ring_mode.png",
         field=field,
-        title=f"toothed ring, {field}",
+        title=f"ring alone on its foundation, {field.split(', ', 1)[1]}",
         colour_label="relative displacement",
         colour_factor=1.0,
     )

@@ -122,11 +122,11 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
 def load_sharing(static: xr.Dataset) -> Figure:
     """Draw the share of every planet in the sun's torque over the mesh period (static.nc).
 
-    The title tells the planet load factor K_gamma of ISO 6336-1, the largest share over the equal one.
+    The title tells the planet load factor K_gamma of ISO 6336-1, the largest mean share over the equal one.
     """
     position, share = periodic(static["position"], static["load_share"].values * 100)
     equal, names = 100.0 / len(share), _of_planets(static, share)
-    factor = share.max() / equal
+    factor = float(static["load_share"].mean("position").max()) * len(share)
     figure, (ax,) = new_figure(height=2.4 if len(names) == 1 else 3.6)
     for i, (text, row) in enumerate(names):
         ax.plot(position, share[row], label=text, linewidth=2.0, **line_style(i))
@@ -134,13 +134,13 @@ def load_sharing(static: xr.Dataset) -> Figure:
     if len(names) == 1:
         ax.set_ylim(0.0, 1.5 * equal)
         size = f"{'up to ' * ('alike' in names[0][0])}{share.max():.4g} %"
-        title = f"all {len(share)} planets carry {size} at every position: K_γ = {factor:.3f}"
+        title = f"all {len(share)} planets carry {size} at every position; mean shares K_γ = {factor:.3f}"
     else:
         ax.axhline(equal, color=GREY, linewidth=1.2, linestyle=":", label=f"equal share {equal:.4g} %")
         highest = share.max(axis=1)
         most = f"planet {static['planet'].values[highest.argmax()]}"
         most = "every planet" if np.ptp(highest) < ALIKE * highest.max() else most
-        title = f"{most} carries up to {share.max():.4g} %: K_γ = {factor:.3f}"
+        title = f"{most} carries up to {share.max():.4g} % at a position; mean shares K_γ = {factor:.3f}"
     label(ax, _POSITION, "share of the torque [%]", title)
     if len(names) > 1:
         legend_below(figure, columns=4)
@@ -637,7 +637,7 @@ _STATIC = Figures(
         ),
         "load_sharing": (
             "Share of every planet in the torque of the sun, and the planet load factor K_γ: the largest "
-            "share over the equal one."
+            "mean share over the equal one."
         ),
         "tooth_loads": "Load of one tooth pair from its first to its last contact.",
         "face_load": (

@@ -62,7 +62,11 @@ STATIC_VARIABLES = {
 """Variables of static.nc: dimensions, unit, and what they are."""
 SLICE_VARIABLES = {
     "slice_load": ("mesh tooth slice position", "N", "load of a tooth pair in a slice, times their number"),
-    "face_load_factor": ("mesh", "1", "K_H-beta: largest load per width over the mean of that tooth pair"),
+    "face_load_factor": (
+        "mesh",
+        "1",
+        "K_H-beta: load per width, extrapolated to the ends, over the mean of its tooth pair",
+    ),
 }
 """Further ones of contact in slices over the width."""
 _ATTRIBUTES = {

@@ -140,18 +140,11 @@ def flank_compliances(
     return sectors, make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
 
 
-def over_width(
-    case: Case, gears: PlanetarySet, *, loaded: bool = False, cache: Path | None = None
-) -> dict[str, Any]:
-    """Compute what bodies yield across the width: options of the mesh cycle, none without slices.
+def check_slices(case: Case, gears: PlanetarySet) -> None:
+    """Refuse (CaseError, E-SLICES) what slices over the width cannot do, and leads without slices.
 
-    ``loaded`` for the state on all supports, with the ring held beside it.
-
-    Raises
-    ------
-    CaseError
-        E-SLICES: modifications along the lead without slices, or slices together with back flanks, with
-        clearance in the bearings of planets, or so many that they are thinner than a quarter of a module.
+    Slices together with back flanks or with clearance in the bearings of planets, or thinner than a quarter
+    of a module.
     """
     static, count, width = case.static, case.static.slices, gears.sun.face_width
     where, remedy = {"code": "E-SLICES", "file": case.location("static.slices")}, "leave static.slices out"
@@ -164,7 +157,7 @@ def over_width(
                         f"a {one.kind} needs slices over the width", code="E-SLICES", key=key,
                         file=case.location(key), remedy="give static.slices = 25",
                     )  # fmt: skip
-        return {}
+        return
     if static.back_flanks:
         raise CaseError("slices have no back flanks", key="static.back_flanks", remedy=remedy, **where)
     if case.planet.bearing_clearance and static.members == "elastic":
@@ -172,8 +165,21 @@ def over_width(
     if width < 0.25 * count * gears.sun.module:
         raise CaseError(
             "slices are thinner than a quarter of the module", key="static.slices", value=count,
-            limit=f"at most {int(4 * width / gears.sun.module)}", **where,
+            limit=f"at most {int(4 * width / gears.sun.module)}", remedy=remedy, **where,
         )  # fmt: skip
+
+
+def over_width(
+    case: Case, gears: PlanetarySet, *, loaded: bool = False, cache: Path | None = None
+) -> dict[str, Any]:
+    """Compute what bodies yield across the width: options of the mesh cycle, none without slices.
+
+    ``loaded`` for the state on all supports, with the ring held beside it. CaseError: see `check_slices`.
+    """
+    check_slices(case, gears)
+    static, count = case.static, case.static.slices
+    if count < 2:
+        return {}
     material = material_of(case)
     # half as fine as in the plane: K_H-beta changes by less than 1e-3
     sectors = make_sectors(gears, material, flank_elements=6, refine=0.5, cache=cache)
@@ -331,7 +337,7 @@ STATIC = Stage(
         "contact": result.cycle.contact,
     },
     describe=lambda results: describe_static(results.static, planetary_set(results.case).sun.module),
-    check=planetary_set,
+    check=lambda case: check_slices(case, planetary_set(case)),
 )
 
 
