@@ -95,7 +95,8 @@ def compare_page(train: Train, first: Results, second: Results) -> str:
     runs = {f"runup {i}": one["runup"] for i, one in enumerate(data, 1) if "runup" in one}
     main = [f"<h1>{escape(title)}</h1>\n"]
     for block in compared(train, first, second):
-        main.append(f"<h2>{escape(block.title)}</h2>\n{table(block, heading=False)}")
+        words = table(block, heading=False)
+        main.append(f'<h2>{escape(block.title)}</h2>\n<div class="compare">{words}</div>')
     for run, key in zip((first, second), runs):
         place = part_of("runup").replace('data-run="runup"', f'data-run="{key}"')
         main.append(f"<h2>Run-up of {escape(run.folder.name)}</h2>\n{place}")
