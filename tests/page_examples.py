@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+from collections.abc import Collection
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -35,10 +36,10 @@ def documented_variables(heading: str) -> dict[str, tuple[str, str]]:
     return {v: (d.strip(), u.strip()) for cell, d, u in rows for v in re.findall(r"`(\w+)`", cell)}
 
 
-def check_documented(data, heading: str) -> None:
-    """Assert that the page names the variables of a dataset with their dimensions and units."""
+def check_documented(data, heading: str, *, others: Collection[str] = ()) -> None:
+    """Assert that the page names the variables of a dataset, and others, with dimensions and units."""
     table = documented_variables(heading)
-    assert set(data.data_vars) == table.keys()
+    assert set(data.data_vars) | set(others) == table.keys()
     for name, variable in data.data_vars.items():
         assert table[name][0] == ", ".join(variable.dims), name
         assert (table[name][1] or "1") == variable.attrs["units"] and variable.attrs["long_name"]

@@ -374,8 +374,8 @@ def test_both_meshes_of_a_planet_have_a_style_each(results):
     ax = transmission_errors(dynamics, results.modes).axes[0]
     lines = [line for line in ax.get_lines() if len(line.get_xdata())]
     drawn = [line for line in lines if line.get_label() in results.modes["mesh"].values]
-    # each beside its static curves, cut and whole
-    assert len(lines) == 6 and len(drawn) == 2 == len(
+    # each beside its static curve
+    assert len(lines) == 4 and len(drawn) == 2 == len(
         {(line.get_color(), line.get_linestyle()) for line in drawn}
     )
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from page_examples import check_documented
 
 from femgear.errors import CaseError
 from femgear.trains.elastic.stages import solve_modes
@@ -42,6 +43,7 @@ def test_static_results_hold_the_load_over_the_width(misaligned):
     block = describe_static(data, 1.5e-3)
     assert block.rows[0][block.header.index("K_Hbeta")] == f"{factor[0]:.3f}"
     assert "W-FACE-LOAD" in data.attrs["warnings"]
+    check_documented(data, "## static.nc")
 
 
 def test_the_load_over_the_width_is_drawn(misaligned):
