@@ -26,7 +26,7 @@ from femgear.contact.assembly import (
 )
 from femgear.contact.batch import BatchState, ContactTangents, check_definite, pair_laws, solve_batch
 from femgear.contact.bodies import Bodies
-from femgear.contact.slices import WidthWaves, solve_slices
+from femgear.contact.slices import WidthWaves, solve_slices, with_ends
 from femgear.contact.supports import (
     RIGID,
     BearingSprings,
@@ -200,8 +200,7 @@ class MeshCycle:
         if self.slice_load is None:
             return None
         load = self.slice_load
-        ends = 1.5 * load[:, :, [0, -1]] - 0.5 * load[:, :, [1, -2]]
-        largest = np.concatenate([load, ends], axis=2).max(axis=2).reshape(len(load), -1)
+        largest = with_ends(load, axis=2).max(axis=2).reshape(len(load), -1)
         at = largest.argmax(axis=1)[:, None]
         mean = np.take_along_axis(load.mean(axis=2).reshape(len(load), -1), at, axis=1)
         largest = np.take_along_axis(largest, at, axis=1)

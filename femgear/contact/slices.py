@@ -112,11 +112,7 @@ class SliceState:
 
     def largest(self) -> np.ndarray:
         """Largest force of a tooth pair in any slice (P, W) [N], towards the ends as in the last slices."""
-        force = self.force
-        if force.shape[1] < 2:
-            return force.max(axis=1)
-        ends = 1.5 * force[:, [0, -1]] - 0.5 * force[:, [1, -2]]
-        return np.concatenate([force, ends], axis=1).max(axis=1)
+        return with_ends(self.force, axis=1).max(axis=1)
 
     def contact_width(self, found: Candidates, laws: PairLaws) -> float:
         """Largest width of a contact along the profile [m]."""
@@ -131,6 +127,13 @@ class SliceState:
     def of_meshes(self) -> np.ndarray:
         """Force of every mesh per slice over the whole width [N], (P, N, meshes)."""
         return self.force @ (self.mesh[:, None] == np.arange(self.mesh[-1] + 1))
+
+
+def with_ends(load, *, axis: int) -> np.ndarray:
+    """Append to the loads of slices, two or more, those at both ends: the lines through the last two."""
+    load = np.asarray(load)
+    near, next_to = np.take(load, [0, -1], axis=axis), np.take(load, [1, -2], axis=axis)
+    return np.concatenate([load, 1.5 * near - 0.5 * next_to], axis=axis)
 
 
 def wave_displacement(x, depth, wave_number: float, material: Material) -> np.ndarray:
@@ -159,6 +162,13 @@ def width_waves(sectors: Sectors, material: Material, slices: int, ring_foundati
         wave_number,
         tuple(Bodies(sun, planet, ring, material, width) for sun, planet, ring in zip(*gears, strict=True)),
     )
+
+
+def with_held_ring(waves: WidthWaves, sectors: Sectors) -> WidthWaves:
+    """Exchange the ring for that which is held at its outer surface."""
+    rings = _wave_compliance(sectors.ring, None, waves.bodies[0].material, waves.wave_number)
+    bodies = (replace(one, ring=ring) for one, ring in zip(waves.bodies, rings, strict=True))
+    return replace(waves, bodies=tuple(bodies))
 
 
 def _wave_compliance(
@@ -292,7 +302,9 @@ class _SliceNewton:
         field = (self.S @ plane.swapaxes(1, 2).reshape(P, 1, -1, 1))[..., 0]
         self.field = field + (plane.sum(axis=-1) @ laws.supports)[..., None]
         self.plane, self.motions = plane.sum(axis=-1), laws.motions[some] / self.unit
-        self.apart = np.where(np.isfinite(laws.separation[some]), laws.separation[some], 1.0)[:, None]
+        there = np.isfinite(laws.separation[some])
+        self.apart = np.where(there, laws.separation[some], 1.0)[:, None]
+        self.widest = float(np.abs(np.where(there[:, None], self.apart + separations, 0.0)).max())
         self.force = np.repeat(self.plane[:, None], N, axis=1)
         self.closed = self.force > 0.0
         # at the given state the curves miss their own points by their interpolation
@@ -331,7 +343,7 @@ class _SliceNewton:
         """
         P, steps, load = len(self.some), np.zeros(len(self.some), int), np.abs(self.load).max()
         # separations that are large against the load leave their rounding in it
-        limit = max(_SETTLED * load, _ROUNDED * np.abs(self.apart).max() / self.unit)
+        limit = max(_SETTLED * load, _ROUNDED * self.widest / self.unit)
         todo = np.ones(P, bool)
         for step in range(_MOST):
             if step < _REFRESHED:

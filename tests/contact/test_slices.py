@@ -315,3 +315,19 @@ def test_pairs_that_only_an_end_reaches_are_candidates(gears, bodies, waves, mon
     expected = walk(gears, bodies, waves, LeadSlope(280e-6), positions=8)
     # what loads lift at the far end is not looked for
     assert np.abs(found.sun_arc - expected.sun_arc).max() < 1e-5 * np.abs(expected.sun_arc).max()
+
+
+def test_coarse_grids_will_do(gears, bodies, waves):
+    """Waves of twice as fine elements change K_H-beta by less than 2e-3."""
+    fine = width_waves(make_sectors(gears, STEEL, flank_elements=12, refine=1.0), STEEL, SLICES)
+    for lead in (LeadSlope(10e-6), LeadCrowning(10e-6), EndRelief(10e-6, 3e-3)):
+        coarse, finer = (walk(gears, bodies, one, lead).face_load_factor[0] for one in (waves, fine))
+        assert coarse == pytest.approx(finer, rel=2e-3)
+
+
+def test_light_loads_settle_as_closely_as_heavy_ones(gears, bodies, waves):
+    """0.01 N m: what stops the iteration is no length of the windows that are absent."""
+    cycle = walk(gears, bodies, waves, LeadSlope(0.05e-6), sun_torque=0.01)
+    total = 0.01 / gears.sun.base_radius
+    assert np.abs(cycle.force[:3].sum(axis=0) / total - 1).max() < 1e-8 and cycle.residual.max() < 1e-9
+    assert np.abs(cycle.force[:3] - cycle.force[0]).max() < 1e-8 * total

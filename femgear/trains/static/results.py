@@ -393,9 +393,11 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
             f"{factor:.2f} times stands at one place"
         )
         yield Finding("W-FACE-LOAD", "", text)
+        from femgear.contact.slices import with_ends
+
         load = data["slice_load"].values
-        ends, inside = 1.5 * load[:, :, [0, -1]] - 0.5 * load[:, :, [1, -2]], load.max(axis=(1, 2, 3))
-        rise = float((ends.max(axis=(1, 2, 3)) / np.where(inside > 0, inside, 1.0)).max()) - 1.0
+        whole, inside = (one.max(axis=(1, 2, 3)) for one in (with_ends(load, axis=2), load))
+        rise = float((whole / np.where(inside > 0, inside, 1.0)).max()) - 1.0
         if rise > _LAST_SLICE:
             text = f"the load rises by {100 * rise:.0f} % within the last slice: take more slices"
             yield Finding("W-FACE-LOAD", "static.slices", text)
