@@ -22,6 +22,7 @@ from femgear.report.style import (
     SIZE,
     SMALL,
     VERMILION,
+    digits,
     distinct_lines,
     family,
     label,
@@ -109,7 +110,7 @@ def mode_shapes(
         names = f"mode{'s' * (len(group) > 1)} {', '.join(str(mode + 1) for mode in group)}"
         diameter = int(modes["nodal_diameter"].values[group[0]])
         kind = str(modes["kind"].values[group[0]]) + (f", n = {diameter}" if diameter >= 0 else "")
-        frequency = f"{modes['frequency'].values[group[0]]:.4g} Hz"
+        frequency = f"{digits(modes['frequency'].values[group[0]])} Hz"
         ax.set_title(f"{names}: {frequency}\n{kind}", fontsize=SMALL)
     legend_below(figure, columns=5)
     return figure

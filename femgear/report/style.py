@@ -266,6 +266,11 @@ def excited_to(data, speed_index: int) -> str:
     return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
 
 
+def digits(value: float) -> str:
+    """Write a number to four digits, without exponent."""
+    return f"{float(f'{value:.4g}'):.12g}"
+
+
 def rpm(speed: float) -> str:
     """Write an input speed [rpm], as datasets have it, in a title."""
     return f"{float(speed):.6g} rpm"

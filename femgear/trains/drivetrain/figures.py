@@ -10,7 +10,7 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.report.response import campbell
-from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below, new_figure, show_changes
+from femgear.report.style import COLOURS, GREY, SIZE, digits, label, legend_below, new_figure, show_changes
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.mode_pictures import write_mode_pictures
 from femgear.trains.drivetrain.model import DrivetrainModel, case_model
@@ -217,7 +217,7 @@ def stiffness_figure(model: DrivetrainModel) -> Figure:
         ax.axhline(mean, color=COLOURS[1], linestyle="--", linewidth=1.2, label="mean")
         ax.set_xlim(phase[0], phase[-1])
         spread = np.ptp(series) / mean
-        words = f"{names[row]}: mean {mean:.4g} N/µm, peak to peak {spread:.0%} of it"
+        words = f"{names[row]}\nmean {digits(mean)} N/µm, peak to peak {spread:.0%} of it"
         label(ax, "position in the mesh period [1]", "mesh stiffness [N/µm]", words)
     legend_below(figure)
     return figure

@@ -18,6 +18,7 @@ from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
+from femgear.contact.slices import with_ends
 from femgear.errors import Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
@@ -393,8 +394,6 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
             f"{factor:.2f} times stands at one place"
         )
         yield Finding("W-FACE-LOAD", "", text)
-        from femgear.contact.slices import with_ends
-
         load = data["slice_load"].values
         whole, inside = (one.max(axis=(1, 2, 3)) for one in (with_ends(load, axis=2), load))
         rise = float((whole / np.where(inside > 0, inside, 1.0)).max()) - 1.0
