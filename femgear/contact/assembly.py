@@ -45,6 +45,9 @@ HELD = 2.56
 ROUGH_STIFFNESS = 10e9
 """Stiffness of a mesh per face width, to size windows [N/m^2]."""
 
+_SAME = 1e-9
+"""Part of a mesh period that is none."""
+
 Found = TypeVar("Found")
 
 
@@ -320,8 +323,9 @@ def mesh_windows(
     share, nearest : float
         Mesh force that sizes the windows [N]; pairs are candidates whose separation exceeds that of the
         nearest pair of their mesh by less than `nearest` [m].
-    positions : int or (P,) array
-        Number of equidistant positions in one mesh period, or the positions themselves [mesh periods].
+    positions : int or (P,) or (P, S) array
+        Number of equidistant positions in one mesh period, or the positions themselves [mesh periods]; those
+        of S slices of helical teeth have windows one after the other.
     contact : {"profile", "line_of_action"}
     cells : int
         Pressure cells in a window.
@@ -330,8 +334,12 @@ def mesh_windows(
         Back flanks as well, as meshes 2N .. 4N - 1.
     """
     tau = cycle_positions(positions)
+    # a tooth pair has one number in all slices; what is rounded off their mean belongs to the same period
+    middle = tau.reshape(len(tau), -1).mean(axis=1)
     # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
-    turns = (np.ceil(tau) if tau[-1] <= 0.0 else np.floor(tau)).astype(int)
+    ends = middle[-1] <= _SAME
+    turns = (np.ceil(middle - _SAME) if ends else np.floor(middle + _SAME)).astype(int)
+    tau, turns = tau.ravel(), np.repeat(turns, tau.size // len(tau))
     N, pairs = planetary_set.n_planets, mesh_pairs(planetary_set)
     line_load = share / bodies.face_width
     widths = [WIDTH * _contact_half_width(pair, line_load, bodies.material) for pair in pairs]
@@ -515,6 +523,7 @@ def contact_candidates(
     local = np.zeros((*layout.shape, setup.cells, setup.cells))
     local[filled] = setup.local[at[0] // N % 2, layout[filled]]
     local[filled] += _corner_part(setup, bodies, *at, polynomials[filled])
+    local /= bodies.of_meshes(mesh // N % 2)[:, None, None]
     approach = np.vstack([rotation_approach(N), -rotation_approach(N)])[:meshes]
     supports = np.zeros((meshes, meshes))
     if members is not None:
@@ -549,24 +558,33 @@ def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -
     """Regular compliance between the nodes of all windows, as `Candidates.images` has it."""
     N, (P, W) = setup.n_planets, pair.shape
     smooth = np.zeros((setup.images, P, W, 3, W, 3))
-    # on the back side every gear carries on its other flank
-    back = mesh >= 2 * N
-    sun_side = mesh % (2 * N) < N
-    left, right = np.where(back, RIGHT, LEFT), np.where(back, LEFT, RIGHT)
-    everything, ones = np.arange(W), np.ones(W, int)
-    on_bodies = [(bodies.sun, everything[sun_side], 0 * ones, left)]
-    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-    gear, side = np.where(sun_side, 1, 0), np.where(sun_side, left, right)
-    on_bodies += [(bodies.planet, everything[mesh % N == planet], gear, side) for planet in range(N)]
-    on_bodies.append((bodies.ring, everything[~sun_side], ones, left))
-    for body, members, gear, side in on_bodies:
+    for name, members, gear, side in windows_of_bodies(mesh, N):
+        body = getattr(bodies, name)
         if body is None:
             continue
-        own, j, i = gear[members], mesh[members], pair[:, members]
-        roll = setup.roll[own, j, positions[:, None], i]
-        sectors = smooth[:1] if body is bodies.planet else smooth
-        _add_body(sectors, body, members, roll, setup.tooth[own, j, i], side[members])
-    return smooth
+        j, i = mesh[members], pair[:, members]
+        roll = setup.roll[gear, j, positions[:, None], i]
+        sectors = smooth[:1] if name == "planet" else smooth
+        _add_body(sectors, body, members, roll, setup.tooth[gear, j, i], side)
+    root = np.sqrt(bodies.of_meshes(mesh // N % 2))
+    return smooth / (root[:, None, None, None] * root[:, None])
+
+
+def windows_of_bodies(mesh: np.ndarray, n_planets: int) -> list[tuple]:
+    """List sun, every planet and ring with the windows on them, by the meshes (W,) of all windows.
+
+    Name of the body, windows (w,), which gear of its mesh the body is in each (w,), and the flanks (w,).
+    """
+    # on the back side every gear carries on its other flank
+    back = mesh >= 2 * n_planets
+    sun_side = mesh % (2 * n_planets) < n_planets
+    left, right = np.where(back, RIGHT, LEFT), np.where(back, LEFT, RIGHT)
+    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
+    gear, side = np.where(sun_side, 1, 0), np.where(sun_side, left, right)
+    found = [("sun", sun_side, 0 * gear, left)]
+    found += [("planet", mesh % n_planets == planet, gear, side) for planet in range(n_planets)]
+    found.append(("ring", ~sun_side, 0 * gear + 1, left))
+    return [(name, np.flatnonzero(on), gear[on], side[on]) for name, on, gear, side in found]
 
 
 def _tooth_pairs(planetary_set, pairs, phase, direction, passed) -> tuple[np.ndarray, np.ndarray]:
@@ -579,7 +597,9 @@ def _tooth_pairs(planetary_set, pairs, phase, direction, passed) -> tuple[np.nda
     end = max(p.path[1] for p in pairs) / pitch
     passed = direction * passed
     lowest = np.floor(begin - phase - np.ceil(passed.max())).astype(int) - 1
-    index = lowest[:, None] + np.arange(int(np.ceil(end - begin)) + 4)
+    # slices of helical teeth reach beyond a mesh period
+    further = int(np.ceil(max(passed.max() - passed.min() - 1.0, 0.0)))
+    index = lowest[:, None] + np.arange(int(np.ceil(end - begin)) + 4 + further)
     zeta = pitch * (passed[None, :, None] + phase[:, None, None] + index[:, None, :])
     return zeta, side_teeth(planetary_set, index, direction)
 

@@ -126,13 +126,22 @@ class FlankCompliance:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Flank compliances of the three kinds of gears and their common material."""
+    """Flank compliances of the three kinds of gears and their common material.
+
+    ``section_factor`` are the stiffnesses of helical teeth over those of spur teeth of the same transverse
+    section, of the meshes with the sun and with the ring.
+    """
 
     sun: FlankCompliance
     planet: FlankCompliance
     ring: FlankCompliance
     material: Material
     face_width: float
+    section_factor: tuple[float, float] = (1.0, 1.0)
+
+    def of_meshes(self, kind) -> np.ndarray:
+        """Section factors of meshes (...) with the sun (0) or with the ring (1)."""
+        return np.asarray(self.section_factor)[kind]
 
 
 def make_sectors(

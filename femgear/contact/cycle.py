@@ -72,6 +72,8 @@ class CycleOptions:
         alone, and no clearance in the bearings of planets.
     slices : int
         Their number.
+    ahead : (slices,) array, optional
+        By how much the slices of helical teeth run ahead of mid-width [mesh periods].
     progress : callable, optional
         Called with (positions done, positions).
     """
@@ -84,6 +86,7 @@ class CycleOptions:
     waves: WidthWaves | None = None
     held_waves: WidthWaves | None = None
     slices: int = 1
+    ahead: np.ndarray | None = None
     progress: Callable[[int, int], None] | None = None
 
 
@@ -157,6 +160,8 @@ class MeshCycle:
         [m/N]; zero where a mesh carries nothing.
     slice_load : (2N, T, S, P) array, optional
         Load of each tooth pair in equal slices of the width, times their number [N].
+    helical : bool
+        Whether the slices are those of helical teeth: the path coordinates are those at mid-width.
     """
 
     position: np.ndarray
@@ -189,17 +194,23 @@ class MeshCycle:
     held_stiffness: np.ndarray | None = None
     held_compliance: np.ndarray | None = None
     slice_load: np.ndarray | None = None
+    helical: bool = False
 
     @property
     def face_load_factor(self) -> np.ndarray | None:
         """K_H-beta of every mesh (2N,): largest load per width of a tooth pair over the mean of that pair.
 
         At the position where the load per width is largest; towards the ends of the width it goes on as
-        between the last two slices.
+        between the last two slices. Of helical teeth, whose pairs carry on a part of the width each: the
+        largest load of a slice over that of all, in the mean of the positions.
         """
         if self.slice_load is None:
             return None
         load = self.slice_load
+        if self.helical:
+            of_slices = load.sum(axis=1).mean(axis=-1)
+            largest, mean = with_ends(of_slices, axis=1).max(axis=1), of_slices.mean(axis=1)
+            return np.divide(largest, mean, out=np.ones(mean.shape), where=mean > 0)
         largest = with_ends(load, axis=2).max(axis=2).reshape(len(load), -1)
         at = largest.argmax(axis=1)[:, None]
         mean = np.take_along_axis(load.mean(axis=2).reshape(len(load), -1), at, axis=1)
@@ -328,6 +339,8 @@ def walk_mesh_cycle(
         position = -position[::-1]
         if options.planet_gaps is not None:
             options = replace(options, planet_gaps=np.asarray(options.planet_gaps, float)[order])
+        if options.ahead is not None:
+            options = replace(options, ahead=-options.ahead)
     record = cycle_without_load(solved.n_planets, position, periods=periods, contact=contact, options=options)
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
@@ -375,6 +388,7 @@ def cycle_without_load(
         contact=contact,
         unknowns=0,
         message="no torque: no tooth carries load and the mesh stiffness is zero",
+        helical=options.ahead is not None,
         **values,
     )
 
@@ -461,12 +475,15 @@ class _Walk:
     def attempt(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
         """Solve all positions in windows of one size, or up to one that needs more, see `in_windows`."""
         options, empty = self.options, self.empty
+        tau, each = empty.position, 1
+        if options.ahead is not None:
+            tau, each = tau[:, None] + options.ahead, len(options.ahead)
         setup = mesh_windows(
             self.sector,
             self.bodies,
             share=share,
             nearest=nearest,
-            positions=empty.position,
+            positions=tau,
             contact=empty.contact,
             cells=options.cells,
             deviations=self.deviations,
@@ -476,22 +493,26 @@ class _Walk:
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
         found, overflow, unknowns, P = [], False, 0, len(empty.position)
-        for first in range(0, P, _TOGETHER):
-            some = np.arange(first, min(first + _TOGETHER, P))
-            candidates = contact_candidates(setup, self.bodies, some, self.members)
+        together = max(_TOGETHER // each, 4)
+        for first in range(0, P, together):
+            some = np.arange(first, min(first + together, P))
+            rows = (some[:, None] * each + np.arange(each)).ravel()
+            candidates = contact_candidates(setup, self.bodies, rows, self.members)
             if first == 0:
                 # bodies that are no elastic bodies are refused before anything rests on them
                 check_definite(candidates)
             load = np.zeros(candidates.approach.shape[1])
             load[setup.n_planets] = self.sun_torque / self.planetary_set.sun.base_radius / self.images
             state = solve_batch(candidates, load, self.springs)
-            found.append(self._at_positions(candidates, state))
-            reach = found[-1]["deflection"]
-            if options.waves is not None:
+            check_residual(candidates, state)
+            found.append({} if empty.helical else self._at_positions(candidates, state))
+            if options.waves is None:
+                reach = found[-1]["deflection"]
+            else:
                 sliced = self._over_width(candidates, state, load, found[-1])
                 overflow, reach = overflow | sliced.pop("overflow"), sliced.pop("reach")
                 found[-1] |= sliced
-            missed = setup.missed(some, reach)
+            missed = setup.missed(rows, reach)
             if empty.contact == "profile" and (missed > nearest).any():
                 return None, share, 1.2 * missed[missed > nearest][0]
             unknowns = max(unknowns, self.images * int(candidates.candidate.sum(axis=(1, 2)).max()))
@@ -506,7 +527,6 @@ class _Walk:
 
     def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
         """What `MeshCycle` keeps of some positions, by the names of its fields; of the planets solved."""
-        check_residual(found, state)
         N, P, members, options = found.setup.n_planets, len(found.position), self.members, self.options
         tooth_load = found.by_pairs(state.loads.sum(axis=-1))
         force = np.zeros((4 * N, P))
@@ -558,52 +578,64 @@ class _Walk:
         options, N, members, W = self.options, self.sector.n_planets, self.members, len(found.mesh)
         assert options.waves is not None
         curves = np.geomspace(_LEAST * load[N] / N, 4.0 * load[N], _FORCES)
-        lead = np.zeros((2, options.slices))
+        S, rows = options.slices, len(found.position)
+        P = rows if options.ahead is None else rows // S
+        lead = np.zeros((2, S))
         if self.deviations is not None:
-            lead = lead_separation(self.deviations, self.sector, options.slices)
-        apart = np.broadcast_to(lead[found.mesh // N].T, (len(found.position), options.slices, W))
+            lead = lead_separation(self.deviations, self.sector, S)
+        apart = np.broadcast_to(lead[found.mesh // N].T, (P, S, W))
         held = None
         if options.held_bodies is not None and options.held_waves is not None:
             held = found.images_of(options.held_bodies).sum(axis=0), options.held_waves
         laws = pair_laws(found, state, curves)
         sliced = solve_slices(found, laws, load, options.waves, apart, held)
         force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
-        motion = np.zeros((len(members.names), len(found.position)))
+        motion = np.zeros((len(members.names), P))
         motion[members.free] = sliced.motions.T[N + 1 :]
         motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung, None]
         thinnest = sliced.contact_width(found, laws)
-        if self.bodies.face_width / options.slices < thinnest:
+        if self.bodies.face_width / S < thinnest:
             raise ContactError(
                 f"contacts of {thinnest * 1e3:.3g} mm along the profile are wider than slices",
-                code="E-SLICES", key="static.slices", value=options.slices,
+                code="E-SLICES", key="static.slices", value=S,
                 limit=f"at most {int(self.bodies.face_width / thinnest)}",
                 remedy="use fewer slices or reduce operation.torque",
             )  # fmt: skip
         # by Hertz's law the largest pressure of a slice grows with the root of its force
         pressure, before = _equal_cell_pressure(found, state.loads).max(axis=2), state.loads.sum(axis=-1)
-        raised = np.divide(sliced.largest(), before, out=np.zeros(before.shape), where=before > 0)
-        inner = np.where(found.at_flank_end(state.active), 0.0, pressure * np.sqrt(raised))
-        # tangents of the springs change; what they begin at is that of the cells
+        largest = sliced.largest() if P == rows else sliced.of_laws(laws)
+        raised = np.divide(largest, before, out=np.zeros(before.shape), where=before > 0)
+        at_edge = sliced.reaches_ends(found, laws)
+        inner = found.by_pairs(np.where(at_edge, 0.0, pressure * np.sqrt(raised))).max(axis=1)
+        # springs stand for all slices of spur teeth, for one of helical teeth
+        slice_load = found.by_pairs(np.moveaxis(sliced.force.reshape(rows, -1, W), 1, 2))
+        slice_load = slice_load.reshape(*slice_load.shape[:3], P, -1).swapaxes(3, 4)
+        slice_load = slice_load.reshape(*slice_load.shape[:2], S, P)
         values: dict[str, Any] = {
             "deflection": rotation_approach(N) @ sliced.motions.T[: N + 1] + members.approach @ motion,
             "sun_arc": sliced.motions[:, N],
             "force": force,
             "member_motion": motion,
-            "tooth_load": found.by_pairs(sliced.force.mean(axis=1)),
-            "slice_load": found.by_pairs(sliced.force.swapaxes(1, 2)),
-            "max_pressure": found.by_pairs(inner).max(axis=1),
-            "residual": np.maximum(plane["residual"], sliced.residual),
-            "iterations": plane["iterations"] + sliced.iterations,
+            "tooth_load": slice_load.mean(axis=2),
+            "slice_load": slice_load,
+            "max_pressure": inner.reshape(len(inner), P, -1).max(axis=-1),
+            "edge_contact": found.by_pairs(at_edge).any(axis=1).reshape(len(inner), P, -1).any(axis=-1),
+            "residual": np.maximum(state.residual.reshape(P, -1).max(axis=1), sliced.residual),
+            "iterations": state.iterations.reshape(P, -1).sum(axis=1) + sliced.iterations,
             "overflow": sliced.overflows(found, laws),
         }
         # the slice that comes nearest decides which pairs may touch
-        values["reach"] = values["deflection"] - lead.min(axis=1)[np.arange(2 * N) // N, None]
+        reach = values["deflection"] - lead.min(axis=1)[np.arange(2 * N) // N, None]
+        values["reach"] = np.repeat(reach, rows // P, axis=1)
         for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
-            values[name] = plane[name] + tangent.T
+            # tangents of the springs change; what they begin at is that of the cells
+            values[name] = plane.get(name, 0.0) + tangent.T
         if held is not None:
-            loaded, between = (force > 0).all(axis=0), np.moveaxis(plane["held_compliance"], -1, 0).copy()
-            changed = np.linalg.inv(between[loaded]) + sliced.tangents[1][loaded]
-            between[loaded] = np.linalg.inv(changed)
+            loaded, between = (force > 0).all(axis=0), np.zeros((P, 2 * N, 2 * N))
+            if P == rows:
+                between = np.moveaxis(plane["held_compliance"], -1, 0).copy()
+                between[loaded] = np.linalg.inv(between[loaded])
+            between[loaded] = np.linalg.inv(between[loaded] + sliced.tangents[1][loaded])
             values["held_compliance"] = np.moveaxis(between, 0, -1)
         return values
 
@@ -613,6 +645,7 @@ class _Walk:
         drive, back = slice(0, 2 * N), slice(2 * N, 4 * N)
         values = {name: np.concatenate([some[name] for some in found], axis=-1) for name in found[0]}
         path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
+        path = path.reshape(*path.shape[:2], len(self.empty.position), -1).mean(axis=-1)
         if self.images > 1:
             s, turned = self.planetary_set, np.zeros((2, 2 * N), int)
             turned[0, :N], turned[1, N:] = (
@@ -622,6 +655,8 @@ class _Walk:
         values |= {"path": path[drive], "tooth": tooth[:, drive]}
         looked = self.options.both_flanks
         values["back_path"] = path[back] if looked else np.zeros_like(path)
+        if self.options.ahead is not None:
+            values["back_tooth_load"] = np.zeros_like(values["tooth_load"])
         values["back_tooth"] = tooth[:, back] if looked else np.zeros_like(tooth)
         if self.options.pressures:
             values["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]

@@ -15,8 +15,11 @@ A load ``cos(k z)`` along a line on the half space moves the point at depth d an
 
 the Fourier transform of Boussinesq's point load (K. L. Johnson, "Contact Mechanics", 1985, section 3.2). Its
 limit for long waves is Flamant's line load. As in `femgear.contact.bodies` this part is taken out at depth
-and put back at the surface; there, beside the load, waves yield less than a uniform load by ``ln(k/2) +
-gamma``.
+and put back at the surface; there waves yield less than a uniform load by ``-K0(k x) - ln x``, beside the
+load by ``ln(k/2) + gamma``.
+
+The slices of helical teeth are each at a position of its own, ahead of the one before; their contacts are not
+beside one another on the flanks, and ``h_m`` holds between the places where they are.
 """
 
 from __future__ import annotations
@@ -27,7 +30,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
-from femgear.contact.assembly import Candidates, body_compliance
+from femgear.contact.assembly import Candidates, body_compliance, windows_of_bodies
 from femgear.contact.batch import PairLaws
 from femgear.contact.bodies import (
     RING_STATE,
@@ -38,6 +41,7 @@ from femgear.contact.bodies import (
     Sectors,
     observed_flanks,
     regular_compliance,
+    station_weights,
 )
 from femgear.contact.local_compliance import depth_displacement, tip_corner
 from femgear.errors import ContactError
@@ -89,7 +93,7 @@ class SliceState:
     ----------
     force : (P, N, W) array
         Force of a tooth pair, were it the same over the whole width [N]; the mean over slices is that of the
-        pair.
+        pair. Of helical teeth a window may be that of another pair in every slice.
     motions : (P, m) array
         [m].
     mesh : (W,) array
@@ -97,7 +101,8 @@ class SliceState:
         Linear solutions, and largest violation of the contact conditions over the largest displacement.
     tangents : tuple of (P, meshes, meshes) arrays
         For every compliance between windows that was asked for: increments of the mesh forces per unit
-        approach of each mesh while the others hold theirs [N/m], less those of the plane solution.
+        approach of each mesh while the others hold theirs [N/m]. Of spur teeth less those of the plane
+        solution.
     own : tuple of (P, meshes) arrays
         The same of every mesh at constant loads of the others.
     """
@@ -114,15 +119,24 @@ class SliceState:
         """Largest force of a tooth pair in any slice (P, W) [N], towards the ends as in the last slices."""
         return with_ends(self.force, axis=1).max(axis=1)
 
+    def of_laws(self, laws: PairLaws) -> np.ndarray:
+        """Largest force of every spring in the slices that it stands for, (rows, W) [N]."""
+        return self.force.reshape(len(laws.separation), -1, len(self.mesh)).max(axis=1)
+
     def contact_width(self, found: Candidates, laws: PairLaws) -> float:
         """Largest width of a contact along the profile [m]."""
-        touched = (laws.touching <= self.force.max(axis=1)[..., None]).sum(axis=-1)
+        touched = (laws.touching <= self.of_laws(laws)[..., None]).sum(axis=-1)
         return float((touched * found.setup.cell[found.mesh]).max(initial=0.0))
 
     def overflows(self, found: Candidates, laws: PairLaws) -> bool:
         """Whether a slice presses cells at the end of a window that is not the end of a flank."""
-        reached = laws.touching[..., [0, -1]] <= self.force.max(axis=1)[..., None]
+        reached = laws.touching[..., [0, -1]] <= self.of_laws(laws)[..., None]
         return bool((reached & ~np.moveaxis(found.at_edge, 0, -1)).any())
+
+    def reaches_ends(self, found: Candidates, laws: PairLaws) -> np.ndarray:
+        """Whether a contact reaches an end of a flank, (rows, W)."""
+        touched = (laws.touching <= self.of_laws(laws)[..., None]) & found.candidate
+        return found.at_flank_end(touched)
 
     def of_meshes(self) -> np.ndarray:
         """Force of every mesh per slice over the whole width [N], (P, N, meshes)."""
@@ -149,10 +163,13 @@ def wave_displacement(x, depth, wave_number: float, material: Material) -> np.nd
     return (1 + nu) / (np.pi * material.youngs_modulus) * wave
 
 
-def width_waves(sectors: Sectors, material: Material, slices: int, ring_foundation=None) -> WidthWaves:
+def width_waves(
+    sectors: Sectors, material: Material, slices: int, ring_foundation=None, section_factor=(1.0, 1.0)
+) -> WidthWaves:
     """Compute the compliance to the waves of as many slices, from sector grids that may be coarse.
 
-    ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over the face width, which otherwise is held.
+    ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over the face width, which otherwise is held;
+    ``section_factor`` as in `Bodies`.
     """
     width = sectors.sun.gear.face_width
     wave_number = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
@@ -160,7 +177,7 @@ def width_waves(sectors: Sectors, material: Material, slices: int, ring_foundati
     gears.append(_wave_compliance(sectors.ring, ring_foundation, material, wave_number))
     return WidthWaves(
         wave_number,
-        tuple(Bodies(sun, planet, ring, material, width) for sun, planet, ring in zip(*gears, strict=True)),
+        tuple(Bodies(*three, material, width, section_factor) for three in zip(*gears, strict=True)),
     )
 
 
@@ -221,18 +238,19 @@ def solve_slices(
 ) -> SliceState:
     """Solve the contact of all tooth pairs in all slices, which share their motions.
 
-    Newton's method on the pairs as springs (`femgear.contact.batch.PairLaws`). Without separations it is the
-    plane solution that the laws were made of.
+    Newton's method on the pairs as springs (`femgear.contact.batch.PairLaws`). Without separations spur teeth
+    have the plane solution that the laws were made of.
 
     Parameters
     ----------
     found : Candidates
-        All windows, with the pairs that the laws are of.
+        All windows, with the pairs that the laws are of: at P positions, or, of helical teeth, in all N
+        slices at each of them, (P N) rows.
     load : (m,) array
         External load on the motions [N].
     separations : (P, N, W) array
         What leads, crowning and misalignment add in the slices to whole pairs [m].
-    held : (P, W, 3, W, 3) array and WidthWaves, optional
+    held : (rows, W, 3, W, 3) array and WidthWaves, optional
         Compliance of other bodies between all windows [m/N], for whose tangents the contact is taken too.
 
     Raises
@@ -240,19 +258,21 @@ def solve_slices(
     ContactError
         E-CONTACT: the iteration does not end.
     """
-    parts, load = [], np.asarray(load, float)
-    for first in range(0, len(separations), _TOGETHER):
-        some = np.arange(first, min(first + _TOGETHER, len(separations)))
-        N = separations.shape[1]
-        across = _across(found, some, waves, N)
-        bodies = [(found.smooth[some], across)]
+    parts, load, (P, N, _) = [], np.asarray(load, float), separations.shape
+    each = len(found.position) // P
+    for first in range(0, P, _TOGETHER):
+        some = np.arange(first, min(first + _TOGETHER, P))
+        rows = some[:, None] * each + np.arange(each)
+        across = _across(found, rows, waves, N)
+        bodies = [(found.smooth[rows], across)]
         if held is not None:
-            bodies.append((held[0][some], _across(found, some, held[1], N)))
-        newton = _SliceNewton(laws, some, load, across, separations[some], found.smooth[some])
-        before = [part for one in bodies for part in newton.tangents(*one)]
+            bodies.append((held[0][rows], _across(found, rows, held[1], N)))
+        newton = _SliceNewton(laws, rows, load, across, separations[some], found.smooth[rows])
+        before = [part for one in bodies for part in newton.tangents(*one)] if each == 1 else []
         solved = newton.solve()
         after = [part for one in bodies for part in newton.tangents(*one)]
-        parts.append((*solved, *(b - a for a, b in zip(before, after, strict=True))))
+        after = [b - a for a, b in zip(before, after, strict=True)] if before else after
+        parts.append((*solved, *after))
     force, motions, iterations, residual, *tangents = (
         np.concatenate(part) for part in zip(*parts, strict=True)
     )
@@ -266,74 +286,174 @@ def cosines(slices: int) -> np.ndarray:
     return np.sqrt(np.where(m == 0, 1.0, 2.0) / slices) * np.cos(np.pi * m * z)
 
 
-def _across(found: Candidates, some, waves: WidthWaves, slices: int) -> np.ndarray:
+def _across(found: Candidates, rows: np.ndarray, waves: WidthWaves, slices: int) -> np.ndarray:
     """Compliance between the slices of all windows beyond the plane one [m/N], (P, N, W, N, W)."""
     from scipy.interpolate import CubicSpline
 
-    W = len(found.mesh)
+    W, (P, each) = len(found.mesh), rows.shape
+    if slices == 1:
+        return np.zeros((P, 1, W, 1, W))
+    wanted = np.pi / waves.bodies[0].face_width * np.arange(1, slices)
+    # weights of the waves that were computed in those of the slices, which are cubics between them
+    between = CubicSpline(np.log(waves.wave_number), np.eye(len(waves.wave_number)))(np.log(wanted))
+    T = cosines(slices)[1:]
+    if each > 1:
+        return _along_helix(found, rows, waves, wanted, between)
     known = np.array(
         [
-            body_compliance(found.setup, one, found.position[some], found.mesh, found.pair[some]).sum(axis=0)
+            body_compliance(found.setup, one, found.position[rows[:, 0]], found.mesh, found.pair[rows[:, 0]])
             for one in waves.bodies
         ]
-    )[:, :, :, 1, :, 1]
-    wanted = np.pi / waves.bodies[0].face_width * np.arange(1, slices)
-    logarithm = np.log(waves.wave_number)
-    change = np.zeros((slices, len(some), W, W))
-    if slices > 1:
-        change[1:] = CubicSpline(logarithm, known)(np.log(wanted))
-        local = replace(waves, wave_number=wanted).local
-        change[1:] += local[:, None, None, None] * np.eye(W)
-    T = cosines(slices)
+    ).sum(axis=1)[:, :, :, 1, :, 1]
+    change = np.tensordot(between, known, 1)
+    kind = found.mesh // found.setup.n_planets % 2
+    local = replace(waves, wave_number=wanted).local[:, None] / waves.bodies[0].of_meshes(kind)
+    change[:, :, range(W), range(W)] += local[:, None]
     return np.einsum("ms,mt,mpvw->psvtw", T, T, change, optimize=True)
 
 
-class _SliceNewton:
-    """Newton's method of `solve_slices` at some positions; motions and compliances over ``unit``."""
+def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, between) -> np.ndarray:
+    """`_across` of helical teeth, whose slices are at positions of their own, (P, N, W, N, W).
 
-    def __init__(self, laws: PairLaws, some, load, across, separations, smooth):
-        self.laws, self.some, self.load, self.smooth = laws, some, load, smooth
-        P, N, W = separations.shape
-        self.shape, self.size = (P, N, W), N * W
+    ``between`` (N - 1, K) are the weights of the waves that were computed in those of ``wave_number``.
+    """
+    setup, W, (P, N) = found.setup, len(found.mesh), rows.shape
+    windows = (
+        np.tile(found.mesh, N), found.pair[rows].reshape(P, N * W),
+        np.repeat(found.position[rows], W, axis=1), np.repeat(np.arange(N), W),
+    )  # fmt: skip
+    # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
+    over = np.cos(np.pi / N * np.arange(1, N)[:, None] * np.arange(2 * N)) / N
+    across = np.zeros((P, N * W, N * W))
+    for name, *on_body in windows_of_bodies(windows[0], setup.n_planets):
+        bodies = [getattr(one, name) for one in waves.bodies]
+        table = (between @ [one.regular.ravel() for one in bodies]).T @ over
+        _add_along(across, setup, bodies[0], table.T.copy(), windows, *on_body)
+    _add_beside(across, setup, waves, windows, wave_number, over)
+    root = np.sqrt(waves.bodies[0].of_meshes(windows[0] // setup.n_planets % 2))
+    return (across / (root[:, None] * root)).reshape(P, N, W, N, W)
+
+
+def _add_along(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:
+    """Add what one body yields between its windows, by a table (2 N, ...) over distances of slices."""
+    mesh, pair, position, piece = windows
+    count, stations = body.regular.shape[:2]
+    j, i = mesh[members], pair[:, members]
+    index, weight = station_weights(setup.roll[gear, j, position[:, members], i, 1], body.roll)
+    index, tooth = index + side[:, None] * len(body.roll), setup.tooth[gear, j, i]
+    one, two = np.triu_indices(len(members))
+    lag = (tooth[:, one] - tooth[:, two]) % count * stations
+    slices = piece[members[one]], piece[members[two]]
+    starts = [table.shape[1] * place for place in (np.abs(slices[0] - slices[1]), sum(slices) + 1)]
+    values, table = np.zeros(lag.shape), table.ravel()
+    for a, b in np.ndindex(4, 4):
+        place = (lag + index[:, one, a]) * stations + index[:, two, b]
+        values += weight[:, one, a] * weight[:, two, b] * sum(table[place + start] for start in starts)
+    _add_both(across, slice(None), members[one], members[two], values)
+
+
+def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) -> None:
+    """Add what the half spaces of both flanks yield between the contacts of one tooth pair in all slices."""
+    mesh, pair, position, piece = windows
+    material, N = waves.bodies[0].material, setup.n_planets
+    factor = (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * waves.bodies[0].face_width)
+    for number in np.unique(mesh):
+        members = np.flatnonzero(mesh == number)
+        one, two = (members[rows] for rows in np.triu_indices(len(members)))
+        p, same = np.nonzero(pair[:, one] == pair[:, two])
+        one, two, local = one[same], two[same], 0.0
+        shape = over[:, np.abs(piece[one] - piece[two])] + over[:, piece[one] + piece[two] + 1]
+        for gear, name in enumerate(("sun", "planet") if number // N % 2 == 0 else ("planet", "ring")):
+            rolls = (setup.roll[gear, number, position[p, w], pair[p, w], 1] for w in (one, two))
+            arcs = [roll**2 / (2 * getattr(waves.bodies[0], name).base_radius) for roll in rolls]
+            local += (shape * _beside(np.abs(arcs[0] - arcs[1]), wave_number[:, None])).sum(axis=0)
+        _add_both(across, p, one, two, factor * local)
+
+
+def _add_both(matrices, number, one, two, values) -> None:
+    """Add values to symmetric matrices on both sides of their diagonals."""
+    matrices[number, one, two] += values
+    off = one != two
+    if isinstance(number, slice):
+        matrices[:, two[off], one[off]] += values[:, off]
+    else:
+        matrices[number[off], two[off], one[off]] += values[off]
+
+
+def _beside(distance, wave_number) -> np.ndarray:
+    """``K0(k x) + ln x`` at distances [m]: what a wave yields on the surface, less a uniform load."""
+    from scipy.special import k0
+
+    near = wave_number * distance < 1e-6
+    some = np.where(near, 1.0, distance)
+    return np.where(near, -np.log(wave_number / 2) - np.euler_gamma, k0(wave_number * some) + np.log(some))
+
+
+class _SliceNewton:
+    """Newton's method of `solve_slices` at some positions; motions and compliances over ``unit``.
+
+    Springs are those of the ``rows`` (P, L) of the laws: one for all slices, or one for each of them.
+    """
+
+    def __init__(self, laws: PairLaws, rows, load, across, separations, smooth):
+        self.laws, self.rows, self.load, self.smooth = laws, rows, load, smooth
+        (P, N, W), L = separations.shape, rows.shape[1]
+        self.shape, self.size, self.each = (P, N, W), N * W, N // L
         self.unit = float(laws.yields[np.isfinite(laws.separation)].mean())
         self.across = across / self.unit
-        self.S = laws.smooth[some].swapaxes(3, 4).reshape(P, W, 3, -1)
-        plane = laws.loads[some]
-        field = (self.S @ plane.swapaxes(1, 2).reshape(P, 1, -1, 1))[..., 0]
+        self.moments = laws.moments[rows.ravel()]
+        self.S = laws.smooth[rows].swapaxes(4, 5).reshape(P, L, W, 3, -1)
+        plane = laws.loads[rows]
+        field = (self.S @ plane.swapaxes(2, 3).reshape(P, L, 1, -1, 1))[..., 0]
         self.field = field + (plane.sum(axis=-1) @ laws.supports)[..., None]
-        self.plane, self.motions = plane.sum(axis=-1), laws.motions[some] / self.unit
-        there = np.isfinite(laws.separation[some])
-        self.apart = np.where(there, laws.separation[some], 1.0)[:, None]
-        self.widest = float(np.abs(np.where(there[:, None], self.apart + separations, 0.0)).max())
-        self.force = np.repeat(self.plane[:, None], N, axis=1)
+        self.plane, own = plane.sum(axis=-1), laws.motions[rows] / self.unit
+        self.motions = own.mean(axis=1)
+        there = np.isfinite(laws.separation[rows])
+        self.apart = np.where(there, laws.separation[rows], 1.0)
+        there, self.apart, self.force = (
+            np.repeat(one, self.each, axis=1) for one in (there, self.apart, self.plane)
+        )
+        self.widest = float(np.abs(np.where(there, self.apart + separations, 0.0)).max())
         self.closed = self.force > 0.0
         # at the given state the curves miss their own points by their interpolation
         self.refresh()
-        missed = np.where(self.plane > 0.0, self.gaps(self.force)[0][:, 0], 0.0)
-        self.apart = self.apart - missed[:, None] * self.unit + separations
+        missed = self.by_laws(self.force)[0] + self.force @ laws.supports / self.unit
+        missed -= np.repeat(own @ laws.approach.T, self.each, axis=1)
+        self.apart = self.apart - np.where(self.force > 0.0, missed, 0.0) * self.unit + separations
         self.refresh()
 
     def refresh(self) -> None:
         """Take the moments of the pressures from the forces as they are."""
-        P, N, W = self.shape
-        mu = self._moments(self.force.swapaxes(0, 1))
-        half = (mu.transpose(1, 2, 0, 3) @ self.S).reshape(P, W, N, 3, W)
-        between = (half * mu.transpose(1, 0, 3, 2)[:, None]).sum(axis=-2).transpose(0, 2, 1, 3)
-        self.between = between / self.unit
-        self.bent = (self.apart - (mu * self.field).sum(axis=-1).swapaxes(0, 1)) / self.unit
+        (P, N, W), L = self.shape, self.rows.shape[1]
+        mu = self._moments(self.force).reshape(P, L, self.each, W, 3).swapaxes(2, 3)
+        half = (mu @ self.S).reshape(P, L, W, self.each, 3, W)
+        between = (half * mu.transpose(0, 1, 3, 4, 2)[:, :, None]).sum(axis=-2)
+        self.between = between.swapaxes(2, 3).reshape(P, N, W, W) / self.unit
+        bent = (mu * self.field[:, :, :, None]).sum(axis=-1).swapaxes(2, 3)
+        self.bent = (self.apart - bent.reshape(P, N, W)) / self.unit
 
     def _moments(self, force: np.ndarray) -> np.ndarray:
-        return replace(self.laws, moments=self.laws.moments[self.some]).moments_under(force)
+        """Moments ``mu`` (P, N, W, 3) under forces (P, N, W) [N]."""
+        P, N, W = self.shape
+        laws = replace(self.laws, moments=self.moments)
+        of_rows = force.reshape(-1, self.each, W).swapaxes(0, 1)
+        return laws.moments_under(of_rows).swapaxes(0, 1).reshape(P, N, W, 3)
+
+    def by_laws(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Separations by what each slice carries by itself, and their slope, (P, N, W), over the unit."""
+        W = self.shape[2]
+        value, slope = self.laws.approaches(force.reshape(-1, W), np.repeat(self.rows.ravel(), self.each))
+        gap = self.bent + value.reshape(self.shape) / self.unit + (self.between @ force[..., None])[..., 0]
+        return gap, slope.reshape(self.shape) / self.unit
 
     def gaps(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Separations that are left, and their slope over the own force, (P, N, W) each, over the unit."""
-        P, N, W = self.shape
-        value, slope = self.laws.approaches(force.reshape(-1, W), np.repeat(self.some, N))
-        gap = self.bent + value.reshape(P, N, W) / self.unit + (self.between @ force[..., None])[..., 0]
-        gap += np.einsum("psvtw,ptw->psv", self.across, force)
+        P = self.shape[0]
+        gap, slope = self.by_laws(force)
+        gap += (self.across.reshape(P, self.size, -1) @ force.reshape(P, -1, 1)).reshape(self.shape)
         # members on springs move as a whole
         gap += (force.mean(axis=1) @ self.laws.supports / self.unit)[:, None]
-        return gap - (self.motions @ self.laws.approach.T)[:, None], slope.reshape(P, N, W) / self.unit
+        return gap - (self.motions @ self.laws.approach.T)[:, None], slope
 
     def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Iterate until all positions are solved: forces, motions, steps and residuals.
@@ -341,7 +461,7 @@ class _SliceNewton:
         Slices that pull open and slices that overlap close, all at once; after `_BOLD` steps the last one
         alone (K. G. Murty, Linear Algebra Appl. 7, 1974), which ends for every linear problem.
         """
-        P, steps, load = len(self.some), np.zeros(len(self.some), int), np.abs(self.load).max()
+        P, steps, load = len(self.rows), np.zeros(len(self.rows), int), np.abs(self.load).max()
         # separations that are large against the load leave their rounding in it
         limit = max(_SETTLED * load, _ROUNDED * self.widest / self.unit)
         todo = np.ones(P, bool)
@@ -368,31 +488,34 @@ class _SliceNewton:
 
         And those of each at constant loads of the others, (P, meshes).
         """
-        (P, N, W), n, laws = self.shape, self.size, self.laws
-        mu = self._moments(self.force.swapaxes(0, 1)).transpose(1, 0, 2, 3)
-        half = mu.swapaxes(1, 2) @ smooth.swapaxes(3, 4).reshape(P, W, 3, -1)
-        between = (
-            (half.reshape(P, W, N, 3, W) * mu.transpose(0, 1, 3, 2)[:, None]).sum(axis=-2).swapaxes(1, 2)
-        )
+        (P, N, W), n, laws, L = self.shape, self.size, self.laws, self.rows.shape[1]
+        mu = self._moments(self.force).reshape(P, L, self.each, W, 3).swapaxes(2, 3)
+        half = mu @ smooth.swapaxes(4, 5).reshape(P, L, W, 3, -1)
+        between = half.reshape(P, L, W, self.each, 3, W) * mu.transpose(0, 1, 3, 4, 2)[:, :, None]
+        between = between.sum(axis=-2).swapaxes(2, 3)
         # the springs contain what bodies yield under their own window
-        own = np.diagonal(self.smooth, axis1=1, axis2=3).transpose(0, 3, 1, 2)
-        between[:, :, range(W), range(W)] -= np.einsum("pswa,pwab,pswb->psw", mu, own, mu)
+        own = np.diagonal(self.smooth, axis1=2, axis2=4).transpose(0, 1, 4, 2, 3)
+        between[..., range(W), range(W)] -= np.einsum("plwsa,plwab,plwsb->plsw", mu, own, mu)
+        between = between.reshape(P, N, W, W)
         A, window = across / self.unit, np.arange(N)
         A[:, window, :, window] += between.swapaxes(0, 1) / self.unit
         A = A.reshape(P, n, n)
         A[:, range(n), range(n)] += self.gaps(self.force)[1].reshape(P, n)
-        on = (self.force > 0.0).reshape(P, n)
-        A = np.where(on[:, :, None] & on[:, None], A, np.eye(n))
-        mesh, meshes = np.tile(laws.mesh, N), int(laws.mesh[-1]) + 1
-        ones = (mesh[:, None] == np.arange(meshes)) * on[..., None].astype(float)
+        (on, at), rows = _first((self.force > 0.0).reshape(P, n)), np.arange(P)[:, None]
+        c = at.shape[1]
+        A = np.where(on[:, :, None] & on[:, None], A[rows[..., None], at[:, :, None], at[:, None]], np.eye(c))
+        meshes = np.arange(int(laws.mesh[-1]) + 1)
+        ones = (np.tile(laws.mesh, N)[at][..., None] == meshes) * on[..., None].astype(float)
         together = ones.swapaxes(1, 2) @ np.linalg.solve(A, ones)
         alone = []
-        for j in range(meshes):
-            rows = np.flatnonzero(mesh == j)
-            own = ones[:, rows, j]
-            alone.append(
-                (own * np.linalg.solve(A[:, rows[:, None], rows], own[..., None])[..., 0]).sum(axis=1)
+        for j in meshes:
+            own, some = _first(ones[..., j] > 0.0)
+            part = np.where(
+                own[:, :, None] & own[:, None],
+                A[rows[..., None], some[:, :, None], some[:, None]],
+                np.eye(own.shape[1]),
             )
+            alone.append((own * np.linalg.solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
         return together / (N * self.unit), np.stack(alone, axis=1) / (N * self.unit)
 
     def step(self, *, single: bool) -> np.ndarray:
@@ -407,21 +530,33 @@ class _SliceNewton:
         self.closed = self.closed ^ wrong.reshape(P, N, W)
         before, self.force = self.force, np.where(self.closed, self.force, 0.0)
         gap, slope = self.gaps(self.force)
-        on = self.closed.reshape(P, n)
         A, window = self.across + self.laws.supports[:, None] / (N * self.unit), np.arange(N)
         A[:, window, :, window] += self.between.swapaxes(0, 1)
         A = A.reshape(P, n, n)
         A[:, range(n), range(n)] += slope.reshape(P, n)
-        system = np.zeros((P, n + m, n + m))
-        system[:, :n, :n] = np.where(on[:, :, None] & on[:, None], A, np.eye(n))
-        G = np.tile(self.laws.approach, (N, 1)) * on[..., None]
-        system[:, :n, n:], system[:, n:, :n] = -G, G.swapaxes(1, 2) / N
-        system[:, range(n, n + m), range(n, n + m)] = _SOFTEST
+        # what is closed alone, and as many of the others as the position with the most of it asks for
+        on, at = _first(self.closed.reshape(P, n))
+        system, c = np.zeros((P, at.shape[1] + m, at.shape[1] + m)), at.shape[1]
+        rows = np.arange(P)[:, None]
+        system[:, :c, :c] = np.where(
+            on[:, :, None] & on[:, None], A[rows[..., None], at[:, :, None], at[:, None]], np.eye(c)
+        )
+        G = np.tile(self.laws.approach, (N, 1))[at] * on[..., None]
+        system[:, :c, c:], system[:, c:, :c] = -G, G.swapaxes(1, 2) / N
+        system[:, range(c, c + m), range(c, c + m)] = _SOFTEST
         balance = self.load - self.force.sum(axis=1) @ self.laws.approach / N - _SOFTEST * self.motions
-        right = np.concatenate([np.where(on, -gap.reshape(P, n), 0.0), balance], axis=1)
-        change = np.linalg.solve(system, right[..., None])[..., 0]
+        right = np.concatenate([np.where(on, -gap.reshape(P, n)[rows, at], 0.0), balance], axis=1)
+        solved = np.linalg.solve(system, right[..., None])[..., 0]
+        change = np.zeros((P, n + m))
+        change[rows, at], change[:, n:] = solved[:, :c], solved[:, c:]
         # pulls stay until the next step: motions belong to them
         self.force = np.where(self.closed, self.force + change[:, :n].reshape(P, N, W), 0.0)
         self.motions = self.motions + change[:, n:]
         moved = np.abs(self.force - before).reshape(P, -1).max(axis=1)
         return np.where(changed, np.inf, moved)
+
+
+def _first(on: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places where rows (P, n) are true, as many for every row, (P, c): whether they are, and which."""
+    at = np.argsort(~on, axis=1, kind="stable")[:, : max(int(on.sum(axis=1).max()), 1)]
+    return np.take_along_axis(on, at, axis=1), at

@@ -151,7 +151,7 @@ def spring_slices(separation, *, stiffness, load, slices):
     )  # fmt: skip
     across = np.zeros((1, slices, 1, slices, 1))
     apart = np.asarray(separation)[None, :, None]
-    newton = _SliceNewton(laws, np.arange(1), np.array([load]), across, apart, laws.smooth)
+    newton = _SliceNewton(laws, np.zeros((1, 1), int), np.array([load]), across, apart, laws.smooth[None])
     return newton.solve()[0][0, :, 0] / load
 
 
