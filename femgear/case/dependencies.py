@@ -39,8 +39,8 @@ _SOLUTION = {
     f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")
 }
 """How the contact is solved, whatever the grids."""
-_HELIX = {"helical.helix_angle"}
-"""All that the transverse section of helical gears depends on."""
+_HELIX = {"helical.helix_angle", "helical.hand"}
+"""All that helical flanks depend on."""
 
 
 def static_entries(case: Case) -> Entries:

@@ -58,6 +58,7 @@ _MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 400
 Deviation = Annotated[float, Quantity(LENGTH, -0.02, 0.02)]
 Amplitude = Annotated[float, Quantity(LENGTH, 0.0, 0.02)]
 Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
+LARGEST_HELIX = math.radians(45.0)
 PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
 Diameter = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 RollAngle = Annotated[float, Quantity(ANGLE, 0.0, 4 * math.pi)]
@@ -225,7 +226,8 @@ class SetSection(Section):
 
     ``centre_distance`` may be left out (the profile shifts give it), and so may the profile shift of the sun,
     of the ring or of both (they are found so that the meshes have no play). ``backlash`` is the play of each
-    mesh on the reference circles: half of it is taken from the tooth thickness of every gear.
+    mesh on the reference circles: half of it is taken from the tooth thickness of every gear. With a
+    ``helix_angle``, positive for a right-handed sun, module, racks and shifts are of the normal section.
     """
 
     planets: Annotated[int, Count(1, 1000)]
@@ -234,6 +236,7 @@ class SetSection(Section):
     planet_angles: Annotated[tuple[Angle, ...], at_most(1000)] | None = None
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
     pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
+    helix_angle: Annotated[float, Quantity(ANGLE, -LARGEST_HELIX, LARGEST_HELIX)] = 0.0
 
 
 class RackSection(Section):
@@ -485,8 +488,8 @@ class Case(Section, ReadCase):
 
     @property
     def helix_angle(self) -> float | None:
-        """Helix angle at the reference circle [rad], None of spur gears."""
-        return None
+        """Helix angle at the reference circle [rad], positive of a right-handed sun; None of spur gears."""
+        return self.set.helix_angle or None
 
     @property
     def mesh_harmonics(self) -> int | None:

@@ -523,7 +523,7 @@ def contact_candidates(
     local = np.zeros((*layout.shape, setup.cells, setup.cells))
     local[filled] = setup.local[at[0] // N % 2, layout[filled]]
     local[filled] += _corner_part(setup, bodies, *at, polynomials[filled])
-    local /= bodies.of_meshes(mesh // N % 2)[:, None, None]
+    local /= bodies.helical
     approach = np.vstack([rotation_approach(N), -rotation_approach(N)])[:meshes]
     supports = np.zeros((meshes, meshes))
     if members is not None:
@@ -566,8 +566,7 @@ def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -
         roll = setup.roll[gear, j, positions[:, None], i]
         sectors = smooth[:1] if name == "planet" else smooth
         _add_body(sectors, body, members, roll, setup.tooth[gear, j, i], side)
-    root = np.sqrt(bodies.of_meshes(mesh // N % 2))
-    return smooth / (root[:, None, None, None] * root[:, None])
+    return smooth / bodies.helical
 
 
 def windows_of_bodies(mesh: np.ndarray, n_planets: int) -> list[tuple]:

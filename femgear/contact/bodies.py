@@ -12,6 +12,7 @@ The contact solution adds half plane and corner at the surface under its pressur
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -128,8 +129,8 @@ class FlankCompliance:
 class Bodies:
     """Flank compliances of the three kinds of gears and their common material.
 
-    ``section_factor`` are the stiffnesses of helical teeth over those of spur teeth of the same transverse
-    section, of the meshes with the sun and with the ring.
+    ``helical`` is the stiffness of helical teeth over that of spur teeth of the same transverse section, see
+    `helical_stiffness`.
     """
 
     sun: FlankCompliance
@@ -137,11 +138,15 @@ class Bodies:
     ring: FlankCompliance
     material: Material
     face_width: float
-    section_factor: tuple[float, float] = (1.0, 1.0)
+    helical: float = 1.0
 
-    def of_meshes(self, kind) -> np.ndarray:
-        """Section factors of meshes (...) with the sun (0) or with the ring (1)."""
-        return np.asarray(self.section_factor)[kind]
+
+def helical_stiffness(helix_angle: float) -> float:
+    """Compute the stiffness of helical teeth over that of spur teeth of the same transverse section.
+
+    ``cos^2 beta`` of the helix angle at the reference circle [rad].
+    """
+    return math.cos(helix_angle) ** 2
 
 
 def make_sectors(

@@ -132,6 +132,9 @@ def loaded_period(
             found = {name: np.concatenate([record[name], found[name]], axis=-1) for name in found}
         order = np.argsort(found["position"], kind="stable")
         record = {name: values[..., order] for name, values in found.items()}
+        if cycle.helical:
+            # slices of helical teeth come into contact one after the other, with steps of their own size
+            break
         smooth, jumps = _unresolved(record)
         tau, gap = record["position"], np.diff(record["position"])
         # jumps in quarters: half as many walks to enclose them

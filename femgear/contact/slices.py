@@ -82,7 +82,7 @@ class WidthWaves:
         """What the half spaces of both flanks yield beside the load [m/N], (M,)."""
         material, width = self.bodies[0].material, self.bodies[0].face_width
         factor = 2 * (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * width)
-        return -factor * (np.log(self.wave_number / 2) + np.euler_gamma)
+        return -factor / self.bodies[0].helical * (np.log(self.wave_number / 2) + np.euler_gamma)
 
 
 @dataclass(frozen=True)
@@ -164,12 +164,12 @@ def wave_displacement(x, depth, wave_number: float, material: Material) -> np.nd
 
 
 def width_waves(
-    sectors: Sectors, material: Material, slices: int, ring_foundation=None, section_factor=(1.0, 1.0)
+    sectors: Sectors, material: Material, slices: int, ring_foundation=None, helical: float = 1.0
 ) -> WidthWaves:
     """Compute the compliance to the waves of as many slices, from sector grids that may be coarse.
 
     ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over the face width, which otherwise is held;
-    ``section_factor`` as in `Bodies`.
+    ``helical`` as in `Bodies`.
     """
     width = sectors.sun.gear.face_width
     wave_number = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
@@ -177,7 +177,7 @@ def width_waves(
     gears.append(_wave_compliance(sectors.ring, ring_foundation, material, wave_number))
     return WidthWaves(
         wave_number,
-        tuple(Bodies(*three, material, width, section_factor) for three in zip(*gears, strict=True)),
+        tuple(Bodies(*three, material, width, helical) for three in zip(*gears, strict=True)),
     )
 
 
@@ -306,9 +306,7 @@ def _across(found: Candidates, rows: np.ndarray, waves: WidthWaves, slices: int)
         ]
     ).sum(axis=1)[:, :, :, 1, :, 1]
     change = np.tensordot(between, known, 1)
-    kind = found.mesh // found.setup.n_planets % 2
-    local = replace(waves, wave_number=wanted).local[:, None] / waves.bodies[0].of_meshes(kind)
-    change[:, :, range(W), range(W)] += local[:, None]
+    change[:, :, range(W), range(W)] += replace(waves, wave_number=wanted).local[:, None, None]
     return np.einsum("ms,mt,mpvw->psvtw", T, T, change, optimize=True)
 
 
@@ -330,8 +328,7 @@ def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, betwee
         table = (between @ [one.regular.ravel() for one in bodies]).T @ over
         _add_along(across, setup, bodies[0], table.T.copy(), windows, *on_body)
     _add_beside(across, setup, waves, windows, wave_number, over)
-    root = np.sqrt(waves.bodies[0].of_meshes(windows[0] // setup.n_planets % 2))
-    return (across / (root[:, None] * root)).reshape(P, N, W, N, W)
+    return across.reshape(P, N, W, N, W) / waves.bodies[0].helical
 
 
 def _add_along(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 
 from femgear.case.quantities import ANGLE, STIFFNESS, TORSION, Count, Quantity, Section
-from femgear.case.sections import Inertia, Mass, MeshStiffnessSection, RigidCase
+from femgear.case.sections import LARGEST_HELIX, Inertia, Mass, MeshStiffnessSection, RigidCase
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
 
-_LARGEST_HELIX = math.radians(45.0)
 _MOST_SLICES = 30
 # measured with 8 meshes of 10 to 30 slices: the time of one speed grows with the cube of the columns
 _SECONDS = 2.7e-7
@@ -48,7 +46,7 @@ class HelicalSection(Section):
     run solves the set of Kahraman in place of the elastic ring.
     """
 
-    helix_angle: Annotated[float, Quantity(ANGLE, 0.0, _LARGEST_HELIX)]
+    helix_angle: Annotated[float, Quantity(ANGLE, 0.0, LARGEST_HELIX)]
     hand: Literal["right", "left"] = "right"
     slices: Annotated[int, Count(1, _MOST_SLICES)] = 1
     contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
@@ -120,8 +118,8 @@ class HelicalCase(RigidCase):
 
     @property
     def helix_angle(self) -> float:
-        """At the reference cylinder, of either hand [rad]."""
-        return self.helical.helix_angle
+        """At the reference cylinder, positive of a right-handed sun [rad]."""
+        return self.helical.signed_helix_angle
 
 
 def check_helical(case: HelicalCase) -> Iterator[CaseError]:
@@ -130,8 +128,18 @@ def check_helical(case: HelicalCase) -> Iterator[CaseError]:
     if helical.helix_angle == 0.0:
         yield CaseError(
             "without a helix the teeth are spur teeth", code="E-RANGE", key="helical.helix_angle",
-            value="0 deg", limit=f"above 0 deg up to {ANGLE.show(_LARGEST_HELIX)}",
+            value="0 deg", limit=f"above 0 deg up to {ANGLE.show(LARGEST_HELIX)}",
             remedy="leave the section helical out",
+        )  # fmt: skip
+    if case.set.helix_angle:
+        yield CaseError(
+            "the section helical has the helix angle", code="E-RANGE", key="set.helix_angle",
+            value=ANGLE.show(case.set.helix_angle), remedy="leave set.helix_angle out",
+        )  # fmt: skip
+    if case.static.slices > 1 and helical.slices > 1:
+        yield CaseError(
+            "the contact over the width gives the stiffness of whole meshes", code="E-SLICES",
+            key="helical.slices", value=helical.slices, remedy="leave helical.slices or static.slices out",
         )  # fmt: skip
     yield from rigid_refusals(case, "helical", without_torque=", so there is no mesh stiffness")
     fixed = case.operation.fixed

@@ -19,7 +19,7 @@ import numpy as np
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import OVER_WIDTH, Case
-from femgear.contact.bodies import Bodies, Sector, Sectors, make_bodies, make_sectors
+from femgear.contact.bodies import Bodies, Sector, Sectors, helical_stiffness, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.root_stress import (
     RootStresses,
@@ -37,6 +37,7 @@ from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import PlanetarySet
+from femgear.gears.profile import overlap_ratio
 from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.static.results import (
     NominalStresses,
@@ -49,6 +50,8 @@ from femgear.trains.static.results import (
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
 # would take a quarter of a gigabyte for three planets
 WHOLE_RECORD = 16
+_PER_OVERLAP = 6
+"""Slices of helical teeth in the part of the width in which they turn by a pitch."""
 LARGEST_MOTION, LARGEST_APPROACH = 2.0, 0.5
 """Of a member and of the flanks of a mesh for which displacements count as small [modules]."""
 
@@ -137,7 +140,15 @@ def flank_compliances(
     material = material_of(case)
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
     foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
-    return sectors, make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
+    bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
+    return sectors, replace(bodies, helical=_helical(case))
+
+
+def _helical(case: Case) -> float:
+    """Stiffness of the teeth over that of their transverse section; plane contact knows no helix."""
+    if case.helix_angle is None or case.static.slices < 2:
+        return 1.0
+    return helical_stiffness(case.helix_angle)
 
 
 def check_slices(case: Case, gears: PlanetarySet) -> None:
@@ -148,6 +159,13 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
     """
     static, count, width = case.static, case.static.slices, gears.sun.face_width
     where, remedy = {"code": "E-SLICES", "file": case.location("static.slices")}, "leave static.slices out"
+    overlap = _overlap(case, gears)
+    if case.set.helix_angle and count < max(2, _PER_OVERLAP * abs(overlap)):
+        raise CaseError(
+            f"helical teeth with an overlap ratio of {abs(overlap):.3g} need slices over the width",
+            key="static.slices", value=count, limit=f"at least {math.ceil(_PER_OVERLAP * abs(overlap)) + 1}",
+            remedy="give static.slices = 25", **where,
+        )  # fmt: skip
     if count < 2:
         for gear in ("sun", "planet", "ring"):
             for i, one in enumerate(getattr(case, gear).modifications):
@@ -185,9 +203,19 @@ def over_width(
     sectors = make_sectors(gears, material, flank_elements=6, refine=0.5, cache=cache)
     elastic = static.members == "elastic"
     foundation = ring_foundation(case, sectors.ring) if elastic or loaded else None
-    waves = width_waves(sectors, material, count, foundation)
+    waves = width_waves(sectors, material, count, foundation, _helical(case))
     found: dict[str, Any] = {"waves": waves, "slices": count}
+    if overlap := _overlap(case, gears):
+        found["ahead"] = overlap * ((np.arange(count) + 0.5) / count - 0.5)
     return found | ({"held_waves": with_held_ring(waves, sectors)} if loaded else {})
+
+
+def _overlap(case: Case, gears: PlanetarySet) -> float:
+    """Overlap ratio, positive of a right-handed sun, whose upper slices run ahead; zero of spur teeth."""
+    if case.helix_angle is None:
+        return 0.0
+    normal = gears.sun.module * math.cos(case.helix_angle)
+    return math.copysign(overlap_ratio(gears.sun.face_width, normal, case.helix_angle), case.helix_angle)
 
 
 @one_blas_thread()
