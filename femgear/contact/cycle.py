@@ -45,7 +45,7 @@ LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""
 _TOGETHER = 64
 """Positions that are solved at once."""
-_FORCES, _LEAST = 64, 1e-4
+_FORCES, _LEAST = 32, 1e-4
 """Of the curves of tooth pairs in slices: their number, and the share of the torque at which they begin."""
 
 
@@ -88,6 +88,11 @@ class CycleOptions:
     slices: int = 1
     ahead: np.ndarray | None = None
     progress: Callable[[int, int], None] | None = None
+
+    def mirrored(self, order: np.ndarray) -> CycleOptions:
+        """The options of the mirror image, whose planets have this order (N,) in the original."""
+        gaps = None if self.planet_gaps is None else np.asarray(self.planet_gaps, float)[order]
+        return replace(self, planet_gaps=gaps, ahead=None if self.ahead is None else -self.ahead)
 
 
 @dataclass(frozen=True)
@@ -336,11 +341,7 @@ def walk_mesh_cycle(
     solved, order, deviations = loaded_image(planetary_set, sun_torque, deviations)
     mirrored = solved is not planetary_set
     if mirrored:
-        position = -position[::-1]
-        if options.planet_gaps is not None:
-            options = replace(options, planet_gaps=np.asarray(options.planet_gaps, float)[order])
-        if options.ahead is not None:
-            options = replace(options, ahead=-options.ahead)
+        position, options = -position[::-1], options.mirrored(order)
     record = cycle_without_load(solved.n_planets, position, periods=periods, contact=contact, options=options)
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
@@ -351,7 +352,31 @@ def walk_mesh_cycle(
         walk = _Walk(solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options)
         found = in_windows(walk.attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
+    if record.helical and not np.ndim(positions):
+        record = replace(record, **over_slices(record, options, periods=periods))
     return _seen_from_front(record, planetary_set, order) if mirrored else record
+
+
+_EVEN = ("deflection", "sun_arc", "force", "stiffness", "member_motion", "held_stiffness")
+"""What all slices of helical teeth have in common, and forces and stiffnesses that are sums over them."""
+
+
+def over_slices(record, options: CycleOptions, *, periods: int = 1) -> dict[str, np.ndarray]:
+    """Compute what a record of helical teeth has where every slice stands for the places around its middle.
+
+    Slices at single places come into contact one after the other, with a frequency of their own, which is
+    none of the teeth: the mean over the mesh periods from one to the next takes it out. The record, with
+    names of `MeshCycle`, is at equidistant positions of whole mesh periods.
+    """
+    assert options.ahead is not None
+    step, found = np.ptp(options.ahead) / (len(options.ahead) - 1), {}
+    for name in _EVEN:
+        values = getattr(record, name, None)
+        if values is not None:
+            count = values.shape[-1]
+            mean = np.sinc(np.fft.rfftfreq(count, periods / count) * step)
+            found[name] = np.fft.irfft(mean * np.fft.rfft(values), n=count)
+    return found
 
 
 def cycle_without_load(
@@ -493,7 +518,7 @@ class _Walk:
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
         found, overflow, unknowns, P = [], False, 0, len(empty.position)
-        together = max(_TOGETHER // each, 4)
+        together = _TOGETHER if each == 1 else max(_TOGETHER // each, 4)
         for first in range(0, P, together):
             some = np.arange(first, min(first + together, P))
             rows = (some[:, None] * each + np.arange(each)).ravel()

@@ -177,7 +177,10 @@ def width_waves(
     gears.append(_wave_compliance(sectors.ring, ring_foundation, material, wave_number))
     return WidthWaves(
         wave_number,
-        tuple(Bodies(*three, material, width, helical) for three in zip(*gears, strict=True)),
+        tuple(
+            Bodies(sun, planet, ring, material, width, helical)
+            for sun, planet, ring in zip(*gears, strict=True)
+        ),
     )
 
 

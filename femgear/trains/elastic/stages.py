@@ -123,6 +123,7 @@ from femgear.trains.static.stages import (
     case_supports,
     mesh_backlash,
     over_width,
+    record_positions,
     ring_foundation,
 )
 
@@ -306,7 +307,7 @@ def solve_modes(
             gears,
             *bodies,
             sun_torque=torque,
-            positions=case.static.positions,
+            positions=record_positions(case, gears),
             contact=case.static.contact,
             deviations=None if deviations.ideal else deviations,
             supports=linear_supports(case),

@@ -77,7 +77,7 @@ def solve_static(
         gears,
         bodies,
         sun_torque=sun_torque,
-        positions=gears.equal_positions(case.static.positions),
+        positions=record_positions(case, gears),
         contact=case.static.contact,
         # thickness errors separate the back flanks alone
         deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
@@ -208,6 +208,19 @@ def over_width(
     if overlap := _overlap(case, gears):
         found["ahead"] = overlap * ((np.arange(count) + 0.5) / count - 0.5)
     return found | ({"held_waves": with_held_ring(waves, sectors)} if loaded else {})
+
+
+def record_positions(case: Case, gears: PlanetarySet) -> int:
+    """Choose the number of equidistant positions of a mesh period, as many as the case asks for at least.
+
+    They meet all planets alike. Those of helical teeth meet the slices alike, as nearly as whole numbers
+    can: what slices add in coming into contact one by one is then mistaken for nothing else.
+    """
+    wanted = case.static.positions
+    if overlap := abs(_overlap(case, gears)):
+        passed = case.static.slices / overlap
+        wanted = round(math.ceil(wanted / passed) * passed)
+    return gears.equal_positions(wanted)
 
 
 def _overlap(case: Case, gears: PlanetarySet) -> float:
@@ -382,5 +395,8 @@ STRESS = Stage(
     },
     describe=lambda results: describe_stress(results.stress),
     wanted=lambda case: case.static.stresses,
+    unavailable=lambda case: (
+        "" if case.helix_angle is None else "it takes teeth that carry over the whole width at once"
+    ),
     asked=lambda case: case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})}),
 )  # fmt: skip
