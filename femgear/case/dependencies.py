@@ -39,8 +39,8 @@ _SOLUTION = {
     f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")
 }
 """How the contact is solved, whatever the grids."""
-_HELIX = {"helical.helix_angle", "helical.hand"}
-"""All that helical flanks depend on."""
+_HELIX = {"helical.helix_angle"}
+"""All that the transverse section of helical gears depends on."""
 
 
 def static_entries(case: Case) -> Entries:
@@ -50,7 +50,8 @@ def static_entries(case: Case) -> Entries:
         left_out, parts = left_out | _FOUNDATION, parts | _SUPPORTS
     # whatever member the torque is given for: the flanks see that of the sun
     sun = torques(planetary_set(case), member=case.operation.input, torque=case.operation.torque).sun
-    return {"operation.torque": f"{sun:.9g} N m on the sun", **_entries(case, left_out, parts, kept=_HELIX)}
+    kept = _HELIX | ({"helical.hand"} if case.static.slices > 1 else set())
+    return {"operation.torque": f"{sun:.9g} N m on the sun", **_entries(case, left_out, parts, kept=kept)}
 
 
 def state_entries(case: Case) -> Entries:

@@ -424,16 +424,11 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
         periods. E-GEOMETRY: virtual gears that cannot be made.
     """
     _check_supports(case, gears)
-    if case.static.slices > 1:
-        raise CaseError(
-            "slices over the width are those of spur teeth", code="E-SLICES", key="static.slices",
-            file=case.location("static.slices"), remedy="leave static.slices and modifications of leads out",
-        )  # fmt: skip
     if case.helical.mesh_stiffness is not None:
         return
     _check_torque(case, gears)
     check_one_period(case, gears, "the helical model takes")
-    if case.helical.section == "normal":
+    if case.helical.section == "normal" and case.static.slices < 2:
         _virtual_gears(case, gears)
 
 

@@ -116,17 +116,19 @@ def solve_helical_modes(
     if case.helical.mesh_stiffness is None:
         static = needed(static, "static")
         check_entries(static, StaticResult, static_entries(_drive_flanks(case)), "static solution")
-        factor = np.ones(2)
-        if case.helical.section == "normal":
+        factor, in_contact = np.ones(2), case.static.slices > 1
+        if case.helical.section == "normal" and not in_contact:
             section = section or section_stiffness(case, gears, cache=cache)
             factor = section.factor
         sense, cycle, beta = rotation_sense(case, gears), static.cycle, case.helical.helix_angle
         overlap = contact_ratios(gears, helix_angle=beta, face_width=case.set.face_width)[0, 1]
+        # contact in slices has the helix in it
+        overlap = 0.0 if in_contact else overlap
         base = profile.base_helix_angle(case.sun.pressure_angle, beta)
         spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, mesh_backlash(gears))
         record = normal_record(spur, factor, base, reversed_time=sense < 0)
         hand = sense * (1 if case.helical.hand == "right" else -1)
-        whole = shared_load(helical_excitation(record, overlap))
+        whole = record if in_contact else shared_load(helical_excitation(record, overlap))
         excitation = helical_excitation(record, overlap, slices=case.helical.slices, hand=hand)
     data = helical_data(case, gears, None if whole is None else whole.stiffness.mean(axis=1))
     torque = driving_torque(case)

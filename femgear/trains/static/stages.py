@@ -216,9 +216,9 @@ def record_positions(case: Case, gears: PlanetarySet) -> int:
     They meet all planets alike. Those of helical teeth meet the slices alike, as nearly as whole numbers
     can: what slices add in coming into contact one by one is then mistaken for nothing else.
     """
-    wanted = case.static.positions
-    if overlap := abs(_overlap(case, gears)):
-        passed = case.static.slices / overlap
+    wanted, slices = case.static.positions, case.static.slices
+    if slices > 1 and (overlap := abs(_overlap(case, gears))):
+        passed = slices / overlap
         wanted = round(math.ceil(wanted / passed) * passed)
     return gears.equal_positions(wanted)
 

@@ -1,0 +1,70 @@
+"""Helical sets whose meshes come from contact over the width: both models, from case to result."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import femgear
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.errors import CaseError
+from femgear.trains.helical.stages import solve_helical_modes, solve_helical_static
+from femgear.trains.static.stages import record_positions, solve_static
+
+ROOT = Path(__file__).parents[3]
+TEXT = (ROOT / "cases" / "helical_23_24_73.toml").read_text(encoding="utf-8")
+
+
+def case_with(tmp_path, text, *changes):
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    return femgear.read_case(path)
+
+
+def test_elastic_set_with_a_helix(tmp_path):
+    """Whole overlap ratio: of the transmission error of the transverse section 5 % are left."""
+    fewer = ("positions = 64\nslices = 25", "positions = 24\nslices = 12"), ("18 mm", "17.281 mm")
+    case = case_with(tmp_path, TEXT, *fewer)
+    found = solve_static(case)
+    overlap = 17.281 * np.sin(np.radians(15.5)) / np.pi / 1.47
+    assert overlap == pytest.approx(1.0, abs=1e-3)
+    gears, passed = found.planetary_set, len(found.cycle.position) / (12 / overlap)
+    assert len(found.cycle.position) == record_positions(case, gears) and abs(passed - round(passed)) < 0.1
+    spur = walk_mesh_cycle(gears, found.bodies, sun_torque=found.sun_torque, positions=96)
+    assert np.ptp(found.cycle.deflection[0]) < 0.05 * np.ptp(spur.deflection[0])
+    assert found.cycle.helical and found.dataset()["slice_load"].sizes["slice"] == 12
+
+
+def test_rigid_set_takes_the_meshes_of_the_contact(tmp_path):
+    """The quick estimate has another section factor, and slices that do not draw one another along."""
+    text = (ROOT / "cases" / "helical_30_20_70.toml").read_text(encoding="utf-8")
+    text = (
+        text.replace("[helical.mesh_stiffness]", "[ignored]") if "[helical.mesh_stiffness]" in text else text
+    )
+    quick = case_with(tmp_path, text)
+    if quick.helical.mesh_stiffness is not None:
+        quick = quick.model_copy(
+            update={"helical": quick.helical.model_copy(update={"mesh_stiffness": None})}
+        )
+    sliced = quick.static.model_copy(update={"slices": 12, "positions": 16})
+    full = quick.model_copy(update={"static": sliced})
+    quick = quick.model_copy(update={"static": quick.static.model_copy(update={"positions": 16})})
+    modes = [solve_helical_modes(one, solve_helical_static(one)) for one in (quick, full)]
+    stiffness = [one.excitation.stiffness.mean(axis=1) for one in modes]
+    assert stiffness[1] == pytest.approx(stiffness[0], rel=0.1)
+    frequency = [one.modes.frequency[one.modes.frequency > 100.0][:6] for one in modes]
+    assert frequency[1] == pytest.approx(frequency[0], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("change", "limit"),
+    [(("slices = 25\n", ""), "at least 8"), (("slices = 25", "slices = 6"), "at least 8")],
+)
+def test_helix_without_enough_slices_is_refused(tmp_path, change, limit):
+    with pytest.raises(CaseError) as raised:
+        solve_static(case_with(tmp_path, TEXT, change))
+    assert raised.value.code == "E-SLICES" and raised.value.limit == limit
+    assert raised.value.key == "static.slices"
