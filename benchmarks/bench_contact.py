@@ -11,6 +11,8 @@ ERRORS = "Errors, floating sun, samples (compliance known)"
 PLANETS = "Contact, 64 positions, over the number of planets (36/24/84)"
 POSITIONS = "Contact over the number of positions (reference set)"
 ELEMENTS = "Compliance and contact, 64 positions, over the elements along a flank (reference set)"
+SLICES = "Static stage in slices over the width, 32 positions (reference set)"
+SLICED_PLANETS = "Contact in 25 slices, 16 positions, over the number of planets (36/24/84)"
 SAMPLES = 10_000
 
 
@@ -185,3 +187,38 @@ def test_growth_over_flank_elements(benchmark, reference, medians, elements):
     note = f"{unknowns} unknowns of three sectors, mean stiffness of the sun-planet meshes "
     note += f"{1e-6 * cycle.stiffness[:3].mean():.1f} N/um" + growth(benchmark, medians, ELEMENTS, elements)
     record(benchmark, f"{elements} elements along a flank", note)
+
+
+@pytest.mark.benchmark(group=SLICES, timer=process_time)
+@pytest.mark.parametrize("slices", [9, 17, 33, 65])
+def test_growth_over_slices(benchmark, reference, medians, slices):
+    from stages import misaligned
+
+    from femgear.trains.static.stages import solve_static
+
+    case = misaligned(reference.case, slices=slices)
+    found = benchmark.pedantic(
+        solve_static, args=(case,), kwargs={"cache": reference.cache}, rounds=3, warmup_rounds=1
+    )
+    factor = found.cycle.face_load_factor.max()
+    note = f"K_Hbeta {factor:.3f} by a lead slope of 10 um" + growth(benchmark, medians, SLICES, slices)
+    record(benchmark, f"{slices} slices", note)
+
+
+@pytest.mark.benchmark(group=SLICED_PLANETS, timer=process_time)
+@pytest.mark.parametrize("n_planets", [3, 4, 5, 6])
+def test_growth_of_slices_over_planets(benchmark, planets, medians, n_planets):
+    from femgear.contact.bodies import make_sectors
+    from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+    from femgear.contact.slices import width_waves
+
+    gears = planets.gears(n_planets)
+    sectors = make_sectors(gears, planets.bodies.material, flank_elements=6, refine=0.5)
+    waves = width_waves(sectors, planets.bodies.material, 25)
+    options = {"positions": 16, "options": CycleOptions(waves=waves, slices=25)}
+    cycle = benchmark.pedantic(
+        walk_mesh_cycle, args=(gears, planets.bodies), kwargs={"sun_torque": 100.0} | options, rounds=3,
+    )  # fmt: skip
+    note = f"{cycle.slice_load.shape[1]} tooth pairs a mesh"
+    note += growth(benchmark, medians, SLICED_PLANETS, n_planets)
+    record(benchmark, f"{2 * n_planets} meshes", note)

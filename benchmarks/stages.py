@@ -220,6 +220,37 @@ def whole_cold(reference: Reference):
     return solve_housing(case, solve_dynamics(case, still, basis))
 
 
+def misaligned(case, *, slices: int = 25, positions: int = 32):
+    """The case with a lead slope of 10 um on the sun, solved in slices over the width."""
+    from femgear.case.sections import ModificationSection
+
+    slope = ModificationSection.model_validate({"kind": "lead slope", "amount": "10 um"})
+    sun = case.sun.model_copy(update={"modifications": (slope,)})
+    static = case.static.model_copy(update={"slices": slices, "positions": positions, "stresses": False})
+    return case.model_copy(update={"sun": sun, "static": static})
+
+
+def slices(reference: Reference):
+    """The static stage in 25 slices over the width, 32 positions, grids cached."""
+    from femgear.trains.static.stages import solve_static
+
+    return solve_static(misaligned(reference.case), cache=reference.cache)
+
+
+def slices_cold(reference: Reference):
+    """The same with new grids."""
+    from femgear.trains.static.stages import solve_static
+
+    return solve_static(misaligned(reference.case))
+
+
+def slices_modes(reference: Reference):
+    """Static and modal stage in slices."""
+    from femgear.trains.elastic.stages import solve_modes
+
+    return solve_modes(misaligned(reference.case), slices(reference))
+
+
 def help_text(_):
     """``femgear --help`` in a new process."""
     command = [sys.executable, "-c", "from femgear.cli import main; main(['--help'])"]
@@ -278,6 +309,16 @@ STAGES = {
     ),
     "contact": Stage("contact, 64 positions", contact, ("bodies",), lambda _, cycle: cycle.unknowns),
     "static": Stage("static stage", static, ("grids",), lambda _, r: r.cycle.unknowns),
+    "slices": Stage(
+        "static stage in 25 slices, 32 positions",
+        slices,
+        ("grids",),
+        lambda _, r: r.cycle.slice_load.size,
+        3,
+        2.0,
+    ),
+    "slices_cold": Stage("the same, new grids", slices_cold, (), _none, 3, 5.0),
+    "slices_modes": Stage("static and modal stage in 25 slices", slices_modes, ("grids",), _none, 1),
     "modes": Stage("modal stage", modes, ("static",), lambda _, r: len(r.model.system.M)),
     "dynamics": Stage(
         "dynamics, 2 speeds, with Floquet verdict", dynamics, ("modes",), lambda r, d: _lines(r, d.response)
