@@ -12,7 +12,7 @@ from femgear.housing.sensor import fixed_sensor_signal, stored_lines
 from femgear.storage.results import _attribute, response_entries
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_value
-from femgear.trains.static.results import SLICE_VARIABLES
+from femgear.trains.static.results import HELIX_VARIABLES, SLICE_VARIABLES
 from femgear.trains.static.stages import solve_static
 
 pytestmark = pytest.mark.usefixtures("coarse_states")
@@ -99,7 +99,7 @@ def test_everything_has_units_and_a_name_and_is_finite(datasets, stage):
 
 @pytest.mark.parametrize("stage", PLACES)
 def test_results_page_names_every_variable_and_attribute(datasets, stage):
-    others = SLICE_VARIABLES if stage == "static" else ()
+    others = SLICE_VARIABLES | HELIX_VARIABLES if stage == "static" else ()
     check_documented(datasets[stage], f"## {stage}.nc", others=others)
     page = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
     # of modes and dynamics the page names the attributes that need words
@@ -110,7 +110,7 @@ def test_results_page_names_every_variable_and_attribute(datasets, stage):
 
 @pytest.mark.parametrize("stage", PLACES)
 def test_exported_attributes_have_units(datasets, stage):
-    pure = {"contact_ratio_sun_planet", "contact_ratio_planet_ring", "mesh_phases"}
+    pure = {"contact_ratio_sun_planet", "contact_ratio_planet_ring", "mesh_phases", "overlap_ratio"}
     for name, value in datasets[stage].attrs.items():
         if np.asarray(value).dtype.kind == "f" and name not in pure:
             assert _attribute(name, value)[2] not in ("", "1"), name

@@ -70,6 +70,10 @@ SLICE_VARIABLES = {
     ),
 }
 """Further ones of contact in slices over the width."""
+HELIX_VARIABLES = {
+    "axial_force": ("mesh position", "N", "axial force of gear 1 on gear 2, positive towards +z"),
+}
+"""Further ones of helical teeth; all others are those of the transverse section."""
 _ATTRIBUTES = {
     "ste": "deflection",
     "ste_overall": "overall_deflection",
@@ -135,7 +139,8 @@ class StaticResult:
     """Static transmission error, load sharing and mesh stiffness of all meshes.
 
     ``sun_torque`` [N m] keeps its sign, ``period_message`` tells how the errors repeat, and ``entries`` are
-    those of the case that it depends on, as in the results that follow.
+    those of the case that it depends on, as in the results that follow. ``overlap_ratio`` and
+    ``base_helix_angle`` [rad] are those of helical teeth, positive where the sun is right-handed.
     """
 
     planetary_set: PlanetarySet
@@ -145,6 +150,8 @@ class StaticResult:
     sun_torque: float
     entries: Entries
     period_message: str = ""
+    overlap_ratio: float = 0.0
+    base_helix_angle: float = 0.0
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
@@ -159,6 +166,11 @@ class StaticResult:
         if cycle.slice_load is not None:
             variables = variables | SLICE_VARIABLES
         values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in variables}
+        if self.overlap_ratio:
+            # a right-handed gear that turns another counter-clockwise pushes it towards -z
+            sense = -math.copysign(math.tan(self.base_helix_angle), self.base_helix_angle * self.sun_torque)
+            values["axial_force"] = sense * cycle.force
+            variables = variables | HELIX_VARIABLES
         teeth, planets = cycle.tooth_load.shape[1], np.arange(1, gears.n_planets + 1)
         found = dataset(
             declared(variables, values),
@@ -180,6 +192,7 @@ class StaticResult:
                 "planet_angles": np.asarray(gears.planet_angles),
                 "centre_distance": gears.centre_distance,
                 "face_width": gears.sun.face_width,
+                "overlap_ratio": abs(self.overlap_ratio),
                 "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
                 "sun_torque": self.sun_torque,
                 "contact": cycle.contact,
@@ -461,6 +474,12 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
         f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
     ]
     notes += _stiffness_notes(elastic=data.sizes.get("member", 0) > 0)
+    if "axial_force" in data:
+        axial = float(np.abs(data.axial_force.values).mean(axis=1).max())
+        notes.append(
+            f"helical teeth, overlap ratio {data.attrs['overlap_ratio']:.3f}, axial force of a mesh "
+            f"{axial:.1f} N; all else in the transverse section"
+        )
     if data.attrs.get("mesh_periods", 1) > 1:
         notes.append(str(data.attrs["period"]))
     notes += map(str, static_warnings(data, module))

@@ -37,7 +37,7 @@ from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import PlanetarySet
-from femgear.gears.profile import overlap_ratio
+from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.static.results import (
     NominalStresses,
@@ -92,7 +92,10 @@ def solve_static(
         ),
     )
     _check_motions(case, cycle, gears.sun.module)
-    return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)
+    overlap = _overlap(case, gears) if cycle.helical else 0.0
+    base = base_helix_angle(case.sun.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
+    found = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
+    return StaticResult(*found, overlap_ratio=overlap, base_helix_angle=base)
 
 
 def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:

@@ -35,7 +35,12 @@ def test_elastic_set_with_a_helix(tmp_path):
     assert len(found.cycle.position) == record_positions(case, gears) and abs(passed - round(passed)) < 0.1
     spur = walk_mesh_cycle(gears, found.bodies, sun_torque=found.sun_torque, positions=96)
     assert np.ptp(found.cycle.deflection[0]) < 0.05 * np.ptp(spur.deflection[0])
-    assert found.cycle.helical and found.dataset()["slice_load"].sizes["slice"] == 12
+    data = found.dataset()
+    assert found.cycle.helical and data["slice_load"].sizes["slice"] == 12
+    # a right-handed sun that turns counter-clockwise pushes the planets down, and they the ring
+    base = np.arcsin(np.sin(np.radians(15.5)) * np.cos(np.radians(17.5)))
+    assert data["axial_force"].values == pytest.approx(-np.tan(base) * found.cycle.force, rel=1e-12)
+    assert data.attrs["overlap_ratio"] == pytest.approx(overlap, rel=1e-12)
 
 
 def test_rigid_set_takes_the_meshes_of_the_contact(tmp_path):
