@@ -8,12 +8,12 @@ from unittest.mock import patch
 
 import numpy as np
 import scipy.sparse as sp
-from contact.test_cycle import STEEL, TORQUE, reference_set
-from contact.test_slices import spring_slices
 from numpy.polynomial import legendre
 from scipy.interpolate import CubicSpline
 
+from femgear.case.gear_set import planetary_set
 from femgear.contact import slices
+from femgear.contact.batch import PairLaws
 from femgear.contact.bodies import make_bodies, make_sectors, observed_flanks, station_weights
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.local_compliance import hertz_half_width
@@ -22,6 +22,7 @@ from femgear.fe.compliance import condense_sector, symmetric_factor, tooth_compl
 from femgear.fe.elasticity import Material, basis, wave_stiffness
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope
+from validation.cases import reference_case
 from validation.mapped import boundary_nodes, mapped_grid
 from validation.reference.twisted import (
     axial_matrices,
@@ -32,6 +33,7 @@ from validation.reference.twisted import (
 )
 from validation.rows import Row, at_most, counted, information, printed, within
 
+STEEL, TORQUE = Material(206e9, 0.3, 7850.0), 100.0
 ISO = "ISO 6336-1, linear teeth"
 JARAMILLO = "Jaramillo, J. Appl. Mech. 17, 1950"
 SOLID = "twisted three-dimensional elements"
@@ -53,26 +55,44 @@ ENDS = (
 # --- closed forms ----------------------------------------------------------------------------------
 
 
+@cache
+def reference_set():
+    """The gears of the reference set."""
+    return planetary_set(reference_case())
+
+
+def spring_loads(separation: np.ndarray, per_width: float) -> np.ndarray:
+    """Loads of slices of one linear spring, not coupled across the width, over their mean."""
+    load, whole = per_width * WIDTH, SPRING * WIDTH
+    laws = PairLaws(
+        force=np.geomspace(1.0, 1e5, 8), yields=np.full((1, 1, 8), 1 / whole),
+        moments=np.full((1, 1, 8, 3), 1 / 3), touching=np.zeros((1, 1, 1)),
+        smooth=np.zeros((1, 1, 3, 1, 3)), supports=np.zeros((1, 1)),
+        separation=np.zeros((1, 1)), mesh=np.zeros(1, int), approach=np.ones((1, 1)),
+        loads=np.full((1, 1, 3), load / 3), motions=np.full((1, 1), load / whole),
+    )  # fmt: skip
+    N, some = len(separation), np.arange(1)
+    across, apart = np.zeros((1, N, 1, N, 1)), np.asarray(separation)[None, :, None]
+    newton = slices._SliceNewton(laws, some, np.array([load]), across, apart, laws.smooth)
+    return newton.solve()[0][0, :, 0] / load
+
+
 def springs() -> tuple[Row, ...]:
     """Slices that are springs of their own, under leads."""
     rows = []
-
-    def loads(separation, per_width):
-        load = {"stiffness": SPRING * WIDTH, "load": per_width * WIDTH, "slices": len(separation)}
-        return spring_slices(separation, **load)
 
     def places(count):
         return (np.arange(count) + 0.5) / count - 0.5
 
     case = "slices without coupling, c' 11.084 N/(mm um), b 25 mm, "
     for amount, factor in ((2, "1.106"), (5, "1.266"), (10, "1.532")):
-        found = loads(1e-6 * amount * places(25), 100e3).max()
+        found = spring_loads(1e-6 * amount * places(25), 100e3).max()
         rows.append(printed("slices", ISO, f"{case}100 N/mm, {amount} um: K_Hbeta", factor, found))
-    found = loads(60e-6 * places(200), 100e3)
+    found = spring_loads(60e-6 * places(200), 100e3)
     edge = 1.5 * found.max() - 0.5 * np.sort(found)[-2]
     law = np.sqrt(2 * 60e-6 * SPRING / 100e3)
     rows.append(within("slices", "ISO 6336-1, root law", case + "100 N/mm, 60 um: K_Hbeta", law, edge, 2e-3))
-    found = loads(10e-6 * (2 * places(400)) ** 2, 200e3).max()
+    found = spring_loads(10e-6 * (2 * places(400)) ** 2, 200e3).max()
     name = case + "200 N/mm, crowning 10 um: K_Hbeta"
     rows.append(within("slices", "1 + C c / (3 w)", name, 1.185, found, 1e-3, relative=False))
     return tuple(rows)
