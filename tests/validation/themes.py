@@ -11,8 +11,10 @@ from validation import (
     drivetrain,
     dynamics,
     elasticity,
+    face_width,
     geometry,
     helical,
+    helical_teeth,
     housing,
     impacts,
     integration,
@@ -120,6 +122,28 @@ THEMES = (
         "to what fits into a tooth, three times the default.",
         (static.equilibrium, static.iso_stiffness, static.planet_gaps, static.some_random_problems),
         (static.numerical_parameters, static.element_size, static.random_problems),
+    ),
+    Theme(
+        "face width",
+        "Contact over the face width",
+        "Slices over the width, joined by waves of the bodies between mirror planes; sets are 27/40/108. "
+        "Rows *solid* and *ends*: a sector in three dimensions, section coordinates turning with the teeth, "
+        "all teeth by cyclic symmetry. Rows *helix*: endless gears of 30/20/70 teeth, m_n 1.6 mm, as in "
+        "docs/helical.md. Love's patch and Hertz's ellipse have no rows: femgear has no contact of points.",
+        (
+            face_width.springs,
+            face_width.half_space,
+            face_width.cosine_transform,
+            face_width.cantilever_plate,
+            face_width.solid_elements,
+        ),
+        (
+            face_width.ends_of_teeth,
+            face_width.whole_sets,
+            face_width.refinement,
+            helical_teeth.factors,
+            helical_teeth.refined,
+        ),
     ),
     Theme(
         "members",
