@@ -437,19 +437,15 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
 
 
 def _lifted(data: xr.Dataset) -> Iterator[Finding]:
-    """Name the mesh of whose width the least carries, of its tooth pair with the largest load per width."""
-    load = data["slice_load"].values.swapaxes(1, 2)
-    load = load.reshape(*load.shape[:2], -1)
-    at = load.max(axis=1).argmax(axis=1)
-    pair = np.take_along_axis(load, at[:, None, None], axis=2)[..., 0]
-    share = np.where(pair.any(axis=1), (pair > 0.0).mean(axis=1), 1.0)
+    """Name the mesh of whose width the least ever carries, where an end lifts."""
+    carries = data["slice_load"].values.max(axis=(1, 3)) > 0.0
+    share = np.where(carries.any(axis=1), carries.mean(axis=1), 1.0)
     worst = int(share.argmin())
     if share[worst] < 1.0:
-        carries = data["slice"].values[pair[worst] > 0.0]
-        side = "both ends are" if abs(carries.mean()) < np.ptp(data["slice"].values) / 1e3 else "one end is"
+        both = not carries[worst, [0, -1]].any()
         text = (
-            f"{side} lifted: {100 * share[worst]:.0f} % of the width of {data['mesh'].values[worst]} carry "
-            "where its load per width is largest"
+            f"{'both ends are' if both else 'one end is'} lifted: {100 * share[worst]:.0f} % of the width of "
+            f"{data['mesh'].values[worst]} carry at all"
         )
         yield Finding("W-LIFTED", "", text)
 
