@@ -96,6 +96,10 @@ RUNS = {
         "tip_relief_design.py", "Design of the tip relief",
         tip_relief="Transmission error over amount and length of the relief, the best one marked.",
     ),
+    "lead_design": _script(
+        "lead_design.py", "Design of the crowning",
+        lead_design="Face load factor and transmission error over misalignment and torque for three leads.",
+    ),
     "pin_error_load_sharing": _script(
         "pin_error_load_sharing.py", "Pin errors",
         load_sharing="Distribution of the load sharing factor: a floating sun takes most errors up.",

@@ -32,7 +32,9 @@ LEAST_TORQUE = 1e-6
 
 def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
     """List the refusals of entries that do not go together; `more` are those of the train."""
-    checks = (_check_operation, _check_set, _check_supports, _check_numbers, _check_deviations)
+    checks = (
+        _check_operation, _check_set, _check_supports, _check_ends, _check_numbers, _check_deviations
+    )  # fmt: skip
     problems = [problem for check in checks for problem in check(case)] + list(more)
     return problems or list(check_published(case))
 
@@ -113,6 +115,20 @@ def _check_supports(case: Case):
             )  # fmt: skip
 
 
+def _check_ends(case: Case):
+    """Ends at which torque passes: given with what depends on them, and with nothing else."""
+    for name, other in (("sun", "torsion_diameter"), ("carrier", "wind_up_stiffness")):
+        section = getattr(case, name)
+        alone = section.torque_end is None
+        # the root diameter stands for that of torsion
+        if alone != (getattr(section, other) is None) and (alone or name == "carrier"):
+            key = f"{name}.{'torque_end' if alone else other}"
+            yield CaseError(
+                f"{name}.torque_end and {name}.{other} belong together", code="E-KEY-MISSING", key=key,
+                limit='torque_end = "front" (z < 0) or "back" (z > 0)', remedy="give both, or none of them",
+            )  # fmt: skip
+
+
 def _check_numbers(case: Case):
     dynamics, harmonics, response = case.dynamics, case.mesh_harmonics, case.response_harmonics
     rigid = case.rigid
@@ -176,6 +192,7 @@ def _check_deviations(case: Case):
 def _check_planets(case: Case):
     for key, tables in (
         ("planet.individual", case.planet.individual),
+        ("planet.misalignment", case.planet.misalignment),
         ("set.pin_errors", case.set.pin_errors),
     ):
         seen = set()
@@ -239,6 +256,12 @@ def _amounts(case: Case):
     yield from _error_amounts("carrier.errors", case.carrier.errors)
     if case.ring.errors is not None and case.ring.errors.ovality is not None:
         yield "ring.errors.ovality", case.ring.errors.ovality.amplitude
+    width = case.set.face_width
+    for name in ("sun", "carrier"):
+        if (askew := getattr(case, name).misalignment) is not None:
+            yield f"{name}.misalignment", width * _largest((askew.x, askew.y))
+    for i, askew in enumerate(case.planet.misalignment):
+        yield f"planet.misalignment[{i}]", width * _largest((askew.radial, askew.tangential))
     for i, pin in enumerate(case.set.pin_errors):
         yield f"set.pin_errors[{i}].radial", pin.radial
         yield f"set.pin_errors[{i}].tangential", pin.tangential

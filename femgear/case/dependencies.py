@@ -30,6 +30,8 @@ FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"
 _WORDS = {"format", "title", "housing", "runup", *(f"material.{n}_stress_limit" for n in ("root", "contact"))}
 """No stage before housing and run-up depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
+_WIDTH = {"tilt_stiffness", "misalignment", "torque_end", "torsion_diameter"}
+"""Of sun and planets in slices over the width: no grid knows them."""
 _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 """As the supports, without effect on the static solution while all members are fixed."""
 _MACHINES = {"dynamics", "motor", "brake", "planar", "operation"}
@@ -79,7 +81,7 @@ def compliance_entries(case: Case) -> Entries:
 def ring_entries(case: Case) -> Entries:
     """List the entries that decide modes and compliances of the ring, but for their number."""
     left_out = _WORDS | _SOLUTION | _MACHINES | {"carrier", "helical"}
-    return _entries(case, left_out, FLANK_ENTRIES | _SUPPORTS | {"mass", "inertia"}, kept=_HELIX)
+    return _entries(case, left_out, FLANK_ENTRIES | _SUPPORTS | _WIDTH | {"mass", "inertia"}, kept=_HELIX)
 
 
 def _entries(

@@ -43,8 +43,10 @@ from femgear.gears.gear import Gear
 from femgear.gears.modifications import (
     EndRelief,
     FlankForm,
+    FlankTwist,
     LeadCrowning,
     LeadSlope,
+    MeasuredLead,
     MeasuredProfile,
     Modification,
     ProfileCrowning,
@@ -225,7 +227,9 @@ def set_deviations(case: Case) -> SetDeviations:
     sun, ring = case.sun.errors or GearErrors(), case.ring.errors or RingErrors()
     planets = [_planet_errors(case, n) for n in range(1, s.n_planets + 1)]
     pitch = [_pitch(errors, s.planet) for errors in planets]
-    oval = ring.ovality
+    oval, misaligned = ring.ovality, np.zeros((s.n_planets, 2))
+    for askew in case.planet.misalignment:
+        misaligned[askew.planet - 1] = askew.radial, askew.tangential
     found = replace(
         no_deviations(s),
         sun=_flank_form(case, s.sun),
@@ -246,6 +250,12 @@ def set_deviations(case: Case) -> SetDeviations:
         sun_thickness=sun.thickness_reduction or 0.0,
         planet_thickness=[errors.thickness_reduction or 0.0 for errors in planets],
         ring_thickness=ring.thickness_reduction or 0.0,
+        planet_misalignment=misaligned,
+        **{
+            f"{name}_misalignment": (askew.x, askew.y)
+            for name in ("sun", "carrier")
+            if (askew := getattr(case, name).misalignment) is not None
+        },
     )
     try:
         check_deviations(found, s)
@@ -308,6 +318,9 @@ def _modification(section: ModificationSection, gear: Gear) -> Modification:
         rolls += [roll_at(gear, diameter=d) or 0.0 for d in diameters]
         points = sorted(zip(rolls, section.deviations or (), strict=True))
         return MeasuredProfile(tuple(r for r, _ in points), tuple(-e for _, e in points))
+    if section.kind == "measured lead":
+        points = sorted(zip(section.places or (), section.deviations or (), strict=True))
+        return MeasuredLead(tuple(z for z, _ in points), tuple(-e for _, e in points))
     start, end = (
         roll_at(
             gear,
@@ -329,6 +342,8 @@ def _modification(section: ModificationSection, gear: Gear) -> Modification:
             return LeadSlope(amount)
         case "lead crowning":
             return LeadCrowning(amount)
+        case "flank twist":
+            return FlankTwist(amount)
         case "end relief":
             return EndRelief(amount, section.length or 0.0)
         case _:

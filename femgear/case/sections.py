@@ -77,9 +77,20 @@ DampingRatio = Annotated[float, Number(0.0, 1.0, open_high=True)]
 _OTHER_FLANKS = "give speeds above zero: a negative torque loads the other flanks"
 Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM, remedy=_OTHER_FLANKS)]
 
-_MEASURED = ("file", "roll_angles", "diameters", "deviations")
+_MEASURED = ("file", "roll_angles", "diameters", "places", "deviations")
 _PLACES = ("diameter", "roll_angle", "roll_length")
-OVER_WIDTH = ("lead slope", "lead crowning", "end relief")
+Slope = Annotated[float, Quantity(ANGLE, -0.02, 0.02)]
+Turning = Annotated[float, Quantity(TORSION, 0.0, 1e13)]
+"""Stiffness against tilt or wind-up; 0 leaves it free."""
+End = Literal["front", "back"]
+"""Of the face width: the front is at z < 0."""
+OVER_WIDTH = ("lead slope", "lead crowning", "end relief", "flank twist", "measured lead")
+WIDTH_ENTRIES = {
+    "sun": ("tilt_stiffness", "misalignment", "torque_end"),
+    "carrier": ("tilt_stiffness", "misalignment", "wind_up_stiffness"),
+    "planet": ("tilt_stiffness", "misalignment"),
+}
+"""Entries of the bodies that need slices over the width."""
 
 
 class ModificationSection(Section):
@@ -91,7 +102,7 @@ class ModificationSection(Section):
 
     kind: Literal[
         "tip relief", "root relief", "profile slope", "profile crowning", "measured profile",
-        "lead slope", "lead crowning", "end relief",
+        "lead slope", "lead crowning", "end relief", "flank twist", "measured lead",
     ]  # fmt: skip
     amount: Deviation | None = None
     length: Annotated[float, Quantity(LENGTH, 1e-5, 2.5)] | None = None
@@ -106,11 +117,12 @@ class ModificationSection(Section):
     file: Annotated[str, Field(max_length=1000)] | None = None
     roll_angles: Annotated[tuple[RollAngle, ...], Points] | None = None
     diameters: Annotated[tuple[Diameter, ...], Points] | None = None
+    places: Annotated[tuple[Deviation, ...], Points] | None = None
     deviations: Annotated[tuple[Deviation, ...], Points] | None = None
 
     @model_validator(mode="after")
     def _belongs_together(self):
-        measured = self.kind == "measured profile"
+        measured = self.kind.startswith("measured")
         relief, over_width = self.kind in ("tip relief", "root relief"), self.kind in OVER_WIDTH
         starts, ends = ([f"{end}_{place}" for place in _PLACES] for end in ("start", "end"))
         unused = self.given("amount", *starts, *ends) if measured else self.given(*_MEASURED)
@@ -150,14 +162,21 @@ class PlanetModificationSection(ModificationSection):
 
 def _check_points(section: ModificationSection) -> None:
     """Refuse a measured profile without its columns; a file has been read into them before."""
-    columns = section.given("roll_angles", "diameters")
-    if len(columns) != 1 or section.deviations is None or section.file is not None:
+    columns, lead = section.given("roll_angles", "diameters", "places"), section.kind == "measured lead"
+    deviations = section.deviations or ()
+    wrong = len(columns) != 1 or section.deviations is None or section.file is not None
+    if lead and (wrong or columns != ["places"]):
+        raise CaseError(
+            "a measured lead is deviations over places", code="E-MODIFICATION",
+            remedy='places = ["-9 mm", "9 mm"] from the middle of the width, deviations = ["0 um", "3 um"]',
+        )  # fmt: skip
+    if wrong or (columns == ["places"]) != lead:
         raise CaseError(
             "a measured profile is a file, or deviations over either roll_angles or diameters",
             code="E-MODIFICATION",
             remedy='file = "profile.csv"',
         )
-    count, places = len(section.deviations), getattr(section, columns[0])
+    count, places = len(deviations), getattr(section, columns[0])
     if count != len(places) or count < 2:
         message = f"{count} deviations over {len(places)} {columns[0]}"
         raise CaseError(message, code="E-COUNT", limit="two or more, and as many of both")
@@ -219,6 +238,24 @@ class PinError(Section):
     planet: Annotated[int, Count(1, 1000)]
     radial: Deviation = 0.0
     tangential: Deviation = 0.0
+
+
+class Misalignment(Section):
+    """Slopes of the axis of sun or carrier along x and y of the carrier frame, in which they stand still.
+
+    They are the rise of the axis along z; those of the carrier take its planets along.
+    """
+
+    x: Slope = 0.0
+    y: Slope = 0.0
+
+
+class PlanetMisalignment(Section):
+    """Slope of the axis of one planet: radial outwards, tangential counter-clockwise, towards z > 0."""
+
+    planet: Annotated[int, Count(1, 1000)]
+    radial: Slope = 0.0
+    tangential: Slope = 0.0
 
 
 class SetSection(Section):
@@ -292,6 +329,10 @@ class SunSection(Section):
     inertia: Inertia
     support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)] | None = None
     support_shaft: _Shaft = ()
+    tilt_stiffness: Turning | None = None
+    misalignment: Misalignment | None = None
+    torque_end: End | None = None
+    torsion_diameter: Diameter | None = None
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
@@ -309,6 +350,8 @@ class PlanetSection(Section):
     inertia: Inertia
     bearing_stiffness: Stiffness
     bearing_clearance: Annotated[float, Quantity(LENGTH, 0.0, 0.002)] = 0.0
+    tilt_stiffness: Turning | None = None
+    misalignment: Annotated[tuple[PlanetMisalignment, ...], Field(max_length=1000)] = ()
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
@@ -341,6 +384,10 @@ class CarrierSection(Section):
     inertia: Inertia
     support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)] | None = None
     support_shaft: _Shaft = ()
+    tilt_stiffness: Turning | None = None
+    misalignment: Misalignment | None = None
+    wind_up_stiffness: Annotated[float, Quantity(TORSION, 1.0, 1e13)] | None = None
+    torque_end: End | None = None
     errors: CarrierErrors | None = None
 
 

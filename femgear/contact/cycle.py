@@ -24,21 +24,33 @@ from femgear.contact.assembly import (
     in_windows,
     mesh_windows,
 )
-from femgear.contact.batch import BatchState, ContactTangents, check_definite, pair_laws, solve_batch
+from femgear.contact.batch import (
+    BatchState,
+    ContactTangents,
+    PairLaws,
+    check_definite,
+    pair_laws,
+    solve_batch,
+)
 from femgear.contact.bodies import Bodies
-from femgear.contact.slices import WidthWaves, solve_slices, with_ends
+from femgear.contact.slices import SliceState, WidthWaves, solve_slices, with_ends
 from femgear.contact.supports import (
     RIGID,
+    UPRIGHT,
     BearingSprings,
     MovingMembers,
     Supports,
+    TiltingMembers,
+    WidthSupports,
     bearing_springs,
     moving_members,
     pin_forces,
+    tilting_members,
 )
 from femgear.errors import ContactError
 from femgear.gears.deviations import SetDeviations, lead_separation, mirrored_deviations
 from femgear.gears.kinematics import rotation_approach
+from femgear.gears.modifications import FlankTwist
 from femgear.gears.planetary import PlanetarySet, mirrored_set
 
 LARGEST_RESIDUAL = 1e-9
@@ -74,6 +86,8 @@ class CycleOptions:
         Their number.
     ahead : (slices,) array, optional
         By how much the slices of helical teeth run ahead of mid-width [mesh periods].
+    width_supports : WidthSupports
+        What holds members against tilting and twisting in slices.
     progress : callable, optional
         Called with (positions done, positions).
     """
@@ -87,6 +101,7 @@ class CycleOptions:
     held_waves: WidthWaves | None = None
     slices: int = 1
     ahead: np.ndarray | None = None
+    width_supports: WidthSupports = UPRIGHT
     progress: Callable[[int, int], None] | None = None
 
     def mirrored(self, order: np.ndarray) -> CycleOptions:
@@ -165,6 +180,15 @@ class MeshCycle:
         [m/N]; zero where a mesh carries nothing.
     slice_load : (2N, T, S, P) array, optional
         Load of each tooth pair in equal slices of the width, times their number [N].
+    slice_pressure : (2N, T, S, P) array, optional
+        Largest pressure of the tooth pair in these slices [Pa], as `max_pressure`: zero at ends of flanks.
+    mesh_misalignment, lead_offset : (2N, P) arrays, optional
+        Misalignment of every mesh under load, leads and errors included: rise of the approach from one end of
+        the width to the other as a least-squares line, positive where flanks come closer at z > 0; and the
+        smallest separation of its flanks by leads and given misalignments [m].
+    member_tilt : (k, P) array, optional
+        Slope of the axes of members that tilt, and wind-up of the carrier [rad], named by `tilt_names`.
+    tilt_names : tuple of str
     helical : bool
         Whether the slices are those of helical teeth: the path coordinates are those at mid-width.
     """
@@ -199,6 +223,11 @@ class MeshCycle:
     held_stiffness: np.ndarray | None = None
     held_compliance: np.ndarray | None = None
     slice_load: np.ndarray | None = None
+    slice_pressure: np.ndarray | None = None
+    mesh_misalignment: np.ndarray | None = None
+    lead_offset: np.ndarray | None = None
+    member_tilt: np.ndarray | None = None
+    tilt_names: tuple[str, ...] = ()
     helical: bool = False
 
     @property
@@ -254,8 +283,9 @@ class MeshCycle:
 
 _PRESSURES = ("pressure", "pressure_offset", "pressure_centre")
 _OVER_MESHES = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
+_SLICED = ("slice_load", "slice_pressure", "mesh_misalignment", "lead_offset")
 _AXES = {
-    "mt": (*_OVER_MESHES, "held_stiffness"),
+    "mt": (*_OVER_MESHES, "held_stiffness", "mesh_misalignment", "lead_offset"),
     "mst": ("tooth_load", "path", "back_tooth_load", "back_path", "pressure_centre"),
     "gms": ("tooth", "back_tooth"),
     "t": ("sun_arc", "residual", "iterations"),
@@ -263,7 +293,7 @@ _AXES = {
     "mmt": ("held_compliance",),
     "msct": ("pressure",),
     "mc": ("pressure_offset",),
-    "mswt": ("slice_load",),
+    "mswt": ("slice_load", "slice_pressure"),
 }
 """Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, slice w, position t."""
 _ODD = ("path", "back_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
@@ -349,7 +379,10 @@ def walk_mesh_cycle(
         if springs is None and options.planet_gaps is None and not options.both_flanks and not options.waves:
             images = math.gcd(planet_symmetry(solved, deviations), solved.sun.teeth)
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
-        walk = _Walk(solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options)
+        tilting = tilting_members(solved, options.width_supports, options.slices) if options.waves else None
+        walk = _Walk(
+            solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, tilting
+        )
         found = in_windows(walk.attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
     if record.helical and not np.ndim(positions):
@@ -401,9 +434,10 @@ def cycle_without_load(
         for name in names
         if not name.startswith("held")
         and (options.pressures or name not in _PRESSURES)
-        and (options.waves is not None or name != "slice_load")
+        and (options.waves is not None or name not in _SLICED)
     }
     values["open_planets"] = np.ones((N, P), bool)
+    values["member_tilt"] = None if options.waves is None else np.zeros((0, P))
     return MeshCycle(
         position=position,
         bearing_force=np.zeros((N, 2, P)),
@@ -424,11 +458,13 @@ def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | Non
     if d is None:
         return symmetry
     turning = (d.sun_runout, d.ring_runout, d.carrier_runout, d.ovality)
+    if d.sun_misalignment.any() or d.carrier_misalignment.any():
+        return 1
     if d.sun_pitch.any() or d.ring_pitch.any() or any(one.amplitude for one in turning):
         return 1
     runouts = np.array([[r.amplitude, r.phase if r.amplitude else 0.0] for r in d.planet_runout])
     pitches = d.planet_pitch, d.planet_ring_side_pitch
-    errors = np.column_stack((d.pin_errors, d.planet_thickness, *pitches, runouts))
+    errors = np.column_stack((d.pin_errors, d.planet_thickness, d.planet_misalignment, *pitches, runouts))
     same = (n for n in range(symmetry, 0, -1) if symmetry % n == 0)
     return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
 
@@ -437,7 +473,8 @@ def _first_planets(
     planetary_set: PlanetarySet, count: int, deviations: SetDeviations | None
 ) -> tuple[PlanetarySet, SetDeviations | None]:
     """Take the first planets of a set, and their deviations."""
-    names = ("planet_pitch", "planet_ring_side_pitch", "planet_runout", "pin_errors", "planet_thickness")
+    names = "planet_pitch", "planet_ring_side_pitch", "planet_runout", "pin_errors", "planet_thickness"
+    names += ("planet_misalignment",)
     if deviations is not None:
         deviations = replace(deviations, **{name: getattr(deviations, name)[:count] for name in names})
     return replace(planetary_set, planet_angles=planetary_set.planet_angles[:count]), deviations
@@ -483,6 +520,7 @@ class _Walk:
     springs: BearingSprings | None
     empty: MeshCycle
     options: CycleOptions
+    tilting: TiltingMembers | None = None
 
     @property
     def images(self) -> int:
@@ -605,52 +643,37 @@ class _Walk:
         curves = np.geomspace(_LEAST * load[N] / N, 4.0 * load[N], _FORCES)
         S, rows = options.slices, len(found.position)
         P = rows if options.ahead is None else rows // S
-        lead = np.zeros((2, S))
-        if self.deviations is not None:
-            lead = lead_separation(self.deviations, self.sector, S)
-        apart = np.broadcast_to(lead[found.mesh // N].T, (P, S, W))
+        lead, apart = self._leads(found, P)
         held = None
         if options.held_bodies is not None and options.held_waves is not None:
             held = found.images_of(options.held_bodies).sum(axis=0), options.held_waves
         laws = pair_laws(found, state, curves)
-        sliced = solve_slices(found, laws, load, options.waves, apart, held)
+        sliced = solve_slices(found, laws, load, options.waves, apart, held, self.tilting)
         force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
         motion = np.zeros((len(members.names), P))
-        motion[members.free] = sliced.motions.T[N + 1 :]
+        count = N + 1 + int(members.free.sum())
+        motion[members.free] = sliced.motions.T[N + 1 : count]
+        # approach of every mesh in every slice by tilts, (2N, S, P)
+        tilts, turned = sliced.motions.T[count:], np.zeros((2 * N, S, P))
+        twisted, angles = turned, tilts
+        if self.tilting is not None:
+            angles = self.tilting.angle[:, None] * tilts
+            turned = self.tilting.approach @ tilts
+            twisted = turned - np.einsum("vswt,ptw->vsp", self.tilting.coupling, sliced.of_meshes())
         motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung, None]
-        thinnest = sliced.contact_width(found, laws)
-        if self.bodies.face_width / S < thinnest:
-            raise ContactError(
-                f"contacts of {thinnest * 1e3:.3g} mm along the profile are wider than slices",
-                code="E-SLICES", key="static.slices", value=S,
-                limit=f"at most {int(self.bodies.face_width / thinnest)}",
-                remedy="use fewer slices or reduce operation.torque",
-            )  # fmt: skip
-        # by Hertz's law the largest pressure of a slice grows with the root of its force
-        pressure, before = _equal_cell_pressure(found, state.loads).max(axis=2), state.loads.sum(axis=-1)
-        largest = sliced.largest() if P == rows else sliced.of_laws(laws)
-        raised = np.divide(largest, before, out=np.zeros(before.shape), where=before > 0)
-        at_edge = sliced.reaches_ends(found, laws)
-        inner = found.by_pairs(np.where(at_edge, 0.0, pressure * np.sqrt(raised))).max(axis=1)
-        # springs stand for all slices of spur teeth, for one of helical teeth
-        slice_load = found.by_pairs(np.moveaxis(sliced.force.reshape(rows, -1, W), 1, 2))
-        slice_load = slice_load.reshape(*slice_load.shape[:3], P, -1).swapaxes(3, 4)
-        slice_load = slice_load.reshape(*slice_load.shape[:2], S, P)
-        values: dict[str, Any] = {
-            "deflection": rotation_approach(N) @ sliced.motions.T[: N + 1] + members.approach @ motion,
+        base = rotation_approach(N) @ sliced.motions.T[: N + 1] + members.approach @ motion
+        nearest = (apart - np.moveaxis(twisted, -1, 0).swapaxes(1, 2)[..., found.mesh]).min(axis=1)
+        values = self._of_pairs(found, state, laws, sliced) | {
+            "deflection": base + turned.mean(axis=1),
             "sun_arc": sliced.motions[:, N],
             "force": force,
             "member_motion": motion,
-            "tooth_load": slice_load.mean(axis=2),
-            "slice_load": slice_load,
-            "max_pressure": inner.reshape(len(inner), P, -1).max(axis=-1),
-            "edge_contact": found.by_pairs(at_edge).any(axis=1).reshape(len(inner), P, -1).any(axis=-1),
-            "residual": np.maximum(state.residual.reshape(P, -1).max(axis=1), sliced.residual),
-            "iterations": state.iterations.reshape(P, -1).sum(axis=1) + sliced.iterations,
-            "overflow": sliced.overflows(found, laws),
+            "mesh_misalignment": _rise(twisted - lead[..., None]),
+            "lead_offset": apart.reshape(P, -1, 2 * N, W // (2 * N)).min(axis=(1, 3)).T,
+            "member_tilt": angles,
         }
         # the slice that comes nearest decides which pairs may touch
-        reach = values["deflection"] - lead.min(axis=1)[np.arange(2 * N) // N, None]
+        reach = base - nearest.reshape(P, 2 * N, W // (2 * N)).min(axis=-1).T
         values["reach"] = np.repeat(reach, rows // P, axis=1)
         for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
             # tangents of the springs change; what they begin at is that of the cells
@@ -663,6 +686,57 @@ class _Walk:
             between[loaded] = np.linalg.inv(between[loaded] + sliced.tangents[1][loaded])
             values["held_compliance"] = np.moveaxis(between, 0, -1)
         return values
+
+    def _of_pairs(
+        self, found: Candidates, state: BatchState, laws: PairLaws, sliced: SliceState
+    ) -> dict[str, Any]:
+        """Loads and pressures of tooth pairs in slices, by the names of `MeshCycle`."""
+        (P, S, W), rows, width = sliced.force.shape, len(found.position), self.bodies.face_width
+        contact, spur = sliced.contact_width(found, laws), P == rows
+        _check_lines(sliced.force if spur else None, contact, width, S)
+        # by Hertz's law the largest pressure of a slice grows with the root of its force
+        pressure, before = _equal_cell_pressure(found, state.loads).max(axis=2), state.loads.sum(axis=-1)
+        at_edge, of_rows = sliced.reaches_ends(found, laws), sliced.force.reshape(rows, -1, W)
+
+        def pressed(force):
+            raised = np.divide(force, before, out=np.zeros(force.shape), where=before > 0)
+            return np.where(at_edge, 0.0, pressure * np.sqrt(raised))
+
+        def over_width(values):
+            """Springs (rows, slices of each, W) stand for all slices of spur teeth, for one of helical."""
+            by_pair = found.by_pairs(np.moveaxis(values, 1, 2))
+            by_pair = by_pair.reshape(*by_pair.shape[:3], P, -1).swapaxes(3, 4)
+            return by_pair.reshape(*by_pair.shape[:2], S, P)
+
+        inner = found.by_pairs(pressed(sliced.largest() if spur else sliced.of_laws(laws))).max(axis=1)
+        slice_load = over_width(of_rows)
+        return {
+            "tooth_load": slice_load.mean(axis=2),
+            "slice_load": slice_load,
+            "slice_pressure": over_width(pressed(of_rows.swapaxes(0, 1)).swapaxes(0, 1)),
+            "max_pressure": inner.reshape(len(inner), P, -1).max(axis=-1),
+            "edge_contact": found.by_pairs(at_edge).any(axis=1).reshape(len(inner), P, -1).any(axis=-1),
+            "residual": np.maximum(state.residual.reshape(P, -1).max(axis=1), sliced.residual),
+            "iterations": state.iterations.reshape(P, -1).sum(axis=1) + sliced.iterations,
+            "overflow": sliced.overflows(found, laws),
+        }
+
+    def _leads(self, found: Candidates, P: int) -> tuple[np.ndarray, np.ndarray]:
+        """Separations by leads and misalignments, of meshes (2N, S) and windows (P, S, W) [m]."""
+        rows, S, mesh = np.arange(len(found.position))[:, None], self.options.slices, found.mesh
+        lead, d = np.zeros((2 * self.sector.n_planets, S)), self.deviations
+        if d is not None:
+            lead = lead_separation(d, self.sector, S)
+        apart = np.broadcast_to(lead[mesh].T, (P, S, len(mesh)))
+        forms = () if d is None else (d.sun, d.planet_sun_side, d.planet_ring_side, d.ring)
+        if d is not None and any(isinstance(one, FlankTwist) for form in forms for one in form.lead):
+            # a twist by the places of the pairs on the flanks, of helical teeth a row a slice
+            rolls = found.setup.roll[:, : len(lead), found.position][..., 1]
+            every = lead_separation(d, self.sector, S, rolls)[mesh, rows, found.pair]
+            helical = len(rows) != P
+            apart = every[rows[:, 0], :, rows[:, 0] % S] if helical else every.swapaxes(1, 2)
+            apart = apart.reshape(P, S, len(mesh))
+        return lead, apart
 
     def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
         """The record from what was found at its positions: with places of the tooth pairs, pins, message."""
@@ -706,8 +780,45 @@ class _Walk:
             open_planets=unloaded,
             unknowns=unknowns,
             member_names=self.members.names,
+            tilt_names=() if self.tilting is None else self.tilting.names,
             message=message,
         )
+
+
+def _rise(approach: np.ndarray) -> np.ndarray:
+    """Rise over the width of the least-squares lines through values (2N, S, P) in slices."""
+    place = 2.0 * (np.arange(approach.shape[1]) + 0.5) / approach.shape[1] - 1.0
+    return 2.0 * np.einsum("s,msp->mp", place, approach) / (place @ place)
+
+
+def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, slices: int) -> None:
+    """Refuse (E-SLICES) contacts that are wider than slices, or of spur teeth points rather than lines.
+
+    Forces are (P, S, W) [N], widths of the contacts along the profile (P, W) [m]. One or two slices amid the
+    width may carry less than their length.
+    """
+    thinnest = float(contact.max(initial=0.0))
+    if width / slices < thinnest:
+        raise ContactError(
+            f"contacts of {thinnest * 1e3:.3g} mm along the profile are wider than slices",
+            code="E-SLICES", key="static.slices", value=slices,
+            limit=f"at most {int(width / thinnest)}",
+            remedy="use fewer slices or reduce operation.torque",
+        )  # fmt: skip
+    if force is None:
+        return
+    load, carries = force.mean(axis=1), force > 0.0
+    length, most = carries.mean(axis=1) * width, 2.5 * width / slices
+    amid = ~(carries[:, 0] | carries[:, -1]) & (length < most) & (load > 0.25 * load.max())
+    point = (contact > 0.4 * length) | amid
+    if point.any():
+        raise ContactError(
+            f"a tooth pair touches over no more than {length[point].min() * 1e3:.3g} mm of the width and "
+            f"{contact[point].max() * 1e3:.3g} mm along the profile: slices hold for lines, not for points",
+            code="E-SLICES", key="static.slices", value=slices,
+            limit="contacts over three slices, and longer than five half widths",
+            remedy="reduce lead crowning and end relief, or take more slices",
+        )  # fmt: skip
 
 
 def _equal_cell_pressure(found: Candidates, loads) -> np.ndarray:
@@ -741,17 +852,26 @@ def _seen_from_front(cycle: MeshCycle, planetary_set: PlanetarySet, order) -> Me
             place = own[axis] if axis in own else slice(None, None, -1)
             values = values[(slice(None),) * number + (place,)]
         found[name] = -values if name in _ODD else values
-    motion = _reflected(cycle.member_motion.reshape(-1, 2, len(cycle.position)), angle)
-    planets = [i for i, name in enumerate(cycle.member_names[::2]) if name.startswith("planet")]
-    if planets:
-        motion[planets] = motion[planets][planet]
+    found["member_motion"] = _in_mirror(cycle.member_names, cycle.member_motion, planet, angle)
+    if cycle.member_tilt is not None:
+        found["member_tilt"] = _in_mirror(cycle.tilt_names, cycle.member_tilt, planet, angle)
     return replace(
         cycle,
         position=0.0 - cycle.position[::-1],
         bearing_force=_reflected(cycle.bearing_force, angle)[planet][:, :, ::-1],
-        member_motion=motion.reshape(cycle.member_motion.shape)[:, ::-1],
         **found,
     )
+
+
+def _in_mirror(names, values: np.ndarray, planet: np.ndarray, angle: float) -> np.ndarray:
+    """Vectors of members (m, P), and what turns them last, of the mirror image in the original's order."""
+    pairs = [name for name in names if name.endswith((": x", ": y"))][::2]
+    vectors, turned = np.split(values, [2 * len(pairs)])
+    found = _reflected(vectors.reshape(-1, 2, vectors.shape[1]), angle)
+    own = [i for i, name in enumerate(pairs) if name.startswith("planet")]
+    if own:
+        found[own] = found[own][planet]
+    return np.concatenate([found.reshape(vectors.shape), -turned])[:, ::-1]
 
 
 def _reflected(vectors: np.ndarray, angle: float) -> np.ndarray:

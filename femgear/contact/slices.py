@@ -44,6 +44,7 @@ from femgear.contact.bodies import (
     station_weights,
 )
 from femgear.contact.local_compliance import depth_displacement, tip_corner
+from femgear.contact.supports import TiltingMembers
 from femgear.errors import ContactError
 from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import Material, stiffness, wave_stiffness
@@ -123,10 +124,10 @@ class SliceState:
         """Largest force of every spring in the slices that it stands for, (rows, W) [N]."""
         return self.force.reshape(len(laws.separation), -1, len(self.mesh)).max(axis=1)
 
-    def contact_width(self, found: Candidates, laws: PairLaws) -> float:
-        """Largest width of a contact along the profile [m]."""
+    def contact_width(self, found: Candidates, laws: PairLaws) -> np.ndarray:
+        """Largest width of the contact of every spring along the profile, (rows, W) [m]."""
         touched = (laws.touching <= self.of_laws(laws)[..., None]).sum(axis=-1)
-        return float((touched * found.setup.cell[found.mesh]).max(initial=0.0))
+        return touched * found.setup.cell[found.mesh]
 
     def overflows(self, found: Candidates, laws: PairLaws) -> bool:
         """Whether a slice presses cells at the end of a window that is not the end of a flank."""
@@ -238,6 +239,7 @@ def solve_slices(
     waves: WidthWaves,
     separations: np.ndarray,
     held: tuple[np.ndarray, WidthWaves] | None = None,
+    tilting: TiltingMembers | None = None,
 ) -> SliceState:
     """Solve the contact of all tooth pairs in all slices, which share their motions.
 
@@ -255,6 +257,8 @@ def solve_slices(
         What leads, crowning and misalignment add in the slices to whole pairs [m].
     held : (rows, W, 3, W, 3) array and WidthWaves, optional
         Compliance of other bodies between all windows [m/N], for whose tangents the contact is taken too.
+    tilting : TiltingMembers, optional
+        Motions that differ from slice to slice; they follow the others.
 
     Raises
     ------
@@ -270,8 +274,13 @@ def solve_slices(
         bodies = [(found.smooth[rows], across)]
         if held is not None:
             bodies.append((held[0][rows], _across(found, rows, held[1], N)))
-        newton = _SliceNewton(laws, rows, load, across, separations[some], found.smooth[rows])
+        newton = _SliceNewton(laws, rows, load, across, separations[some], found.smooth[rows], tilting)
         before = [part for one in bodies for part in newton.tangents(*one)] if each == 1 else []
+        if tilting is not None:
+            mesh, window = laws.mesh, np.arange(N)[:, None]
+            coupling = tilting.coupling[mesh, window][:, :, mesh, window]
+            newton.across = newton.across + coupling / newton.unit
+            bodies = [(smooth, change + coupling) for smooth, change in bodies]
         solved = newton.solve()
         after = [part for one in bodies for part in newton.tangents(*one)]
         after = [b - a for a, b in zip(before, after, strict=True)] if before else after
@@ -395,9 +404,13 @@ class _SliceNewton:
     Springs are those of the ``rows`` (P, L) of the laws: one for all slices, or one for each of them.
     """
 
-    def __init__(self, laws: PairLaws, rows, load, across, separations, smooth):
-        self.laws, self.rows, self.load, self.smooth = laws, rows, load, smooth
+    def __init__(self, laws: PairLaws, rows, load, across, separations, smooth, tilting=None):
+        self.laws, self.rows, self.smooth = laws, rows, smooth
         (P, N, W), L = separations.shape, rows.shape[1]
+        k = 0 if tilting is None else len(tilting.names)
+        # approach by the motions that slices do not share, (N, W, k)
+        self.tilts = np.zeros((N, W, 0)) if tilting is None else tilting.approach[laws.mesh].swapaxes(0, 1)
+        self.load = np.append(load, np.zeros(k))
         self.shape, self.size, self.each = (P, N, W), N * W, N // L
         self.unit = float(laws.yields[np.isfinite(laws.separation)].mean())
         self.across = across / self.unit
@@ -407,7 +420,11 @@ class _SliceNewton:
         field = (self.S @ plane.swapaxes(2, 3).reshape(P, L, 1, -1, 1))[..., 0]
         self.field = field + (plane.sum(axis=-1) @ laws.supports)[..., None]
         self.plane, own = plane.sum(axis=-1), laws.motions[rows] / self.unit
-        self.motions = own.mean(axis=1)
+        self.motions = np.hstack([own.mean(axis=1), np.zeros((P, k))])
+        # of springs on the motions, over the unit
+        self.springs = np.full(len(self.load), _SOFTEST)
+        if tilting is not None:
+            self.springs[len(load) :] += tilting.stiffness * self.unit
         there = np.isfinite(laws.separation[rows])
         self.apart = np.where(there, laws.separation[rows], 1.0)
         there, self.apart, self.force = (
@@ -453,7 +470,9 @@ class _SliceNewton:
         gap += (self.across.reshape(P, self.size, -1) @ force.reshape(P, -1, 1)).reshape(self.shape)
         # members on springs move as a whole
         gap += (force.mean(axis=1) @ self.laws.supports / self.unit)[:, None]
-        return gap - (self.motions @ self.laws.approach.T)[:, None], slope
+        shared = self.laws.approach.shape[1]
+        gap = gap - (self.motions[:, :shared] @ self.laws.approach.T)[:, None]
+        return gap - np.einsum("nwk,pk->pnw", self.tilts, self.motions[:, shared:]), slope
 
     def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Iterate until all positions are solved: forces, motions, steps and residuals.
@@ -506,15 +525,24 @@ class _SliceNewton:
         A = np.where(on[:, :, None] & on[:, None], A[rows[..., None], at[:, :, None], at[:, None]], np.eye(c))
         meshes = np.arange(int(laws.mesh[-1]) + 1)
         ones = (np.tile(laws.mesh, N)[at][..., None] == meshes) * on[..., None].astype(float)
+        # tilts follow the increments: the border of the rows that carry
+        k, tilts = self.tilts.shape[-1], self.tilts.reshape(n, -1)[at] * on[..., None]
+        A, plain = np.zeros((P, c + k, c + k)), A
+        A[:, :c, :c], A[:, :c, c:], A[:, c:, :c] = plain, -tilts, tilts.swapaxes(1, 2) / N
+        A[:, range(c, c + k), range(c, c + k)] = self.springs[len(self.load) - k :]
+        ones = np.concatenate([ones, np.zeros((P, k, len(meshes)))], axis=1)
         together = ones.swapaxes(1, 2) @ np.linalg.solve(A, ones)
         alone = []
         for j in meshes:
-            own, some = _first(ones[..., j] > 0.0)
+            own, some = _first(ones[:, :c, j] > 0.0)
+            own = np.hstack([own, np.ones((P, k), bool)])
+            some = np.hstack([some, np.tile(np.arange(c, c + k), (P, 1))])
             part = np.where(
                 own[:, :, None] & own[:, None],
                 A[rows[..., None], some[:, :, None], some[:, None]],
                 np.eye(own.shape[1]),
             )
+            own = np.where(some < c, own, False)
             alone.append((own * np.linalg.solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
         return together / (N * self.unit), np.stack(alone, axis=1) / (N * self.unit)
 
@@ -541,10 +569,12 @@ class _SliceNewton:
         system[:, :c, :c] = np.where(
             on[:, :, None] & on[:, None], A[rows[..., None], at[:, :, None], at[:, None]], np.eye(c)
         )
-        G = np.tile(self.laws.approach, (N, 1))[at] * on[..., None]
+        G = np.hstack([np.tile(self.laws.approach, (N, 1)), self.tilts.reshape(n, -1)])[at] * on[..., None]
         system[:, :c, c:], system[:, c:, :c] = -G, G.swapaxes(1, 2) / N
-        system[:, range(c, c + m), range(c, c + m)] = _SOFTEST
-        balance = self.load - self.force.sum(axis=1) @ self.laws.approach / N - _SOFTEST * self.motions
+        system[:, range(c, c + m), range(c, c + m)] = self.springs
+        tilted = np.einsum("nwk,pnw->pk", self.tilts, self.force)
+        carried = np.hstack([self.force.sum(axis=1) @ self.laws.approach, tilted]) / N
+        balance = self.load - carried - self.springs * self.motions
         right = np.concatenate([np.where(on, -gap.reshape(P, n)[rows, at], 0.0), balance], axis=1)
         solved = np.linalg.solve(system, right[..., None])[..., 0]
         change = np.zeros((P, n + m))

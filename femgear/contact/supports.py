@@ -114,6 +114,109 @@ class BearingSprings:
         return whole, np.append(gap, np.full(count, self.clearance)), np.vstack([G, arms])
 
 
+@dataclass(frozen=True)
+class WidthSupports:
+    """What holds members against tilting and twisting over the face width: None is rigid, 0 free.
+
+    Parameters
+    ----------
+    sun, carrier, planet : float, optional
+        Tilt stiffness between sun or carrier and the ground, and of every planet on its pin [N m/rad].
+    wind_up : float, optional
+        Torsional stiffness between the walls of the carrier at the ends of the width [N m/rad].
+    wind_up_end : int
+        End at which the torque leaves the carrier, -1 at z < 0, 1 at z > 0.
+    sun_rigidity : float, optional
+        Torsional rigidity G J of the sun [N m^2].
+    sun_end : int
+        End at which the torque enters the sun.
+    """
+
+    sun: float | None = None
+    carrier: float | None = None
+    planet: float | None = None
+    wind_up: float | None = None
+    wind_up_end: int = 1
+    sun_rigidity: float | None = None
+    sun_end: int = -1
+
+
+UPRIGHT = WidthSupports()
+
+
+@dataclass(frozen=True)
+class TiltingMembers:
+    """Motions that differ from slice to slice, as the contact in S slices takes them.
+
+    Parameters
+    ----------
+    names : tuple of str
+        One a motion, such as ``"sun: x"``, the direction in which the end z > 0 moves.
+    approach : (2N, S, k) array
+        Approach of the flanks per unit motion, the displacement of an end of the width [m].
+    stiffness : (k,) array
+        [N/m], 0 for free motions.
+    angle : (k,) array
+        Slope, or angle of wind-up, per unit motion [rad/m].
+    coupling : (2N, S, 2N, S) array
+        Compliance between forces over the whole width in the slices of all meshes [m/N].
+    """
+
+    names: tuple[str, ...]
+    approach: np.ndarray
+    stiffness: np.ndarray
+    angle: np.ndarray
+    coupling: np.ndarray
+
+
+def tilting_members(
+    planetary_set: PlanetarySet, supports: WidthSupports, slices: int
+) -> TiltingMembers | None:
+    """List tilts and twists that the supports allow, with their effect on every slice; None without any.
+
+    A member that tilts displaces its section at z like a motion by slope times z; across the flanks of spur
+    teeth nothing else does. Of the pin forces the wall of the carrier at which no torque leaves takes the
+    shares ``zeta`` in 0 .. 1, their distance from the other wall over the width, and turns against that by
+    ``psi = r_c sum(zeta F_t)/k``; the pins slope by ``r_c psi / b``, so that planets move by ``r_c psi
+    zeta``. The sun turns at the distance ``x`` from the end of its torque, under forces at ``x'``, by
+    ``r_b F min(x, x')/(G J)`` (St Venant), here as means over slices.
+
+    Raises
+    ------
+    ContactError
+        E-MECHANISM: free tilts that move no flank.
+    """
+    s, N, width = planetary_set, planetary_set.n_planets, planetary_set.sun.face_width
+    along = 2.0 * (np.arange(slices) + 0.5) / slices - 1.0
+    tilts = _one_side(s, Supports(supports.sun, supports.carrier, supports.planet), False)
+    free = tilts.approach[:, tilts.free]
+    if np.linalg.matrix_rank(free, tol=1e-9) < free.shape[1]:
+        loose = [name.split(":")[0].split()[0] for name in np.array(tilts.names)[tilts.free]]
+        raise ContactError(
+            f"nothing holds a common tilt of {' and '.join(dict.fromkeys(loose))}", code="E-MECHANISM",
+            key=f"{loose[0]}.tilt_stiffness", value="0 N m/rad", limit="above 0 N m/rad",
+            remedy="give it a tilt stiffness, or leave the entry out for a rigid one",
+        )  # fmt: skip
+    names, stiffness = list(tilts.names), tilts.stiffness / (0.5 * width) ** 2
+    approach, angle = tilts.approach[:, None] * along[:, None], np.full(len(names), 2.0 / width)
+    if supports.wind_up is not None:
+        psi, radius = np.tile(s.planet_angles, 2), s.centre_distance
+        tangent = np.stack([-np.sin(psi), np.cos(psi)], axis=1)
+        share = 0.5 * (1.0 - supports.wind_up_end * along)
+        moved = (member_approach(s)["carrier"] * tangent).sum(axis=1)[:, None] * share
+        approach = np.concatenate([approach, moved[..., None]], axis=-1)
+        stiffness, angle = np.append(stiffness, supports.wind_up / radius**2), np.append(angle, 1.0 / radius)
+        names.append("carrier: wind-up")
+    coupling = np.zeros((2 * N, slices) * 2)
+    if supports.sun_rigidity is not None:
+        reach = 0.5 * width * (1.0 - supports.sun_end * along)
+        shorter = np.minimum.outer(reach, reach) - np.eye(slices) * width / (6 * slices)
+        coupling[:N, :, :N] = s.sun.base_radius**2 / (supports.sun_rigidity * slices) * shorter[:, None]
+    if not names and not coupling.any():
+        return None
+    return TiltingMembers(tuple(names), approach, stiffness, angle, coupling)
+
+
 def moving_members(
     planetary_set: PlanetarySet, supports: Supports, *, both_flanks: bool = False
 ) -> MovingMembers:

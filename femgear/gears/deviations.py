@@ -15,15 +15,16 @@ curves, so this is exact to first order (the next term is ``u^2`` over the centr
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from femgear.gears.gear import Gear, GeometryWarning
-from femgear.gears.kinematics import mesh_normals, orientations
-from femgear.gears.modifications import FlankForm, check_flank, form_deviation, lead_deviation
+from femgear.gears.kinematics import member_approach, mesh_normals, orientations
+from femgear.gears.modifications import FlankForm, check_flank, form_deviation, lead_deviation, profile_height
 from femgear.gears.planetary import PlanetarySet
 
+_MISALIGNMENTS = ("sun_misalignment", "carrier_misalignment", "planet_misalignment")
 LONGEST_RECORD = 256
 """Mesh periods that a record spans at most unless told otherwise."""
 LONGEST_SEARCH = 4096
@@ -95,6 +96,11 @@ class SetDeviations:
     planet_thickness : (N,) array
         The same of every planet [m]. Only its differences separate loaded flanks: they stay in touch on the
         planet with the thickest teeth, as they do for the set's own allowances.
+    planet_misalignment : (N, 2) array
+        Radial and tangential slope of the planet axes [rad]: rise of `pin_errors` per width towards z > 0.
+    sun_misalignment, carrier_misalignment : (2,) arrays
+        Slopes of their axes along x and y of the carrier frame [rad], in which they stand still; the carrier
+        takes its planets along.
     """
 
     sun: FlankForm
@@ -108,6 +114,9 @@ class SetDeviations:
     planet_runout: tuple[Runout, ...]
     pin_errors: np.ndarray
     planet_thickness: np.ndarray
+    planet_misalignment: np.ndarray
+    sun_misalignment: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    carrier_misalignment: np.ndarray = field(default_factory=lambda: np.zeros(2))
     sun_runout: Runout = Runout()
     ring_runout: Runout = Runout()
     carrier_runout: Runout = Runout()
@@ -117,7 +126,7 @@ class SetDeviations:
 
     def __post_init__(self):
         pitches = ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch")
-        for name in (*pitches, "pin_errors", "planet_thickness"):
+        for name in (*pitches, "pin_errors", "planet_thickness", *_MISALIGNMENTS):
             array = np.array(getattr(self, name), dtype=float)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -143,7 +152,13 @@ class SetDeviations:
             or self.pin_errors.any()
             or self.ovality.amplitude
             or np.ptp(self.planet_thickness)
+            or self.misaligned
         )
+
+    @property
+    def misaligned(self) -> bool:
+        """Whether any axis is askew."""
+        return any(getattr(self, name).any() for name in _MISALIGNMENTS)
 
 
 def rotational_symmetry(d: SetDeviations, s: PlanetarySet) -> int:
@@ -170,6 +185,7 @@ def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:
         planet_runout=(Runout(),) * N,
         pin_errors=np.zeros((N, 2)),
         planet_thickness=np.zeros(N),
+        planet_misalignment=np.zeros((N, 2)),
     )
 
 
@@ -208,17 +224,44 @@ def profile_separation(
     return form_deviation(one, gears[0], roll_1) + form_deviation(two, gears[1], roll_2)
 
 
-def lead_separation(deviations: SetDeviations, planetary_set: PlanetarySet, slices: int) -> np.ndarray:
-    """Compute the separation (2, slices) [m] of sun-planet and planet-ring flanks over the width.
+def lead_separation(
+    deviations: SetDeviations,
+    planetary_set: PlanetarySet,
+    slices: int,
+    rolls: np.ndarray | None = None,
+    *,
+    back: bool = False,
+) -> np.ndarray:
+    """Compute the separation (2N, ..., slices) [m] of the flanks of every mesh over the width.
 
-    Means over equal slices, by the modifications of both flanks along the lead.
+    Means over equal slices, by the modifications of both flanks along the lead and by axes askew, which
+    displace a section as a motion of the member by slope times z would. The roll lengths (2, 2N, ...) [m] on
+    gear 1 and 2 of every mesh are those halfway along the profiles when left out.
     """
-    s, fine = planetary_set, 16
+    d, s, fine = deviations, planetary_set, 16
+    N, gears = s.n_planets, ((s.sun, s.planet), (s.planet, s.ring))
     width = s.sun.face_width
     place = width * ((np.arange(slices * fine) + 0.5) / (slices * fine) - 0.5)
-    meshes = (deviations.mesh_forms(kind, back=False) for kind in (0, 1))
-    found = [lead_deviation(one, width, place) + lead_deviation(two, width, place) for one, two in meshes]
-    return np.array(found).reshape(2, slices, fine).mean(axis=2)
+    apart = -misaligned_approach(d, s, back=back)
+    found = []
+    for mesh in range(2 * N):
+        removed = apart[mesh] * place
+        for i, form in enumerate(d.mesh_forms(mesh // N, back=back)):
+            height = 0.0 if rolls is None else profile_height(gears[mesh // N][i], rolls[i][mesh])[..., None]
+            removed = removed + lead_deviation(form, width, place, height)
+        found.append(removed)
+    found = np.array(found)
+    return found.reshape(*found.shape[:-1], slices, fine).mean(axis=-1)
+
+
+def misaligned_approach(d: SetDeviations, s: PlanetarySet, *, back: bool = False) -> np.ndarray:
+    """Compute the approach (2N,) of the flanks of every mesh by axes askew, per place over the width [1]."""
+    motions, angles = member_approach(s, back=back), np.asarray(s.planet_angles)
+    radial = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    outwards, along = d.planet_misalignment.T[..., None]
+    planets = outwards * radial + along * (radial[:, ::-1] * [-1.0, 1.0]) + d.carrier_misalignment
+    planets = np.tile(planets, (2, 1))
+    return motions["sun"] @ d.sun_misalignment + (motions["carrier"] * planets).sum(axis=1)
 
 
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):
@@ -383,7 +426,16 @@ def mirrored_deviations(
         ovality=replace(d.ovality, phase=ring * s.ring.pitch_angle - d.ovality.phase),
         pin_errors=d.pin_errors[order] * [1.0, -1.0],
         planet_thickness=d.planet_thickness[order],
+        planet_misalignment=d.planet_misalignment[order] * [1.0, -1.0],
+        sun_misalignment=_in_mirror(d.sun_misalignment, axis),
+        carrier_misalignment=_in_mirror(d.carrier_misalignment, axis),
     )
+
+
+def _in_mirror(vector: np.ndarray, axis: float) -> tuple[float, float]:
+    """Vector (2,) in the mirror image at half the angle `axis` [rad]."""
+    image = np.exp(1j * axis) * complex(vector[0], -vector[1])
+    return image.real, image.imag
 
 
 def _turned(values: np.ndarray, first: int) -> np.ndarray:
@@ -464,7 +516,11 @@ def _worst(d: SetDeviations, s: PlanetarySet, *, back: bool) -> np.ndarray:
         profile_separation(d, s, kind, one[:, None], two, back=back).min()
         for kind, one, two in ((0, sun, planet), (1, planet, ring))
     ]
-    return pitch + np.repeat(profile, N)
+    # of leads the ends of profiles, between which a twist is linear
+    sun, planet, ring = ([g.form_roll, g.tip_roll] for g in (s.sun, s.planet, s.ring))
+    ends = [(np.tile(a, 2), np.repeat(b, 2)) for a, b in ((sun, planet), (planet, ring))]
+    lead = lead_separation(d, s, 64, np.repeat(ends, N, axis=0).swapaxes(0, 1), back=back).min(axis=(1, 2))
+    return pitch + np.repeat(profile, N) + lead
 
 
 def _wedging(d: SetDeviations, s: PlanetarySet):

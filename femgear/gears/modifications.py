@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -125,8 +126,31 @@ class EndRelief:
     length: float
 
 
+@dataclass(frozen=True)
+class FlankTwist:
+    """Lead slope that varies along the profile, linearly in the roll length.
+
+    The amount [m] is the lead slope (see `LeadSlope`) at the tip circle less that at the form circle, zero
+    halfway: the twist of a flank S_beta (ISO 21771-1).
+    """
+
+    amount: float
+
+
+@dataclass(frozen=True)
+class MeasuredLead:
+    """Any lead from its points, straight between them and constant beyond the first and the last.
+
+    ``place`` are ascending places from the middle of the width [m], ``removed`` is the material missing there
+    [m], of all teeth alike.
+    """
+
+    place: tuple[float, ...]
+    removed: tuple[float, ...]
+
+
 ProfileModification = TipRelief | RootRelief | ProfileSlope | ProfileCrowning | MeasuredProfile
-LeadModification = LeadSlope | LeadCrowning | EndRelief
+LeadModification = LeadSlope | LeadCrowning | EndRelief | FlankTwist | MeasuredLead
 Modification = ProfileModification | LeadModification
 
 
@@ -143,23 +167,35 @@ class FlankForm:
 
     @property
     def lead(self) -> tuple[LeadModification, ...]:
-        """Modifications over the width, the same all over the profile; none of them in its middle."""
+        """Modifications over the width; but for a twist the same all over the profile."""
         return tuple(one for one in self.modifications if isinstance(one, LeadModification))
 
 
-def lead_deviation(form: FlankForm, width: float, place) -> np.ndarray:
-    """Compute the material removed from a flank [m] at places from the middle of its width [m], any shape."""
+def lead_deviation(form: FlankForm, width: float, place, height: Any = 0.0) -> np.ndarray:
+    """Compute the material removed from a flank [m] at places from the middle of its width [m], any shape.
+
+    And at heights on the profile that broadcast with them, from -0.5 at the form circle to 0.5 at the tip.
+    """
     place = np.asarray(place, float)
-    total, along = np.zeros(place.shape), 2.0 * place / width
+    total, along = np.zeros(np.broadcast(place, height).shape), 2.0 * place / width
     for one in form.lead:
         if isinstance(one, LeadSlope):
             total = total - 0.5 * one.amount * along
         elif isinstance(one, LeadCrowning):
             total = total + one.amount * along**2
+        elif isinstance(one, FlankTwist):
+            total = total - 0.5 * one.amount * along * height
+        elif isinstance(one, MeasuredLead):
+            total = total + np.interp(place, one.place, one.removed)
         else:
             inside = (0.5 * width - np.abs(place)) / one.length
             total = total + one.amount * np.maximum(1.0 - inside, 0.0) ** 2
     return total
+
+
+def profile_height(gear: Gear, roll) -> np.ndarray:
+    """Find heights on the profile from -0.5 at the form circle to 0.5 at the tip, of roll lengths [m]."""
+    return np.clip((np.asarray(roll) - gear.form_roll) / (gear.tip_roll - gear.form_roll), 0.0, 1.0) - 0.5
 
 
 def form_deviation(form: FlankForm, gear: Gear, roll):

@@ -138,8 +138,8 @@ def test_cosines_are_orthonormal():
 # --- slices ----------------------------------------------------------------------------------------
 
 
-def spring_slices(separation, *, stiffness, load, slices):
-    """Loads of slices of one linear spring, not coupled across the width, as parts of their mean."""
+def spring_newton(separation, *, stiffness, load, slices, tilting=None):
+    """Slices of one linear spring, not coupled across the width."""
     from femgear.contact.batch import PairLaws
 
     force = np.geomspace(1.0, 1e5, 8)
@@ -151,8 +151,13 @@ def spring_slices(separation, *, stiffness, load, slices):
     )  # fmt: skip
     across = np.zeros((1, slices, 1, slices, 1))
     apart = np.asarray(separation)[None, :, None]
-    newton = _SliceNewton(laws, np.zeros((1, 1), int), np.array([load]), across, apart, laws.smooth[None])
-    return newton.solve()[0][0, :, 0] / load
+    rows, smooth = np.zeros((1, 1), int), laws.smooth[None]
+    return _SliceNewton(laws, rows, np.array([load]), across, apart, smooth, tilting)
+
+
+def spring_slices(separation, *, load, **options):
+    """Loads of these slices as parts of their mean."""
+    return spring_newton(separation, load=load, **options).solve()[0][0, :, 0] / load
 
 
 @pytest.mark.parametrize(("misaligned", "factor"), [(2e-6, 1.106), (5e-6, 1.266), (10e-6, 1.532)])
@@ -261,7 +266,7 @@ def test_leads_of_both_flanks_of_a_mesh_add_up(gears):
         planet_sun_side=planet,
         planet_ring_side=planet,
     )
-    sun, ring = lead_separation(deviations, gears, 4)
+    sun, _, _, ring, _, _ = lead_separation(deviations, gears, 4)
     assert sun == pytest.approx(8e-6 * np.array([3, 1, -1, -3]) / 8, abs=1e-15)
     assert ring == pytest.approx(sun / 4, abs=1e-15)
 

@@ -27,3 +27,13 @@ def test_rows_of_the_table(row):
         cycle.max_pressure[0].max() / 1e6,
     )  # fmt: skip
     assert found == pytest.approx(printed, rel=3e-3)
+
+
+def test_planets_that_tilt():
+    row = re.search(r"(?m)^\| 1e4 N m/rad \|(.*)\|$", PAGE)
+    numbers = [float(one) for one in re.findall(r"-?[\d.]+", row[1].replace("−", "-"))]
+    changes = {"static.slices": 25, "static.positions": 32, "sun.misalignment": {"x": "0.4 mrad"}}
+    changes["planet.tilt_stiffness"] = "1e4 N m/rad"
+    cycle = solve_static(with_values(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), changes)).cycle
+    found = np.append(cycle.face_load_factor, cycle.mesh_misalignment.mean(axis=1) * 1e6)
+    assert np.abs(found - numbers).max() < 0.006

@@ -20,6 +20,7 @@ SCRIPTS = (
     "housing_modulation.py",
     "harris_map.py",
     "tip_relief_design.py",
+    "lead_design.py",
     "pin_error_load_sharing.py",
     "optimise.py",
     "drivetrain.py",

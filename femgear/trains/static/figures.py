@@ -184,27 +184,58 @@ def face_load(static: xr.Dataset) -> Figure:
 
     From static.nc of slices; pairs go on as in `tooth_loads`.
     """
+    scale = 1e-3 / static.attrs["face_width"]
+    return _over_flank(
+        static, "slice_load", scale, "load per width [N/mm]",
+        lambda one: f"K_Hβ = {float(one['face_load_factor']):.3f}",
+    )  # fmt: skip
+
+
+def contact_pattern(static: xr.Dataset) -> Figure:
+    """Draw the contact pressure of a tooth pair over path and face width in both meshes of a planet.
+
+    As `face_load`; grey where the end of a flank carries, under which the pressure has no limit.
+    """
+    return _over_flank(
+        static, "slice_pressure", 1e-6, "contact pressure [MPa]",
+        lambda one: f"up to {float(one['max_pressure'].max()) * 1e-6:.4g} MPa",
+    )  # fmt: skip
+
+
+def _over_flank(
+    static: xr.Dataset, name: str, scale: float, words: str, title: Callable[[xr.Dataset], str]
+) -> Figure:
+    """Draw values of a tooth pair over path and face width in both meshes of the first planet."""
+    from matplotlib.colors import ListedColormap
+
     figure, axes = new_figure(columns=2, sharey=True)
     names, place = [str(name) for name in static["mesh"].values], 1e3 * static["slice"].values
-    width, position = static.attrs["face_width"], static["position"].values
-    rows = [next(i for i, name in enumerate(names) if family(name) == kind) for kind in _KINDS]
+    position = static["position"].values
+    rows = [next(i for i, one in enumerate(names) if family(one) == kind) for kind in _KINDS]
     periods = int(static.attrs.get("mesh_periods", 1))
-    largest = static["slice_load"].values[rows].max() * 1e-3 / width
+    largest, most = (static[one].values[rows].max() for one in (name, "slice_load"))
     for ax, row in zip(axes, rows):
-        load = static["slice_load"].values[row].swapaxes(0, 1) * 1e-3 / width
+        values, load = (static[one].values[row].swapaxes(0, 1) for one in (name, "slice_load"))
         slot = np.arange(load.shape[1])[:, None]
         each = np.arange(len(position)).reshape(periods, -1)[slot.ravel() % periods]
-        path, load = (slot + position[each] % 1.0).ravel(), load[:, slot, each].reshape(len(place), -1)
-        shown = _while_loaded(load.max(axis=0) > 1e-9 * largest)
+        path = (slot + position[each] % 1.0).ravel()
+        values, load = (one[:, slot, each].reshape(len(place), -1) for one in (values, load))
+        carries = load > 1e-9 * most
+        shown = _while_loaded(carries.any(axis=0))
+        along = path[shown] - path[shown][0]
+        if (edge := carries & (values <= 0.0))[:, shown].any():
+            shade = np.ma.masked_equal(edge[:, shown], False)
+            ax.pcolormesh(along, place, shade, cmap=ListedColormap([GREY]), shading="nearest", alpha=0.5)
         image = ax.pcolormesh(
-            path[shown] - path[shown][0], place, np.ma.masked_less_equal(load[:, shown], 0.0),
-            cmap="cividis", vmin=0.0, vmax=largest, shading="nearest",
+            along, place, np.ma.masked_less_equal(scale * values[:, shown], 0.0),
+            cmap="cividis", vmin=0.0, vmax=scale * largest or 1.0, shading="nearest",
         )  # fmt: skip
-        factor = float(static["face_load_factor"].values[row])
-        words = "path since the first contact [base pitches]"
-        label(ax, words, title=f"{names[row]}: K_Hβ = {factor:.3f}")
+        label(
+            ax, "path since the first contact [base pitches]",
+            title=f"{names[row]}: {title(static.isel(mesh=row))}",
+        )  # fmt: skip
     label(axes[0], y="place over the face width [mm]")
-    figure.colorbar(image, ax=axes, label="load per width [N/mm]", pad=0.02)
+    figure.colorbar(image, ax=axes, label=words, pad=0.02)
     return figure
 
 
@@ -516,7 +547,9 @@ def _degrees(gear: Gear, roll):
 def _static_figures(drawn: Drawn) -> dict[str, Figure]:
     """Draw the figures of static.nc."""
     static = drawn.data["static"]
-    over_width = {"face_load": face_load(static)} if "slice_load" in static else {}
+    over_width = {}
+    if "slice_load" in static:
+        over_width = {"face_load": face_load(static), "contact_pattern": contact_pattern(static)}
     return over_width | {
         "static_transmission_error": static_transmission_error(static),
         "mesh_stiffness": mesh_stiffness(static, face_width=planetary_set(drawn.case).sun.face_width),
@@ -643,6 +676,10 @@ _STATIC = Figures(
         "face_load": (
             "Load per width of one tooth pair from its first to its last contact over the face width, and "
             "the face load factor K_Hβ: the largest load per width over the mean of that pair."
+        ),
+        "contact_pattern": (
+            "Contact pressure of one tooth pair over path and face width, by Hertz's law from the load of "
+            "every slice; grey where the end of a flank carries, under which the pressure has no limit."
         ),
         "profile_deviations": (
             "Deviations of the loaded flanks from the involute over the roll angle, positive with more "

@@ -68,6 +68,18 @@ SLICE_VARIABLES = {
         "1",
         "K_H-beta: load per width, extrapolated to the ends, over the mean of its tooth pair",
     ),
+    "slice_pressure": ("mesh tooth slice position", "Pa", "largest pressure of a tooth pair in a slice"),
+    "mesh_misalignment": (
+        "mesh position",
+        "m",
+        "misalignment of the mesh under load over the face width, closer at z > 0 positive",
+    ),
+    "lead_offset": ("mesh position", "m", "smallest separation by leads and given misalignments"),
+    "member_tilt": (
+        "tilt position",
+        "rad",
+        "slope of the axis of a member that tilts, wind-up of the carrier",
+    ),
 }
 """Further ones of contact in slices over the width."""
 HELIX_VARIABLES = {
@@ -212,7 +224,10 @@ class StaticResult:
             return {}
         count = self.cycle.slice_load.shape[2]
         place = width * ((np.arange(count) + 0.5) / count - 0.5)
-        return {"slice": ("slice", place, "m", "place of a slice from the middle of the face width")}
+        return {
+            "slice": ("slice", place, "m", "place of a slice from the middle of the face width"),
+            "tilt": ("tilt", list(self.cycle.tilt_names), "1", "member and direction of its end z > 0"),
+        }
 
 
 @dataclass(frozen=True)
@@ -380,6 +395,9 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
     """
     names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
     force, back, pressure, motion, approach = (data[name].values for name in names)
+    if "lead_offset" in data:
+        # an offset of leads is no deflection
+        approach = approach - data["lead_offset"].values
     if pressure.max(initial=0.0) > 4e9:
         text = (
             f"the contact pressure reaches {pressure.max() * 1e-6:.0f} MPa: no steel carries that, and the "
@@ -413,6 +431,8 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
         if rise > _LAST_SLICE:
             text = f"the load rises by {100 * rise:.0f} % within the last slice: take more slices"
             yield Finding("W-FACE-LOAD", "static.slices", text)
+    if "slice_load" in data:
+        yield from _lifted(data)
     unloaded = (force + back)[: len(force) // 2] <= 0.0
     if unloaded.any() and force.any():
         planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
@@ -427,6 +447,20 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
     if ((back > 0) & ~(force > 0)).any():
         text = "some meshes carry on their back flanks alone: planets work against one another"
         yield Finding("W-BACK", "", text)
+
+
+def _lifted(data: xr.Dataset) -> Iterator[Finding]:
+    """Name the mesh of whose width the least ever carries, where an end lifts."""
+    carries = data["slice_load"].values.max(axis=(1, 3)) > 0.0
+    share = np.where(carries.any(axis=1), carries.mean(axis=1), 1.0)
+    worst = int(share.argmin())
+    if share[worst] < 1.0:
+        both = not carries[worst, [0, -1]].any()
+        text = (
+            f"{'both ends are' if both else 'one end is'} lifted: {100 * share[worst]:.0f} % of the width of "
+            f"{data['mesh'].values[worst]} carry at all"
+        )
+        yield Finding("W-LIFTED", "", text)
 
 
 def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
@@ -469,6 +503,7 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
     }
     if "face_load_factor" in data:
         columns["K_Hbeta"] = lambda one: f"{float(one.face_load_factor):.3f}"
+        columns["misaligned [um]"] = lambda one: f"{float(one.mesh_misalignment.mean()) * 1e6:+.2f}"
     notes = [
         f"load share of a planet {share.min():.4f} to {share.max():.4f} "
         f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",

@@ -18,7 +18,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.gear_set import material_of, planetary_set, set_deviations
-from femgear.case.sections import OVER_WIDTH, Case
+from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES, Case
 from femgear.contact.bodies import Bodies, Sector, Sectors, helical_stiffness, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.root_stress import (
@@ -29,7 +29,7 @@ from femgear.contact.root_stress import (
     root_stress_cycle,
 )
 from femgear.contact.slices import width_waves, with_held_ring
-from femgear.contact.supports import RIGID, Supports
+from femgear.contact.supports import RIGID, Supports, WidthSupports, tilting_members
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
 from femgear.errors import CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import foundation
@@ -107,7 +107,8 @@ def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:
     for name, motion, key, modules, remedy in (
         (
             "the flanks approach",
-            cycle.deflection,
+            # an offset of leads is none of the flanks' own
+            cycle.deflection - (0.0 if cycle.lead_offset is None else cycle.lead_offset),
             "operation.torque",
             LARGEST_APPROACH,
             "reduce operation.torque or the errors",
@@ -169,6 +170,7 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
             key="static.slices", value=count, limit=f"at least {math.ceil(_PER_OVERLAP * abs(overlap)) + 1}",
             remedy="give static.slices = 25", **where,
         )  # fmt: skip
+    _check_width_entries(case, helical=bool(overlap))
     if count < 2:
         for gear in ("sun", "planet", "ring"):
             for i, one in enumerate(getattr(case, gear).modifications):
@@ -179,6 +181,11 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
                         file=case.location(key), remedy="give static.slices = 25",
                     )  # fmt: skip
         return
+    try:
+        tilting_members(gears, width_supports(case, gears), count)
+    except ContactError as error:
+        error.file = case.location(error.key or "")
+        raise
     if static.back_flanks:
         raise CaseError("slices have no back flanks", key="static.back_flanks", remedy=remedy, **where)
     if case.planet.bearing_clearance and static.members == "elastic":
@@ -188,6 +195,20 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
             "slices are thinner than a quarter of the module", key="static.slices", value=count,
             limit=f"at most {int(4 * width / gears.sun.module)}", remedy=remedy, **where,
         )  # fmt: skip
+
+
+def _check_width_entries(case: Case, *, helical: bool) -> None:
+    """Refuse tilts and twists without slices, and those of helical teeth, which axial motions press too."""
+    if case.static.slices > 1 and not helical:
+        return
+    for name, entries in WIDTH_ENTRIES.items():
+        given = vars(getattr(case, name))
+        for key in (f"{name}.{entry}" for entry in entries if given[entry] not in (None, ())):
+            raise CaseError(
+                "tilts and twists over the face width are those of spur teeth in slices", code="E-SLICES",
+                key=key, file=case.location(key),
+                remedy="leave them out, or take a lead slope" if helical else "give static.slices = 25",
+            )  # fmt: skip
 
 
 def over_width(
@@ -207,7 +228,8 @@ def over_width(
     elastic = static.members == "elastic"
     foundation = ring_foundation(case, sectors.ring) if elastic or loaded else None
     waves = width_waves(sectors, material, count, foundation, _helical(case))
-    found: dict[str, Any] = {"waves": waves, "slices": count}
+    supports = width_supports(case, gears)
+    found: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": supports}
     if overlap := _overlap(case, gears):
         found["ahead"] = overlap * ((np.arange(count) + 0.5) / count - 0.5)
     return found | ({"held_waves": with_held_ring(waves, sectors)} if loaded else {})
@@ -317,6 +339,33 @@ def case_supports(case: Case) -> Supports:
         carrier=case.carrier.support_stiffness,
         planet=case.planet.bearing_stiffness,
         planet_clearance=case.planet.bearing_clearance,
+    )
+
+
+def width_supports(case: Case, gears: PlanetarySet) -> WidthSupports:
+    """Make what holds the members of a case against tilting and twisting over the face width.
+
+    The sun twists as a tube between its bore and its root circle, or the diameter that the case gives.
+    """
+    sun, carrier, rigidity = case.sun, case.carrier, None
+    if sun.torque_end is not None:
+        outer = sun.torsion_diameter or 2.0 * gears.sun.root_radius
+        rigidity = material_of(case).shear_modulus * np.pi / 32 * (outer**4 - (2.0 * sun.bore_radius) ** 4)
+        if rigidity <= 0.0:
+            raise CaseError(
+                "the sun has no section to twist", code="E-RANGE", key="sun.torsion_diameter",
+                value=f"{outer * 1e3:.6g} mm", limit=f"above its bore, {2e3 * sun.bore_radius:.6g} mm",
+                file=case.location("sun.torsion_diameter"),
+            )  # fmt: skip
+    sign = {"front": -1, "back": 1, None: 1}
+    return WidthSupports(
+        sun=sun.tilt_stiffness,
+        carrier=carrier.tilt_stiffness,
+        planet=case.planet.tilt_stiffness,
+        wind_up=carrier.wind_up_stiffness,
+        wind_up_end=sign[carrier.torque_end],
+        sun_rigidity=rigidity,
+        sun_end=sign[sun.torque_end],
     )
 
 

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from page_examples import check_documented
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, FemgearError
 from femgear.trains.elastic.stages import solve_modes
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.figures import face_load
+from femgear.trains.static.figures import contact_pattern, face_load
 from femgear.trains.static.results import describe_static
 from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[3]
+WIND_UP = {"carrier.wind_up_stiffness": "1e5 N m/rad", "carrier.torque_end": "front"}
 SLOPE = {"kind": "lead slope", "amount": "10 um"}
 
 
@@ -51,6 +52,12 @@ def test_the_load_over_the_width_is_drawn(misaligned):
     image = figure.axes[0].collections[0].get_array()
     width, load = 25.0, misaligned[1].cycle.slice_load[0]
     assert image.max() == pytest.approx(load.max() / width) and np.ma.count_masked(image)
+    pressure = misaligned[1].cycle.slice_pressure[0]
+    drawn = contact_pattern(misaligned[1].dataset()).axes[0].collections[-1].get_array()
+    assert drawn.max() == pytest.approx(pressure.max() * 1e-6)
+    # the largest pressure is that of the load as it goes on to the end of the width
+    largest = misaligned[1].cycle.max_pressure[0].max()
+    assert pressure.max() <= largest < 1.1 * pressure.max()
 
 
 def test_modes_follow_the_softer_meshes(case, misaligned):
@@ -65,6 +72,10 @@ def test_modes_follow_the_softer_meshes(case, misaligned):
     ("changes", "key"),
     [
         ({"static.slices": 0, "sun.modifications": [SLOPE]}, "sun.modifications[0]"),
+        ({"static.slices": 0, "sun.misalignment": {"x": "0.1 mrad"}}, "sun.misalignment"),
+        ({"static.slices": 0, "planet.tilt_stiffness": "0 N m/rad"}, "planet.tilt_stiffness"),
+        ({"static.slices": 0, "sun.torque_end": "back"}, "sun.torque_end"),
+        ({"static.slices": 0, **WIND_UP}, "carrier.wind_up_stiffness"),
         ({"static.back_flanks": True}, "static.back_flanks"),
         ({"static.members": "elastic", "planet.bearing_clearance": "5 um"}, "planet.bearing_clearance"),
         ({"static.slices": 100}, "static.slices"),
@@ -83,9 +94,68 @@ def test_what_slices_cannot_do_is_refused(case, changes, key):
         ({"kind": "lead slope"}, "E-KEY-MISSING"),
         ({"kind": "lead crowning", "amount": "5 um", "start_diameter": "41 mm"}, "E-MODIFICATION"),
         ({"kind": "profile slope", "amount": "5 um", "length": "3 mm"}, "E-MODIFICATION"),
+        ({"kind": "flank twist", "amount": "5 um", "end_diameter": "41 mm"}, "E-MODIFICATION"),
+        ({"kind": "measured lead", "deviations": ["1 um"]}, "E-MODIFICATION"),
+        ({"kind": "measured profile", "places": ["1 mm"], "deviations": ["1 um"]}, "E-MODIFICATION"),
+        ({"kind": "measured lead", "places": ["1 mm"], "deviations": ["1 um"]}, "E-COUNT"),
     ],
 )
 def test_leads_have_their_own_entries(case, section, code):
     with pytest.raises(CaseError) as caught:
         with_values(case, {"sun.modifications": [section]})
     assert caught.value.code == code
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "key"),
+    [
+        ({"carrier.wind_up_stiffness": "1e5 N m/rad"}, "E-KEY-MISSING", "carrier.torque_end"),
+        ({"sun.torsion_diameter": "20 mm"}, "E-KEY-MISSING", "sun.torque_end"),
+        ({"carrier.torque_end": "back"}, "E-KEY-MISSING", "carrier.wind_up_stiffness"),
+        ({"sun.torque_end": "front", "sun.torsion_diameter": "17 mm"}, "E-RANGE", "sun.torsion_diameter"),
+        ({"planet.misalignment": [{"planet": 4}]}, "E-RANGE", "planet.misalignment[0].planet"),
+        ({"sun.misalignment": {"x": "19 mrad"}}, "E-RANGE", "sun.misalignment"),
+        (
+            {"planet.tilt_stiffness": "0 N m/rad", "carrier.tilt_stiffness": "0 N m/rad"},
+            "E-MECHANISM",
+            "carrier.tilt_stiffness",
+        ),
+    ],
+)
+def test_tilts_and_twists_that_cannot_be_are_refused(case, changes, code, key):
+    with pytest.raises(FemgearError) as caught:
+        solve_static(with_values(case, changes))
+    assert caught.value.code == code and caught.value.key == key
+
+
+def test_axes_askew_in_a_case(case):
+    """Any unit of an angle; an end that lifts is named with the share of the width that carries."""
+    askew = {"sun.misalignment": {"x": "0.8 mrad"}, "sun.tilt_stiffness": "1e5 N m/rad"}
+    data = solve_static(with_values(case, askew)).dataset()
+    other = solve_static(with_values(case, askew | {"sun.misalignment": {"x": "8e-4 rad"}})).dataset()
+    assert data.equals(other) and list(data["tilt"].values) == ["sun: x", "sun: y"]
+    assert "W-LIFTED" in data.attrs["warnings"] and "one end is lifted" in data.attrs["warnings"]
+    block = describe_static(data, 1.5e-3)
+    found = float(block.rows[1][block.header.index("misaligned [um]")])
+    assert found == pytest.approx(data["mesh_misalignment"].values[1].mean() * 1e6, abs=0.006)
+
+
+def test_an_offset_of_leads_is_no_deflection(case):
+    """A lead measured 200 um off its datum: flanks approach by that, teeth do not bend by it."""
+    line = {"kind": "measured lead", "places": ["-1 mm", "1 mm"], "deviations": ["-200 um", "-200 um"]}
+    plain, offset = (
+        solve_static(with_values(case, {"sun.modifications": lead})).dataset() for lead in ([], [line])
+    )
+    rise = offset["ste"].values[:3] - plain["ste"].values[:3]
+    assert rise == pytest.approx(np.full(rise.shape, 200e-6), rel=1e-9)
+    assert "W-DEFLECTION" not in offset.attrs["warnings"]
+
+
+def test_modes_know_tilts_and_twists(case):
+    """Of the loaded state: wind-up and torsion are in series with the meshes."""
+    soft = {"sun.torque_end": "front", "planet.tilt_stiffness": "1e4 N m/rad", **WIND_UP}
+    found = [
+        solve_modes(one, solve_static(one)).dataset()["mesh_stiffness"].values
+        for one in (with_values(case, soft), case)
+    ]
+    assert (found[0] < found[1]).all()
