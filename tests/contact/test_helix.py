@@ -88,7 +88,6 @@ def test_loads_balance_the_torque_and_go_over_the_width(gears, bodies, waves):
 def test_softer_teeth_are_those_of_a_softer_material(gears, bodies, waves):
     """Young's modulus and section factor scale all separations of one load alike."""
     soft = helical_stiffness(np.radians(20.0))
-    assert soft == pytest.approx(0.8830, abs=1e-4)
     helical = replace(waves, bodies=tuple(replace(one, helical=soft) for one in waves.bodies))
     found = walk(gears, replace(bodies, helical=soft), helical, 1.0, positions=6)
     steel = replace(STEEL, youngs_modulus=soft * STEEL.youngs_modulus)

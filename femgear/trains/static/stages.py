@@ -152,7 +152,7 @@ def _helical(case: Case) -> float:
     """Stiffness of the teeth over that of their transverse section; plane contact knows no helix."""
     if case.helix_angle is None or case.static.slices < 2:
         return 1.0
-    return helical_stiffness(case.helix_angle)
+    return helical_stiffness(base_helix_angle(case.sun.pressure_angle, case.helix_angle))
 
 
 def check_slices(case: Case, gears: PlanetarySet) -> None:
