@@ -62,6 +62,22 @@ def marks(folder):
     return sorted(int(x) for file in Path(folder).iterdir() for x in file.read_text().split())
 
 
+def memory_of_client_and_scheduler(address, scheduler, folder):
+    """MB of this process and of a scheduler after 1000, 10 000 and 30 000 calls of `marked` on a cluster."""
+    import psutil
+
+    from femgear.study.runner import Dask
+
+    watched, sizes = (psutil.Process(), psutil.Process(scheduler)), []
+    with Dask(address) as runner:
+        for done, count in ((0, 1000), (1000, 9000), (10_000, 20_000)):
+            items = ((str(folder), done + x) for x in range(count))
+            found = [index for index, _ in runner.map(marked, items)]
+            assert sorted(found) == [*range(count)]
+            sizes.append([one.memory_info().rss / 1e6 for one in watched])
+    return sizes
+
+
 def _valley(variant):
     x, y = variant.case.dynamics.damping_ratio, variant.case.carrier.mass
     return 1.0 + (0.6 - x) ** 2 + 10.0 * (y - x**2 / 0.36) ** 2

@@ -36,6 +36,7 @@ QUICK = {
     "static.flank_elements": 6,
     "static.stresses": False,
     "dynamics.mesh_harmonics": 6,
+    "runup.count": 12,
     "housing.published": [],
     "housing.microphone": {"distance": "0.5 m", "angle": "30 deg"},
 }
@@ -47,19 +48,8 @@ def out(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     (folder / "case.toml").write_text(to_toml(with_values(read_case(CASE), QUICK)), encoding="utf-8")
     assert cli.main(["run", str(folder / "case.toml"), "-o", str(folder / "out"), "--no-pictures"]) == 0
-    options = [
-        "--xlsx",
-        "--mat",
-        "--wav",
-        "--uff",
-        "--quality",
-        "--duration",
-        "2.4",
-        "--pressure-scale",
-        "0.5",
-        "--acceleration-scale",
-        "1",
-    ]
+    options = ["--xlsx", "--mat", "--wav", "--uff", "--quality", "--duration", "2.4", "--run-up", "0.5"]
+    options += ["--pressure-scale", "0.5", "--acceleration-scale", "1"]
     assert cli.main(["export", str(folder / "out"), *options]) == 0
     return folder / "out"
 
@@ -109,7 +99,7 @@ def test_wav_files_of_a_run_are_its_lines(out, results):
 
 
 def test_samples_beyond_the_full_scale_are_warned_of(out, tmp_path, capsys):
-    options = ["export", str(out), "--wav", "--duration", "0.1", "-o", str(tmp_path / "a")]
+    options = ["export", str(out), "--wav", "--duration", "0.1", "--run-up", "0.5", "-o", str(tmp_path / "a")]
     assert cli.main([*options, "--pressure-scale", "1e-3", "--acceleration-scale", "1e5"]) == 0
     said = capsys.readouterr().err
     assert said.count("W-CLIPPING") == 1 and "raise --pressure-scale" in said
@@ -126,7 +116,7 @@ def test_samples_beyond_the_full_scale_are_warned_of(out, tmp_path, capsys):
 
 
 def test_what_a_rate_leaves_out_is_told_with_its_size(out, results, tmp_path, capsys):
-    options = ["export", str(out), "--wav", "--duration", "0.1", "-o", str(tmp_path / "a")]
+    options = ["export", str(out), "--wav", "--duration", "0.1", "--run-up", "0.5", "-o", str(tmp_path / "a")]
     assert cli.main([*options, "--rate", "2000"]) == 0
     said = [line for line in capsys.readouterr().err.splitlines() if "m/s^2 r.m.s." in line]
     lines = run_up_lines(results.runup, results.housing.attrs)[0]  # it has the loudest speed
