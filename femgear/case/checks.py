@@ -7,9 +7,9 @@ floating members that the planets cannot hold.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import accumulate
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from femgear.case.quantities import SPEED
 from femgear.case.sections import (
@@ -61,17 +61,22 @@ def _check_operation(case: Case):
             limit=f"below {SPEED.show(to)}" if name == "from" else f"above {SPEED.show(start)}",
             remedy="give runup.from below runup.to; defaults are around operation.speeds",
         )  # fmt: skip
-    if 0.0 < abs(operation.torque) < LEAST_TORQUE:
-        yield CaseError(
-            "the torque is too small to be told from none", code="E-RANGE", key="operation.torque",
-            value=f"{operation.torque:g} N m",
-            limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
-        )  # fmt: skip
+    yield from check_torque(operation.torque)
     if not case.rigid and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
         yield CaseError(
             "the ring is the fixed member but nothing keeps it from turning", code="E-MECHANISM",
             key="ring.foundation_tangential", value="0 N/m^3", limit="above 0 N/m^3",
             remedy="give a tangential foundation, or hold another member",
+        )  # fmt: skip
+
+
+def check_torque(torque: float) -> Iterator[CaseError]:
+    """Refuse a torque [N m] that is neither none nor enough to be told from none."""
+    if 0.0 < abs(torque) < LEAST_TORQUE:
+        yield CaseError(
+            "the torque is too small to be told from none", code="E-RANGE", key="operation.torque",
+            value=f"{torque:g} N m",
+            limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
         )  # fmt: skip
 
 
@@ -172,16 +177,21 @@ def _check_numbers(case: Case):
 
 def _check_deviations(case: Case):
     """What no entry shows alone: amounts against the module, numbers of teeth and planets."""
-    most = LARGEST_DEVIATION * case.sun.module
     yield from _check_planets(case)
-    for name in ("sun", "planet", "ring"):
+    yield from check_gear_deviations(case, _amounts(case))
+
+
+def check_gear_deviations(case: Any, more: Iterable[tuple[str, float]] = ()) -> Iterator[CaseError]:
+    """Refuse pitch deviations and amounts that cannot be, of all gears; and `more` by key [m]."""
+    most = LARGEST_DEVIATION * case.module
+    for name in case.gear_names:
         gear = getattr(case, name)
         tables = [] if gear.errors is None else [(f"{name}.errors", gear.errors)]
         if name == "planet":
             tables += [(f"planet.individual[{i}]", one) for i, one in enumerate(gear.individual)]
         for key, table in tables:
             yield from _check_pitch(key, table, gear.teeth, most)
-    for key, value in _amounts(case):
+    for key, value in (*_gear_amounts(case), *more):
         if abs(value) > most:
             yield CaseError(
                 f"a deviation of {value * 1e6:.6g} um is not plausible", code="E-RANGE", key=key,
@@ -243,14 +253,18 @@ def _check_cumulative(key: str, pitch: tuple[float, ...], most: float):
         )  # fmt: skip
 
 
-def _amounts(case: Case):
-    """Keys and values [m] of all deviations."""
-    for name in ("sun", "planet", "ring"):
+def _gear_amounts(case: Case):
+    """Keys and values [m] of the deviations of all gears."""
+    for name in case.gear_names:
         gear = getattr(case, name)
         for i, one in enumerate(gear.modifications):
             for entry in ("amount", "deviations"):
                 yield f"{name}.modifications[{i}].{entry}", _largest(getattr(one, entry))
         yield from _error_amounts(f"{name}.errors", gear.errors)
+
+
+def _amounts(case: Case):
+    """Keys and values [m] of what only planetary sets have."""
     for i, one in enumerate(case.planet.individual):
         yield from _error_amounts(f"planet.individual[{i}]", one)
     yield from _error_amounts("carrier.errors", case.carrier.errors)

@@ -255,7 +255,7 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
         return table.get("kind") == "measured profile" and "deviations" not in table
 
     found = {}
-    for gear in ("sun", "planet", "ring"):
+    for gear in ("sun", "planet", "ring", "gear_1", "gear_2"):
         entry = f"{gear}.modifications"
         found |= embed_points(data, entry, name, read=read_profile, units=_PROFILE_UNITS, plain=plain)
     return found

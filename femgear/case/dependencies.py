@@ -12,9 +12,8 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Set
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import driving_torque
 from femgear.errors import CaseError
-from femgear.gears.kinematics import torques
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -51,7 +50,7 @@ def static_entries(case: Case) -> Entries:
     if case.static.members == "fixed":
         left_out, parts = left_out | _FOUNDATION, parts | _SUPPORTS
     # whatever member the torque is given for: the flanks see that of the sun
-    sun = torques(planetary_set(case), member=case.operation.input, torque=case.operation.torque).sun
+    sun = driving_torque(case)
     kept = _HELIX | ({"helical.hand"} if case.static.slices > 1 else set())
     return {"operation.torque": f"{sun:.9g} N m on the sun", **_entries(case, left_out, parts, kept=kept)}
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, singledispatch
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,9 +22,7 @@ from femgear.case.sections import (
     CarrierErrors,
     Case,
     GearErrors,
-    PlanetSection,
     RingErrors,
-    RingSection,
     SunSection,
 )
 from femgear.errors import CaseError, FemgearError, GeometryError
@@ -40,6 +38,7 @@ from femgear.gears.deviations import (
     tooth_displacements,
 )
 from femgear.gears.gear import Gear
+from femgear.gears.kinematics import torques
 from femgear.gears.modifications import (
     EndRelief,
     FlankForm,
@@ -75,7 +74,7 @@ def need_set(case: Any) -> None:
         )  # fmt: skip
 
 
-def planetary_set(case: Case) -> PlanetarySet:
+def planetary_set(case: Any) -> PlanetarySet:
     """Make the gears of a case, closed on their centre distance [m] and checked.
 
     Profile shifts, or the centre distance, that the case leaves out are found. Gears of a helical case are
@@ -84,9 +83,8 @@ def planetary_set(case: Case) -> PlanetarySet:
     GeometryError, with file and line: what cannot be made, assembled or run (see
     `femgear.gears.checks.check_set`), and members that float without being held (E-MECHANISM).
     """
-    need_set(case)
     try:
-        return _checked_set(case)
+        return checked_set(case)
     except GeometryError as error:
         in_terms_of_the_case(error, case)
         if (error.key or "").endswith("rack.root_radius"):
@@ -96,8 +94,10 @@ def planetary_set(case: Case) -> PlanetarySet:
         raise
 
 
-def _checked_set(case: Case) -> PlanetarySet:
-    """Gears of a case, closed on their centre distance and checked as a set."""
+@singledispatch
+def checked_set(case: Any) -> Any:
+    """Make the gears of a case, closed on their centre distance and checked; others register their own."""
+    need_set(case)
     closed = _closed_set(case)
     check_set(closed)
     check_floating(case, closed)
@@ -107,33 +107,28 @@ def _checked_set(case: Case) -> PlanetarySet:
 def _closed_set(case: Case) -> PlanetarySet:
     """Gears of a case, closed on their centre distance but not yet checked as a set."""
     ring = case.ring
-    cutter = None
-    if ring.cutter_teeth is not None:
-        shift = ring.cutter_profile_shift * _normal_modules(case)
-        cutter = PinionCutter(teeth=ring.cutter_teeth, profile_shift=shift)
     left_open = (("sun", case.sun.profile_shift), ("ring", ring.profile_shift))
     return close_set(
-        _gear(case, case.sun, "sun", case.sun.bore_radius),
-        _gear(case, case.planet, "planet", case.planet.bore_radius),
-        _gear(case, ring, "ring", ring.outer_radius, cutter),
+        gear_of(case, case.sun, "sun", case.sun.bore_radius),
+        gear_of(case, case.planet, "planet", case.planet.bore_radius),
+        gear_of(case, ring, "ring", ring.outer_radius, internal=True),
         planet_angles=case.set.planet_angles or equal_planet_angles(case.set.planets),
         centre_distance=case.set.centre_distance,
         find=tuple(name for name, shift in left_open if shift is None),
     )
 
 
-def _gear(
-    case: Case,
-    section: SunSection | PlanetSection | RingSection,
-    name: str,
-    rim: float,
-    cutter: PinionCutter | None = None,
-) -> Gear:
-    given, module, pressure_angle = section.rack or case.rack, case.sun.module, case.sun.pressure_angle
+def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = False) -> Gear:
+    """Make a gear of a case from its section; the rim is its bore or outer radius [m]."""
+    given, module, pressure_angle = section.rack or case.rack, case.module, case.pressure_angle
     rack = BasicRack(**given.model_dump())
     if case.helix_angle is not None:
         module, pressure_angle = transverse_tool(module, pressure_angle, case.helix_angle)
         rack = transverse_rack(rack, case.helix_angle)
+    cutter = None
+    if internal and section.cutter_teeth is not None:
+        shift = section.cutter_profile_shift * _normal_modules(case)
+        cutter = PinionCutter(teeth=section.cutter_teeth, profile_shift=shift)
     return Gear(
         teeth=section.teeth,
         module=module,
@@ -141,7 +136,7 @@ def _gear(
         profile_shift=(section.profile_shift or 0.0) * _normal_modules(case),
         face_width=case.set.face_width,
         rim_radius=rim,
-        internal=name == "ring",
+        internal=internal,
         rack=rack,
         cutter=cutter,
         tip_diameter=section.tip_diameter,
@@ -159,7 +154,7 @@ def _normal_modules(case: Case) -> float:
 def _refusal(case: Case) -> str:
     """Code of what is wrong with the gears of a case; empty where nothing is."""
     try:
-        _checked_set(case)
+        checked_set(case)
     except GeometryError as error:
         return error.code
     return ""
@@ -217,34 +212,46 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
     return (first - 1) / 1e4 if first else None
 
 
-def set_deviations(case: Case) -> SetDeviations:
+def set_deviations(case: Any) -> SetDeviations:
     """Turn modifications and errors of a case into separations of the loaded flanks [m].
 
     GeometryError: modifications that the flanks cannot have (E-MODIFICATION), with file and line, and what
     `planetary_set` refuses.
     """
     s = planetary_set(case)
+    found = made_deviations(case, s)
+    try:
+        check_deviations(found, s)
+    except GeometryError as error:
+        error.file = case.location(error.key or "")
+        raise
+    return found
+
+
+@singledispatch
+def made_deviations(case: Any, s: Any) -> SetDeviations:
+    """Make the deviations of a case with the gears `s`, not yet checked; others register their own."""
     sun, ring = case.sun.errors or GearErrors(), case.ring.errors or RingErrors()
     planets = [_planet_errors(case, n) for n in range(1, s.n_planets + 1)]
-    pitch = [_pitch(errors, s.planet) for errors in planets]
+    pitch = [pitch_of(errors, s.planet) for errors in planets]
     oval, misaligned = ring.ovality, np.zeros((s.n_planets, 2))
     for askew in case.planet.misalignment:
         misaligned[askew.planet - 1] = askew.radial, askew.tangential
-    found = replace(
+    return replace(
         no_deviations(s),
-        sun=_flank_form(case, s.sun),
-        planet_sun_side=_flank_form(case, s.planet, "sun side"),
-        planet_ring_side=_flank_form(case, s.planet, "ring side"),
-        ring=_flank_form(case, s.ring),
+        sun=flank_form(case, s.sun),
+        planet_sun_side=flank_form(case, s.planet, "sun side"),
+        planet_ring_side=flank_form(case, s.planet, "ring side"),
+        ring=flank_form(case, s.ring),
         # a tooth that stands further on brings its left flank nearer to the mate, its right flank away
-        sun_pitch=-_pitch(sun, s.sun),
+        sun_pitch=-pitch_of(sun, s.sun),
         planet_pitch=[-displaced for displaced in pitch],
         planet_ring_side_pitch=pitch,
-        ring_pitch=-_pitch(ring, s.ring),
-        sun_runout=_runout(sun),
-        planet_runout=tuple(_runout(errors) for errors in planets),
-        ring_runout=_runout(ring),
-        carrier_runout=_runout(case.carrier.errors or CarrierErrors()),
+        ring_pitch=-pitch_of(ring, s.ring),
+        sun_runout=runout_of(sun),
+        planet_runout=tuple(runout_of(errors) for errors in planets),
+        ring_runout=runout_of(ring),
+        carrier_runout=runout_of(case.carrier.errors or CarrierErrors()),
         pin_errors=pin_errors(case, s),
         ovality=Ovality(**oval.model_dump()) if oval else Ovality(),
         sun_thickness=sun.thickness_reduction or 0.0,
@@ -257,12 +264,16 @@ def set_deviations(case: Case) -> SetDeviations:
             if (askew := getattr(case, name).misalignment) is not None
         },
     )
-    try:
-        check_deviations(found, s)
-    except GeometryError as error:
-        error.file = case.location(error.key or "")
-        raise
-    return found
+
+
+@singledispatch
+def driving_torque(case: Case, torque: float | None = None) -> float:
+    """Find the torque on the sun [N m] under one on the input, by default the case's.
+
+    Others register their own.
+    """
+    value = case.operation.torque if torque is None else torque
+    return torques(planetary_set(case), member=case.operation.input, torque=value).sun
 
 
 def pin_errors(case: Case, gears: PlanetarySet) -> np.ndarray:
@@ -283,16 +294,17 @@ def _planet_errors(case: Case, number: int) -> GearErrors:
     return common.model_copy(update=given)
 
 
-def _pitch(errors: GearErrors, gear: Gear) -> np.ndarray:
+def pitch_of(errors: GearErrors, gear: Gear) -> np.ndarray:
     """Displacement of every tooth on the base circle [m]."""
     return tooth_displacements(gear, cumulative=errors.cumulative_pitch, single=errors.pitch)
 
 
-def _runout(errors: CarrierErrors) -> Runout:
+def runout_of(errors: CarrierErrors) -> Runout:
+    """Make the runout of a table of errors."""
     return Runout(errors.runout_amplitude or 0.0, errors.runout_phase or 0.0)
 
 
-def _flank_form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
+def flank_form(case: Any, gear: Gear, side: str = "both") -> FlankForm:
     """Form of both flanks of sun or ring, or of a planet's flank on the "sun side" or the "ring side"."""
     found = []
     for i, section in enumerate(getattr(case, gear.name).modifications):

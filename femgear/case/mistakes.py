@@ -217,7 +217,8 @@ def _assembly(error: GeometryError, case: Case) -> None:
 
 def _shift_left_out(error: GeometryError, case: Case) -> None:
     """A shift that was found is no entry to change: name the one that it follows from."""
-    sections = {"sun": case.sun, "ring": case.ring}
+    others = {"sun": "ring", "ring": "sun", "gear_1": "gear_2", "gear_2": "gear_1"}
+    sections = {name: getattr(case, name) for name in case.gear_names if name in others}
     gear, _, entry = (error.key or "").partition(".")
     if gear not in sections or entry != "profile_shift" or sections[gear].profile_shift is not None:
         return
@@ -225,7 +226,7 @@ def _shift_left_out(error: GeometryError, case: Case) -> None:
         error.key, given = "set.centre_distance", f"{1e3 * case.set.centre_distance:.6g} mm"
         remedy = "change the centre distance or the tooth numbers"
     else:
-        other = "ring" if gear == "sun" else "sun"
+        other = others[gear]
         error.key, given = f"{other}.profile_shift", sections[other].profile_shift
         remedy = f"change the {other}'s profile shift or the tooth numbers"
     found = f"{error.value:.5g}" if isinstance(error.value, float) else error.value
@@ -248,7 +249,7 @@ def _in_transverse_section(error: GeometryError, case: Case) -> None:
 
 def added_material(case: Case) -> Iterator[Finding]:
     """Find reliefs and crownings with a negative amount [m]: most are slips of the sign."""
-    for gear in ("sun", "planet", "ring"):
+    for gear in case.gear_names:
         for i, one in enumerate(getattr(case, gear).modifications):
             if one.kind in ("tip relief", "root relief", "profile crowning") and one.amount < 0.0:
                 yield Finding(

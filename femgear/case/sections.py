@@ -398,7 +398,7 @@ class MachineSection(Section):
     coupling_stiffness: Annotated[float, Quantity(TORSION, 1e-3, 1e15)]
 
 
-def _speed_range(value: object) -> object:
+def speed_range(value: object) -> object:
     """List of speeds of a table ``{from, to, count}``, equally spaced."""
     if not isinstance(value, dict):
         if not isinstance(value, list) or not value:
@@ -429,7 +429,7 @@ class OperationSection(Section):
     input: Member
     fixed: Member
     torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
-    speeds: Annotated[tuple[Speed, ...], Values(max_length=100_000), BeforeValidator(_speed_range)]
+    speeds: Annotated[tuple[Speed, ...], Values(max_length=100_000), BeforeValidator(speed_range)]
 
 
 class StaticSection(Section):
@@ -511,6 +511,7 @@ class Case(Section, ReadCase):
     """
 
     train: ClassVar[str] = "elastic"
+    gear_names: ClassVar[tuple[str, ...]] = ("sun", "planet", "ring")
     format: Annotated[int, Count(1, FORMAT)] = FORMAT
     title: Title
     set: SetSection
@@ -527,6 +528,16 @@ class Case(Section, ReadCase):
     dynamics: DynamicsSection = DynamicsSection()
     housing: HousingSection = HousingSection()
     runup: RunupSection = RunupSection()
+
+    @property
+    def module(self) -> float:
+        """Module of all gears, of helical teeth the normal one [m]."""
+        return self.sun.module
+
+    @property
+    def pressure_angle(self) -> float:
+        """Pressure angle of all gears, of helical teeth the normal one [rad]."""
+        return self.sun.pressure_angle
 
     @property
     def rigid(self) -> bool:

@@ -18,11 +18,11 @@ from femgear.contact.bodies import Bodies, FlankCompliance, station_weights
 from femgear.contact.flank_pairs import (
     BACK_SIDE,
     DRIVE_SIDE,
-    LEFT,
-    RIGHT,
     FlankPair,
+    acting_flanks,
     admissible_arcs,
     flank_side,
+    mesh_count,
     mesh_pairs,
     pair_separations,
     profile_form,
@@ -34,8 +34,8 @@ from femgear.contact.supports import MovingMembers
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import SetDeviations
-from femgear.gears.kinematics import rotation_approach
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.pair import EACH
+from femgear.gears.planetary import GearSet
 
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
 WIDTH = 3.2
@@ -88,30 +88,45 @@ class Windows:
 
 @dataclass(frozen=True)
 class MeshWindows(Windows):
-    """Contact windows of all meshes and positions: of 2N meshes, or of 4N with the back flanks.
+    """Contact windows of all meshes and positions, or of twice as many with the back flanks.
 
     Parameters
     ----------
-    n_planets : int
-        N: the planets that have windows.
+    gears : PlanetarySet or GearPair
+        With the N planets that have windows.
     tooth : (2, meshes, pairs) int array
         Tooth numbers on gear 1 and gear 2 in the first mesh period.
     turns : (P,) int array
         Mesh periods passed at each position; one of the record's periods has one number.
-    local : (2, 4, cells, cells) array
-        Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh and all layouts.
+    local : (kinds, 4, cells, cells) array
+        Half-plane compliance of both bodies within a window [m/N], for all kinds of mesh and layouts.
     cell_area : (meshes, 4, cells) array
         Areas of the pressure cells in all layouts [m^2].
     images : int
         Sectors of the set that are all in the same state: the planets are those of the first.
     """
 
-    n_planets: int
+    gears: GearSet
     tooth: np.ndarray
     turns: np.ndarray
     local: np.ndarray
     cell_area: np.ndarray
     images: int = 1
+
+    @property
+    def n_planets(self) -> int:
+        """Number N of planets that have windows."""
+        return self.gears.n_planets
+
+    @property
+    def driver(self) -> int:
+        """Number of the motion on which the torque acts, the last of the rotations."""
+        return self.gears.rotation_approach.shape[1] - 1
+
+    @property
+    def meshes(self) -> int:
+        """Number of meshes, back sides not counted."""
+        return mesh_count(self.gears)
 
     @property
     def cells(self) -> int:
@@ -132,7 +147,7 @@ class MeshWindows(Windows):
     def missed(self, positions, deflection) -> np.ndarray:
         """Separation from the nearest pair within which no omitted pair penetrates [m]; zero if none does.
 
-        ``deflection`` (2N, P) is the approach of the drive flanks of every mesh [m] at `positions` (P,).
+        ``deflection`` (meshes, P) is the approach of the drive flanks of every mesh [m] at `positions` (P,).
         """
         gap = self.smallest_gap[:, positions]
         # a back flank approaches when its drive flank parts
@@ -155,7 +170,7 @@ class ContactProblem:
         Separations [m], and areas of the pressure cells [m^2].
     G : (n, m) array
         Approach per unit motion.
-    supports : (2N, 2N) or, with back flanks, (4N, 4N) array
+    supports : (meshes, meshes) array
         Compliance of sprung members between the meshes [m/N], part of `compliance`.
     mesh, pair, cell : (n,) int arrays
     position : int
@@ -305,7 +320,7 @@ class Candidates:
 
 
 def mesh_windows(
-    planetary_set: PlanetarySet,
+    planetary_set: GearSet,
     bodies: Bodies,
     *,
     share: float,
@@ -331,7 +346,7 @@ def mesh_windows(
         Pressure cells in a window.
     deviations : SetDeviations, optional
     both_flanks : bool
-        Back flanks as well, as meshes 2N .. 4N - 1.
+        Back flanks as well, as the second half of the meshes.
     """
     tau = cycle_positions(positions)
     # a tooth pair has one number in all slices; what is rounded off their mean belongs to the same period
@@ -349,7 +364,8 @@ def mesh_windows(
         zeta, tooth = _tooth_pairs(planetary_set, pairs, phase, direction, tau - turns)
         shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
         shift += clearance[:, None, None]
-        for kind, rows in enumerate((slice(0, N), slice(N, 2 * N))):
+        for kind, contact_pair in enumerate(pairs):
+            rows = slice(kind * N, (kind + 1) * N)
             options = {
                 "width": widths[kind],
                 "cells": cells,
@@ -357,9 +373,9 @@ def mesh_windows(
                 "line_of_action": contact == "line_of_action",
                 "form": profile_form(planetary_set, deviations, kind, direction < 0),
             }
-            found.append(windows(pairs[kind], zeta[rows], shift=shift[rows], **options))
+            found.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
         teeth.append(tooth)
-    return _gathered(found, np.concatenate(teeth, axis=1), turns, bodies, cells)
+    return _gathered(found, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
 
 
 def in_windows(
@@ -499,8 +515,8 @@ def contact_candidates(
 ) -> Candidates:
     """Assemble separations and compliance of all candidates at some positions.
 
-    The motions are those of the planets and of the sun, as arcs on their base circles [m], positive in the
-    direction in which the sun drives, and then the free motions of `members` [m].
+    The motions are those of the planets and of the sun (gear 1 of a pair alone), as arcs on their base
+    circles [m], positive in the direction in which the sun drives, and then the free motions of `members`.
 
     Parameters
     ----------
@@ -521,10 +537,11 @@ def contact_candidates(
     at = mesh[filled[1]], positions[filled[0]], pair[filled]
     polynomials = _window_polynomials(setup.cells)[layout]
     local = np.zeros((*layout.shape, setup.cells, setup.cells))
-    local[filled] = setup.local[at[0] // N % 2, layout[filled]]
+    local[filled] = setup.local[at[0] // N % len(setup.gears.kinds), layout[filled]]
     local[filled] += _corner_part(setup, bodies, *at, polynomials[filled])
     local /= bodies.helical
-    approach = np.vstack([rotation_approach(N), -rotation_approach(N)])[:meshes]
+    turns = setup.gears.rotation_approach
+    approach = np.vstack([turns, -turns])[:meshes]
     supports = np.zeros((meshes, meshes))
     if members is not None:
         if setup.images == 1:
@@ -556,42 +573,41 @@ def assemble_contact(
 
 def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> np.ndarray:
     """Regular compliance between the nodes of all windows, as `Candidates.images` has it."""
-    N, (P, W) = setup.n_planets, pair.shape
+    P, W = pair.shape
     smooth = np.zeros((setup.images, P, W, 3, W, 3))
-    for name, members, gear, side in windows_of_bodies(mesh, N):
-        body = getattr(bodies, name)
+    for number, members, gear, side in windows_of_bodies(setup.gears, mesh):
+        body = bodies.gears[number]
         if body is None:
             continue
         j, i = mesh[members], pair[:, members]
         roll = setup.roll[gear, j, positions[:, None], i]
-        sectors = smooth[:1] if name == "planet" else smooth
+        sectors = smooth[:1] if number == EACH else smooth
         _add_body(sectors, body, members, roll, setup.tooth[gear, j, i], side)
     return smooth / bodies.helical
 
 
-def windows_of_bodies(mesh: np.ndarray, n_planets: int) -> list[tuple]:
-    """List sun, every planet and ring with the windows on them, by the meshes (W,) of all windows.
+def windows_of_bodies(gears: GearSet, mesh: np.ndarray) -> list[tuple]:
+    """List all bodies of a set with the windows on them, by the meshes (W,) of all windows.
 
-    Name of the body, windows (w,), which gear of its mesh the body is in each (w,), and the flanks (w,).
+    Number of the gear, windows (w,), which gear of its mesh the body is in each (w,), and the flanks (w,).
     """
     # on the back side every gear carries on its other flank
-    back = mesh >= 2 * n_planets
-    sun_side = mesh % (2 * n_planets) < n_planets
-    left, right = np.where(back, RIGHT, LEFT), np.where(back, LEFT, RIGHT)
-    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-    gear, side = np.where(sun_side, 1, 0), np.where(sun_side, left, right)
-    found = [("sun", sun_side, 0 * gear, left)]
-    found += [("planet", mesh % n_planets == planet, gear, side) for planet in range(n_planets)]
-    found.append(("ring", ~sun_side, 0 * gear + 1, left))
-    return [(name, np.flatnonzero(on), gear[on], side[on]) for name, on, gear, side in found]
+    found, (back, front) = [], np.divmod(mesh, mesh_count(gears))
+    for number, acting in acting_flanks(gears):
+        place, side = np.full((2, mesh_count(gears)), -1)
+        for one, gear, flank in acting:
+            place[one], side[one] = gear, flank
+        on = np.flatnonzero(place[front] >= 0)
+        found.append((number, on, place[front[on]], np.abs(side[front[on]] - back[on])))
+    return found
 
 
 def _tooth_pairs(planetary_set, pairs, phase, direction, passed) -> tuple[np.ndarray, np.ndarray]:
-    """Path coordinates (2N, P, pairs) [m] and teeth (2, 2N, pairs) of all pairs that may come near.
+    """Path coordinates (meshes, P, pairs) [m] and teeth (2, meshes, pairs) of all pairs that may come near.
 
     `passed` (P,) are the positions less the mesh periods passed.
     """
-    pitch = planetary_set.sun.base_pitch
+    pitch = planetary_set.base_pitch
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
     passed = direction * passed
@@ -624,7 +640,7 @@ def _window_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
     return (loaded + surface_displacement(distance, half[:, None, :], *constants)) / bodies.face_width
 
 
-def _gathered(found: list[Windows], tooth, turns, bodies: Bodies, cells: int) -> MeshWindows:
+def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int) -> MeshWindows:
     """Join all meshes and drop the leading and trailing pairs that never come near."""
     used = np.concatenate([w.near.any(axis=1) for w in found])
     # every mesh keeps the same number of pairs, starting at its own first candidate
@@ -642,10 +658,12 @@ def _gathered(found: list[Windows], tooth, turns, bodies: Bodies, cells: int) ->
     area = parts["cell"] * cells * bodies.face_width
     return MeshWindows(
         **parts,
-        n_planets=len(found[0].cell),
+        gears=gears,
         tooth=tooth[:, mesh[:, None], take],
         turns=turns,
-        local=np.stack([_window_compliance(w.cell[0] * cells, cells, bodies) for w in found[:2]]),
+        local=np.stack(
+            [_window_compliance(w.cell[0] * cells, cells, bodies) for w in found[: len(gears.kinds)]]
+        ),
         cell_area=area[:, None, None] * np.diff(cell_edges(cells)),
     )
 
@@ -676,9 +694,9 @@ def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):
 def _corner_part(setup: MeshWindows, bodies: Bodies, mesh, position, pair, polynomials) -> np.ndarray:
     """What tip corners of both flanks add within each window, shape (windows, cells, cells) [m/N]."""
     total = np.zeros((len(mesh), polynomials.shape[1], polynomials.shape[1]))
-    sun_side = mesh // setup.n_planets % 2 == 0
-    of_gear = ((bodies.sun, bodies.planet), (bodies.planet, bodies.ring))
-    for rows, flanks in zip((sun_side, ~sun_side), of_gear, strict=True):
+    of_kind = mesh // setup.n_planets % len(setup.gears.kinds)
+    for kind, pairing in enumerate(setup.gears.mates):
+        rows, flanks = of_kind == kind, [bodies.gears[number] for number in pairing]
         place, values = (mesh[rows], position[rows], pair[rows]), polynomials[rows]
         parts = []
         for roll, flank in zip(setup.roll, flanks, strict=True):

@@ -244,18 +244,18 @@ class _ActiveSets:
 
         Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
         """
-        found, N = self.found, self.found.setup.n_planets
+        found, meshes = self.found, self.found.setup.meshes
         width, material = found.bodies.face_width, found.bodies.material
         modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
-        share = self.given.sum() / N
+        share = self.given.sum() / found.setup.n_planets
         gap = np.where(found.candidate, found.gap, np.inf)
         smallest = gap.min(axis=-1).reshape(len(gap), len(found.approach), -1)
         reached = smallest < smallest.min(axis=-1, keepdims=True) + share / (ROUGH_STIFFNESS * width)
         # back flanks carry nothing unless the solution says so
-        reached[:, 2 * N :] = False
+        reached[:, meshes:] = False
         force = share / np.maximum(reached.sum(axis=-1, keepdims=True), 1)
         edge = np.where(reached, smallest + 2 * force / (np.pi * modulus * width), -np.inf if share else 0.0)
-        pushed = -self.arms @ (found.approach[: 2 * N] / self.arm).sum(axis=0)
+        pushed = -self.arms @ (found.approach[:meshes] / self.arm).sum(axis=0)
         springs = pushed > 0.8 * pushed.max(initial=0.0)
         return gap <= edge.reshape(*gap.shape[:2], 1), np.tile(springs, (len(gap), 1))
 

@@ -36,7 +36,7 @@ from femgear.fe.elasticity import BoundaryStress, Material, stiffness, tangentia
 from femgear.fe.grid import Grid, mirror
 from femgear.fe.meshing import mesh_outlines
 from femgear.gears.gear import Gear, tooth_thickness
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import GearSet, PlanetarySet
 from femgear.gears.tooth import half_sector
 
 # external gears are slender along the axis only; the ring's rim is thin and free at its faces
@@ -57,11 +57,16 @@ class Sector:
 
 @dataclass(frozen=True)
 class Sectors:
-    """Sectors of the three kinds of gears."""
+    """Sectors of the three kinds of gears; a pair has its gears 1 and 2 in place of sun and planet."""
 
     sun: Sector
     planet: Sector
-    ring: Sector
+    ring: Any = None
+
+    @property
+    def gears(self) -> tuple[Sector, ...]:
+        """Sectors of all gears of the set in order."""
+        return tuple(one for one in (self.sun, self.planet, self.ring) if one is not None)
 
 
 @dataclass(frozen=True)
@@ -130,15 +135,20 @@ class Bodies:
     """Flank compliances of the three kinds of gears and their common material.
 
     ``helical`` is the stiffness of helical teeth over that of spur teeth of the same transverse section, see
-    `helical_stiffness`.
+    `helical_stiffness`. A pair has its gears 1 and 2 in place of sun and planet, and no ring.
     """
 
     sun: FlankCompliance
     planet: FlankCompliance
-    ring: FlankCompliance
+    ring: Any
     material: Material
     face_width: float
     helical: float = 1.0
+
+    @property
+    def gears(self) -> tuple[Any, ...]:
+        """Compliances of the gears in the order of the set."""
+        return self.sun, self.planet, self.ring
 
 
 def helical_stiffness(base_helix_angle: float) -> float:
@@ -153,7 +163,7 @@ def helical_stiffness(base_helix_angle: float) -> float:
 
 
 def make_sectors(
-    planetary_set: PlanetarySet,
+    planetary_set: GearSet,
     material: Material,
     *,
     flank_elements: int = 24,
@@ -165,7 +175,7 @@ def make_sectors(
     ``flank_elements`` are the element edges along a flank, ``refine`` divides all element sizes, ``cache`` is
     the folder of generated grids.
     """
-    gears = (planetary_set.sun, planetary_set.planet, planetary_set.ring)
+    gears = planetary_set.gears
     halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in gears]
     try:
         grids = mesh_outlines(halves, cache=cache)
@@ -197,14 +207,21 @@ def make_bodies(
     ring_foundation : (2n, 2n) sparse matrix, optional
         Stiffness of an elastic foundation of the ring, which then is not held [N/m].
     """
-    # the ring's roots need a solution of their own: its sector is not of one plane state, see `root_stress`
-    sun, planet = (
-        flank_compliance(s.grid, s.gear, material, s.stiffness, depth=depth, root_state=TEETH_STATE)
-        for s in (sectors.sun, sectors.planet)
-    )
-    s = sectors.ring
-    ring = flank_compliance(s.grid, s.gear, material, s.stiffness, depth=depth, foundation=ring_foundation)
-    return Bodies(sun, planet, ring, material, face_width=sectors.sun.gear.face_width)
+    # roots of internal gears need a solution of their own: no sector of one plane state, see `root_stress`
+    found = [
+        flank_compliance(
+            s.grid,
+            s.gear,
+            material,
+            s.stiffness,
+            depth=depth,
+            root_state=None if s.gear.internal else TEETH_STATE,
+            foundation=ring_foundation if s.gear.internal else None,
+        )
+        for s in sectors.gears
+    ]
+    ring = found[2] if len(found) > 2 else None
+    return Bodies(found[0], found[1], ring, material, face_width=sectors.sun.gear.face_width)
 
 
 def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:

@@ -1,4 +1,4 @@
-"""The walk through the mesh cycle: all 2N meshes of a planetary set solved together at each position.
+"""The walk through the mesh cycle: all meshes of a planetary set or a pair solved together at each position.
 
 It gives loads, motions and stiffness of the meshes (`MeshCycle`). A negative torque loads the other flanks:
 it is the mirror image of a set under a positive one (`femgear.contact.flank_pairs`).
@@ -33,6 +33,7 @@ from femgear.contact.batch import (
     solve_batch,
 )
 from femgear.contact.bodies import Bodies
+from femgear.contact.flank_pairs import mesh_count
 from femgear.contact.slices import SliceState, WidthWaves, solve_slices, with_ends
 from femgear.contact.supports import (
     RIGID,
@@ -49,9 +50,9 @@ from femgear.contact.supports import (
 )
 from femgear.errors import ContactError
 from femgear.gears.deviations import SetDeviations, lead_separation, mirrored_deviations
-from femgear.gears.kinematics import rotation_approach
 from femgear.gears.modifications import FlankTwist
-from femgear.gears.planetary import PlanetarySet, mirrored_set
+from femgear.gears.pair import EACH
+from femgear.gears.planetary import GearSet, PlanetarySet, mirrored_set
 
 LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""
@@ -112,41 +113,44 @@ class CycleOptions:
 
 @dataclass(frozen=True)
 class MeshCycle:
-    """Static solution over one mesh period or several; meshes in the order sun-planet 1..N, planet 1..N-ring.
+    """Static solution over one mesh period or several.
+
+    The M meshes are in the order sun-planet 1..N, planet 1..N-ring; of a pair alone gear 1 stands for the
+    sun, gear 2 for its only planet.
 
     Parameters
     ----------
     position : (P,) array
         In mesh periods.
-    deflection : (2N, P) array
+    deflection : (M, P) array
         Static transmission error of every mesh along its line of action: the approach of the flanks
         by the motions of their gears, deviations included [m].
     sun_arc : (P,) array
         Rotation of the sun behind the unloaded, exact set, as an arc on its base circle [m].
-    force, back_force : (2N, P) arrays
+    force, back_force : (M, P) arrays
         Force on the drive and on the back flanks of the mesh, torque over base radius [N].
-    stiffness : (2N, P) array
+    stiffness : (M, P) array
         Tangent mesh stiffness dF/d delta at constant loads of the other meshes [N/m].
-    tooth_load : (2N, T, P) array
+    tooth_load : (M, T, P) array
         Load of each simultaneous tooth pair, in the order of the path coordinate [N]; from one mesh period to
         the next a pair goes on to the next place, whatever the sign of the torque.
-    path : (2N, T, P) array
+    path : (M, T, P) array
         Path coordinate of each tooth pair, from the pitch point in the direction of motion [m].
-    tooth : (2, 2N, T) int array
+    tooth : (2, M, T) int array
         Tooth numbers of the pairs on gear 1 and gear 2 in the first mesh period, see
         `femgear.contact.flank_pairs`.
-    back_tooth_load, back_path : (2N, T, P) arrays
+    back_tooth_load, back_path : (M, T, P) arrays
         The same of the back flanks' own pairs [N], [m]: the path coordinate falls with the position, and
         grows towards the tip of gear 1 as that of the drive flanks does (with a negative torque, both towards
         its root). All of the back flanks is zero where they were not looked at.
-    back_tooth : (2, 2N, T) int array
+    back_tooth : (2, M, T) int array
         Their tooth numbers, counted as those of `tooth`.
     bearing_force : (N, 2, P) array
         Force of the pin on each planet, x and y in the frame of the carrier [N].
-    max_pressure : (2N, P) array
+    max_pressure : (M, P) array
         Largest pressure of the contacts that do not reach the end of a flank [Pa]: under a sharp edge the
         pressure has no limit, it grows with every halving of the cells.
-    edge_contact : (2N, P) bool array
+    edge_contact : (M, P) bool array
         Whether a contact of the mesh reaches a tip corner or the start of the involute.
     open_planets : (N, P) bool array
         Planets that carry nothing.
@@ -165,20 +169,20 @@ class MeshCycle:
     unknowns : int
         Largest number of pressure cells at one position.
     message : str
-    pressure : (2N, T, C, P) array, optional
+    pressure : (M, T, C, P) array, optional
         Pressure in the cells of the drive flanks [Pa], where it was asked for.
-    pressure_offset : (2N, C) array, optional
+    pressure_offset : (M, C) array, optional
         Place of these cells along the common tangent [m], positive towards growing path coordinates, from
         the middle of their window.
-    pressure_centre : (2N, T, P) array, optional
+    pressure_centre : (M, T, P) array, optional
         Place of the middle of each window from the point on the path [m]: zero but for windows that end at
         the end of a flank or follow modified profiles. To be added to `pressure_offset`.
-    held_stiffness : (2N, P) array, optional
+    held_stiffness : (M, P) array, optional
         As `stiffness`, with the ring held at its outer surface [N/m].
-    held_compliance : (2N, 2N, P) array, optional
+    held_compliance : (M, M, P) array, optional
         Tangent compliance between the meshes through their common bodies, the ring held, supports left out
         [m/N]; zero where a mesh carries nothing.
-    slice_load : (2N, T, S, P) array, optional
+    slice_load : (M, T, S, P) array, optional
         Load of each tooth pair in equal slices of the width, times their number [N].
     slice_pressure : (2N, T, S, P) array, optional
         Largest pressure of the tooth pair in these slices [Pa], as `max_pressure`: zero at ends of flanks.
@@ -232,7 +236,7 @@ class MeshCycle:
 
     @property
     def face_load_factor(self) -> np.ndarray | None:
-        """K_H-beta of every mesh (2N,): largest load per width of a tooth pair over the mean of that pair.
+        """K_H-beta of every mesh (M,): largest load per width of a tooth pair over the mean of that pair.
 
         At the position where the load per width is largest; towards the ends of the width it goes on as
         between the last two slices. Of helical teeth, whose pairs carry on a part of the width each: the
@@ -253,22 +257,22 @@ class MeshCycle:
 
     @property
     def overall_deflection(self) -> np.ndarray:
-        """Transmission error from sun to ring over every planet, shape (N, P) [m].
+        """Transmission error from sun to what is held over every planet, shape (N, P) [m].
 
         With fixed centres the sum of the two mesh deflections; moving members add their part.
         """
-        return np.broadcast_to(self.sun_arc, (len(self.deflection) // 2, len(self.sun_arc)))
+        return np.broadcast_to(self.sun_arc, self.open_planets.shape)
 
     @property
     def secant_stiffness(self) -> np.ndarray:
-        """Force over deflection, zero where a mesh carries nothing, shape (2N, P) [N/m]."""
+        """Force over deflection, zero where a mesh carries nothing, shape (M, P) [N/m]."""
         loaded = (self.force > 0) & (self.deflection > 0)
         return np.divide(self.force, self.deflection, out=np.zeros_like(self.force), where=loaded)
 
     @property
     def load_share(self) -> np.ndarray:
         """Share of every planet in the sun's torque, shape (N, P); zero without torque."""
-        n = len(self.force) // 2
+        n = len(self.open_planets)
         carried = self.force[:n] - self.back_force[:n]
         total = carried.sum(axis=0)
         # teeth may be wedged without torque: what is left of their forces is then rounding
@@ -277,7 +281,7 @@ class MeshCycle:
 
     @property
     def wedged(self) -> np.ndarray:
-        """Meshes that are loaded on both flanks at once, shape (2N, P)."""
+        """Meshes that are loaded on both flanks at once, shape (M, P)."""
         return (self.force > 0) & (self.back_force > 0)
 
 
@@ -301,8 +305,8 @@ _ODD = ("path", "back_path", "tooth", "back_tooth", "pressure_offset", "pressure
 
 
 def loaded_image(
-    planetary_set: PlanetarySet, sun_torque: float, deviations: SetDeviations | None = None
-) -> tuple[PlanetarySet, np.ndarray, SetDeviations | None]:
+    planetary_set: GearSet, sun_torque: float, deviations: SetDeviations | None = None
+) -> tuple[GearSet, np.ndarray, SetDeviations | None]:
     """Find the set whose drive flanks a torque loads: the set itself, or its mirror image.
 
     The mirror image turns the other way: position ``tau`` of the set is position ``-tau`` of the image.
@@ -319,7 +323,7 @@ def loaded_image(
 
 
 def walk_mesh_cycle(
-    planetary_set: PlanetarySet,
+    planetary_set: GearSet,
     bodies: Bodies,
     *,
     sun_torque: float,
@@ -343,7 +347,7 @@ def walk_mesh_cycle(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
+    planetary_set : PlanetarySet or GearPair
     bodies : Bodies
         Flank compliances and material.
     sun_torque : float
@@ -369,15 +373,15 @@ def walk_mesh_cycle(
     options = options or CycleOptions()
     position = cycle_positions(positions, periods=periods)
     solved, order, deviations = loaded_image(planetary_set, sun_torque, deviations)
-    mirrored = solved is not planetary_set
+    mirrored = sun_torque < 0
     if mirrored:
         position, options = -position[::-1], options.mirrored(order)
-    record = cycle_without_load(solved.n_planets, position, periods=periods, contact=contact, options=options)
+    record = cycle_without_load(solved, position, periods=periods, contact=contact, options=options)
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
         springs, images = bearing_springs(solved, supports, members), 1
         if springs is None and options.planet_gaps is None and not options.both_flanks and not options.waves:
-            images = math.gcd(planet_symmetry(solved, deviations), solved.sun.teeth)
+            images = math.gcd(planet_symmetry(solved, deviations), solved.gears[0].teeth)
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
         tilting = tilting_members(solved, options.width_supports, options.slices) if options.waves else None
         walk = _Walk(
@@ -413,7 +417,7 @@ def over_slices(record, options: CycleOptions, *, periods: int = 1) -> dict[str,
 
 
 def cycle_without_load(
-    n_planets: int,
+    gears: GearSet,
     position: np.ndarray,
     *,
     periods: int,
@@ -425,8 +429,8 @@ def cycle_without_load(
     ``position``, ``periods`` and ``contact`` are those of `MeshCycle`; the options say whether there are
     pressures, and in how many cells.
     """
-    options, N, P = options or CycleOptions(), n_planets, len(position)
-    size = {"g": 2, "m": 2 * N, "n": N, "s": 1, "c": options.cells, "w": options.slices, "t": P}
+    options, N, P = options or CycleOptions(), gears.n_planets, len(position)
+    size = {"g": 2, "m": mesh_count(gears), "n": N, "s": 1, "c": options.cells, "w": options.slices, "t": P}
     kinds = {"tooth": int, "back_tooth": int, "iterations": int, "edge_contact": bool}
     values: dict[str, Any] = {
         name: np.zeros([size[axis] for axis in axes], kinds.get(name, float))
@@ -452,7 +456,7 @@ def cycle_without_load(
     )
 
 
-def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | None = None) -> int:
+def planet_symmetry(planetary_set: GearSet, deviations: SetDeviations | None = None) -> int:
     """Count the rotations that map the planets, with their errors, onto one another."""
     symmetry, N, d = planetary_set.rotations, planetary_set.n_planets, deviations
     if d is None:
@@ -470,24 +474,32 @@ def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | Non
 
 
 def _first_planets(
-    planetary_set: PlanetarySet, count: int, deviations: SetDeviations | None
-) -> tuple[PlanetarySet, SetDeviations | None]:
+    planetary_set: GearSet, count: int, deviations: SetDeviations | None
+) -> tuple[GearSet, SetDeviations | None]:
     """Take the first planets of a set, and their deviations."""
-    names = "planet_pitch", "planet_ring_side_pitch", "planet_runout", "pin_errors", "planet_thickness"
-    names += ("planet_misalignment",)
+    if not isinstance(planetary_set, PlanetarySet) or count == planetary_set.n_planets:
+        return planetary_set, deviations
+    names = (
+        "planet_misalignment",
+        "planet_pitch",
+        "planet_ring_side_pitch",
+        "planet_runout",
+        "pin_errors",
+        "planet_thickness",
+    )
     if deviations is not None:
         deviations = replace(deviations, **{name: getattr(deviations, name)[:count] for name in names})
     return replace(planetary_set, planet_angles=planetary_set.planet_angles[:count]), deviations
 
 
-def first_windows(planetary_set: PlanetarySet, bodies: Bodies, sun_torque: float) -> tuple[float, float]:
+def first_windows(planetary_set: GearSet, bodies: Bodies, sun_torque: float) -> tuple[float, float]:
     """Share [N] and nearest [m] of the first windows under a torque [N m], as `mesh_windows` takes them."""
     s, width = planetary_set, bodies.face_width
     # without torque what one micrometre of wedging may carry
-    share = sun_torque / (s.sun.base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
+    share = sun_torque / (s.gears[0].base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
     rough = share / (ROUGH_STIFFNESS * width)
     # a ring on a soft foundation lets flanks come nearer than teeth alone do
-    yields = max(body.regular[0].diagonal().max() for body in (bodies.sun, bodies.planet, bodies.ring))
+    yields = max(body.regular[0].diagonal().max() for body in bodies.gears if body is not None)
     return share, max(3.0 * rough, rough + share * yields)
 
 
@@ -511,8 +523,8 @@ class _Walk:
     Where planets are in the same state at all times, those of the first ``sector`` are solved for all.
     """
 
-    planetary_set: PlanetarySet
-    sector: PlanetarySet
+    planetary_set: GearSet
+    sector: GearSet
     bodies: Bodies
     sun_torque: float
     deviations: SetDeviations | None
@@ -529,9 +541,9 @@ class _Walk:
 
     @property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of all meshes the one that is solved, (2N,), and the image of it that they are, (2N,)."""
+        """Of all meshes the one that is solved, (M,), and the image of it that they are, (M,)."""
         n, N = self.sector.n_planets, self.planetary_set.n_planets
-        kind, planet = np.divmod(np.arange(2 * N), N)
+        kind, planet = np.divmod(np.arange(mesh_count(self.planetary_set)), N)
         image, first = np.divmod(planet, n)
         return kind * n + first, image
 
@@ -565,7 +577,7 @@ class _Walk:
                 # bodies that are no elastic bodies are refused before anything rests on them
                 check_definite(candidates)
             load = np.zeros(candidates.approach.shape[1])
-            load[setup.n_planets] = self.sun_torque / self.planetary_set.sun.base_radius / self.images
+            load[setup.driver] = self.sun_torque / self.planetary_set.gears[0].base_radius / self.images
             state = solve_batch(candidates, load, self.springs)
             check_residual(candidates, state)
             found.append({} if empty.helical else self._at_positions(candidates, state))
@@ -590,13 +602,15 @@ class _Walk:
 
     def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
         """What `MeshCycle` keeps of some positions, by the names of its fields; of the planets solved."""
-        N, P, members, options = found.setup.n_planets, len(found.position), self.members, self.options
+        setup, P, members, options = found.setup, len(found.position), self.members, self.options
+        meshes, turns = setup.meshes, setup.gears.rotation_approach
+        driver, rotations = setup.driver, turns.shape[1]
         tooth_load = found.by_pairs(state.loads.sum(axis=-1))
-        force = np.zeros((4 * N, P))
+        force = np.zeros((2 * meshes, P))
         force[: len(tooth_load)] = tooth_load.sum(axis=1)
         # sprung members yield under the mesh forces, free ones are unknowns of the problem
         motion, sprung = np.zeros((len(members.names), P)), ~members.free
-        motion[members.free] = state.motions.T[N + 1 :] if self.images == 1 else 0.0
+        motion[members.free] = state.motions.T[rotations:] if self.images == 1 else 0.0
         whole = force if self.images == 1 else force[self._places[0]]
         pulled = members.approach[:, sprung].T @ whole[: len(members.approach)]
         motion[sprung] = -pulled / members.stiffness[sprung, None]
@@ -605,28 +619,28 @@ class _Walk:
         inner = np.where(at_edge, 0.0, pressure.max(axis=2))
         tangents = ContactTangents(found, state)
         values = {
-            "deflection": rotation_approach(N) @ state.motions.T[: N + 1]
-            + members.approach[: 2 * N * self.images][self._places[1] == 0] @ motion,
-            "sun_arc": state.motions[:, N],
-            "force": force[: 2 * N],
-            "back_force": force[2 * N :],
-            "stiffness": _both_flanks(tangents, found.images, N),
-            "tooth_load": tooth_load[: 2 * N],
+            "deflection": turns @ state.motions.T[:rotations]
+            + members.approach[: meshes * self.images][self._places[1] == 0] @ motion,
+            "sun_arc": state.motions[:, driver],
+            "force": force[:meshes],
+            "back_force": force[meshes:],
+            "stiffness": _both_flanks(tangents, found.images, meshes),
+            "tooth_load": tooth_load[:meshes],
             "member_motion": motion,
-            "edge_contact": found.by_pairs(at_edge)[: 2 * N].any(axis=1),
-            "max_pressure": found.by_pairs(inner).max(axis=1)[: 2 * N],
+            "edge_contact": found.by_pairs(at_edge)[:meshes].any(axis=1),
+            "max_pressure": found.by_pairs(inner).max(axis=1)[:meshes],
             "residual": state.residual,
             "iterations": state.iterations,
         }
         looked = options.both_flanks
-        values["back_tooth_load"] = tooth_load[2 * N :] if looked else np.zeros(tooth_load.shape)
+        values["back_tooth_load"] = tooth_load[meshes:] if looked else np.zeros(tooth_load.shape)
         if options.pressures:
-            values["pressure"] = found.by_pairs(pressure)[: 2 * N]
+            values["pressure"] = found.by_pairs(pressure)[:meshes]
         if options.held_bodies is not None:
             held = found.images_of(options.held_bodies)
-            values["held_stiffness"] = _both_flanks(tangents, held, N)
+            values["held_stiffness"] = _both_flanks(tangents, held, meshes)
             loaded = (values["force"] > 0).all(axis=0)
-            coupling = tangents.between_meshes(held, 2 * N)
+            coupling = tangents.between_meshes(held, meshes)
             coupling[:, loaded] = np.linalg.inv(coupling[:, loaded])
             coupling[:, ~loaded] = 0.0
             between, (every, sector) = np.fft.irfft(coupling, n=self.images, axis=0), self._places
@@ -639,8 +653,9 @@ class _Walk:
     ) -> dict[str, Any]:
         """What slices change in the plane solution of some positions, by the names of `MeshCycle`."""
         options, N, members, W = self.options, self.sector.n_planets, self.members, len(found.mesh)
+        driver, turns = found.setup.driver, found.setup.gears.rotation_approach
         assert options.waves is not None
-        curves = np.geomspace(_LEAST * load[N] / N, 4.0 * load[N], _FORCES)
+        curves = np.geomspace(_LEAST * load[driver] / N, 4.0 * load[driver], _FORCES)
         S, rows = options.slices, len(found.position)
         P = rows if options.ahead is None else rows // S
         lead, apart = self._leads(found, P)
@@ -651,35 +666,35 @@ class _Walk:
         sliced = solve_slices(found, laws, load, options.waves, apart, held, self.tilting)
         force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
         motion = np.zeros((len(members.names), P))
-        count = N + 1 + int(members.free.sum())
-        motion[members.free] = sliced.motions.T[N + 1 : count]
+        count = driver + 1 + int(members.free.sum())
+        motion[members.free] = sliced.motions.T[driver + 1 : count]
         # approach of every mesh in every slice by tilts, (2N, S, P)
-        tilts, turned = sliced.motions.T[count:], np.zeros((2 * N, S, P))
+        tilts, turned = sliced.motions.T[count:], np.zeros((len(force), S, P))
         twisted, angles = turned, tilts
         if self.tilting is not None:
             angles = self.tilting.angle[:, None] * tilts
             turned = self.tilting.approach @ tilts
             twisted = turned - np.einsum("vswt,ptw->vsp", self.tilting.coupling, sliced.of_meshes())
         motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung, None]
-        base = rotation_approach(N) @ sliced.motions.T[: N + 1] + members.approach @ motion
+        base = turns @ sliced.motions.T[: driver + 1] + members.approach @ motion
         nearest = (apart - np.moveaxis(twisted, -1, 0).swapaxes(1, 2)[..., found.mesh]).min(axis=1)
         values = self._of_pairs(found, state, laws, sliced) | {
             "deflection": base + turned.mean(axis=1),
-            "sun_arc": sliced.motions[:, N],
+            "sun_arc": sliced.motions[:, driver],
             "force": force,
             "member_motion": motion,
             "mesh_misalignment": _rise(twisted - lead[..., None]),
-            "lead_offset": apart.reshape(P, -1, 2 * N, W // (2 * N)).min(axis=(1, 3)).T,
+            "lead_offset": apart.reshape(P, -1, len(force), W // len(force)).min(axis=(1, 3)).T,
             "member_tilt": angles,
         }
         # the slice that comes nearest decides which pairs may touch
-        reach = base - nearest.reshape(P, 2 * N, W // (2 * N)).min(axis=-1).T
+        reach = base - nearest.reshape(P, len(force), W // (len(force))).min(axis=-1).T
         values["reach"] = np.repeat(reach, rows // P, axis=1)
         for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
             # tangents of the springs change; what they begin at is that of the cells
             values[name] = plane.get(name, 0.0) + tangent.T
         if held is not None:
-            loaded, between = (force > 0).all(axis=0), np.zeros((P, 2 * N, 2 * N))
+            loaded, between = (force > 0).all(axis=0), np.zeros((P, len(force), len(force)))
             if P == rows:
                 between = np.moveaxis(plane["held_compliance"], -1, 0).copy()
                 between[loaded] = np.linalg.inv(between[loaded])
@@ -741,15 +756,17 @@ class _Walk:
     def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
         """The record from what was found at its positions: with places of the tooth pairs, pins, message."""
         N, cells, every = self.planetary_set.n_planets, setup.cells, self._places[0]
-        drive, back = slice(0, 2 * N), slice(2 * N, 4 * N)
+        meshes = mesh_count(self.planetary_set)
+        drive, back = slice(0, meshes), slice(meshes, 2 * meshes)
         values = {name: np.concatenate([some[name] for some in found], axis=-1) for name in found[0]}
         path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
         path = path.reshape(*path.shape[:2], len(self.empty.position), -1).mean(axis=-1)
         if self.images > 1:
-            s, turned = self.planetary_set, np.zeros((2, 2 * N), int)
-            turned[0, :N], turned[1, N:] = (
-                self._places[1][:N] * (g.teeth // self.images) for g in (s.sun, s.ring)
-            )
+            s, turned = self.planetary_set, np.zeros((2, meshes), int)
+            for kind, place, number in ((k, p, pair[p]) for k, pair in enumerate(s.mates) for p in (0, 1)):
+                if number != EACH:
+                    teeth = s.gears[number].teeth // self.images
+                    turned[place, kind * N : (kind + 1) * N] = self._places[1][:N] * teeth
             tooth = tooth[:, every] + turned[..., None]
         values |= {"path": path[drive], "tooth": tooth[:, drive]}
         looked = self.options.both_flanks
@@ -831,16 +848,18 @@ def _equal_cell_pressure(found: Candidates, loads) -> np.ndarray:
     return pressure / area[:, None]
 
 
-def _both_flanks(tangents: ContactTangents, images, n_planets: int) -> np.ndarray:
-    """Tangent stiffness of every mesh (2N, P), both flanks together [N/m]."""
+def _both_flanks(tangents: ContactTangents, images, meshes: int) -> np.ndarray:
+    """Tangent stiffness of every mesh (M, P), both flanks together [N/m]."""
     found = tangents.of_meshes(images[0])
-    return found.reshape(len(found), -1, 2 * n_planets).sum(axis=1).T
+    return found.reshape(len(found), -1, meshes).sum(axis=1).T
 
 
-def _seen_from_front(cycle: MeshCycle, planetary_set: PlanetarySet, order) -> MeshCycle:
+def _seen_from_front(cycle: MeshCycle, planetary_set: GearSet, order) -> MeshCycle:
     """Results of the mirror image in the order of planets and positions of the original."""
     planet, angle = np.argsort(order), planetary_set.planet_angles[0]
-    own = {"m": np.concatenate([planet, planet + len(order)]), "n": planet, "g": np.arange(2)}
+    kinds = range(len(planetary_set.kinds))
+    own: dict[str, Any] = {"m": np.concatenate([planet + kind * len(order) for kind in kinds]), "n": planet}
+    own["g"] = np.arange(2)
     own["w"] = slice(None)
     found = {}
     for name, axes in ((name, axes) for axes, names in _AXES.items() for name in names):

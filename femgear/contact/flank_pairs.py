@@ -11,15 +11,16 @@ teeth a pair consists of is told by `tooth_numbers`; tooth number zero of every 
 `femgear.gears.kinematics.orientations` has its centreline.
 
 The back flanks of a set are the drive flanks of its mirror image (`femgear.gears.planetary.mirrored_set`),
-and so are the flanks that a negative torque loads (`femgear.contact.cycle.loaded_image`). Mesh ``2N + j`` is
-the back side of mesh ``j``: its path coordinate runs backwards, and its flanks approach when those of mesh
-``j`` part.
+and so are the flanks that a negative torque loads (`femgear.contact.cycle.loaded_image`). Of M meshes mesh
+``M + j`` is the back side of mesh ``j``: its path coordinate runs backwards, and its flanks approach when
+those of mesh ``j`` part.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -31,8 +32,9 @@ from femgear.gears.deviations import (
     tooth_separation,
 )
 from femgear.gears.gear import Gear
-from femgear.gears.kinematics import orientations
-from femgear.gears.planetary import PlanetarySet, mirrored_set
+from femgear.gears.kinematics import orientations, pitch_tooth
+from femgear.gears.pair import EACH
+from femgear.gears.planetary import GearSet, mirrored_set
 
 LEFT, RIGHT = 0, 1
 """Flanks of a tooth."""
@@ -145,95 +147,106 @@ def admissible_arcs(pair: FlankPair, zeta):
     return low, high
 
 
-def mesh_pairs(planetary_set: PlanetarySet) -> tuple[FlankPair, FlankPair]:
-    """Flank pairs sun-planet and planet-ring of a set."""
-    s = planetary_set
-    return (
-        flank_pair(s.sun, s.planet, s.centre_distance, s.working_pressure_angle_sun_planet),
-        flank_pair(s.planet, s.ring, s.centre_distance, s.working_pressure_angle_planet_ring),
+def mesh_pairs(planetary_set: GearSet) -> tuple[FlankPair, ...]:
+    """Flank pairs of every kind of mesh of a set, such as sun-planet and planet-ring."""
+    return tuple(
+        flank_pair(kind.gear_1, kind.gear_2, kind.centre_distance, kind.working_pressure_angle)
+        for kind in planetary_set.kinds
     )
 
 
-def acting_flanks(n_planets: int) -> tuple[list, list, list]:
-    """Drive flanks (mesh, gear of the pair, side) of the sun, of every planet and of the ring."""
-    N = n_planets
-    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-    planets = [[(n, 1, LEFT), (N + n, 0, RIGHT)] for n in range(N)]
-    return [(j, 0, LEFT) for j in range(N)], planets, [(N + j, 1, LEFT) for j in range(N)]
+def mesh_count(planetary_set: GearSet) -> int:
+    """Count the meshes of a set: one of every kind at every planet."""
+    return len(planetary_set.kinds) * planetary_set.n_planets
 
 
-def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the teeth of gear 1 and gear 2, (2N, pairs) each, that make up the pairs `index` (2N, pairs).
+def acting_flanks(planetary_set: GearSet) -> list[tuple[int, list[tuple[int, int, int]]]]:
+    """List all bodies of a set: number of the gear, and drive flanks (mesh, gear of the pair, side)."""
+    s, N, found = planetary_set, planetary_set.n_planets, []
+    for number, sense in enumerate(s.senses):
+        acting = [
+            # gear 1 pushes with the flank that goes ahead, gear 2 is pushed on the one behind
+            [(kind * N + n, place, LEFT if (sense > 0) == (place == 0) else RIGHT) for n in range(N)]
+            for kind, pair in enumerate(s.mates)
+            for place in np.flatnonzero(np.array(pair) == number).tolist()
+        ]
+        bodies = zip(*acting, strict=True) if number == EACH else [chain(*acting)]
+        found += [(number, list(body)) for body in bodies]
+    return found
+
+
+def tooth_numbers(planetary_set: GearSet, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the teeth of gear 1 and gear 2, (meshes, pairs) each, that make up the pairs `index`.
 
     A pair of mesh j with index i touches at the pitch point when the position is ``-(phase_j + i)``; the
     tooth is then at the planet's angle, less its half thickness, which fixes its place on the body.
     """
-    s, N = planetary_set, planetary_set.n_planets
-    psi = np.asarray(s.planet_angles) - s.planet_angles[0]
+    s, N, at = planetary_set, planetary_set.n_planets, orientations(planetary_set)
+    psi, exact = np.asarray(s.planet_angles), np.zeros((2, *index.shape))
     turns = np.asarray(s.mesh_phases)[:, None] + index
-    sun = psi[:, None] / s.sun.pitch_angle + turns[:N] - s.mesh_phases[0]
-    ring = psi[:, None] / s.ring.pitch_angle - (turns[N:] - s.mesh_phases[N])
-    (_, sun_side), (ring_side, _) = s.half_angles
-    first = np.asarray(s.mesh_phases)[:N, None]
-    planet_sun = -(turns[:N] - first)
-    planet_ring = (sun_side + ring_side - np.pi) / s.planet.pitch_angle - (turns[N:] - first)
-    exact = np.concatenate([sun, planet_ring]), np.concatenate([planet_sun, ring])
-    first_gear, second_gear = (np.rint(e).astype(int) for e in exact)
-    if max(np.abs(exact[0] - first_gear).max(), np.abs(exact[1] - second_gear).max()) > 1e-3:
+    for kind, pair in enumerate(s.mates):
+        rows = slice(kind * N, (kind + 1) * N)
+        for place, number in enumerate(pair):
+            away = psi + sum(pitch_tooth(s, kind, place)) - np.asarray(at.gears[number])
+            exact[place, rows] = away[:, None] / s.gears[number].pitch_angle + s.senses[number] * turns[rows]
+    whole = np.rint(exact).astype(int)
+    if np.abs(exact - whole).max() > 1e-3:
         raise ContactError(
             "the phases of the meshes and the positions of the teeth contradict one another",
             code="E-CONTACT",
             remedy="planet angles must be whole multiples of 360/(z_sun + z_ring) degrees from one another",
         )
-    return first_gear, second_gear
+    return whole[0], whole[1]
 
 
-def flank_side(planetary_set: PlanetarySet, direction: float) -> tuple[np.ndarray, np.ndarray]:
-    """Phases (2N,) and clearances (2N,) [m] of all meshes on the drive (+1) or back (-1) side.
+def flank_side(planetary_set: GearSet, direction: float) -> tuple[np.ndarray, np.ndarray]:
+    """Phases (meshes,) and clearances (meshes,) [m] of all meshes on the drive (+1) or back (-1) side.
 
     The clearance is the separation of that side when the drive flanks just touch: zero, or the backlash.
     """
     s, N = planetary_set, planetary_set.n_planets
     if direction > 0:
-        return np.asarray(s.mesh_phases), np.zeros(2 * N)
+        return np.asarray(s.mesh_phases), np.zeros(mesh_count(s))
     mirrored, order = mirrored_set(s)
-    phase = np.empty(2 * N)
-    phase[np.concatenate([order, order + N])] = mirrored.mesh_phases
+    phase = np.empty(mesh_count(s))
+    phase[_mesh_order(s, order)] = mirrored.mesh_phases
     phase += _mirrored_position(s, mirrored)
-    return phase, np.repeat([s.backlash_sun_planet, s.backlash_planet_ring], N)
+    return phase, np.repeat([kind.backlash for kind in s.kinds], N)
 
 
-def side_teeth(planetary_set: PlanetarySet, index: np.ndarray, direction: float):
-    """Find the teeth (2, 2N, pairs) of the pairs `index` (2N, pairs) of a side, in the drive side's count."""
+def side_teeth(planetary_set: GearSet, index: np.ndarray, direction: float):
+    """Find the teeth (2, meshes, pairs) of the pairs `index` of a side, in the drive side's count."""
     if direction > 0:
         return np.stack(tooth_numbers(planetary_set, index))
     s, N = planetary_set, planetary_set.n_planets
     mirrored, order = mirrored_set(s)
-    rows = np.concatenate([order, order + N])
+    rows = _mesh_order(s, order)
     teeth = np.empty((2, *index.shape), int)
     teeth[:, rows] = -np.stack(tooth_numbers(mirrored, index[rows]))
     # the tooth that the mirror image counts as zero stands here, counted in the original
     here, image = orientations(s), orientations(mirrored, _mirrored_position(s, mirrored))
-    opposite = np.empty(N)
-    opposite[order] = image.planets
-
-    def offset(reflected, original, gear):
-        return np.rint((2 * s.planet_angles[0] - reflected - original) / gear.pitch_angle).astype(int)
-
-    of_planets = offset(opposite, np.array(here.planets), s.planet)[:, None]
-    teeth[0, :N] += offset(image.sun, here.sun, s.sun)
-    teeth[1, :N] += of_planets
-    teeth[0, N:] += of_planets
-    teeth[1, N:] += offset(image.ring, here.ring, s.ring)
+    for kind, pair in enumerate(s.mates):
+        for place, number in enumerate(pair):
+            reflected = np.array(image.gears[number])
+            if number == EACH:
+                reflected[order] = image.gears[number]
+            away = 2 * s.planet_angles[0] - reflected - np.array(here.gears[number])
+            offset = np.rint(away / s.gears[number].pitch_angle).astype(int)
+            teeth[place, kind * N : (kind + 1) * N] += offset[:, None]
     return teeth
 
 
+def _mesh_order(planetary_set: GearSet, order: np.ndarray) -> np.ndarray:
+    """Meshes (meshes,) of a set in the order of the planets (N,) of its mirror image."""
+    return np.concatenate([order + kind * len(order) for kind in range(len(planetary_set.kinds))])
+
+
 def profile_form(
-    planetary_set: PlanetarySet, deviations: SetDeviations | None, kind: int, back: bool
+    planetary_set: GearSet, deviations: SetDeviations | None, kind: int, back: bool
 ) -> Callable | None:
     """Separation [m] by deviations of the profiles as a function of both roll lengths [m], or None.
 
-    `kind` is 0 for the sun-planet and 1 for the planet-ring meshes.
+    `kind` is that of the mesh, 0 for sun-planet and 1 for planet-ring.
     """
     if deviations is None or not any(form.profile for form in deviations.mesh_forms(kind, back)):
         return None
@@ -243,36 +256,39 @@ def profile_form(
 
 
 def pair_separations(
-    planetary_set: PlanetarySet, deviations: SetDeviations | None, tooth, turns, tau, *, back: bool
+    planetary_set: GearSet, deviations: SetDeviations | None, tooth, turns, tau, *, back: bool
 ) -> np.ndarray:
-    """Compute the separations of whole tooth pairs by errors of pitch and position [m], (2N, P, pairs).
+    """Compute the separations of whole tooth pairs by errors of pitch and position [m], (meshes, P, pairs).
 
     Parameters
     ----------
-    tooth : (2, 2N, pairs) int array
+    tooth : (2, meshes, pairs) int array
         Tooth numbers during the first mesh period.
     turns, tau : (P,) int array, (P,) array
         Mesh periods passed, and positions [mesh periods].
     back : bool
         Whether it is the back side.
     """
-    N = planetary_set.n_planets
-    shift = np.zeros((2 * N, len(tau), tooth.shape[2]))
+    meshes = mesh_count(planetary_set)
+    shift = np.zeros((meshes, len(tau), tooth.shape[2]))
     if deviations is None:
         return shift
     shift += body_separation(deviations, planetary_set, tau, back=back)[:, :, None]
-    for mesh in range(2 * N):
-        first, second = (tooth[gear, mesh] + tooth_steps(mesh, gear, N) * turns[:, None] for gear in (0, 1))
+    for mesh in range(meshes):
+        first, second = (
+            tooth[gear, mesh] + tooth_steps(planetary_set, mesh, gear) * turns[:, None] for gear in (0, 1)
+        )
         shift[mesh] += tooth_separation(deviations, mesh, first, second, back=back)
     return shift
 
 
-def tooth_steps(mesh, gear, n_planets: int):
+def tooth_steps(planetary_set: GearSet, mesh, gear):
     """Change of the tooth numbers of a mesh from one mesh period to the next (arrays or numbers).
 
     The sun's teeth move on by one, -1 in its count; those of planets and ring back, +1.
     """
-    return np.where((np.asarray(mesh) < n_planets) & (np.asarray(gear) == 0), -1, 1)
+    kind = np.asarray(mesh) // planetary_set.n_planets
+    return -np.array(planetary_set.senses)[np.array(planetary_set.mates)[kind, gear]]
 
 
 def _roll(gear: Gear, radius: float) -> float:
@@ -300,5 +316,5 @@ def _arc_of_foot(pair: FlankPair, zeta, roll_2):
 def _mirrored_position(planetary_set, mirrored) -> float:
     """Position of the mirror image, in [0, 1), at which its sun stands like the original at zero."""
     image, original = orientations(mirrored).sun, orientations(planetary_set).sun
-    turns = (2 * planetary_set.planet_angles[0] - image - original) / planetary_set.sun.pitch_angle
+    turns = (2 * planetary_set.planet_angles[0] - image - original) / planetary_set.gears[0].pitch_angle
     return float(turns - np.floor(turns))

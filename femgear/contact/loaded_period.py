@@ -18,7 +18,7 @@ from femgear.contact.bodies import Bodies
 from femgear.contact.cycle import CycleOptions, MeshCycle, over_slices, planet_symmetry, walk_mesh_cycle
 from femgear.contact.supports import RIGID, Supports
 from femgear.gears.deviations import SetDeviations
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import GearSet
 
 SHORTEST = 2.0**-13
 """Mesh periods in which a jump is enclosed."""
@@ -34,15 +34,15 @@ STEEP = 0.02
 
 @dataclass(frozen=True)
 class LoadedPeriod:
-    """Loads and tangent stiffness of all 2N meshes over one mesh period.
+    """Loads and tangent stiffness of all meshes over one mesh period.
 
     Parameters
     ----------
     position : (P,) array
         In mesh periods, ascending from 0 and denser near jumps.
-    deflection, force, stiffness, held_stiffness : (2N, P) arrays
+    deflection, force, stiffness, held_stiffness : (meshes, P) arrays
         As in `MeshCycle` [m], [N], [N/m].
-    held_compliance : (2N, 2N) array
+    held_compliance : (meshes, meshes) array
         Mean over the period of the tangent compliance between the meshes through their common bodies, the
         ring held, supports left out [m/N].
     """
@@ -55,7 +55,7 @@ class LoadedPeriod:
     held_compliance: np.ndarray
 
     def resampled(self, name: str, count: int) -> np.ndarray:
-        """Values (2N, count) of one of the arrays (2N, P) at equidistant positions.
+        """Values (meshes, count) of one of the arrays (meshes, P) at equidistant positions.
 
         Between jumps by cubics (Akima's, modified): straight lines would make harmonics of their own, images
         of the low ones beside the number of positions.
@@ -86,7 +86,7 @@ class LoadedPeriod:
 
 
 def loaded_period(
-    planetary_set: PlanetarySet,
+    planetary_set: GearSet,
     bodies: Bodies,
     held_bodies: Bodies,
     *,
@@ -112,7 +112,7 @@ def loaded_period(
     """
     options = replace(options or CycleOptions(), held_bodies=held_bodies)
     symmetry = planet_symmetry(planetary_set, deviations)
-    parts = symmetry // gcd(symmetry, planetary_set.sun.teeth)
+    parts = symmetry // gcd(symmetry, planetary_set.gears[0].teeth)
     first = -(-positions // parts)
     # the end of the part is there to see jumps before it, and then left out
     wanted, record = np.arange(first + 1) / (first * parts), {}
@@ -189,16 +189,16 @@ def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> Loa
     """
     N = planetary_set.n_planets
     ahead = N // symmetry
-    common = gcd(symmetry, planetary_set.sun.teeth)
-    step = pow(planetary_set.sun.teeth // common, -1, parts) if parts > 1 else 0
+    common = gcd(symmetry, planetary_set.gears[0].teeth)
+    step = pow(planetary_set.gears[0].teeth // common, -1, parts) if parts > 1 else 0
     shown = record["position"] < (1.0 - 1e-12) / parts
     tau = record["position"][shown]
     compliance = record["held_compliance"][..., shown] @ _mean_weights(tau, 1.0 / parts)
-    names, mean = ("deflection", "force", "stiffness", "held_stiffness"), np.zeros((2 * N, 2 * N))
+    names, mean = ("deflection", "force", "stiffness", "held_stiffness"), np.zeros(compliance.shape[:2])
     values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
         moved = (np.arange(N) - ahead * (step * part % parts)) % N
-        meshes = np.concatenate([moved, moved + N])
+        meshes = np.concatenate([moved + first for first in range(0, len(mean), N)])
         for name in names:
             values[name].append(record[name][meshes][:, shown])
         mean += compliance[np.ix_(meshes, meshes)] / parts

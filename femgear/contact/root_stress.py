@@ -26,13 +26,14 @@ from femgear.contact.bodies import (
     station_weights,
 )
 from femgear.contact.cycle import MeshCycle
-from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks
+from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks, mesh_count
 from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
 from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import Grid
 from femgear.gears.gear import Gear
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.pair import EACH
+from femgear.gears.planetary import GearSet
 
 LOADED, BACK = 0, 1
 """Root of the loaded flank and of the back flank in `RootCycle.stress`."""
@@ -57,17 +58,17 @@ class _RootStress:
 
 @dataclass(frozen=True)
 class RootStresses:
-    """Root stress influences of the three kinds of gears."""
+    """Root stress influences of the three kinds of gears; a pair has gears 1 and 2 for sun and planet."""
 
     sun: _RootStress
     planet: _RootStress
-    ring: _RootStress
+    ring: _RootStress | None = None
 
-    def of_bodies(self, n_planets: int) -> list[tuple[str, _RootStress, list]]:
-        """Kind, influence and drive flanks (mesh, gear of the pair, side) of every body of a set."""
-        sun, planets, ring = acting_flanks(n_planets)
-        on_planets = [("planet", self.planet, acting) for acting in planets]
-        return [("sun", self.sun, sun), *on_planets, ("ring", self.ring, ring)]
+    def of_bodies(self, planetary_set: GearSet) -> list[tuple[int, _RootStress, list]]:
+        """Number of the gear, influence and drive flanks (mesh, gear of the pair, side) of every body."""
+        gears = self.sun, self.planet, self.ring
+        bodies = ((number, gears[number], acting) for number, acting in acting_flanks(planetary_set))
+        return [(number, root, acting) for number, root, acting in bodies if root is not None]
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class RootCycle:
     Parameters
     ----------
     kind : str
-        ``"sun"``, ``"planet"`` or ``"ring"``.
+        Name of the gear, such as ``"planet"``.
     mesh, gear : int
         Mesh, and 0 or 1 for its first or second gear.
     path : (T, P) array
@@ -243,7 +244,7 @@ def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:
 
 
 def root_stress_cycle(
-    planetary_set: PlanetarySet, roots: RootStresses, cycle: MeshCycle, *, reverse: bool = False
+    planetary_set: GearSet, roots: RootStresses, cycle: MeshCycle, *, reverse: bool = False
 ) -> tuple[RootCycle, ...]:
     """Compute the root stress of both gears of every mesh at every position of the cycle.
 
@@ -252,22 +253,22 @@ def root_stress_cycle(
     With ``reverse`` the cycle is that of a negative torque on the sun: the stress field is then the mirror
     image of that on the other flanks.
     """
-    N = planetary_set.n_planets
+    s = planetary_set
     teeth = loaded_teeth(cycle, reverse=reverse)
     samples = np.arange(len(cycle.position))
     found = {}
-    for kind, root, acting in roots.of_bodies(N):
-        slots = [_slots(cycle.tooth[gear, mesh], kind) for mesh, gear, _ in acting]
+    for number, root, acting in roots.of_bodies(s):
+        slots = [_slots(cycle.tooth[gear, mesh], s.senses[number]) for mesh, gear, _ in acting]
         # seen from behind the teeth are counted the other way round
         numbers = np.concatenate(slots) * (-1 if reverse else 1)
         field = body_stress(planetary_set, root, acting, teeth, samples, numbers)
         for target, stress in zip(acting, np.split(field, len(acting)), strict=True):
-            found[target[:2]] = _root_cycle(planetary_set, kind, root, cycle, target, stress)
-    return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
+            found[target[:2]] = _root_cycle(s, s.gears[number].name, root, cycle, target, stress)
+    return tuple(found[mesh, gear] for mesh in range(mesh_count(planetary_set)) for gear in (0, 1))
 
 
 def root_ranges(
-    planetary_set: PlanetarySet, roots: RootStresses, teeth: LoadedTeeth, *, closes: bool = True
+    planetary_set: GearSet, roots: RootStresses, teeth: LoadedTeeth, *, closes: bool = True
 ) -> tuple[RootRange, ...]:
     """Find the stress range in the root of every loaded flank, from the field of whole bodies.
 
@@ -275,16 +276,15 @@ def root_ranges(
     after its end, every tooth meets every state that tooth numbers and periods without a common divisor
     allow; otherwise each tooth has what the record shows of it.
     """
-    N = planetary_set.n_planets
     found = {}
-    for kind, root, acting in roots.of_bodies(N):
-        for one in _body_ranges(planetary_set, kind, root, acting, teeth, closes):
+    for number, root, acting in roots.of_bodies(planetary_set):
+        for one in _body_ranges(planetary_set, number, root, acting, teeth, closes):
             found[one.mesh, one.gear] = one
-    return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
+    return tuple(found[mesh, gear] for mesh in range(mesh_count(planetary_set)) for gear in (0, 1))
 
 
 def body_stress(
-    planetary_set: PlanetarySet, root: _RootStress, acting, teeth: LoadedTeeth, samples, numbers
+    planetary_set: GearSet, root: _RootStress, acting, teeth: LoadedTeeth, samples, numbers
 ) -> np.ndarray:
     """Superpose the root stress (t, 2 m, p) [Pa] of some teeth of a body at some positions, left root first.
 
@@ -318,7 +318,7 @@ def _root_cycle(planetary_set, kind, root: _RootStress, cycle: MeshCycle, target
     """Root cycle of one mesh (mesh, gear, side) from the stress (T, 2 m, P) of the teeth in its slots."""
     mesh, gear, side = target
     stress = stress.reshape(len(stress), 2, -1, len(cycle.position)).transpose(0, 3, 1, 2)
-    path = cycle.path[mesh] / planetary_set.sun.base_pitch
+    path = cycle.path[mesh] / planetary_set.base_pitch
     load = np.zeros(stress.shape[:2])
     load[1:-1] = cycle.tooth_load[mesh]
     return RootCycle(
@@ -334,18 +334,17 @@ def _root_cycle(planetary_set, kind, root: _RootStress, cycle: MeshCycle, target
     )
 
 
-def _slots(teeth, kind) -> np.ndarray:
+def _slots(teeth, step: int) -> np.ndarray:
     """Tooth numbers of the slots of a mesh with one more at either end."""
     # the sun's teeth come one after another, those of planets and ring the other way round
-    step = 1 if kind == "sun" else -1
     return np.concatenate([teeth[:1] - step, teeth, teeth[-1:] + step])
 
 
-def _body_ranges(planetary_set, kind, root: _RootStress, acting, teeth: LoadedTeeth, closes):
+def _body_ranges(planetary_set, number, root: _RootStress, acting, teeth: LoadedTeeth, closes):
     """Ranges of the roots of the acting flanks of one body."""
     z, m = len(root.influence), len(root.arc)
     # with every period the sun's teeth go on to the next higher place, those of planets and ring back
-    step = 1 if kind == "sun" else -1
+    step = planetary_set.senses[number]
     alike = math.gcd(z, teeth.periods) if closes else z
     high, low = np.full((alike, 2 * m), -np.inf), np.full((alike, 2 * m), np.inf)
     worst = {}
@@ -366,17 +365,17 @@ def _body_ranges(planetary_set, kind, root: _RootStress, acting, teeth: LoadedTe
         tooth = int((top - bottom)[own].argmax())
         point = int(widest[tooth])
         # seen from behind the teeth are counted the other way round
-        number = (-1 if teeth.reverse else 1) * np.arange(z) % alike
-        start = acting[0] if kind == "planet" else target
+        counted = (-1 if teeth.reverse else 1) * np.arange(z) % alike
+        start = acting[0] if number == EACH else target
         yield RootRange(
-            kind=kind,
+            kind=planetary_set.gears[number].name,
             mesh=target[0],
             gear=target[1],
             point=point,
             maximum=float(top[tooth, point]),
             minimum=float(bottom[tooth, point]),
-            tooth_maximum=top[own][number],
-            tooth_minimum=bottom[own][number],
+            tooth_maximum=top[own][counted],
+            tooth_minimum=bottom[own][counted],
             worst=worst[target][1:],
             history=_history(field[:, rows][:, point], teeth, start[:2], step) if one else None,
         )

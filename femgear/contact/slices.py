@@ -335,8 +335,8 @@ def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, betwee
     # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
     over = np.cos(np.pi / N * np.arange(1, N)[:, None] * np.arange(2 * N)) / N
     across = np.zeros((P, N * W, N * W))
-    for name, *on_body in windows_of_bodies(windows[0], setup.n_planets):
-        bodies = [getattr(one, name) for one in waves.bodies]
+    for number, *on_body in windows_of_bodies(setup.gears, windows[0]):
+        bodies = [one.gears[number] for one in waves.bodies]
         table = (between @ [one.regular.ravel() for one in bodies]).T @ over
         _add_along(across, setup, bodies[0], table.T.copy(), windows, *on_body)
     _add_beside(across, setup, waves, windows, wave_number, over)
@@ -372,9 +372,9 @@ def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) ->
         p, same = np.nonzero(pair[:, one] == pair[:, two])
         one, two, local = one[same], two[same], 0.0
         shape = over[:, np.abs(piece[one] - piece[two])] + over[:, piece[one] + piece[two] + 1]
-        for gear, name in enumerate(("sun", "planet") if number // N % 2 == 0 else ("planet", "ring")):
+        for gear, body in enumerate(setup.gears.mates[number // N % len(setup.gears.kinds)]):
             rolls = (setup.roll[gear, number, position[p, w], pair[p, w], 1] for w in (one, two))
-            arcs = [roll**2 / (2 * getattr(waves.bodies[0], name).base_radius) for roll in rolls]
+            arcs = [roll**2 / (2 * waves.bodies[0].gears[body].base_radius) for roll in rolls]
             local += (shape * _beside(np.abs(arcs[0] - arcs[1]), wave_number[:, None])).sum(axis=0)
         _add_both(across, p, one, two, factor * local)
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from femgear.errors import ContactError
 from femgear.gears.kinematics import MEMBERS, member_approach, mesh_normals, unheld_members
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import GearSet, PlanetarySet
 
 SPRINGS = 120
 """One-sided springs of a planet bearing with clearance: even, so that they are their own mirror image.
@@ -217,9 +217,7 @@ def tilting_members(
     return TiltingMembers(tuple(names), approach, stiffness, angle, coupling)
 
 
-def moving_members(
-    planetary_set: PlanetarySet, supports: Supports, *, both_flanks: bool = False
-) -> MovingMembers:
+def moving_members(planetary_set: GearSet, supports: Supports, *, both_flanks: bool = False) -> MovingMembers:
     """List the motions that the supports allow, each with its effect on the approach of every mesh.
 
     Raises
@@ -227,6 +225,10 @@ def moving_members(
     ContactError
         E-MECHANISM: members float that the planets cannot hold.
     """
+    if supports == RIGID:
+        sides = 1 + both_flanks
+        return MovingMembers((), np.zeros((sides * len(planetary_set.mesh_names), 0)), np.zeros(0))
+    assert isinstance(planetary_set, PlanetarySet)
     floating = [name for name in MEMBERS if getattr(supports, name) == 0.0]
     loose = unheld_members(planetary_set, floating, both_flanks=both_flanks)
     if loose:
@@ -243,7 +245,7 @@ def moving_members(
 
 
 def bearing_springs(
-    planetary_set: PlanetarySet, supports: Supports, members: MovingMembers
+    planetary_set: GearSet, supports: Supports, members: MovingMembers
 ) -> BearingSprings | None:
     """Springs of all planet bearings, or None for bearings without clearance.
 
@@ -263,19 +265,21 @@ def bearing_springs(
     return BearingSprings(supports.planet_clearance, compliance, arms.reshape(N * n, -1))
 
 
-def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
+def pin_forces(planetary_set: GearSet, force, back_force) -> np.ndarray:
     """Compute the force of every pin on its planet [N], shape (N, 2, P), in the frame of the carrier.
 
     What balances the mesh forces on the planet, whatever holds it: ``-(n_sp F_sp - n_pr F_pr)`` with the
-    normals of `femgear.gears.kinematics.mesh_normals` on either side of the teeth.
+    normals of `femgear.gears.kinematics.mesh_normals` on either side of the teeth. Of a pair it is the force
+    of its bearing on gear 2.
 
-    ``force`` and ``back_force`` (2N, P) [N] are those on drive and back flanks.
+    ``force`` and ``back_force`` (meshes, P) [N] are those on drive and back flanks.
     """
     N = planetary_set.n_planets
     result = np.zeros((N, 2, np.shape(force)[1]))
     for back, carried in ((False, force), (True, back_force)):
         along = mesh_normals(planetary_set, back=back)[:, :, None] * np.asarray(carried)[:, None, :]
-        result += along[N:] - along[:N]
+        on_planet = -along[:N]
+        result += on_planet if len(along) == N else along[N:] + on_planet
     return result
 
 

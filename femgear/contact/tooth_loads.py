@@ -16,7 +16,8 @@ from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import acting_flanks, mesh_pairs, tooth_steps
 from femgear.fe.compliance import cyclic_displacement, mirror_nodes, mirrored_columns
 from femgear.gears.kinematics import orientations
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.pair import EACH
+from femgear.gears.planetary import GearSet, PlanetarySet
 
 LOAD_BINS = 20
 
@@ -58,7 +59,7 @@ class LoadedTeeth:
     periods: int
     reverse: bool
 
-    def on_body(self, planetary_set: PlanetarySet, acting) -> Iterator[_ToothLoad]:
+    def on_body(self, planetary_set: GearSet, acting) -> Iterator[_ToothLoad]:
         """Tooth pairs that load one body with the drive flanks `acting`, see `acting_flanks`."""
         pairs, N = mesh_pairs(planetary_set), planetary_set.n_planets
         for mesh, gear, side in acting:
@@ -69,8 +70,9 @@ class LoadedTeeth:
             ):
                 for load, path, tooth in zip(loads[mesh], paths[mesh], numbers[gear, mesh], strict=True):
                     if load.any():
-                        roll = pairs[int(mesh >= N)].roll_on(gear, path)
-                        yield _ToothLoad(int(tooth), int(tooth_steps(mesh, gear, N)), flank, roll, load)
+                        roll = pairs[mesh // N].roll_on(gear, path)
+                        step = int(tooth_steps(planetary_set, mesh, gear))
+                        yield _ToothLoad(int(tooth), step, flank, roll, load)
 
     @property
     def each(self) -> int:
@@ -90,13 +92,13 @@ class LoadSpectrum:
     ----------
     edges : (B + 1,) array
         Limits of the load classes [N].
-    time, engagements : (2N, B) arrays
+    time, engagements : (meshes, B) arrays
         Share of the time under load that a tooth spends in each class, and of the engagements whose largest
         load lies in it [1].
-    cycles : (2N, 2) array
+    cycles : (meshes, 2) array
         Load cycles of the flank that gear 1 or gear 2 has in this mesh, per turn of the gear against the
         carrier [1]: of the sun and the ring those with all planets.
-    duration : (2N,) array
+    duration : (meshes,) array
         Mesh periods for which a tooth pair carries load, on average [1]: the contact ratio under load.
     """
 
@@ -112,7 +114,7 @@ class DeformedBody:
     """One gear in the frame of the set: where its sector 0 is turned to and how every sector moves."""
 
     name: str
-    kind: str  # "sun", "planet" or "ring"
+    kind: str  # name of the gear, such as "planet"
     centre: np.ndarray  # (2,) [m]
     angle: float  # of the centreline of sector 0 [rad]
     displacement: np.ndarray  # (count, n, 2) of every node of every sector, in the frame of that sector [m]
@@ -135,24 +137,28 @@ def loaded_teeth(cycle: MeshCycle, *, reverse: bool) -> LoadedTeeth:
     )
 
 
-def load_spectrum(teeth: LoadedTeeth, *, closes: bool = True) -> LoadSpectrum:
+def load_spectrum(teeth: LoadedTeeth, mates=PlanetarySet.mates, *, closes: bool = True) -> LoadSpectrum:
     """Count the load spectrum of the teeth of every mesh.
 
     Parameters
     ----------
     teeth : LoadedTeeth
+    mates : tuple
+        Of the set.
     closes : bool
         Whether the record repeats after its end; otherwise engagements that its ends cut off do not count,
         unless the record is too short to hold another.
     """
     meshes, _, positions = teeth.load.shape
-    N = meshes // 2
     edges = np.linspace(0.0, teeth.load.max(initial=0.0), LOAD_BINS + 1)
     peaks = _engagement_peaks(teeth, closes)
     loaded = (peaks > 0.0).mean(axis=-1)
     cycles = np.empty((meshes, 2))
-    cycles[:N, 0], cycles[:N, 1] = loaded[:N].sum(), loaded[:N]
-    cycles[N:, 0], cycles[N:, 1] = loaded[N:], loaded[N:].sum()
+    N = meshes // len(mates)
+    for kind, pair in enumerate(mates):
+        rows = slice(kind * N, (kind + 1) * N)
+        for place, number in enumerate(pair):
+            cycles[rows, place] = loaded[rows] if number == EACH else loaded[rows].sum()
     return LoadSpectrum(
         edges=edges,
         time=_shares(teeth.load.reshape(meshes, -1), edges),
@@ -163,7 +169,7 @@ def load_spectrum(teeth: LoadedTeeth, *, closes: bool = True) -> LoadSpectrum:
 
 
 def deformed_set(
-    planetary_set: PlanetarySet, sectors: Sectors, cycle: MeshCycle, *, position: int = 0
+    planetary_set: GearSet, sectors: Sectors, cycle: MeshCycle, *, position: int = 0
 ) -> tuple[DeformedBody, ...]:
     """Compute the elastic displacement of sun, planets and ring, each held as in the static problem.
 
@@ -171,23 +177,21 @@ def deformed_set(
     tenths of a micrometre deep, is not part of the field. The torque is on the left flanks of the sun (mirror
     the set otherwise); ``position`` is an index into ``cycle.position``.
     """
-    s = planetary_set
+    s, found = planetary_set, []
     at = orientations(s, float(cycle.position[position]))
-    teeth = loaded_teeth(cycle, reverse=False)
-    on_sun, on_planets, on_ring = acting_flanks(s.n_planets)
-    bodies = [("sun", "sun", sectors.sun, np.zeros(2), at.sun, on_sun)]
-    for n, psi in enumerate(s.planet_angles):
-        centre = s.centre_distance * np.array([np.cos(psi), np.sin(psi)])
-        bodies.append((f"planet {n + 1}", "planet", sectors.planet, centre, at.planets[n], on_planets[n]))
-    bodies.append(("ring", "ring", sectors.ring, np.zeros(2), at.ring, on_ring))
-    return tuple(
-        DeformedBody(name, kind, centre, float(angle), _displacement(teeth, s, sector, acting, position))
-        for name, kind, sector, centre, angle, acting in bodies
-    )
+    teeth, bodies = loaded_teeth(cycle, reverse=False), acting_flanks(s)
+    for number, (gear, sector) in enumerate(zip(s.gears, sectors.gears, strict=True)):
+        own = [acting for one, acting in bodies if one == number]
+        for n, acting in enumerate(own):
+            name = f"{gear.name} {n + 1}" if number == EACH and len(s.kinds) > 1 else gear.name
+            centre, moved = s.centres[number][n], _displacement(teeth, s, sector, acting, position)
+            place = np.array([centre.real, centre.imag])
+            found.append(DeformedBody(name, gear.name, place, float(at.gears[number][n]), moved))
+    return tuple(found)
 
 
 def _engagement_peaks(teeth: LoadedTeeth, closes: bool) -> np.ndarray:
-    """Largest load of every engagement, shape (2N, engagements) [N]."""
+    """Largest load of every engagement, shape (meshes, engagements) [N]."""
     meshes, slots, _ = teeth.load.shape
     # the tooth that enters the first slot in one period is in the next slot a period later
     entered = teeth.turn[None, :] - np.arange(slots)[:, None]

@@ -19,7 +19,8 @@ from femgear.gears.gear import (
     tooth_thickness,
     working_half_angles,
 )
-from femgear.gears.planetary import BACKLASH_TOLERANCE, PlanetarySet, assembly_positions
+from femgear.gears.pair import EACH, GearPair
+from femgear.gears.planetary import BACKLASH_TOLERANCE, GearSet, PlanetarySet, assembly_positions
 from femgear.gears.profile import inv, pressure_angle_at, undercut_shift
 
 FILLET_TOLERANCE = 1e-4
@@ -45,8 +46,12 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
     """
     found = [*_planets(planetary), *_neighbours(planetary)]
     assembly_positions(planetary.sun.teeth, planetary.ring.teeth, planetary.planet_angles)
+    return *found, *check_meshes(planetary)
+
+
+def check_meshes(planetary: GearSet) -> tuple[GeometryWarning, ...]:
+    """Check the meshes and gears of a set or a pair; see `check_set`, from W-BACKLASH and E-BACKLASH on."""
     return (
-        *found,
         *_backlash(planetary),
         *_interference(planetary),
         *_clearances(planetary),
@@ -55,15 +60,23 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
     )
 
 
-def tip_clearances(planetary: PlanetarySet) -> dict[str, float]:
+def tip_clearances(planetary: GearSet) -> dict[str, float]:
     """Compute the radial clearances [m] between tip and root circles, by the gears of tip and root."""
-    s, a = planetary, planetary.centre_distance
-    return {
-        "sun tip to planet root": a - s.sun.tip_radius - s.planet.root_radius,
-        "planet tip to sun root": a - s.planet.tip_radius - s.sun.root_radius,
-        "planet tip to ring root": s.ring.root_radius - a - s.planet.tip_radius,
-        "ring tip to planet root": s.ring.tip_radius - a - s.planet.root_radius,
-    }
+    found = {}
+    for pair in planetary.kinds:
+        (one, two), a = pair.gears, pair.centre_distance
+        inner, outer = f"{one.name} tip to {two.name} root", f"{two.name} tip to {one.name} root"
+        if two.internal:
+            found[inner], found[outer] = (
+                two.root_radius - a - one.tip_radius,
+                two.tip_radius - a - one.root_radius,
+            )
+        else:
+            found[inner], found[outer] = (
+                a - one.tip_radius - two.root_radius,
+                a - two.tip_radius - one.root_radius,
+            )
+    return found
 
 
 def _planets(s: PlanetarySet):
@@ -101,13 +114,12 @@ def _neighbours(s: PlanetarySet):
         )  # fmt: skip
 
 
-def _backlash(s: PlanetarySet):
+def _backlash(s: GearSet):
     """Refuse flanks that overlap, and warn of much play."""
-    module = s.sun.module
-    for mesh, value, gear in (
-        ("sun-planet", s.backlash_sun_planet, s.sun),
-        ("planet-ring", s.backlash_planet_ring, s.ring),
-    ):
+    module = s.gears[0].module
+    for pair, numbers in zip(s.kinds, s.mates, strict=True):
+        mesh, value = f"{pair.gear_1.name}-{pair.gear_2.name}", pair.backlash
+        gear = next(gear for gear, number in zip(pair.gears, numbers, strict=True) if number != EACH)
         if value < -BACKLASH_TOLERANCE * module:
             raise GeometryError(
                 f"{mesh}: the flanks overlap by {-value * 1e6:.3f} um along the line of action at the centre "
@@ -123,29 +135,27 @@ def _backlash(s: PlanetarySet):
             )  # fmt: skip
 
 
-def _clearances(s: PlanetarySet):
+def _clearances(s: GearSet):
     """Refuse tips that run into roots, and warn of small clearances."""
     for name, value in tip_clearances(s).items():
-        gear = name.split()[0]
+        gear = next(gear for gear in s.gears if gear.name == name.split()[0])
         if value < 0.0:
             raise GeometryError(
                 f"negative tip clearance, {name}: {value * 1e3:.4f} mm", code="E-CLEARANCE",
-                key=f"{gear}.tip_diameter", value=2.0 * getattr(s, gear).tip_radius, limit="clearance >= 0",
-                remedy=f"shorten the tips of the {gear} (tip_diameter) or deepen the rack's dedendum",
+                key=f"{gear.name}.tip_diameter", value=2.0 * gear.tip_radius, limit="clearance >= 0",
+                remedy=f"shorten the tips of the {gear.name} (tip_diameter) or deepen the rack's dedendum",
             )  # fmt: skip
-        if value < 0.1 * s.sun.module:
+        if value < 0.1 * gear.module:
             yield GeometryWarning(
-                "W-CLEARANCE", f"{gear}.tip_diameter", f"tip clearance, {name}, of {value * 1e3:.4f} mm",
+                "W-CLEARANCE", f"{gear.name}.tip_diameter", f"tip clearance, {name}, of {value * 1e3:.4f} mm",
                 ">= 0.1 modules",
             )  # fmt: skip
 
 
-def _contact_ratios(s: PlanetarySet):
+def _contact_ratios(s: GearSet):
     """Refuse contact ratios below one, and warn of those below 1.2."""
-    for mesh, value in (
-        ("sun-planet", s.contact_ratio_sun_planet),
-        ("planet-ring", s.contact_ratio_planet_ring),
-    ):
+    for pair in s.kinds:
+        mesh, value = f"{pair.gear_1.name}-{pair.gear_2.name}", pair.contact_ratio
         if value < 1.0:
             raise GeometryError(
                 f"{mesh}: contact ratio {value:.4f}, so contact is lost between teeth",
@@ -159,9 +169,9 @@ def _contact_ratios(s: PlanetarySet):
             )  # fmt: skip
 
 
-def _single_gears(s: PlanetarySet):
+def _single_gears(s: GearSet):
     """Warn of undercut, thin tips and thin rims."""
-    for gear in (s.sun, s.planet, s.ring):
+    for gear in s.gears:
         if gear.undercut:
             yield GeometryWarning(
                 "W-UNDERCUT", f"{gear.name}.profile_shift",
@@ -200,9 +210,9 @@ def _rim_held(gear: Gear) -> str:
     )
 
 
-def _interference(s: PlanetarySet):
-    """Involute and fillet interference of both meshes, and passing tips of planet and ring."""
-    for gear, partner, reach in _active_limits(s):
+def _interference(s: GearSet):
+    """Involute and fillet interference of all meshes, and passing tips of internal ones."""
+    for gear, partner, reach in (limit for pair in s.kinds for limit in _active_limits(pair)):
         if reach < 0.0 and partner.internal:
             allowed = math.hypot(partner.base_radius, partner.tip_roll - reach)
             raise GeometryError(
@@ -215,20 +225,18 @@ def _interference(s: PlanetarySet):
         excess = reach - gear.form_roll if gear.internal else gear.form_roll - reach
         # undercut has removed the flank that a partner's tip would reach: the path of contact is shorter
         if excess > 0.0 and not gear.undercut:
-            yield from _fillet_contact(gear, partner, reach, s.centre_distance)
-    check_passing_tips(s.planet, s.ring, s.centre_distance)
+            yield from _fillet_contact(gear, partner, reach, s.kinds[0].centre_distance)
+    for pair in s.kinds:
+        if pair.gear_2.internal:
+            check_passing_tips(*pair.gears, pair.centre_distance)
 
 
-def _active_limits(s: PlanetarySet):
-    """Gear, partner and roll length [m] on the gear's flank that the partner's tip reaches, four times."""
-    sun_planet = s.centre_distance * math.sin(s.working_pressure_angle_sun_planet)
-    planet_ring = s.centre_distance * math.sin(s.working_pressure_angle_planet_ring)
-    return (
-        (s.sun, s.planet, sun_planet - s.planet.tip_roll),
-        (s.planet, s.sun, sun_planet - s.sun.tip_roll),
-        (s.planet, s.ring, s.ring.tip_roll - planet_ring),
-        (s.ring, s.planet, s.planet.tip_roll + planet_ring),
-    )
+def _active_limits(pair: GearPair):
+    """Gear, partner and roll length [m] on the gear's flank that the partner's tip reaches, twice."""
+    (one, two), length = pair.gears, pair.centre_distance * math.sin(pair.working_pressure_angle)
+    if two.internal:
+        return (one, two, two.tip_roll - length), (two, one, one.tip_roll + length)
+    return (one, two, length - two.tip_roll), (two, one, length - one.tip_roll)
 
 
 def _fillet_contact(gear: Gear, partner: Gear, reach: float, centre_distance: float):
@@ -323,9 +331,10 @@ def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None
     margin = tip_margin(planet, ring, centre_distance)
     if margin < 0.0:
         raise GeometryError(
-            f"the tips of planet ({planet.teeth} teeth) and ring ({ring.teeth}) strike each other outside "
-            f"the path of contact: the corners overlap by {-margin * ring.tip_radius * 1e3:.4f} mm",
-            code="E-INTERFERENCE", key="ring.teeth", value=ring.teeth,
+            f"the tips of {planet.name} ({planet.teeth} teeth) and {ring.name} ({ring.teeth}) strike each "
+            "other outside the path of contact: "
+            f"the corners overlap by {-margin * ring.tip_radius * 1e3:.4f} mm",
+            code="E-INTERFERENCE", key=f"{ring.name}.teeth", value=ring.teeth,
             limit="corners of the tips pass each other",
             remedy="increase the difference of the tooth numbers, or shorten the tips (tip_diameter)",
         )  # fmt: skip

@@ -22,7 +22,8 @@ import numpy as np
 from femgear.gears.gear import Gear, GeometryWarning
 from femgear.gears.kinematics import member_approach, mesh_normals, orientations
 from femgear.gears.modifications import FlankForm, check_flank, form_deviation, lead_deviation, profile_height
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.pair import EACH
+from femgear.gears.planetary import GearSet
 
 _MISALIGNMENTS = ("sun_misalignment", "carrier_misalignment", "planet_misalignment")
 LONGEST_RECORD = 256
@@ -161,7 +162,7 @@ class SetDeviations:
         return any(getattr(self, name).any() for name in _MISALIGNMENTS)
 
 
-def rotational_symmetry(d: SetDeviations, s: PlanetarySet) -> int:
+def rotational_symmetry(d: SetDeviations, s: GearSet) -> int:
     """Find the largest g for which a turn by ``2 pi/g`` takes every planet to the place of one like it."""
     even, places = no_deviations(s), np.exp(1j * np.asarray(s.planet_angles))
     forms = {name: getattr(even, name) for name in ("sun", "planet_sun_side", "planet_ring_side", "ring")}
@@ -170,7 +171,7 @@ def rotational_symmetry(d: SetDeviations, s: PlanetarySet) -> int:
     return max(g for g, one in turned.items() if np.abs(one - places).min(axis=1).max() < 1e-6)
 
 
-def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:
+def no_deviations(planetary_set: GearSet) -> SetDeviations:
     """Make the deviations of ideal gears: none. `dataclasses.replace` puts in what there is."""
     s, N = planetary_set, planetary_set.n_planets
     return SetDeviations(
@@ -178,10 +179,10 @@ def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:
         planet_sun_side=FlankForm(),
         planet_ring_side=FlankForm(),
         ring=FlankForm(),
-        sun_pitch=np.zeros(s.sun.teeth),
-        planet_pitch=np.zeros((N, s.planet.teeth)),
-        planet_ring_side_pitch=np.zeros((N, s.planet.teeth)),
-        ring_pitch=np.zeros(s.ring.teeth),
+        sun_pitch=np.zeros(s.gears[0].teeth),
+        planet_pitch=np.zeros((N, s.gears[EACH].teeth)),
+        planet_ring_side_pitch=np.zeros((N, s.gears[EACH].teeth)),
+        ring_pitch=np.zeros(s.gears[-1].teeth),
         planet_runout=(Runout(),) * N,
         pin_errors=np.zeros((N, 2)),
         planet_thickness=np.zeros(N),
@@ -210,7 +211,7 @@ def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarr
 
 
 def profile_separation(
-    deviations: SetDeviations, planetary_set: PlanetarySet, kind: int, roll_1, roll_2, *, back: bool = False
+    deviations: SetDeviations, planetary_set: GearSet, kind: int, roll_1, roll_2, *, back: bool = False
 ):
     """Compute the separation [m] of two flanks by their modifications, of the shape of both roll lengths [m].
 
@@ -218,15 +219,14 @@ def profile_separation(
     is the sun), 1 for planet-ring (gear 1 is the planet). With ``back`` the other flanks of the teeth; those
     of a planet are its ring side in the mesh with the sun.
     """
-    s = planetary_set
     one, two = deviations.mesh_forms(kind, back)
-    gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
-    return form_deviation(one, gears[0], roll_1) + form_deviation(two, gears[1], roll_2)
+    gear_1, gear_2 = planetary_set.kinds[kind].gears
+    return form_deviation(one, gear_1, roll_1) + form_deviation(two, gear_2, roll_2)
 
 
 def lead_separation(
     deviations: SetDeviations,
-    planetary_set: PlanetarySet,
+    planetary_set: GearSet,
     slices: int,
     rolls: np.ndarray | None = None,
     *,
@@ -239,12 +239,12 @@ def lead_separation(
     gear 1 and 2 of every mesh are those halfway along the profiles when left out.
     """
     d, s, fine = deviations, planetary_set, 16
-    N, gears = s.n_planets, ((s.sun, s.planet), (s.planet, s.ring))
-    width = s.sun.face_width
+    N, gears = s.n_planets, [pair.gears for pair in s.kinds]
+    width = s.gears[0].face_width
     place = width * ((np.arange(slices * fine) + 0.5) / (slices * fine) - 0.5)
     apart = -misaligned_approach(d, s, back=back)
     found = []
-    for mesh in range(2 * N):
+    for mesh in range(len(apart)):
         removed = apart[mesh] * place
         for i, form in enumerate(d.mesh_forms(mesh // N, back=back)):
             height = 0.0 if rolls is None else profile_height(gears[mesh // N][i], rolls[i][mesh])[..., None]
@@ -254,8 +254,10 @@ def lead_separation(
     return found.reshape(*found.shape[:-1], slices, fine).mean(axis=-1)
 
 
-def misaligned_approach(d: SetDeviations, s: PlanetarySet, *, back: bool = False) -> np.ndarray:
+def misaligned_approach(d: SetDeviations, s: GearSet, *, back: bool = False) -> np.ndarray:
     """Compute the approach (2N,) of the flanks of every mesh by axes askew, per place over the width [1]."""
+    if not any(np.any(one) for one in (d.planet_misalignment, d.sun_misalignment, d.carrier_misalignment)):
+        return np.zeros(len(s.mesh_names))
     motions, angles = member_approach(s, back=back), np.asarray(s.planet_angles)
     radial = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     outwards, along = d.planet_misalignment.T[..., None]
@@ -279,7 +281,7 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
 
 
 def body_separation(
-    deviations: SetDeviations, planetary_set: PlanetarySet, position, *, back: bool = False
+    deviations: SetDeviations, planetary_set: GearSet, position, *, back: bool = False
 ) -> np.ndarray:
     """Compute the separation (2N, P) [m] of every mesh by runouts, pin errors, ovality and planet thickness.
 
@@ -291,27 +293,30 @@ def body_separation(
     d, s = deviations, planetary_set
     moved = _relative_displacements(d, s, np.atleast_1d(np.asarray(position, float)))
     normals = mesh_normals(s, back=back) @ np.array([1.0, 1.0j])
-    thinner = np.tile(0.5 * (d.planet_thickness - d.planet_thickness.min()), 2)
+    kinds = len(s.kinds)
+    thinner = np.tile(0.5 * (d.planet_thickness - d.planet_thickness.min()), kinds)
     if back:
-        others = np.repeat([d.sun_thickness, d.ring_thickness], s.n_planets)
-        thinner = others + np.tile(d.planet_thickness, 2) - thinner
-    return np.real(normals.conj()[:, None] * moved) + thinner[:, None] * math.cos(s.sun.pressure_angle)
+        others = np.repeat([d.sun_thickness, d.ring_thickness][:kinds], s.n_planets)
+        thinner = others + np.tile(d.planet_thickness, kinds) - thinner
+    return np.real(normals.conj()[:, None] * moved) + thinner[:, None] * math.cos(s.gears[0].pressure_angle)
 
 
-def _relative_displacements(d: SetDeviations, s: PlanetarySet, position: np.ndarray) -> np.ndarray:
-    """Displacement of gear 2 less that of gear 1 of every mesh, (2N, P), as x + iy."""
-    start = orientations(s)
-    sun = _turning(d.sun_runout, start.sun + position * s.sun.pitch_angle)
-    turned = [
-        _turning(runout, angle - position * s.planet.pitch_angle)
-        for runout, angle in zip(d.planet_runout, start.planets, strict=True)
+def _relative_displacements(d: SetDeviations, s: GearSet, position: np.ndarray) -> np.ndarray:
+    """Displacement of gear 2 less that of gear 1 of every mesh, (meshes, P), as x + iy."""
+    psi, runouts = np.asarray(s.planet_angles), ((d.sun_runout,), d.planet_runout, (d.ring_runout,))
+    angles = [
+        [angle + sense * (position * gear.pitch_angle) for angle in start]
+        for gear, sense, start in zip(s.gears, s.senses, orientations(s).gears, strict=True)
+    ]
+    moved = [
+        np.array([_turning(*one) for one in zip(found, turned, strict=True)])
+        for found, turned in zip(runouts, angles, strict=False)
     ]
     # pin errors and the eccentric pin circle
-    pins = d.pin_errors @ np.array([1.0, 1.0j]) * np.exp(1j * np.asarray(s.planet_angles))
-    planets = (pins + _turning(d.carrier_runout, 0.0))[:, None] + np.array(turned)
-    ring_angle = start.ring - position * s.ring.pitch_angle
-    ring = _turning(d.ring_runout, ring_angle) + _oval(d.ovality, np.asarray(s.planet_angles), ring_angle)
-    return np.concatenate([planets - sun, ring - planets])
+    pins = d.pin_errors @ np.array([1.0, 1.0j]) * np.exp(1j * psi)
+    moved[EACH] = (pins + _turning(d.carrier_runout, 0.0))[:, None] + moved[EACH]
+    moved[-1] = moved[-1] + _oval(d.ovality, psi, angles[-1][0])
+    return np.concatenate([moved[two] - moved[one] for one, two in s.mates])
 
 
 def _turning(runout: Runout, tooth_zero) -> np.ndarray:
@@ -328,7 +333,7 @@ def _oval(ovality: Ovality, psi: np.ndarray, ring_angle: np.ndarray) -> np.ndarr
 
 
 def common_period(
-    deviations: SetDeviations, planetary_set: PlanetarySet, *, limit: int = LONGEST_RECORD
+    deviations: SetDeviations, planetary_set: GearSet, *, limit: int = LONGEST_RECORD
 ) -> tuple[int, str]:
     """Find the number of mesh periods after which a set with deviations repeats.
 
@@ -356,7 +361,7 @@ def common_period(
     causes = ", ".join(f"{name} {count}" for name, count in parts.items())
     if periods <= limit:
         return periods, f"{periods} mesh periods, after which all repeats ({causes})"
-    teeth = planetary_set.ring.teeth
+    teeth = planetary_set.gears[-1].teeth
     if teeth <= limit:
         kept, what = teeth, "one turn of the carrier against the ring"
     else:
@@ -367,16 +372,17 @@ def common_period(
     )
 
 
-def _own_periods(d: SetDeviations, s: PlanetarySet):
+def _own_periods(d: SetDeviations, s: GearSet):
     """Name and number of mesh periods after which the deviations of every kind of body repeat."""
-    yield "sun", math.lcm(_repeat(d.sun_pitch), s.sun.teeth if d.sun_runout.amplitude else 1)
+    first, each, last = s.gears[0], s.gears[EACH], s.gears[-1]
+    yield first.name, math.lcm(_repeat(d.sun_pitch), first.teeth if d.sun_runout.amplitude else 1)
     planets = [
-        math.lcm(_repeat(one), _repeat(two), s.planet.teeth if runout.amplitude else 1)
+        math.lcm(_repeat(one), _repeat(two), each.teeth if runout.amplitude else 1)
         for one, two, runout in zip(d.planet_pitch, d.planet_ring_side_pitch, d.planet_runout, strict=True)
     ]
-    yield "planets", math.lcm(*planets)
-    oval = s.ring.teeth // math.gcd(s.ring.teeth, d.ovality.nodal_diameter) if d.ovality.amplitude else 1
-    yield "ring", math.lcm(_repeat(d.ring_pitch), s.ring.teeth if d.ring_runout.amplitude else 1, oval)
+    yield "planets" if len(s.kinds) > 1 else each.name, math.lcm(*planets)
+    oval = last.teeth // math.gcd(last.teeth, d.ovality.nodal_diameter) if d.ovality.amplitude else 1
+    yield last.name, math.lcm(_repeat(d.ring_pitch), last.teeth if d.ring_runout.amplitude else 1, oval)
 
 
 def _repeat(values: np.ndarray) -> int:
@@ -390,7 +396,7 @@ def _repeat(values: np.ndarray) -> int:
 
 
 def mirrored_deviations(
-    deviations: SetDeviations, planetary_set: PlanetarySet, mirrored: PlanetarySet, order
+    deviations: SetDeviations, planetary_set: GearSet, mirrored: GearSet, order
 ) -> SetDeviations:
     """Find the deviations that the mirror image of the set has, for a torque that loads the other flanks.
 
@@ -404,13 +410,14 @@ def mirrored_deviations(
     axis = 2.0 * s.planet_angles[0]
     image = orientations(mirrored)
     # at this position the right flank of tooth 0 of the sun is where its left flank is at position 0
-    found = orientations(s, 2.0 * (s.planet_angles[0] - orientations(s).sun) / s.sun.pitch_angle)
-    ring = round((axis - image.ring - found.ring) / s.ring.pitch_angle)
+    found = orientations(s, 2.0 * (s.planet_angles[0] - orientations(s).sun) / s.gears[0].pitch_angle)
+    last = s.gears[-1].pitch_angle
+    ring = round((axis - image.gears[-1][0] - found.gears[-1][0]) / last)
     planets = [
-        round((axis - angle - found.planets[n]) / s.planet.pitch_angle)
+        round((axis - angle - found.planets[n]) / s.gears[EACH].pitch_angle)
         for n, angle in zip(order, image.planets, strict=True)
     ]
-    runouts = [_reflected(d.planet_runout[n], k * s.planet.pitch_angle) for n, k in zip(order, planets)]
+    runouts = [_reflected(d.planet_runout[n], k * s.gears[EACH].pitch_angle) for n, k in zip(order, planets)]
     return replace(
         d,
         planet_sun_side=d.planet_ring_side,
@@ -421,9 +428,9 @@ def mirrored_deviations(
         planet_ring_side_pitch=[_turned(d.planet_pitch[n], k) for n, k in zip(order, planets)],
         planet_runout=tuple(runouts),
         sun_runout=_reflected(d.sun_runout, 0.0),
-        ring_runout=_reflected(d.ring_runout, ring * s.ring.pitch_angle),
+        ring_runout=_reflected(d.ring_runout, ring * last),
         carrier_runout=_reflected(d.carrier_runout, axis),
-        ovality=replace(d.ovality, phase=ring * s.ring.pitch_angle - d.ovality.phase),
+        ovality=replace(d.ovality, phase=ring * last - d.ovality.phase),
         pin_errors=d.pin_errors[order] * [1.0, -1.0],
         planet_thickness=d.planet_thickness[order],
         planet_misalignment=d.planet_misalignment[order] * [1.0, -1.0],
@@ -448,17 +455,17 @@ def _reflected(runout: Runout, axis: float) -> Runout:
     return replace(runout, phase=axis - runout.phase)
 
 
-def loaded_flanks(d: SetDeviations, s: PlanetarySet) -> tuple[tuple[str, FlankForm, Gear], ...]:
-    """Name the four kinds of loaded flanks, with their forms and gears."""
-    return (
-        ("sun", d.sun, s.sun),
-        ("planet, sun side", d.planet_sun_side, s.planet),
-        ("planet, ring side", d.planet_ring_side, s.planet),
-        ("ring", d.ring, s.ring),
-    )
+def loaded_flanks(d: SetDeviations, s: GearSet) -> tuple[tuple[str, FlankForm, Gear], ...]:
+    """Name the kinds of loaded flanks, with their forms and gears: gear 1 and 2 of every kind of mesh."""
+    found = []
+    for kind, pair in enumerate(s.kinds):
+        for gear, mate, form in zip(pair.gears, pair.gears[::-1], d.mesh_forms(kind, back=False)):
+            several = len(s.kinds) > 1 and gear is s.gears[EACH]
+            found.append((f"{gear.name}, {mate.name} side" if several else gear.name, form, gear))
+    return tuple(found)
 
 
-def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[GeometryWarning, ...]:
+def check_deviations(deviations: SetDeviations, planetary_set: GearSet) -> tuple[GeometryWarning, ...]:
     """Check the deviations of a planetary set, and list what deserves a warning.
 
     Returns
@@ -478,7 +485,7 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
     return (*found, *_wedging(deviations, planetary_set))
 
 
-def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[float, float]:
+def least_play(deviations: SetDeviations, planetary_set: GearSet) -> tuple[float, float]:
     """Find lower bounds of the play that the deviations leave, along the line of action [m].
 
     Positions are sampled over the common period; pitch deviations and profiles enter with their extremes, as
@@ -499,38 +506,39 @@ def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[
     bodies = [body_separation(d, s, position, back=back) for back in (False, True)]
     drive = bodies[0] + _worst(d, s, back=False)[:, None]
     back = bodies[1] + _worst(d, s, back=True)[:, None]
-    back = back + np.repeat([s.backlash_sun_planet, s.backlash_planet_ring], N)[:, None]
+    back = back + np.repeat([kind.backlash for kind in s.kinds], N)[:, None]
     single = float((drive + back).min())
-    whole = float(((drive[:N] + drive[N:]).min(axis=0) + (back[:N] + back[N:]).min(axis=0)).min())
+    drive, back = (side.reshape(-1, N, len(position)).sum(axis=0) for side in (drive, back))
+    whole = float((drive.min(axis=0) + back.min(axis=0)).min())
     return single, whole
 
 
-def _worst(d: SetDeviations, s: PlanetarySet, *, back: bool) -> np.ndarray:
+def _worst(d: SetDeviations, s: GearSet, *, back: bool) -> np.ndarray:
     """Smallest separation (2N,) of any teeth and any points of the flanks of every mesh."""
     N, side = s.n_planets, -1.0 if back else 1.0
     first, second = d.planet_pitch.min(axis=1), d.planet_ring_side_pitch.min(axis=1)
     sun_side, ring_side = (second, first) if back else (first, second)
-    pitch = np.concatenate([(side * d.sun_pitch).min() + sun_side, ring_side + (side * d.ring_pitch).min()])
-    sun, planet, ring = (np.linspace(g.form_roll, g.tip_roll, 101) for g in (s.sun, s.planet, s.ring))
+    pitch = [(side * d.sun_pitch).min() + sun_side, ring_side + (side * d.ring_pitch).min()]
+    rolls = [np.linspace(g.form_roll, g.tip_roll, 101) for g in s.gears]
     profile = [
-        profile_separation(d, s, kind, one[:, None], two, back=back).min()
-        for kind, one, two in ((0, sun, planet), (1, planet, ring))
+        profile_separation(d, s, kind, rolls[one][:, None], rolls[two], back=back).min()
+        for kind, (one, two) in enumerate(s.mates)
     ]
     # of leads the ends of profiles, between which a twist is linear
-    sun, planet, ring = ([g.form_roll, g.tip_roll] for g in (s.sun, s.planet, s.ring))
-    ends = [(np.tile(a, 2), np.repeat(b, 2)) for a, b in ((sun, planet), (planet, ring))]
+    corners = [[g.form_roll, g.tip_roll] for g in s.gears]
+    ends = [(np.tile(corners[one], 2), np.repeat(corners[two], 2)) for one, two in s.mates]
     lead = lead_separation(d, s, 64, np.repeat(ends, N, axis=0).swapaxes(0, 1), back=back).min(axis=(1, 2))
-    return pitch + np.repeat(profile, N) + lead
+    return np.concatenate(pitch[: len(profile)]) + np.repeat(profile, N) + lead
 
 
-def _wedging(d: SetDeviations, s: PlanetarySet):
+def _wedging(d: SetDeviations, s: GearSet):
     """Warn where the deviations may use up the play (W-WEDGING)."""
     if d.ideal and not (d.planet_thickness.any() or d.sun_thickness or d.ring_thickness):
         return
     single, whole = least_play(d, s)
     least = min(single, whole)
     if least < -1e-12:
-        nominal = min(s.backlash_sun_planet, s.backlash_planet_ring)
+        nominal = min(kind.backlash for kind in s.kinds)
         where = "in one mesh" if single <= whole else "between different planets"
         yield GeometryWarning(
             "W-WEDGING",

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, cutter_of
+from femgear.gears.pair import GearPair
 from femgear.gears.profile import inv
 
 # coefficients C1 .. C9 of the minimum flexibility q', ISO 6336-1:2019, eq. 82 (gears of one module depth)
@@ -374,3 +375,19 @@ def mesh_stiffness_method_b(
     solid = theoretical_single_stiffness(teeth_1, teeth_2, shift_1, shift_2, helix_angle=helix_angle)
     single = solid * THEORETICAL_CORRECTION * rack * math.cos(helix_angle)
     return single, single * (0.75 * contact_ratio + 0.25)
+
+
+def pair_mesh_stiffness(pair: GearPair) -> tuple[float, float]:
+    """Compute c' and c_gamma_alpha [N/m^2] of a pair with both gears' racks, see `mesh_stiffness_method_b`.
+
+    An internal gear counts as endless, its shift with the sign of the standard; the larger shift stands
+    first of external gears, as the formula has it.
+    """
+    one, two = pair.gears
+    if not two.internal and two.profile_shift > one.profile_shift:
+        one, two = two, one
+    teeth, shift = (math.inf, -two.profile_shift) if two.internal else (two.teeth, two.profile_shift)
+    return mesh_stiffness_method_b(
+        one.teeth, teeth, one.profile_shift, shift, pair.contact_ratio,
+        dedendum=0.5 * (one.rack.dedendum + two.rack.dedendum), pressure_angle=one.pressure_angle,
+    )  # fmt: skip

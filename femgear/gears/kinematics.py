@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.pair import EACH
+from femgear.gears.planetary import GearSet, PlanetarySet
 
 MEMBERS = ("sun", "carrier", "ring")
 TOLERANCE = 1e-9
@@ -25,11 +26,13 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Orientations:
-    """Angle [rad] of one tooth centreline of every body, about its own centre, in the carrier frame."""
+    """Angles [rad] of one tooth centreline of every body of every gear, in the carrier frame."""
 
-    sun: float
-    planets: tuple[float, ...]
-    ring: float
+    gears: tuple[tuple[float, ...], ...]
+
+    sun = property(lambda self: self.gears[0][0])
+    planets = property(lambda self: self.gears[1])
+    ring = property(lambda self: self.gears[2][0])
 
 
 @dataclass(frozen=True)
@@ -52,22 +55,33 @@ class Torques:
     carrier: float
 
 
-def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations:
+def orientations(planetary: GearSet, position: float = 0.0) -> Orientations:
     """Compute the rotations [rad] of all bodies at a position tau, loaded flanks touching.
 
     tau is a fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
-    ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``.
+    ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``; gears of a pair as their senses say.
     """
-    s = planetary
-    psi, phase = s.planet_angles, s.mesh_phases.tolist()
-    (eta_s, eta_p), (_, eta_r) = s.half_angles
-    pitch_p = s.planet.pitch_angle
-    planets = tuple(psi[n] + math.pi - eta_p - (position + phase[n]) * pitch_p for n in range(s.n_planets))
-    return Orientations(
-        sun=psi[0] - eta_s + position * s.sun.pitch_angle,
-        planets=planets,
-        ring=psi[0] - eta_r - (position + phase[s.n_planets]) * s.ring.pitch_angle,
-    )
+    s, N, psi = planetary, planetary.n_planets, planetary.planet_angles
+    phase, found = s.mesh_phases.tolist(), []
+    for number, (gear, sense) in enumerate(zip(s.gears, s.senses, strict=True)):
+        # every body by the first mesh in which it takes part
+        kind, place = next((k, pair.index(number)) for k, pair in enumerate(s.mates) if number in pair)
+        start, lean = pitch_tooth(s, kind, place)
+        each = [psi[n] + start + lean for n in range(N if number == EACH else 1)]
+        turned = [(position + phase[kind * N + n]) * gear.pitch_angle for n in range(len(each))]
+        found.append(tuple(angle + sense * turn for angle, turn in zip(each, turned, strict=True)))
+    return Orientations(tuple(found))
+
+
+def pitch_tooth(gears: GearSet, kind: int, place: int) -> tuple[float, float]:
+    """Find the tooth of gear 1 or 2 (0, 1) of a kind of mesh whose loaded flank is at the pitch point.
+
+    The angle of that flank [rad] from the direction in which gear 1 sees the pitch point, and that of the
+    tooth's centreline from its flank [rad].
+    """
+    number, eta = gears.mates[kind][place], gears.kinds[kind].half_angles[place]
+    opposite = place == 1 and not gears.gears[number].internal
+    return math.pi if opposite else 0.0, (gears.senses[number] if place else -gears.senses[number]) * eta
 
 
 def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> Speeds:
@@ -120,27 +134,21 @@ def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
     return Torques(sun=sun, ring=sun * share["ring"], carrier=sun * share["carrier"])
 
 
-def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarray:
-    """Compute the unit vectors (2N, 2) of the force of gear 1 on gear 2 in every mesh.
+def mesh_normals(planetary_set: GearSet, *, back: bool = False) -> np.ndarray:
+    """Compute the unit vectors (meshes, 2) of the force of gear 1 on gear 2 in every mesh.
 
     Its line of action: sun on planet at ``psi + pi/2 - alpha_w``, planet on ring at ``psi - pi/2 + alpha_w``
     (carrier frame); the back flanks, with `back`, at ``psi - pi/2 + alpha_w`` and ``psi + pi/2 - alpha_w``.
     """
-    s = planetary_set
-    psi, side = np.asarray(s.planet_angles), -1.0 if back else 1.0
+    s, psi = planetary_set, np.asarray(planetary_set.planet_angles)
+    sides = [-s.senses[one] if back else s.senses[one] for one, _ in s.mates]
     angle = np.concatenate(
         [
-            psi + side * (0.5 * np.pi - s.working_pressure_angle_sun_planet),
-            psi - side * (0.5 * np.pi - s.working_pressure_angle_planet_ring),
+            psi + side * (0.5 * np.pi - kind.working_pressure_angle)
+            for side, kind in zip(sides, s.kinds, strict=True)
         ]
     )
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
-
-def rotation_approach(n_planets: int) -> np.ndarray:
-    """Compute the approach of drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
-    N = n_planets
-    return np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
 
 
 def member_approach(planetary_set: PlanetarySet, *, back: bool = False) -> dict[str, np.ndarray]:
@@ -179,7 +187,7 @@ def _held(s: PlanetarySet, floating: tuple[str, ...], both_flanks: bool) -> bool
     """Whether forces of the flanks keep the members in equilibrium, and a single one from sliding."""
     from scipy.optimize import nnls
 
-    turns = rotation_approach(s.n_planets)
+    turns = s.rotation_approach
     approach = []
     for back in (False, True)[: 1 + both_flanks]:
         motions = member_approach(s, back=back)

@@ -17,8 +17,9 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import Gear, is_whole, working_half_angles
-from femgear.gears.profile import BasicRack, arcinv, inv, pressure_angle_at
+from femgear.gears.gear import Gear, is_whole
+from femgear.gears.pair import EACH, GearPair, zero_backlash_distance, zero_backlash_shift
+from femgear.gears.profile import BasicRack
 
 BACKLASH_TOLERANCE = 1e-4
 """Normal backlash, in modules, that counts as none: what four decimals of profile shifts leave open."""
@@ -52,6 +53,9 @@ class PlanetarySet:
     centre_distance: float
     planet_angles: tuple[float, ...]
 
+    mates = ((0, EACH), (EACH, 2))
+    senses = (1, -1, -1)
+
     def __post_init__(self):
         object.__setattr__(self, "planet_angles", tuple(float(a) for a in self.planet_angles))
         for name in ("sun", "planet", "ring"):
@@ -59,8 +63,7 @@ class PlanetarySet:
             if gear.name != name:
                 object.__setattr__(self, name, replace(gear, name=name))
         check_angles(self.planet_angles)
-        # both raise when the base circles would overlap
-        _ = self.working_pressure_angle_sun_planet, self.working_pressure_angle_planet_ring
+        _ = self.kinds  # refuses base circles that would overlap
 
     @property
     def n_planets(self) -> int:
@@ -72,27 +75,47 @@ class PlanetarySet:
         """Names of the 2N meshes in order."""
         return mesh_names(self.n_planets)
 
-    @cached_property
-    def working_pressure_angle_sun_planet(self) -> float:
-        """Working pressure angle of the meshes with the sun [rad]."""
-        return working_pressure_angle(self.sun, self.planet, self.centre_distance)
+    @property
+    def gears(self) -> tuple[Gear, Gear, Gear]:
+        """Sun, planet and ring."""
+        return self.sun, self.planet, self.ring
 
     @cached_property
+    def kinds(self) -> tuple[GearPair, GearPair]:
+        """Sun with planet, and planet with ring."""
+        a = self.centre_distance
+        return GearPair(self.sun, self.planet, a), GearPair(self.planet, self.ring, a)
+
+    @property
+    def rotation_approach(self) -> np.ndarray:
+        """Approach of the drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
+        return rotation_approach(self.n_planets)
+
+    @property
+    def centres(self) -> tuple[tuple[complex, ...], ...]:
+        """Centres of sun, planets and ring as x + iy [m]."""
+        planets = self.centre_distance * np.exp(1j * np.asarray(self.planet_angles))
+        return (0j,), tuple(planets.tolist()), (0j,)
+
+    @property
+    def working_pressure_angle_sun_planet(self) -> float:
+        """Working pressure angle of the meshes with the sun [rad]."""
+        return self.kinds[0].working_pressure_angle
+
+    @property
     def working_pressure_angle_planet_ring(self) -> float:
         """Working pressure angle of the meshes with the ring [rad]."""
-        return working_pressure_angle(self.planet, self.ring, self.centre_distance)
+        return self.kinds[1].working_pressure_angle
 
     @property
     def contact_ratio_sun_planet(self) -> float:
         """Transverse contact ratio from the tip circles (and from what undercut leaves)."""
-        start, end = self.path_sun_planet
-        return (end - start) / self.base_pitch
+        return self.kinds[0].contact_ratio
 
     @property
     def contact_ratio_planet_ring(self) -> float:
         """Transverse contact ratio from the tip circles (and from what undercut leaves)."""
-        start, end = self.path_planet_ring
-        return (end - start) / self.base_pitch
+        return self.kinds[1].contact_ratio
 
     @property
     def base_pitch(self) -> float:
@@ -101,40 +124,28 @@ class PlanetarySet:
 
     @property
     def path_sun_planet(self) -> tuple[float, float]:
-        """Path coordinates [m] of first (planet tip) and last (sun tip) contact, 0 at the pitch point.
-
-        Undercut shortens the path to what is left of the involute.
-        """
-        tangent = math.tan(self.working_pressure_angle_sun_planet)
-        sun, planet = self.sun.base_radius * tangent, self.planet.base_radius * tangent
-        start = max(planet - self.planet.tip_roll, _undercut_roll(self.sun) - sun)
-        return start, min(self.sun.tip_roll - sun, planet - _undercut_roll(self.planet))
+        """Path coordinates [m] of first (planet tip) and last (sun tip) contact, see `GearPair.path`."""
+        return self.kinds[0].path
 
     @property
     def path_planet_ring(self) -> tuple[float, float]:
         """As `path_sun_planet`, of first (ring tip) and last (planet tip) contact [m]."""
-        tangent = math.tan(self.working_pressure_angle_planet_ring)
-        planet, ring = self.planet.base_radius * tangent, self.ring.base_radius * tangent
-        start = max(self.ring.tip_roll - ring, _undercut_roll(self.planet) - planet)
-        return start, self.planet.tip_roll - planet
+        return self.kinds[1].path
 
-    @cached_property
+    @property
     def half_angles(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Half-thickness angles [rad] on the working pitch circles: of sun and planet, of planet and ring."""
-        return (
-            working_half_angles(self.sun, self.planet, self.working_pressure_angle_sun_planet),
-            working_half_angles(self.planet, self.ring, self.working_pressure_angle_planet_ring),
-        )
+        return self.kinds[0].half_angles, self.kinds[1].half_angles
 
     @property
     def backlash_sun_planet(self) -> float:
         """Normal play [m] along the line of action."""
-        return _backlash(self.sun, self.planet, self.working_pressure_angle_sun_planet)
+        return self.kinds[0].backlash
 
     @property
     def backlash_planet_ring(self) -> float:
         """Normal play [m] along the line of action."""
-        return _backlash(self.planet, self.ring, self.working_pressure_angle_planet_ring)
+        return self.kinds[1].backlash
 
     @property
     def mesh_phases(self) -> np.ndarray:
@@ -176,6 +187,12 @@ class PlanetarySet:
                 if np.abs(np.mod(away + math.pi, 2.0 * math.pi) - math.pi).max() < 1e-9:
                     return turns
         return 1
+
+
+def rotation_approach(n_planets: int) -> np.ndarray:
+    """Compute the approach of drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
+    N = n_planets
+    return np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
 
 
 def mesh_names(n_planets: int) -> tuple[str, ...]:
@@ -221,12 +238,18 @@ def close_set(
     return PlanetarySet(sun, planet, ring, centre_distance, planet_angles)
 
 
-def mirrored_set(planetary_set: PlanetarySet) -> tuple[PlanetarySet, np.ndarray]:
+GearSet = PlanetarySet | GearPair
+"""What the contact of teeth is solved for."""
+
+
+def mirrored_set(planetary_set):
     """Mirror a set, as it is seen from behind, and tell the places ``order`` (N,) of its planets.
 
     Planet angles are counted the other way round, ascending from the first planet; mirrored planet ``i`` is
     original planet ``order[i]``.
     """
+    if planetary_set.n_planets == 1:
+        return planetary_set, np.zeros(1, int)
     angles = np.asarray(planetary_set.planet_angles)
     turned = np.mod(angles[0] - angles, 2 * np.pi)
     order = np.argsort(turned, kind="stable")
@@ -286,68 +309,6 @@ def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
         name=gear.name,
     )
     return replace(made, rim_radius=made.root_radius + gear.rim_radius - gear.root_radius)
-
-
-def _tooth_sum(one: Gear, two: Gear) -> int:
-    """Sum of the teeth of an external pair, difference of an internal one (gear 2)."""
-    return two.teeth - one.teeth if two.internal else one.teeth + two.teeth
-
-
-def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> float:
-    """Compute the working pressure angle [rad] of two gears at a centre distance [m].
-
-    ``cos(aw) = a0 cos(alpha) / a``
-
-    Raises
-    ------
-    GeometryError
-        E-CENTRE-DISTANCE: the base circles would overlap (``cos(aw) > 1``).
-    """
-    base = 0.5 * one.module * _tooth_sum(one, two) * math.cos(one.pressure_angle)
-    if not centre_distance >= base:
-        raise GeometryError(
-            f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {one.teeth} and "
-            f"{two.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
-            code="E-CENTRE-DISTANCE", key="set.centre_distance", value=centre_distance,
-            limit=f">= {math.ceil(base * 1e7) / 1e4:.4f} mm",
-            remedy="increase the centre distance or reduce the tooth numbers or the module",
-        )  # fmt: skip
-    return pressure_angle_at(centre_distance, base)
-
-
-def zero_backlash_distance(one: Gear, two: Gear) -> float:
-    """Compute the centre distance [m] at which two gears run without play, allowances left aside.
-
-    External: ``inv(aw) = inv(a) + 2 tan(a) (x1 + x2)/(z1 + z2)`` (ISO 21771, eq. 60); internal (gear 2):
-    ``inv(aw) = inv(a) + 2 tan(a) (x2 - x1)/(z2 - z1)``, shifts positive outwards.
-
-    Raises
-    ------
-    GeometryError
-        E-GEOMETRY: ``inv(aw)`` would be negative.
-    """
-    alpha, total = one.pressure_angle, _tooth_sum(one, two)
-    x_1, x_2 = one.profile_shift, two.profile_shift
-    shift = x_2 - x_1 if two.internal else x_1 + x_2
-    try:
-        angle = arcinv(inv(alpha) + 2.0 * math.tan(alpha) * shift / total)
-    except GeometryError as error:
-        raise GeometryError(
-            f"no centre distance suits profile shifts {x_1:.4f} ({one.name}) and {x_2:.4f} "
-            f"({two.name}): {error.message}", code=error.code, key=f"{two.name}.profile_shift", value=x_2,
-            limit=error.limit, remedy=error.remedy,
-        ) from None  # fmt: skip
-    return 0.5 * one.module * total * math.cos(alpha) / math.cos(angle)
-
-
-def zero_backlash_shift(one: Gear, two: Gear, centre_distance: float) -> float:
-    """Compute the sum or difference of profile shifts [modules] without play at a centre distance [m].
-
-    The sum of external gears, ``x2 - x1`` where gear 2 is internal: inverse of `zero_backlash_distance`
-    (ISO 21771, eq. 60).
-    """
-    alpha, working = one.pressure_angle, working_pressure_angle(one, two, centre_distance)
-    return _tooth_sum(one, two) * (inv(working) - inv(alpha)) / (2.0 * math.tan(alpha))
 
 
 def equal_planet_angles(planets: int) -> tuple[float, ...]:
@@ -417,18 +378,6 @@ def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...
             remedy=f"nearest planet_angles that assemble: {listing} deg",
         )  # fmt: skip
     return tuple(round(t) for t in turns)
-
-
-def _undercut_roll(gear: Gear) -> float:
-    """Roll length [m] where an undercut flank ends, minus infinity without undercut."""
-    return gear.form_roll if gear.undercut else -math.inf
-
-
-def _backlash(one: Gear, two: Gear, angle: float) -> float:
-    """Pitch minus both tooth thicknesses on the working pitch circles, taken along the normal [m]."""
-    eta_1, eta_2 = working_half_angles(one, two, angle)
-    r_1, r_2 = one.base_radius / math.cos(angle), two.base_radius / math.cos(angle)
-    return (one.pitch_angle * r_1 - 2.0 * (r_1 * eta_1 + r_2 * eta_2)) * math.cos(angle)
 
 
 def _fraction(value: np.ndarray) -> np.ndarray:

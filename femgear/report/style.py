@@ -212,8 +212,8 @@ def _measured_once(ax) -> None:
 
 
 def family(name: str) -> str:
-    """Tell the kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
-    return "planet-ring" if "ring" in name else "sun-planet"
+    """Tell the kind of a mesh from its label: ``"planet-ring"`` where the ring takes part; that of a pair."""
+    return "planet-ring" if "ring" in name else name if name.startswith("gear 1") else "sun-planet"
 
 
 def distinct_lines(

@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
-from femgear.gears.kinematics import torques
 from femgear.gears.modifications import FlankForm, TipRelief
 from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.static.stages import flank_compliances, static_supports
@@ -115,11 +114,11 @@ def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
 
 def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
     """Find the torque on the sun under one on the input [N m], by default the case's; E-TORQUE for none."""
-    value = case.operation.torque if torque is None else torque
+    value = driving_torque(case, torque)
     if value == 0:
         message = "without torque no tooth bends"
         raise CaseError(message, code="E-TORQUE", key="operation.torque", remedy="give a torque")
-    return torques(gears, member=case.operation.input, torque=value).sun
+    return value
 
 
 def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
@@ -140,7 +139,7 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
         )  # fmt: skip
     pair = mesh_pairs(planetary_set)[0]
     begin, end = pair.path
-    along = length * (end - begin - planetary_set.sun.base_pitch)
+    along = length * (end - begin - planetary_set.base_pitch)
     return float(pair.pitch_roll_1 + end - along), float(pair.pitch_roll_2 - begin - along)
 
 
@@ -190,8 +189,8 @@ class HarrisMap:
     ----------
     torques : (T,) array
         Torque on the sun [N m].
-    peak_to_peak : (variants, 2, T) array
-        Of the transmission error of the sun-planet and the planet-ring meshes, the largest of each kind [m].
+    peak_to_peak : (variants, kinds, T) array
+        Of the transmission error of the meshes, the largest of each kind [m].
     overall : (variants, T) array
         Of the transmission error from sun to ring [m].
     residual : float
@@ -235,15 +234,15 @@ def harris_map(
     if not len(torques) or not (np.isfinite(torques).all() and torques.all()):
         message = "every torque of the map must differ from zero"
         raise CaseError(message, code="E-TORQUE", value=torques, remedy="leave zero out")
-    N = basis.gears.n_planets
-    peaks = np.zeros((len(deviations), 2, len(torques)))
+    kinds = len(basis.gears.kinds)
+    peaks = np.zeros((len(deviations), kinds, len(torques)))
     overall, residual = np.zeros((len(deviations), len(torques))), 0.0
     for v, variant in enumerate(deviations):
         periods = 1 if variant is None else common_period(variant, basis.gears)[0]
         for t, torque in enumerate(torques):
             cycle = replace(basis, deviations=variant).walk(float(torque), periods=periods)
             peak = np.ptp(cycle.deflection, axis=1)
-            peaks[v, :, t] = peak[:N].max(), peak[N:].max()
+            peaks[v, :, t] = peak.reshape(kinds, -1).max(axis=1)
             overall[v, t] = np.ptp(cycle.sun_arc)
             residual = max(residual, float(cycle.residual.max()))
             if progress is not None:

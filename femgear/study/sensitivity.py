@@ -47,12 +47,11 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
-from femgear.gears.kinematics import rotation_approach
 from femgear.study.relief import DesignBasis
 from femgear.trains.protocol import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+    from femgear.gears.planetary import PlanetarySet, rotation_approach
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +241,9 @@ def _touching(solved: PlanetarySet, setup, numbers, cells) -> _TouchingCells:
     mesh, pair, cell, weight = (np.concatenate([c[i] for c in cells]) for i in range(4))
     place = mesh, numbers[at], pair
     turns = setup.turns[numbers[at]]
-    tooth_1, tooth_2 = (setup.tooth[gear][mesh, pair] + tooth_steps(mesh, gear, N) * turns for gear in (0, 1))
+    tooth_1, tooth_2 = (
+        setup.tooth[gear][mesh, pair] + tooth_steps(solved, mesh, gear) * turns for gear in (0, 1)
+    )
     roll_1, roll_2 = np.zeros((2, len(mesh)))
     for kind, contact in enumerate(mesh_pairs(solved)):
         rows = mesh // N == kind

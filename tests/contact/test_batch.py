@@ -265,7 +265,9 @@ def test_first_cells_and_springs_are_those_that_equal_forces_would_press():
     candidate = np.ones(gap.shape, bool)
     candidate[0, 0, 1] = False
     bodies = SimpleNamespace(face_width=0.02, material=STEEL)
-    found = SimpleNamespace(setup=SimpleNamespace(n_planets=2), bodies=bodies, gap=gap, candidate=candidate)
+    found = SimpleNamespace(
+        setup=SimpleNamespace(n_planets=2, meshes=4), bodies=bodies, gap=gap, candidate=candidate
+    )
     # equal forces on all drive flanks push along both motions alike, over their arms
     found.approach = np.array([[-4.0, 0.0], [1.0, 0.0], [1.0, -1.0], [0.0, 0.5], *np.full((4, 2), 5.0)])
     arms = np.array([[1.0, 0.0], [0.7, 0.7], [0.9, 0.4], [0.0, 1.0], [-1.0, 0.0]])

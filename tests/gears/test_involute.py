@@ -11,7 +11,7 @@ from validation.reference import gear_limits as limits
 from femgear.errors import GeometryError
 from femgear.gears import profile as iv
 from femgear.gears.gear import Gear
-from femgear.gears.planetary import working_pressure_angle, zero_backlash_distance, zero_backlash_shift
+from femgear.gears.pair import working_pressure_angle, zero_backlash_distance, zero_backlash_shift
 
 ALPHA = math.radians(20.0)
 

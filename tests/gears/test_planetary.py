@@ -13,7 +13,8 @@ import pytest
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
-from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, zero_backlash_distance
+from femgear.gears.pair import zero_backlash_distance
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 
 ALPHA = math.radians(20.0)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from femgear.gears import profile
 from femgear.gears.gear import Gear
-from femgear.gears.planetary import working_pressure_angle, zero_backlash_distance
+from femgear.gears.pair import working_pressure_angle, zero_backlash_distance
 from femgear.gears.profile import BasicRack
 from validation.reference import gear_limits
 from validation.rows import REPEATED, Row, counted, printed

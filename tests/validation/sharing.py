@@ -15,8 +15,7 @@ from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, moving_members
 from femgear.gears.deviations import body_separation, no_deviations
 from femgear.gears.gear import Gear
-from femgear.gears.kinematics import rotation_approach
-from femgear.gears.planetary import PlanetarySet, equal_planet_angles
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles, rotation_approach
 from femgear.gears.profile import BasicRack
 from validation import independent
 from validation.rows import Row, within

@@ -25,7 +25,7 @@ from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.gears.deviations import SetDeviations, loaded_flanks
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import form_deviation
-from femgear.gears.planetary import PlanetarySet, mesh_names
+from femgear.gears.planetary import GearSet
 from femgear.report.scene import Body, View, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.solid import SOLID, solid
 from femgear.report.style import (
@@ -47,7 +47,7 @@ from femgear.report.style import (
 )
 from femgear.storage.files import write_text
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.results import StaticResult
+from femgear.trains.static.results import SIDES, StaticResult
 from femgear.trains.static.stages import static_supports
 
 if TYPE_CHECKING:
@@ -59,7 +59,6 @@ _POSITION = "position in the mesh period [1]"
 _TENSION, _COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
 # tangent of the critical section after ISO 6336-3, external and internal gears
 _CRITICAL_SLOPE = {False: 30.0, True: 60.0}
-_KINDS = ("sun-planet", "planet-ring")
 # largest displacement of the deformed set [modules]: teeth bend and do not cross
 _SHOWN = 0.25
 
@@ -69,6 +68,8 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     figure, (left, right) = new_figure(columns=2, height=3.6, sharex=True)
     drawn = distinct_lines(static["mesh"].values, static["ste"], partly=True, within=ALIKE)
     position, each = periodic(static["position"], static["ste"].values * 1e6)
+    if len(drawn) == len(_kinds(static)) == 1:
+        return _one_error(position, each[0], drawn[0][0])
     for i, (text, row) in enumerate(drawn):
         left.plot(position, each[row], label=text, **line_style(i))
     overall = periodic(static["position"], static["ste_overall"].values * 1e6)[1]
@@ -85,6 +86,15 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
         name_curves(left)
     else:
         legend_below(figure, columns=2)
+    return figure
+
+
+def _one_error(position: np.ndarray, error: np.ndarray, title: str) -> Figure:
+    """Draw the transmission error of a pair [um]."""
+    figure, (ax,) = new_figure(height=3.6)
+    ax.plot(position, error, **line_style(0))
+    ax.set_xlim(0, position[-1])
+    label(ax, _POSITION, "transmission error [µm]", f"{title}: peak to peak {np.ptp(error):.3g} µm")
     return figure
 
 
@@ -156,11 +166,12 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     to the next place with every mesh period: from period to period and place to place the loads are the
     history of one pair. The meshes are those of the first planet.
     """
-    figure, axes = new_figure(columns=2, sharey=True)
+    kinds = _kinds(static)
+    figure, axes = new_figure(columns=len(kinds), sharey=True)
     names = [str(name) for name in static["mesh"].values]
     position, largest = static["position"].values, 0.0
     periods = int(static.attrs.get("mesh_periods", 1))
-    for ax, kind in zip(axes, _KINDS):
+    for ax, kind in zip(axes, kinds):
         row = next(i for i, name in enumerate(names) if family(name) == kind)
         load, force = static["tooth_load"].values[row], static["mesh_force"].values[row]
         place = np.arange(len(load))[:, None]
@@ -211,7 +222,7 @@ def _over_flank(
     figure, axes = new_figure(columns=2, sharey=True)
     names, place = [str(name) for name in static["mesh"].values], 1e3 * static["slice"].values
     position = static["position"].values
-    rows = [next(i for i, one in enumerate(names) if family(one) == kind) for kind in _KINDS]
+    rows = [next(i for i, one in enumerate(names) if family(one) == kind) for kind in _kinds(static)]
     periods = int(static.attrs.get("mesh_periods", 1))
     largest, most = (static[one].values[rows].max() for one in (name, "slice_load"))
     for ax, row in zip(axes, rows):
@@ -246,6 +257,11 @@ def _of_planets(static: xr.Dataset, rows) -> list[tuple[str, int]]:
     return [(text.replace("all sun-planet meshes", "every planet"), row) for text, row in found]
 
 
+def _kinds(data: xr.Dataset) -> tuple[str, ...]:
+    """Kinds of mesh of a file, in order."""
+    return tuple(dict.fromkeys(family(str(name)) for name in data["mesh"].values))
+
+
 def _while_loaded(loaded: np.ndarray) -> slice:
     """Range of samples (n,) from one before the first loaded one to one behind the last."""
     found = np.flatnonzero(loaded)
@@ -258,7 +274,7 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
 
     The nominal ones, ``iso_root_stress``, too, where the file has them.
     """
-    gears = _four_gears(stress)
+    gears = _flanks_of(stress)
 
     def draw(number: int, ax) -> str:
         title, row = gears[number]
@@ -269,16 +285,16 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
         ax.plot(path, compression * 1e-6, color=BLUE, linestyle="--", label=_COMPRESSION)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
         _nominal(ax, row, "iso_root_stress", "σ_F0 of ISO 6336-3")
-        if number > 1:
+        if number >= len(gears) - 2:
             label(ax, "path from the pitch point [base pitches]")
         return f"{title}: {tension.max() * 1e-6:.3g} and {compression.min() * 1e-6:.3g} MPa".replace("-", "−")
 
-    return _four_panels(draw, "stress [MPa]", columns=2, sharex=True)
+    return _panels(draw, "stress [MPa]", len(gears), columns=2, sharex=True)
 
 
 def root_stress_profile(stress: xr.Dataset) -> Figure:
     """Draw the stress along both roots of the tooth with the largest tension (stress.nc)."""
-    gears = _four_gears(stress)
+    gears = _flanks_of(stress)
 
     def draw(number: int, ax) -> str:
         title, row = gears[number]
@@ -295,17 +311,18 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
         label(ax, "arc from the end of the flank [mm]")
         return title
 
-    return _four_panels(draw, "stress [MPa]", columns=2)
+    return _panels(draw, "stress [MPa]", len(gears), columns=2)
 
 
 def contact_pressure(stress: xr.Dataset) -> Figure:
     """Draw the contact pressure of a tooth pair over its path (stress.nc), on the planet with the largest."""
-    figure, axes = new_figure(rows=2, columns=2, height=6.0)
+    kinds = _kinds(stress)
+    figure, axes = new_figure(rows=2, columns=len(kinds), height=6.0)
     top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
     # at the end of a flank the pressure grows as cells shrink: it only decides where there is no other
     edge = stress["pressure_distribution"].max(("pair", "cell", "position")).values
     planet = _worst_planet(stress, stress["contact_pressure"].max("position").values, edge)
-    for upper, lower, kind in zip(axes[:2], axes[2:], _KINDS):
+    for upper, lower, kind in zip(axes[: len(kinds)], axes[len(kinds) :], kinds):
         row = _mesh_of(stress, kind, planet)
         path, place, pressure = _along_path(row)
         upper.plot(path, pressure.max(axis=0), color=VERMILION, label="largest pressure")
@@ -327,8 +344,8 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
         lower.set_ylim(-reach or -1.0, reach or 1.0)
         label(lower, "path from the pitch point [mm]")
     label(axes[0], y="pressure [MPa]")
-    label(axes[2], y="along the common tangent [µm]")
-    figure.colorbar(image, ax=axes[2:], label="pressure [MPa]", extend="max")
+    label(axes[len(kinds)], y="along the common tangent [µm]")
+    figure.colorbar(image, ax=axes[len(kinds) :], label="pressure [MPa]", extend="max")
     legend_below(figure, columns=2)
     highest = float(stress["pressure_distribution"].max()) * 1e-6
     if highest > top:
@@ -351,11 +368,12 @@ def _along_path(row):
 
 def load_spectrum(stress: xr.Dataset) -> Figure:
     """Draw the load spectrum of the teeth in both meshes of the planet with the largest load (stress.nc)."""
-    figure, axes = new_figure(columns=2, sharex=True, sharey=True)
+    kinds = _kinds(stress)
+    figure, axes = new_figure(columns=len(kinds), sharex=True, sharey=True)
     edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
     time = stress["load_time_share"].values
     planet = _worst_planet(stress, (edges[1:] * (time > 0.0)).max(axis=1), time @ edges[1:])
-    for ax, kind in zip(axes, _KINDS):
+    for ax, kind in zip(axes, kinds):
         row = _mesh_of(stress, kind, planet)
         time, cycles = (100 * row[f"load_{name}_share"].values for name in ("time", "cycle"))
         ax.stairs(time, edges, fill=True, color=BLUE, alpha=0.75, label="share of the time under load")
@@ -397,7 +415,7 @@ def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
     """Find the planet (from 0) with the largest of a measure (mesh,); the next measure decides ties."""
     kinds = [family(str(name)) for name in stress["mesh"].values]
     of_planets = [
-        np.max([measure[[kind == wanted for kind in kinds]] for wanted in _KINDS], axis=0)
+        np.max([measure[[kind == wanted for kind in kinds]] for wanted in dict.fromkeys(kinds)], axis=0)
         for measure in measures
     ]
     left = np.arange(len(of_planets[0]))
@@ -414,15 +432,14 @@ def _nominal(ax, row: xr.Dataset, name: str, text: str) -> None:
         ax.axhline(row[name].item() * 1e-6, color=BLACK, linewidth=1.2, linestyle="-.", label=text)
 
 
-def _four_gears(stress: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+def _flanks_of(stress: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     """Name sun, planet on both sides, and ring of the planet with the largest tension, with their rows."""
     tension = stress["root_tension"].max([dim for dim in stress["root_tension"].dims if dim != "mesh"])
     n = _worst_planet(stress, tension.values)
-    titles = ("sun", f"planet {n + 1}, sun side"), (f"planet {n + 1}, ring side", "ring")
     return [
-        (title, _mesh_of(stress, kind, n).isel(gear=gear))
-        for kind, pair in zip(_KINDS, titles)
-        for gear, title in enumerate(pair)
+        (title.replace("planet", f"planet {n + 1}"), _mesh_of(stress, kind, n).isel(gear=gear))
+        for kind in _kinds(stress)
+        for gear, title in enumerate(SIDES.get(kind, tuple(kind.split("-"))))
     ]
 
 
@@ -435,9 +452,12 @@ def _crossing(slope, arc, angle) -> float | None:
     return float(arc[i] + (arc[i + 1] - arc[i]) * (angle - slope[i]) / (slope[i + 1] - slope[i]))
 
 
-def _four_panels(draw: Callable[[int, Any], str], y: str, *, columns: int, sharex: bool = False) -> Figure:
-    """Draw sun, planets (either side) and ring in panels of one scale; ``draw(panel, axes)`` gives titles."""
-    figure, axes = new_figure(rows=2, columns=2, height=6.0, sharex=sharex, sharey=True)
+def _panels(
+    draw: Callable[[int, Any], str], y: str, count: int, *, columns: int, sharex: bool = False
+) -> Figure:
+    """Draw all flanks in panels of one scale, two in a row; ``draw(panel, axes)`` gives titles."""
+    rows = count // 2
+    figure, axes = new_figure(rows=rows, columns=2, height=3.0 * rows, sharex=sharex, sharey=True)
     for number, ax in enumerate(axes):
         label(ax, title=draw(number, ax))
     for ax in axes[::2]:
@@ -446,7 +466,7 @@ def _four_panels(draw: Callable[[int, Any], str], y: str, *, columns: int, share
     return figure
 
 
-def has_profiles(deviations: SetDeviations, planetary_set: PlanetarySet) -> bool:
+def has_profiles(deviations: SetDeviations, planetary_set: GearSet) -> bool:
     """Tell whether any loaded flank differs from its involute, so that `profile_chart` shows something."""
     flanks = loaded_flanks(deviations, planetary_set)
     return any(form_deviation(form, gear, _stations(form, gear)).any() for _, form, gear in flanks)
@@ -458,7 +478,7 @@ def has_pitches(deviations: SetDeviations) -> bool:
     return any(p.any() for p in (d.sun_pitch, d.planet_pitch, d.planet_ring_side_pitch, d.ring_pitch))
 
 
-def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
+def profile_chart(deviations: SetDeviations, planetary_set: GearSet) -> Figure:
     """Draw the profiles of the loaded flanks over the roll angle, positive with more material.
 
     The involute is the zero line; the part that meets the mate is marked.
@@ -476,10 +496,10 @@ def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Fig
         label(ax, "roll angle [deg]")
         return name
 
-    return _deviation_panels(draw)
+    return _deviation_panels(draw, len(flanks))
 
 
-def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
+def pitch_chart(deviations: SetDeviations, planetary_set: GearSet) -> Figure:
     """Draw the cumulative pitch deviations of the loaded flanks over the teeth, positive with more material.
 
     Along the line of action; a line for each planet and flank that has any.
@@ -491,6 +511,9 @@ def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figur
         ("planets, ring side", [(f"planet {n + 1}", d.planet_ring_side_pitch[n]) for n in range(N)]),
         ("ring", [("ring", d.ring_pitch)]),
     )
+    if len(planetary_set.kinds) == 1:
+        names = [gear.name.replace("_", " ") for gear in planetary_set.gears]
+        rows = tuple((name, [(name, one)]) for name, one in zip(names, (d.sun_pitch, d.planet_pitch[0])))
 
     def draw(number: int, ax) -> str:
         title, lines = rows[number]
@@ -501,34 +524,30 @@ def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figur
         label(ax, "tooth number [1]")
         return title
 
-    return _deviation_panels(draw)
+    return _deviation_panels(draw, len(rows))
 
 
-def _deviation_panels(draw: Callable[[int, Any], str]) -> Figure:
-    """Draw deviations of the four kinds of flanks on a scale of at least one micrometre up and down."""
-    figure = _four_panels(draw, "deviation [µm], material positive", columns=5)
+def _deviation_panels(draw: Callable[[int, Any], str], count: int) -> Figure:
+    """Draw deviations of all kinds of flanks on a scale of at least one micrometre up and down."""
+    figure = _panels(draw, "deviation [µm], material positive", count, columns=5)
     low, high = figure.axes[0].get_ylim()
     figure.axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
     return figure
 
 
-def active_rolls(planetary_set: PlanetarySet) -> tuple[tuple[float, float], ...]:
+def active_rolls(planetary_set: GearSet) -> tuple[tuple[float, float], ...]:
     """Find the roll lengths [m] of the parts of the flanks that rigid gears use: sun, planet twice, ring.
 
     From the path of contact: ``r_b tan(alpha_w)`` and the path coordinate, which runs down the flank of a
     driven external gear.
     """
-    s = planetary_set
-    sun_side = math.tan(s.working_pressure_angle_sun_planet)
-    ring_side = math.tan(s.working_pressure_angle_planet_ring)
-    (a, b), (c, e) = s.path_sun_planet, s.path_planet_ring
-    planet = s.planet.base_radius
-    return (
-        (s.sun.base_radius * sun_side + a, s.sun.base_radius * sun_side + b),
-        (planet * sun_side - b, planet * sun_side - a),
-        (planet * ring_side + c, planet * ring_side + e),
-        (s.ring.base_radius * ring_side + c, s.ring.base_radius * ring_side + e),
-    )
+    found = []
+    for pair in planetary_set.kinds:
+        (one, two), tangent, (a, b) = pair.gears, math.tan(pair.working_pressure_angle), pair.path
+        first, second = one.base_radius * tangent, two.base_radius * tangent
+        found += [(first + a, first + b)]
+        found += [(second + a, second + b) if two.internal else (second - b, second - a)]
+    return tuple(found)
 
 
 def _stations(form, gear: Gear) -> np.ndarray:
@@ -550,10 +569,11 @@ def _static_figures(drawn: Drawn) -> dict[str, Figure]:
     over_width = {}
     if "slice_load" in static:
         over_width = {"face_load": face_load(static), "contact_pattern": contact_pattern(static)}
+    sharing = {"load_sharing": load_sharing(static)} if len(_kinds(static)) > 1 else {}
     return over_width | {
         "static_transmission_error": static_transmission_error(static),
-        "mesh_stiffness": mesh_stiffness(static, face_width=planetary_set(drawn.case).sun.face_width),
-        "load_sharing": load_sharing(static),
+        "mesh_stiffness": mesh_stiffness(static, face_width=planetary_set(drawn.case).gears[0].face_width),
+        **sharing,
         "tooth_loads": tooth_loads(static),
     }
 
@@ -584,7 +604,7 @@ def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
     return figures
 
 
-def picture_sectors(drawn: Drawn, gears: PlanetarySet) -> Sectors:
+def picture_sectors(drawn: Drawn, gears: GearSet) -> Sectors:
     """Make sectors of some thousand nodes: pictures need no converged stresses, and files stay small."""
     return make_sectors(gears, material_of(drawn.case), flank_elements=6, refine=0.35, cache=drawn.cache)
 
@@ -597,9 +617,10 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
 
     gears, cycle = _left_flanks_loaded(static, case)
     sectors = picture_sectors(drawn, gears)
+    of_kind = {sector.gear.name: sector for sector in sectors.gears}
     bodies, deformed = [], deformed_set(gears, sectors, cycle)
     for body in deformed:
-        sector = getattr(sectors, body.kind)
+        sector = of_kind[body.kind]
         count = sector.gear.teeth
         numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
         moved = whole_field(np.asarray(body.displacement), numbers)
@@ -608,28 +629,31 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         bodies = [_reflected(body) for body in bodies]
     grid = assemble_set(bodies)
     write_vtu(grid, folder / "deformed_set.vtu")
-    title = f"deflection under {static.sun_torque:.4g} N m on the sun".replace("-", "−")
+    title = f"{static.sun_torque:.4g} N m on {gears.gears[0].name.replace('_', ' ')}".replace("-", "−")
+    title = f"deflection under {title.replace('on ', 'on the ')}" if len(gears.kinds) > 1 else title
     deformed_picture(
         grid, folder / "deformed_set.png", title=title,
-        largest=_SHOWN * gears.sun.module, details=_mesh_views(static.planetary_set),
+        largest=_SHOWN * gears.gears[0].module, details=_mesh_views(static.planetary_set),
     )  # fmt: skip
-    grids = {kind: getattr(sectors, kind).grid for kind in ("sun", "planet", "ring")}
+    if len(gears.kinds) == 1:
+        return ["deformed_set.vtu", "deformed_set.png"]
+    grids = {kind: sector.grid for kind, sector in of_kind.items()}
     model = solid(gears, grids, deformed, material_of(case), drawn.data.get("modes"))
     write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SOLID)
     return ["deformed_set.vtu", "deformed_set.png", SOLID]
 
 
-def _mesh_views(gears: PlanetarySet) -> list[View]:
-    """Look at the pitch points of both meshes of the first planet, three pitches to either side."""
-    arm, along = gears.centre_distance, np.exp(1j * float(gears.planet_angles[0]))
-    sun, planet, ring = gears.sun.teeth, gears.planet.teeth, gears.ring.teeth
-    radii = (arm * sun / (sun + planet), arm * ring / (ring - planet))
-    places = zip(mesh_names(1), (radius * along for radius in radii))
-    half = 3.0 * math.pi * gears.sun.module
-    return [View(f"mesh {name}", (at.real, at.imag), half) for name, at in places]
+def _mesh_views(gears: GearSet) -> list[View]:
+    """Look at the pitch points of all kinds of mesh of the first planet, three pitches to either side."""
+    half, along, views = 3.0 * math.pi * gears.gears[0].module, np.exp(1j * gears.planet_angles[0]), []
+    for kind, pair in enumerate(gears.kinds):
+        radius = pair.gear_1.base_radius / math.cos(pair.working_pressure_angle)
+        at = gears.centres[gears.mates[kind][0]][0] + radius * along
+        views.append(View(f"mesh {gears.mesh_names[kind * gears.n_planets]}", (at.real, at.imag), half))
+    return views
 
 
-def _left_flanks_loaded(static: StaticResult, case: Case) -> tuple[PlanetarySet, MeshCycle]:
+def _left_flanks_loaded(static: StaticResult, case: Case) -> tuple[Any, MeshCycle]:
     """The set and its static state at position zero; of a negative torque those of the mirror image."""
     if static.sun_torque >= 0:
         return static.planetary_set, static.cycle

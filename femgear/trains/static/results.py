@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import tooth_thickness
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_set, phasing_table
+from femgear.report.style import family
 from femgear.report.tables import Block, chosen, tabulate
 from femgear.storage.results import coordinates, dataset, declared
 
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.root_stress import RootRange, RootStresses
     from femgear.contact.tooth_loads import LoadSpectrum
-    from femgear.gears.planetary import PlanetarySet
+    from femgear.gears.planetary import GearSet, PlanetarySet
 
 _COUNTING = (
     "one load cycle an engagement, from zero to the largest load of the tooth (peak counting between "
@@ -141,6 +143,8 @@ _HARMONICS, _ROWS = 6, 8
 """Harmonics whose phasing is listed, and neighbouring sets."""
 _DISTANCE, _TOLERANCE = 3, 0.02
 """How far teeth and ratio of neighbouring sets may lie away."""
+SIDES = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
+"""Names of the flanks in both kinds of mesh of a planetary set; those of a pair are its gears."""
 _LAST_SLICE = 0.1
 """Rise of the load within a slice that deserves more of them."""
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
@@ -168,13 +172,14 @@ class StaticResult:
     @property
     def warnings(self) -> tuple[Finding, ...]:
         """Findings that an engineer should not overlook in this result."""
-        return tuple(static_warnings(self.dataset(), self.planetary_set.sun.module))
+        return tuple(static_warnings(self.dataset(), self.planetary_set.gears[0].module))
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of static.nc."""
         cycle, gears = self.cycle, self.planetary_set
-        bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
-        variables, width = STATIC_VARIABLES, gears.sun.face_width
+        bodies = [body for body in self.bodies.gears if body is not None]
+        kinds = {f"{pair.gear_1.name}_{pair.gear_2.name}": pair for pair in gears.kinds}
+        variables, width = STATIC_VARIABLES, gears.gears[0].face_width
         if cycle.slice_load is not None:
             variables = variables | SLICE_VARIABLES
         values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in variables}
@@ -196,16 +201,17 @@ class StaticResult:
             },
             attrs={
                 "title": "static transmission error, load sharing and mesh stiffness",
-                "contact_ratio_sun_planet": gears.contact_ratio_sun_planet,
-                "contact_ratio_planet_ring": gears.contact_ratio_planet_ring,
-                "working_pressure_angle_sun_planet": gears.working_pressure_angle_sun_planet,
-                "working_pressure_angle_planet_ring": gears.working_pressure_angle_planet_ring,
+                **{f"contact_ratio_{name}": pair.contact_ratio for name, pair in kinds.items()},
+                **{
+                    f"working_pressure_angle_{name}": pair.working_pressure_angle
+                    for name, pair in kinds.items()
+                },
                 "mesh_phases": np.asarray(gears.mesh_phases),
                 "planet_angles": np.asarray(gears.planet_angles),
                 "centre_distance": gears.centre_distance,
-                "face_width": gears.sun.face_width,
+                "face_width": width,
                 "overlap_ratio": abs(self.overlap_ratio),
-                "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
+                "teeth": np.array([gear.teeth for gear in gears.gears]),
                 "sun_torque": self.sun_torque,
                 "contact": cycle.contact,
                 "mesh_periods": cycle.periods,
@@ -215,7 +221,7 @@ class StaticResult:
                 "message": cycle.message,
             },
         )
-        found.attrs["warnings"] = " ".join(map(str, static_warnings(found, gears.sun.module)))
+        found.attrs["warnings"] = " ".join(map(str, static_warnings(found, gears.gears[0].module)))
         return found
 
     def _over_width(self, width: float) -> dict[str, Any]:
@@ -337,7 +343,7 @@ class StressResult:
             "root_range_arc": _by_gear([r.arc[one.point] for r, one in zip(self.roots, ranges, strict=True)]),
         }
         planets = [one.history for one in ranges if one.kind == "planet"]
-        if planets[0] is not None:
+        if planets and planets[0] is not None:
             values["planet_root_stress"] = np.array(planets)
         if self.cycle.periods > 1:
             values["tooth_root_maximum"] = _by_gear([one.tooth_maximum for one in ranges])
@@ -433,7 +439,7 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
             yield Finding("W-FACE-LOAD", "static.slices", text)
     if "slice_load" in data:
         yield from _lifted(data)
-    unloaded = (force + back)[: len(force) // 2] <= 0.0
+    unloaded = (force + back)[: data.sizes["planet"]] <= 0.0
     if unloaded.any() and force.any():
         planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
         text = (
@@ -465,12 +471,12 @@ def _lifted(data: xr.Dataset) -> Iterator[Finding]:
 
 def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
     """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
-    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(approach, 2))
     if not members:
         return (
-            f"the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: small displacements "
-            "no longer hold"
+            f"the teeth deflect by {np.abs(approach).max() * 1e6:.0f} um, more than 5 % of the module: small "
+            "displacements no longer hold"
         )
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(approach, 2))
     return (
         f"the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
         "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
@@ -504,11 +510,14 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
     if "face_load_factor" in data:
         columns["K_Hbeta"] = lambda one: f"{float(one.face_load_factor):.3f}"
         columns["misaligned [um]"] = lambda one: f"{float(one.mesh_misalignment.mean()) * 1e6:+.2f}"
-    notes = [
+    contact = f"contact: {data.attrs.get('contact', 'unknown')}"
+    sharing = (
         f"load share of a planet {share.min():.4f} to {share.max():.4f} "
-        f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
-    ]
-    notes += _stiffness_notes(elastic=data.sizes.get("member", 0) > 0)
+        f"(equal sharing {1 / data.sizes['planet']:.4f}); {contact}"
+    )
+    notes = [sharing, *_stiffness_notes(elastic=data.sizes.get("member", 0) > 0)]
+    if data.sizes["mesh"] == 1:
+        notes = [contact, "k: tangent stiffness dF/dx of teeth and bodies, held at bore or outer surface"]
     if "axial_force" in data:
         axial = float(np.abs(data.axial_force.values).mean(axis=1).max())
         notes.append(
@@ -538,18 +547,21 @@ def describe_stress(data: xr.Dataset) -> Block:
     One row for the contact and one for the root of every kind of gear, each of its worst mesh.
     """
     names = [str(name) for name in data["mesh"].values]
-    kinds = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
     contact, roots = [], []
-    for kind, titles in kinds.items():
-        meshes = [i for i, name in enumerate(names) if ("ring" in name) == (kind == "planet-ring")]
+    for kind in dict.fromkeys(map(family, names)):
+        meshes = [i for i, name in enumerate(names) if family(name) == kind]
+        titles = SIDES.get(kind, tuple(kind.split("-")))
         contact.append(_contact_row(kind, data.isel(mesh=meshes)))
         roots += [_root_row(title, data.isel(mesh=meshes, gear=g)) for g, title in enumerate(titles)]
+    equal, against = (
+        ("", "") if len(names) == 1 else ("equal load on all planets and ", " against the carrier")
+    )
     notes = [
-        "ISO 6336: nominal stresses sigma_H0 and sigma_F0 (method B) with equal load on all planets and no "
+        f"ISO 6336: nominal stresses sigma_H0 and sigma_F0 (method B) with {equal}no "
         "load factors; FE: largest contact pressure away from flank ends, and largest tension in the root",
         "position in mesh periods; arc from the end of the flank, tangent to the centreline of the tooth; "
         "range: smallest to largest stress at the root point where they differ most, while the gear turns "
-        "once against the carrier; cycles: load cycles of the flank in that turn",
+        f"once{against}; cycles: load cycles of the flank in that turn",
     ]
     if data.attrs.get("iso"):
         notes.append(f"outside the range of ISO 6336: {data.attrs['iso']}")
@@ -597,8 +609,8 @@ def describe_set(case: Case) -> tuple[Block, ...]:
     """Tabulate geometry, phasing and operation of a planetary set."""
     planetary = planetary_set(case)
     return (
-        _gears(planetary),
-        _meshes(planetary),
+        describe_gears(planetary),
+        describe_meshes(planetary),
         _harmonics(planetary),
         _neighbours(planetary),
         _operation(case, planetary),
@@ -607,17 +619,21 @@ def describe_set(case: Case) -> tuple[Block, ...]:
 
 def set_warnings(case: Case) -> Iterator[Finding]:
     """List what is allowed in any planetary set but deserves a look."""
-    planetary = planetary_set(case)
-    yield from (*check_set(planetary), *case.notices)
-    yield from check_deviations(set_deviations(case), planetary)
+    yield from (*check_set(planetary_set(case)), *case.notices)
+    yield from load_warnings(case)
+
+
+def load_warnings(case: Any) -> Iterator[Finding]:
+    """List what deserves a look in the deviations and the torque of a case."""
+    yield from check_deviations(set_deviations(case), planetary_set(case))
     if case.operation.torque <= 0:
         nothing = "without torque no tooth touches; only static results exist"
         text = "a negative torque loads the other flanks" if case.operation.torque < 0 else nothing
         yield Finding("W-TORQUE", "operation.torque", text)
 
 
-def _gears(s: PlanetarySet) -> Block:
-    """Tabulate diameters and teeth of the three gears."""
+def describe_gears(s: GearSet) -> Block:
+    """Tabulate diameters and teeth of all gears."""
     rows = {
         "teeth": lambda g: str(g.teeth),
         "profile shift": lambda g: f"{g.profile_shift:.5f}",
@@ -628,41 +644,41 @@ def _gears(s: PlanetarySet) -> Block:
         "tooth thickness at the tip [mm]": lambda g: f"{1e3 * float(tooth_thickness(g, g.tip_radius)):.4f}",
         "bore or outer diameter [mm]": lambda g: f"{2e3 * g.rim_radius:.4f}",
     }
-    columns = {
-        "": lambda name: name,
-        "sun": lambda name: rows[name](s.sun),
-        "planet": lambda name: rows[name](s.planet),
-        "ring": lambda name: rows[name](s.ring),
-    }
+    columns: dict[str, Any] = {"": lambda name: name}
+    columns |= {gear.name: partial(lambda gear, name: rows[name](gear), gear) for gear in s.gears}
     angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in s.planet_angles[:12])
+    first = s.gears[0]
     notes = (
-        f"module {s.sun.module * 1e3:.6g} mm, pressure angle {math.degrees(s.sun.pressure_angle):.6g} deg, "
-        f"face width {s.sun.face_width * 1e3:.6g} mm, centre distance {s.centre_distance * 1e3:.6g} mm",
-        f"{s.n_planets} planets at {angles} deg",
-        "profile shift of the ring: positive moves the flank outwards (the opposite of ISO 21771)",
+        f"module {first.module * 1e3:.6g} mm, pressure angle {math.degrees(first.pressure_angle):.6g} deg, "
+        f"face width {first.face_width * 1e3:.6g} mm, centre distance {s.centre_distance * 1e3:.6g} mm",
+        *[f"{s.n_planets} planets at {angles} deg"][: len(s.kinds) - 1],
+        *[
+            f"profile shift of the {gear.name}: positive moves the flank outwards (the opposite of ISO 21771)"
+            for gear in s.gears
+            if gear.internal
+        ],
     )
     return tabulate("Gears", rows, columns, notes)
 
 
-def _meshes(s: PlanetarySet) -> Block:
-    """Tabulate what the geometry says of both kinds of mesh."""
+def describe_meshes(s: GearSet) -> Block:
+    """Tabulate what the geometry says of every kind of mesh."""
     n, phases = s.n_planets, [f"{phase:.4f}" for phase in s.mesh_phases]
     more = ", ..." if n > 6 else ""
-    clearance = {name: f"{1e3 * value:.3f}" for name, value in tip_clearances(s).items()}
-    angles = s.working_pressure_angle_sun_planet, s.working_pressure_angle_planet_ring
-    backlashes = s.backlash_sun_planet, s.backlash_planet_ring
+    clearance = iter(f"{1e3 * value:.3f}" for value in tip_clearances(s).values())
+    of_kinds = [", ".join(phases[i * n : (i + 1) * n][:6]) + more for i in range(len(s.kinds))]
+    names = [f"{pair.gear_1.name}-{pair.gear_2.name}" for pair in s.kinds]
     rows = (
-        ("working pressure angle [deg]", *(f"{math.degrees(angle):.4f}" for angle in angles)),
-        ("contact ratio", f"{s.contact_ratio_sun_planet:.4f}", f"{s.contact_ratio_planet_ring:.4f}"),
-        ("normal backlash [um]", *(f"{round(play * 1e6, 2) + 0.0:.2f}" for play in backlashes)),
         (
-            "tip clearances [mm]",
-            f"{clearance['sun tip to planet root']}, {clearance['planet tip to sun root']}",
-            f"{clearance['planet tip to ring root']}, {clearance['ring tip to planet root']}",
+            "working pressure angle [deg]",
+            *(f"{math.degrees(pair.working_pressure_angle):.4f}" for pair in s.kinds),
         ),
-        ("mesh phases [periods]", ", ".join(phases[:n][:6]) + more, ", ".join(phases[n:][:6]) + more),
+        ("contact ratio", *(f"{pair.contact_ratio:.4f}" for pair in s.kinds)),
+        ("normal backlash [um]", *(f"{round(pair.backlash * 1e6, 2) + 0.0:.2f}" for pair in s.kinds)),
+        ("tip clearances [mm]", *(f"{next(clearance)}, {next(clearance)}" for _ in s.kinds)),
+        *[("mesh phases [periods]", *of_kinds)][: len(of_kinds) - 1],
     )
-    return Block("Meshes", ("", "sun-planet", "planet-ring"), rows)
+    return Block("Meshes", ("", *names), rows)
 
 
 def _operation(case: Case, s: PlanetarySet) -> Block:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
-from femgear.case.gear_set import material_of, planetary_set, set_deviations
+from femgear.case.gear_set import driving_torque, material_of, planetary_set, set_deviations
 from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES, Case
 from femgear.contact.bodies import Bodies, Sector, Sectors, helical_stiffness, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
@@ -35,7 +35,6 @@ from femgear.errors import CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import foundation
 from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
-from femgear.gears.kinematics import torques
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
@@ -71,7 +70,7 @@ def solve_static(
     sectors, bodies = steps.kept("flank compliances", known) or steps.keep(
         "flank compliances", known, flank_compliances(case, gears, cache=cache)
     )
-    sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
+    sun_torque = driving_torque(case)
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
     cycle = walk_mesh_cycle(
         gears,
@@ -91,9 +90,9 @@ def solve_static(
             **over_width(case, gears, cache=cache),
         ),
     )
-    _check_motions(case, cycle, gears.sun.module)
+    _check_motions(case, cycle, gears.gears[0].module)
     overlap = _overlap(case, gears) if cycle.helical else 0.0
-    base = base_helix_angle(case.sun.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
+    base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
     found = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
     return StaticResult(*found, overlap_ratio=overlap, base_helix_angle=base)
 
@@ -161,7 +160,7 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
     Slices together with back flanks or with clearance in the bearings of planets, or thinner than a quarter
     of a module.
     """
-    static, count, width = case.static, case.static.slices, gears.sun.face_width
+    static, count, width = case.static, case.static.slices, gears.gears[0].face_width
     where, remedy = {"code": "E-SLICES", "file": case.location("static.slices")}, "leave static.slices out"
     overlap = _overlap(case, gears)
     if case.set.helix_angle and count < max(2, _PER_OVERLAP * abs(overlap)):
@@ -172,7 +171,7 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
         )  # fmt: skip
     _check_width_entries(case, helical=bool(overlap))
     if count < 2:
-        for gear in ("sun", "planet", "ring"):
+        for gear in case.gear_names:
             for i, one in enumerate(getattr(case, gear).modifications):
                 if one.kind in OVER_WIDTH:
                     key = f"{gear}.modifications[{i}]"
@@ -202,7 +201,7 @@ def _check_width_entries(case: Case, *, helical: bool) -> None:
     if case.static.slices > 1 and not helical:
         return
     for name, entries in WIDTH_ENTRIES.items():
-        given = vars(getattr(case, name))
+        given = vars(getattr(case, name)) if name in type(case).model_fields else dict.fromkeys(entries)
         for key in (f"{name}.{entry}" for entry in entries if given[entry] not in (None, ())):
             raise CaseError(
                 "tilts and twists over the face width are those of spur teeth in slices", code="E-SLICES",
@@ -281,7 +280,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
         roots=roots,
         first_period=first,
         ranges=ranges,
-        spectrum=load_spectrum(teeth, closes=closes),
+        spectrum=load_spectrum(teeth, gears.mates, closes=closes),
         nominal=nominal_stresses(
             gears, static.sun_torque, case.material.youngs_modulus, case.material.poisson_ratio
         ),
@@ -298,17 +297,17 @@ def nominal_stresses(
     The torque on the sun may have either sign [N m]; Young's modulus [Pa] and Poisson's ratio [1].
     """
     s = planetary_set
-    # torque over reference radius: the same at all three gears
-    force = abs(sun_torque) / (s.n_planets * s.sun.reference_radius)
-    contact, root, messages = np.full(2, math.nan), np.full((2, 2), math.nan), []
-    meshes = (
-        (s.sun, s.planet, s.working_pressure_angle_sun_planet, s.contact_ratio_sun_planet),
-        (s.planet, s.ring, s.working_pressure_angle_planet_ring, s.contact_ratio_planet_ring),
-    )
-    for i, (one, two, angle, ratio) in enumerate(meshes):
+    # torque over reference radius: the same at all gears
+    force = abs(sun_torque) / (s.n_planets * s.gears[0].reference_radius)
+    contact, root, messages = np.full(len(s.kinds), math.nan), np.full((len(s.kinds), 2), math.nan), []
+    for i, pair in enumerate(s.kinds):
+        one, two = pair.gears
         small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
-        load = {"contact_ratio": ratio, "tangential_force": force}
-        elastic = {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio}
+        load = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
+        angle, elastic = (
+            pair.working_pressure_angle,
+            {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio},
+        )
         try:
             contact[i] = nominal_contact_stress(small, large, working_angle=angle, **load, **elastic)
         except GeometryError as error:
@@ -371,24 +370,24 @@ def width_supports(case: Case, gears: PlanetarySet) -> WidthSupports:
 
 def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
     """List the normal backlash (2N,) of all meshes [m]."""
-    n = gears.n_planets
-    return np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], n)
+    return np.repeat([pair.backlash for pair in gears.kinds], gears.n_planets)
 
 
 def _influences(case: Case, static: StaticResult) -> RootStresses:
     """Find the root influences of the bodies as the static solution holds them.
 
-    Sun and planet were observed with their flanks; only the ring, whose contact has two plane states, is
-    solved again.
+    External gears were observed with their flanks; only an internal one, whose contact has two plane states,
+    is solved again.
     """
-    sectors, bodies = static.sectors, static.bodies
-    assert bodies.sun.root is not None and bodies.planet.root is not None
-    sun = observed_root_stress(sectors.sun.gear, bodies.sun.root)
-    planet = observed_root_stress(sectors.planet.gear, bodies.planet.root)
-    ring = sectors.ring
-    support = ring_foundation(case, ring) if case.static.members == "elastic" else None
-    root = root_stress(ring.grid, ring.gear, material_of(case), foundation=support)
-    return RootStresses(sun, planet, root)
+    found = []
+    for sector, body in zip(static.sectors.gears, static.bodies.gears, strict=False):
+        if sector.gear.internal:
+            support = ring_foundation(case, sector) if case.static.members == "elastic" else None
+            found.append(root_stress(sector.grid, sector.gear, material_of(case), foundation=support))
+        else:
+            assert body is not None and body.root is not None
+            found.append(observed_root_stress(sector.gear, body.root))
+    return RootStresses(*found)
 
 
 def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
@@ -430,7 +429,7 @@ STATIC = Stage(
         "message": result.cycle.message,
         "contact": result.cycle.contact,
     },
-    describe=lambda results: describe_static(results.static, planetary_set(results.case).sun.module),
+    describe=lambda results: describe_static(results.static, planetary_set(results.case).gears[0].module),
     check=lambda case: check_slices(case, planetary_set(case)),
 )
 

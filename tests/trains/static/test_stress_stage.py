@@ -321,8 +321,8 @@ def test_nominal_stresses_scale_as_the_standard_says(reference):
 def test_outside_the_range_of_the_standard_there_is_no_number(reference, monkeypatch):
     """Contact ratios of 2.5 and above are not covered: no value, and a reason, but no failure."""
     gears = reference[1].planetary_set
-    ratio = property(lambda _: 2.6)
-    monkeypatch.setattr(type(gears), "contact_ratio_planet_ring", ratio)
+    ratio = property(lambda pair: 2.6 if pair.gear_2.internal else 1.5)
+    monkeypatch.setattr(type(gears.kinds[0]), "contact_ratio", ratio)
     found = nominal_stresses(gears, 100.0, 206e9, 0.3)
     assert np.isfinite(found.contact[0]) and np.isfinite(found.root[0]).all()
     assert np.isnan(found.contact[1]) and np.isnan(found.root[1]).all()
