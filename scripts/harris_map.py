@@ -15,13 +15,7 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 from femgear.errors import CaseError
 
 FILES = ("harris_map.csv", "harris_map.png")
-HEADER = (
-    "relief [m]",
-    "torque [N m]",
-    "sun-planet STE peak to peak [m]",
-    "planet-ring STE peak to peak [m]",
-    "sun-ring STE peak to peak [m]",
-)
+KINDS = ("sun-planet", "planet-ring")
 
 
 def main(
@@ -51,9 +45,9 @@ def main(
     positions
         Positions over one mesh period.
     """
-    from femgear.case.gear_set import need_set, planetary_set
+    from femgear.case.gear_set import planetary_set
     from femgear.case.quantities import LENGTH, TORQUE, to_si
-    from femgear.report.style import save_figure
+    from femgear.report.style import family, save_figure
     from femgear.run import grid_cache
     from femgear.study.relief import (
         design_basis,
@@ -66,11 +60,10 @@ def main(
     from femgear.trains.reading import read_case
 
     data = read_case(case)
-    need_set(data)
+    gears = planetary_set(data)
     if not 4 <= positions <= 2048:
         raise CaseError("too few or too many positions", code="E-RANGE", key="--positions", value=positions)
-    amounts = [_checked(to_si(text, LENGTH), text, data.sun.module) for text in relief]
-    gears = planetary_set(data)
+    amounts = [_checked(to_si(text, LENGTH), text, data.module) for text in relief]
     relief_starts(gears, length=length)
     # a torque given twice is one point of the curves
     given = list(dict.fromkeys(to_si(text, TORQUE) for text in torque))
@@ -85,11 +78,14 @@ def main(
         options = {"length": length, "back": back}
         variants = [with_tip_relief(basis.deviations, gears, amount=a, **options) for a in amounts]
         found = harris_map(basis, torques=on_sun, deviations=variants, progress=progress)
-    write_csv(folder / "harris_map.csv", HEADER, _records(amounts, inputs, found))
+    kinds = tuple(dict.fromkeys(map(family, gears.mesh_names)))
+    columns = [f"{kind} STE peak to peak [m]" for kind in (*kinds, "sun-ring")[: 2 * len(kinds) - 1]]
+    header = ("relief [m]", "torque [N m]", *columns)
+    write_csv(folder / "harris_map.csv", header, _records(amounts, inputs, found))
     names = [f"relief {a * 1e6:g} µm" for a in amounts]
-    figure = harris_curves(inputs, found.peak_to_peak, names, design=data.operation.torque)
+    figure = harris_curves(inputs, found.peak_to_peak, names, design=data.operation.torque, kinds=kinds)
     save_figure(figure, folder / "harris_map.png")
-    _print_summary(amounts, inputs, found)
+    _print_summary(amounts, inputs, found, kinds[0])
     print(f"largest residual of all contact problems: {found.residual:.1e}")
     say_files(folder, FILES)
 
@@ -108,12 +104,12 @@ def _records(amounts, inputs, found):
                 float(amount),
                 float(torque),
                 *(float(x) for x in found.peak_to_peak[v, :, t]),
-                float(found.overall[v, t]),
+                *[float(found.overall[v, t])][: found.peak_to_peak.shape[1] - 1],
             )
 
 
-def _print_summary(amounts, inputs, found):
-    title = "Transmission error of the sun-planet meshes, peak to peak"
+def _print_summary(amounts, inputs, found, kind):
+    title = f"Transmission error of the {kind} meshes, peak to peak"
     curves = found.peak_to_peak[:, 0] * 1e6
     names = [f"{amount * 1e6:g}" for amount in amounts]
     if len(inputs) == 1:
@@ -130,15 +126,15 @@ def _print_summary(amounts, inputs, found):
     print_table(title, ("relief [um]", "least at [N m]", "STE p-p there [um]", *ends), rows)
 
 
-def harris_curves(torques, peak_to_peak, names, *, design: float | None = None):
+def harris_curves(torques, peak_to_peak, names, *, design: float | None = None, kinds=KINDS):
     """Transmission error peak to peak over torque, one curve a relief.
 
     Parameters
     ----------
     torques : (T,) array
         Of the input [N m].
-    peak_to_peak : (variants, 2, T) array
-        Of sun-planet and planet-ring meshes [m].
+    peak_to_peak : (variants, kinds, T) array
+        Of the kinds of mesh [m].
     names : sequence of str
         Legend text of each variant.
     design : float, optional
@@ -146,7 +142,7 @@ def harris_curves(torques, peak_to_peak, names, *, design: float | None = None):
     """
     from femgear.report.style import BLACK, label, legend_below, line_style, new_figure
 
-    figure, axes = new_figure(columns=2, width=10.0, height=4.6, sharex=True)
+    figure, axes = new_figure(columns=len(kinds), width=5.0 * len(kinds), height=4.6, sharex=True)
     # one torque is no line
     marker = {"marker": "o"} if len(torques) == 1 else {}
     for kind, ax in enumerate(axes):
@@ -160,7 +156,7 @@ def harris_curves(torques, peak_to_peak, names, *, design: float | None = None):
         if design is not None:
             ax.axvline(design, color="0.5", linewidth=1.0, label=f"{design:g} N m")
         ax.set_ylim(bottom=0)
-        label(ax, "torque of the input [N m]", title=f"{('sun-planet', 'planet-ring')[kind]} meshes")
+        label(ax, "torque of the input [N m]", title=f"{kinds[kind]} meshes")
     label(axes[0], y="transmission error peak to peak [µm]")
     legend_below(figure)
     return figure

@@ -99,7 +99,7 @@ def _print_summary(torques, results):
 
 
 def _figure(torques, results):
-    """Transmission error above, stiffness below; sun-planet meshes left, planet-ring meshes right."""
+    """Transmission error above, stiffness below; every kind of mesh in a column."""
     from femgear.report.style import (
         distinct_lines,
         family,
@@ -110,8 +110,9 @@ def _figure(torques, results):
         periodic,
     )
 
-    figure, axes = new_figure(rows=2, columns=2, width=10.0, height=7.4, sharex=True)
-    for column, kind in enumerate(("sun-planet", "planet-ring")):
+    kinds = list(dict.fromkeys(family(str(name)) for name in results[0]["mesh"].values))
+    figure, axes = new_figure(rows=2, columns=len(kinds), width=5.0 * len(kinds), height=7.4, sharex=True)
+    for column, kind in enumerate(kinds):
         number = 0
         for torque, static in zip(torques, results):
             for name, j in distinct_lines(static["mesh"].values, static["mesh_stiffness"]):
@@ -121,7 +122,7 @@ def _figure(torques, results):
                 position, ste = periodic(static["position"], static["ste"].values[j] * 1e6)
                 axes[column].plot(position, ste, label=text, **line_style(number))
                 position, k = periodic(static["position"], static["mesh_stiffness"].values[j] / 1e6)
-                axes[2 + column].plot(position, k, label=text, **line_style(number))
+                axes[len(kinds) + column].plot(position, k, label=text, **line_style(number))
                 number += 1
         title, mean = f"{kind} meshes", ""
         if number == 1:
@@ -129,7 +130,7 @@ def _figure(torques, results):
             title += f", {torques[0]:g} N m: {np.ptp(ste):.3g} µm peak to peak"
             mean = f"mean {np.mean(k[:-1]):.4g} N/µm, {np.ptp(k):.4g} N/µm peak to peak"
         label(axes[column], y="transmission error [µm]", title=title)
-        label(axes[2 + column], "position in the mesh period [1]", "tangent stiffness [N/µm]", mean)
+        label(axes[len(kinds) + column], "position in the mesh period [1]", "tangent stiffness [N/µm]", mean)
     axes[0].set_xlim(0, 1)
     if number > 1:
         legend_below(figure, columns=4)

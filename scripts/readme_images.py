@@ -72,6 +72,7 @@ RUNS = {
     "own_chain": _case("own_chain", "A drivetrain to start from"),
     "four_stage_reducer": _case("four_stage_reducer", "Four planetary stages in series"),
     "published_four_stages": _case("published_four_stages", "Four published stages in series"),
+    "spur_pair": _case("spur_pair", "Spur gear pair from its teeth"),
     "gear_pair": _case("gear_pair", "Gear pair with backlash"),
     "gear_pair_light": _case("gear_pair_light", "Lightly loaded gear pair"),
     "samples": Run(

@@ -35,6 +35,7 @@ TRAINS = tuple(
     for name, key, reads in (
         ("multistage", "model", "trains.multistage.case_file"),
         ("gear_pair", "model", "trains.gear_pair.case_file"),
+        ("pair", "model", "trains.pair.case_file"),
         ("drivetrain", "model", "trains.drivetrain.case_file"),
         ("helical", "helical", "trains.helical.section"),
         ("planar", "planar", "trains.planar.section"),

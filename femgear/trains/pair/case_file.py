@@ -1,0 +1,200 @@
+"""The case file with ``model = "pair"``: two gears on a centre distance, computed from their teeth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from femgear.case.checks import check_gear_deviations, check_torque
+from femgear.case.csv_columns import embed_profiles
+from femgear.case.gear_set import (
+    checked_set,
+    driving_torque,
+    flank_form,
+    gear_of,
+    made_deviations,
+    pitch_of,
+    runout_of,
+)
+from femgear.case.mistakes import added_material
+from femgear.case.quantities import LENGTH, TORQUE, Count, Quantity, Section, Title, Values
+from femgear.case.sections import (
+    FORMAT,
+    LARGEST_TORQUE,
+    FaceWidth,
+    GearErrors,
+    MaterialSection,
+    ModificationSection,
+    PressureAngle,
+    RackSection,
+    Radius,
+    Shift,
+    Speed,
+    StaticSection,
+    speed_range,
+)
+from femgear.case.text import CaseFile, ReadCase
+from femgear.errors import CaseError
+from femgear.gears.checks import check_meshes
+from femgear.gears.deviations import SetDeviations, no_deviations
+from femgear.gears.pair import GearPair, close_pair
+
+
+class SetSection(Section):
+    """What both gears share.
+
+    ``centre_distance`` may be left out (the profile shifts give it), and so may, where it is given, one of
+    the profile shifts (it is found so that the mesh has no play). ``backlash`` is the play on the reference
+    circles: half of it is taken from the tooth thickness of either gear.
+    """
+
+    helix_angle: ClassVar[float] = 0.0
+    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.1)]
+    pressure_angle: PressureAngle
+    face_width: FaceWidth
+    centre_distance: Annotated[float, Quantity(LENGTH, 1e-4, 20.0)] | None = None
+    backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
+
+
+class GearSection(Section):
+    """Gear 1, the driving one."""
+
+    teeth: Annotated[int, Count(5, 5000)]
+    profile_shift: Shift | None = None
+    bore_radius: Radius
+    tip_diameter: Radius | None = None
+    root_diameter: Radius | None = None
+    rack: RackSection | None = None
+    modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
+    errors: GearErrors | None = None
+
+
+class WheelSection(GearSection):
+    """Gear 2: external with a bore radius, internal with an outer radius and perhaps its pinion cutter."""
+
+    bore_radius: Radius | None = None
+    outer_radius: Radius | None = None
+    cutter_teeth: Annotated[int, Count(5, 1000)] | None = None
+    cutter_profile_shift: Shift = 0.0
+
+    @property
+    def internal(self) -> bool:
+        """Whether it is an internal gear."""
+        return self.outer_radius is not None
+
+
+class OperationSection(Section):
+    """Torque on gear 1, of either sign, and speeds of gear 1; gear 2 is held while the contact is solved."""
+
+    torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
+    speeds: Annotated[tuple[Speed, ...], Values(max_length=100_000), BeforeValidator(speed_range)] = ()
+
+
+class PairCase(Section, ReadCase):
+    """Two gears, their load and how to compute them, in SI units.
+
+    The fields carry the names of the case file; ``source`` is the text that gives this case.
+    """
+
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
+    train: ClassVar[str] = "pair"
+    gear_names: ClassVar[tuple[str, ...]] = ("gear_1", "gear_2")
+    helix_angle: ClassVar[None] = None
+    model: Literal["pair"]
+    title: Title
+    set: SetSection
+    rack: RackSection = RackSection()
+    material: MaterialSection
+    gear_1: GearSection
+    gear_2: WheelSection
+    operation: OperationSection
+    static: StaticSection = StaticSection()
+
+    @property
+    def module(self) -> float:
+        """Module of both gears [m]."""
+        return self.set.module
+
+    @property
+    def pressure_angle(self) -> float:
+        """Pressure angle of both gears [rad]."""
+        return self.set.pressure_angle
+
+
+@checked_set.register
+def _(case: PairCase) -> GearPair:
+    two = case.gear_2
+    pair = close_pair(
+        gear_of(case, case.gear_1, "gear_1", case.gear_1.bore_radius),
+        gear_of(case, two, "gear_2", two.outer_radius or two.bore_radius or 0.0, internal=two.internal),
+        centre_distance=case.set.centre_distance,
+        find=tuple(name for name in case.gear_names if getattr(case, name).profile_shift is None),
+    )
+    check_meshes(pair)
+    return pair
+
+
+@made_deviations.register
+def _(case: PairCase, s: GearPair) -> SetDeviations:
+    one, two = (getattr(case, name).errors or GearErrors() for name in case.gear_names)
+    form = flank_form(case, s.gear_2)
+    # a tooth that stands further on brings the flank on that side nearer to the mate
+    pitch = s.senses[1] * pitch_of(two, s.gear_2)
+    return replace(
+        no_deviations(s),
+        sun=flank_form(case, s.gear_1),
+        planet_sun_side=form,
+        planet_ring_side=form,
+        sun_pitch=-pitch_of(one, s.gear_1),
+        planet_pitch=[pitch],
+        planet_ring_side_pitch=[-pitch],
+        sun_runout=runout_of(one),
+        planet_runout=(runout_of(two),),
+        sun_thickness=one.thickness_reduction or 0.0,
+        planet_thickness=np.array([two.thickness_reduction or 0.0]),
+    )
+
+
+@driving_torque.register
+def _(case: PairCase, torque: float | None = None) -> float:
+    return case.operation.torque if torque is None else torque
+
+
+def cross_check(case: PairCase) -> Iterator[CaseError]:
+    """Refuse what no entry shows alone."""
+    two, shifts = case.gear_2, [getattr(case, name).profile_shift for name in case.gear_names]
+    if (two.bore_radius is None) == (two.outer_radius is None):
+        yield CaseError(
+            "gear 2 needs one radius of its rim", code="E-CHOICE", key="gear_2.bore_radius",
+            limit="bore_radius of an external, outer_radius of an internal gear",
+        )  # fmt: skip
+    elif not two.internal and two.cutter_teeth is not None:
+        yield CaseError(
+            "the teeth of an external gear are made by its rack", code="E-CHOICE", key="gear_2.cutter_teeth",
+            remedy="leave it out, or give outer_radius in place of bore_radius",
+        )  # fmt: skip
+    if shifts.count(None) > (case.set.centre_distance is not None):
+        yield CaseError(
+            "the profile shifts leave the pair open", code="E-KEY-MISSING",
+            key=f"gear_{1 + shifts.index(None)}.profile_shift",
+            remedy="give both profile shifts, or one of them and set.centre_distance",
+        )  # fmt: skip
+    for entry, plain, why in (
+        ("members", "fixed", "both gears stand on fixed axes"),
+        ("slices", 0, "the contact of a pair is solved in the plane"),
+    ):
+        if getattr(case.static, entry) != plain:
+            code = "E-SLICES" if entry == "slices" else "E-CHOICE"
+            yield CaseError(why, code=code, key=f"static.{entry}", value=getattr(case.static, entry),
+                            limit=repr(plain), remedy=f"leave static.{entry} out")  # fmt: skip
+    yield from check_torque(case.operation.torque)
+    yield from check_gear_deviations(case)
+
+
+FILE = CaseFile(
+    PairCase, cross_check, notices=lambda tables, case: added_material(case), embed=embed_profiles
+)

@@ -1,0 +1,46 @@
+"""The numbers of docs/pair.md are what the package computes."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.study.relief import design_basis, harris_map, with_tip_relief
+from femgear.trains.pair.stages import iso_stiffness
+from femgear.trains.reading import read_case, with_values
+from femgear.trains.static.stages import solve_static, solve_stress
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "pair.md").read_text(encoding="utf-8")
+CASE = ROOT / "cases" / "spur_pair.toml"
+
+
+def test_table_and_relief():
+    case = read_case(CASE)
+    static = solve_static(case)
+    cycle, data = static.cycle, solve_stress(case, static).dataset()
+    roots = zip(data.root_worst.values[0] / 1e6, data.iso_root_stress.values[0] / 1e6, strict=True)
+    found = [
+        cycle.deflection.mean() * 1e6, np.ptp(cycle.deflection) * 1e6,
+        cycle.stiffness.mean() / case.set.face_width / 1e9, iso_stiffness(case)[1] / 1e9,
+        cycle.max_pressure.max() / 1e6, float(data.iso_contact_stress[0]) / 1e6,
+        *(x for pair in roots for x in pair),
+    ]  # fmt: skip
+    rows = re.findall(r"(?m)^\| [a-z].*\] \|(.*)\|$", PAGE)
+    printed = [float(number) for row in rows for number in re.findall(r"[\d.]+", row)]
+    assert found == pytest.approx(printed, rel=3e-3)
+    basis, plain = design_basis(case), re.search(r"falls from ([\d.]+) to ([\d.]+) µm", PAGE)
+    forms = [with_tip_relief(None, static.planetary_set, amount=a) for a in (0.0, 15e-6)]
+    peaks = harris_map(replace(basis, positions=64), torques=[200.0], deviations=forms).peak_to_peak
+    assert plain and 1e6 * peaks[:, 0, 0] == pytest.approx([float(one) for one in plain.groups()], rel=5e-3)
+
+
+def test_the_internal_pair_can_be_solved():
+    (block,) = re.findall(r"```toml\n\[gear_2\]\n(.*?)```", PAGE, re.DOTALL)
+    entries = dict(line.split(" = ") for line in block.strip().splitlines())
+    changes = {f"gear_2.{key}": int(v) if v.isdigit() else v.strip('"') for key, v in entries.items()}
+    changes |= {"gear_2.bore_radius": None, "static.positions": 8}
+    changes |= {"set.centre_distance": "54 mm", "gear_1.profile_shift": 0.0}
+    assert solve_static(with_values(read_case(CASE), changes)).cycle.stiffness.min() > 0.0
