@@ -90,16 +90,20 @@ def _on_edges(surface, edge, t):
     return np.einsum("iq,qic->qc", shape, node), np.einsum("iq,qic->qc", slope, node), shape
 
 
-def _compliance(surface, edge, shape, direction, weight):
-    """Compliance between tractions along `direction` (q, 2), distributed by `weight` (q, m): (m, m)."""
+def _nodal_loads(surface, edge, shape, direction, weight):
+    """Loads on the free degrees of freedom of tractions along `direction` (q, 2), by `weight` (q, m)."""
     from scipy.sparse import csr_array
 
     dof = 2 * surface.nodes[2 * edge[:, None] + [0, 1, 2]][..., None] + [0, 1]
     value = np.einsum("iq,qc->qic", shape, direction @ surface.turn)
     point = np.broadcast_to(np.arange(len(edge))[:, None, None], dof.shape)
     nodal = csr_array((value.ravel(), (dof.ravel(), point.ravel())), shape=(surface.unknowns, len(edge)))
-    load = (nodal @ weight)[surface.free]
-    u = symmetric_factor(surface.stiffness).solve(load)
+    return (nodal @ weight)[surface.free]
+
+
+def _compliance(surface, load, factor=None):
+    """Compliance (m, m) between loads (n_free, m) on a body, by the factor of its stiffness if known."""
+    u = (factor or symmetric_factor(surface.stiffness)).solve(load)
     check_solution(surface.stiffness, u, load)
     return load.T @ u
 
@@ -127,6 +131,15 @@ def _quadrature(slave, master, first, last):
     points = start[:, None] + 0.5 * length[:, None] * (1 + node)
     edge = np.repeat(np.floor(start + 0.5 * length).astype(int), GAUSS)
     return edge, points.ravel() - edge, (0.5 * length[:, None] * weight).ravel()
+
+
+def covered(slave, master) -> np.ndarray:
+    """Whether the master has a point opposite to every corner of the slave, bool (k + 1,)."""
+    place = np.arange(len(slave.nodes) // 2 + 1)
+    edge = np.minimum(place, place[-1] - 1)
+    x, tangent, _ = _on_edges(slave, edge, place - edge)
+    away = ((master.points[None, 0::2] - x[:, None]) * tangent[:, None]).sum(axis=2)
+    return (away.min(axis=1) <= 0) & (away.max(axis=1) >= 0)
 
 
 def _project(master, x, along):
@@ -170,25 +183,49 @@ def mortar_contact(slave, master, near, load: float, *, centre: float, base_radi
         surface (it may end where the surface ends), or the active set does not settle.
     """
     first, last = near
-    edge, t, weight = _quadrature(slave, master, first, last)
-    x, tangent, shape = _on_edges(slave, edge, t)
-    length = np.hypot(*tangent.T)
-    along = tangent / length[:, None]
-    normal = np.column_stack([along[:, 1], -along[:, 0]])
-    hats = np.maximum(1.0 - np.abs((edge - first + t)[:, None] - np.arange(last - first + 2)), 0.0)
-    hats *= (length * weight)[:, None]
-    on_edge, on_t = _project(master, x, along)
-    y, _, on_shape = _on_edges(master, on_edge, on_t)
-    arm = (y[:, 1] * normal[:, 0] - (y[:, 0] - centre) * normal[:, 1]) / base_radius
-    gap = hats.T @ ((y - x) * normal).sum(axis=1)
-    H = _compliance(slave, edge, shape, -normal, hats)
-    H += _compliance(master, on_edge, on_shape, normal, hats)
-    approach, pressure = _active_set(H, gap, hats.T @ arm, load)
-    ends = ((first == 0, pressure[0]), (last == len(slave.nodes) // 2 - 1, pressure[-1]))
-    if any(value > 0 and not at_end for at_end, value in ends):
-        raise ContactError("the contact runs out of the edges that may touch", code="E-CONTACT")
+    places = [(slave, master, near)]
+    ((approach, (pressure,)),) = mortar_contacts(places, [load], centre=centre, base_radius=base_radius)
     corner = slave.points[2 * first : 2 * last + 3 : 2]
     return approach, np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corner, axis=0).T))]), pressure
+
+
+def mortar_contacts(places, loads, *, centre: float, base_radius: float, factors=(None, None)):
+    """Solve the contact of several pairs of surfaces (slave, master, near) of the same two bodies.
+
+    As `mortar_contact`, with the factors of both stiffnesses where they are known: the approach and the
+    pressures of every pair under each of the loads.
+    """
+    nodal, gaps, arms, ends = ([], []), [], [], []
+    for slave, master, (first, last) in places:
+        edge, t, weight = _quadrature(slave, master, first, last)
+        x, tangent, shape = _on_edges(slave, edge, t)
+        length = np.hypot(*tangent.T)
+        along = tangent / length[:, None]
+        normal = np.column_stack([along[:, 1], -along[:, 0]])
+        hats = np.maximum(1.0 - np.abs((edge - first + t)[:, None] - np.arange(last - first + 2)), 0.0)
+        hats *= (length * weight)[:, None]
+        on_edge, on_t = _project(master, x, along)
+        y, _, on_shape = _on_edges(master, on_edge, on_t)
+        arm = (y[:, 1] * normal[:, 0] - (y[:, 0] - centre) * normal[:, 1]) / base_radius
+        gaps.append(hats.T @ ((y - x) * normal).sum(axis=1))
+        arms.append(hats.T @ arm)
+        nodal[0].append(_nodal_loads(slave, edge, shape, -normal, hats))
+        nodal[1].append(_nodal_loads(master, on_edge, on_shape, normal, hats))
+        opposite = np.concatenate([[False], covered(slave, master), [False]])
+        ends += [not opposite[first], not opposite[last + 3]]
+    H = sum(
+        _compliance(body, np.hstack(columns), factor)
+        for body, columns, factor in zip(places[0][:2], nodal, factors, strict=True)
+    )
+    found, splits = [], np.cumsum([len(gap) for gap in gaps])[:-1]
+    for load in loads:
+        approach, pressure = _active_set(H, np.concatenate(gaps), np.concatenate(arms), load)
+        each = np.split(pressure, splits)
+        outer = (p[k] for p in each for k in (0, -1))
+        if any(one > 0 and not at for at, one in zip(ends, outer, strict=True)):
+            raise ContactError("the contact runs out of the edges that may touch", code="E-CONTACT")
+        found.append((approach, each))
+    return found
 
 
 def _active_set(H, gap, arm, load):

@@ -26,6 +26,7 @@ from validation import (
     nonlinear,
     nonlinear_tones,
     nrel,
+    pairs,
     parametric,
     parametric_routes,
     planar,
@@ -110,6 +111,16 @@ THEMES = (
             contact.springs_with_gap,
         ),
         (two_body.tooth_pairs, two_body.tip_contact),
+    ),
+    Theme(
+        "pairs",
+        "Gear pairs",
+        "Negative tooth numbers are internal gears, shifts positive where they move the flank outwards. "
+        "Bodies are held 8 modules beyond their roots, small ones at 0.4 of the reference radius: the "
+        "standard's solid disc has no twist between teeth and hub. Whole bodies: all teeth in one plane "
+        "grid, held at the bore.",
+        (pairs.iso_stiffness,),
+        (pairs.whole_bodies,),
     ),
     Theme(
         "static",
