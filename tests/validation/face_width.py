@@ -410,7 +410,7 @@ def whole_sets() -> tuple[Row, ...]:
 
 ROOF = (
     "mirror planes make a roof of a slope: beside its ridge the load grows with the logarithm of the "
-    "distance, and K_Hbeta by 0.05 for every doubling of the slices, until these are as thin as the contact"
+    "distance, and K_Hbeta by some 0.05 a doubling of the slices, until these are as thin as the contact is wide"
 )
 
 
