@@ -410,7 +410,8 @@ def whole_sets() -> tuple[Row, ...]:
 
 ROOF = (
     "mirror planes make a roof of a slope: beside its ridge the load grows with the logarithm of the "
-    "distance, and K_Hbeta by some 0.05 a doubling of the slices, until these are as thin as the contact is wide"
+    "distance, and K_Hbeta by some 0.05 a doubling of the slices, until these are as thin as the contact "
+    "is wide"
 )
 
 
