@@ -71,9 +71,9 @@ def spring_loads(separation: np.ndarray, per_width: float) -> np.ndarray:
         separation=np.zeros((1, 1)), mesh=np.zeros(1, int), approach=np.ones((1, 1)),
         loads=np.full((1, 1, 3), load / 3), motions=np.full((1, 1), load / whole),
     )  # fmt: skip
-    N, some = len(separation), np.arange(1)
+    N, rows = len(separation), np.zeros((1, 1), int)
     across, apart = np.zeros((1, N, 1, N, 1)), np.asarray(separation)[None, :, None]
-    newton = slices._SliceNewton(laws, some, np.array([load]), across, apart, laws.smooth)
+    newton = slices._SliceNewton(laws, rows, np.array([load]), across, apart, laws.smooth[None])
     return newton.solve()[0][0, :, 0] / load
 
 
