@@ -71,9 +71,9 @@ def spring_loads(separation: np.ndarray, per_width: float) -> np.ndarray:
         separation=np.zeros((1, 1)), mesh=np.zeros(1, int), approach=np.ones((1, 1)),
         loads=np.full((1, 1, 3), load / 3), motions=np.full((1, 1), load / whole),
     )  # fmt: skip
-    N, some = len(separation), np.arange(1)
+    N, rows = len(separation), np.zeros((1, 1), int)
     across, apart = np.zeros((1, N, 1, N, 1)), np.asarray(separation)[None, :, None]
-    newton = slices._SliceNewton(laws, some, np.array([load]), across, apart, laws.smooth)
+    newton = slices._SliceNewton(laws, rows, np.array([load]), across, apart, laws.smooth[None])
     return newton.solve()[0][0, :, 0] / load
 
 
@@ -410,7 +410,8 @@ def whole_sets() -> tuple[Row, ...]:
 
 ROOF = (
     "mirror planes make a roof of a slope: beside its ridge the load grows with the logarithm of the "
-    "distance, and K_Hbeta by 0.05 for every doubling of the slices, until these are as thin as the contact"
+    "distance, and K_Hbeta by some 0.05 a doubling of the slices, until these are as thin as the contact "
+    "is wide"
 )
 
 

@@ -19,7 +19,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from femgear.case.gear_set import material_of, planetary_set
-from femgear.contact.bodies import make_sectors, observed_flanks, regular_compliance, station_weights
+from femgear.contact.bodies import (
+    helical_stiffness,
+    make_sectors,
+    observed_flanks,
+    regular_compliance,
+    station_weights,
+)
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.local_compliance import depth_displacement, hertz_half_width
 from femgear.fe.compliance import condense_sector, tooth_compliance
@@ -37,6 +43,7 @@ PITCHES, DEPTHS, WAVES = 3.0, 5.0, 24
 """Waves shorter than the pitch over the first do not see the next tooth: some are computed, up to a depth."""
 
 
+ONE_POWER = "one power stands for meshes with and without a ring"
 EXPLAINED = (
     "virtual gears do not know that pieces of a contact line high on a tooth lean on those low on it: "
     "slices without coupling are too soft, the more so the shorter the lines"
@@ -204,6 +211,8 @@ def factors() -> tuple[Row, ...]:
             rows += [
                 within("helix", source, formula, shared, math.cos(angle) ** power, 0.01),
                 within("helix", source, name + "the same under one load", shared, loaded, 0.01),
+                within("helix", source, name + "helical stiffness of femgear", shared,
+                       helical_stiffness(angle), 0.01, explanation=ONE_POWER),
                 within("helix", source, name + "factor of virtual gears on slices of the transverse section",
                        found["helical"][1] / found["spur"][1], virtual[mesh], 0.05, explanation=EXPLAINED),
             ]  # fmt: skip
