@@ -17,6 +17,7 @@ planetary gears using an extended harmonic balance approach", NREL/CP-5000-55355
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -169,9 +170,7 @@ class TiltingMembers:
     coupling: np.ndarray
 
 
-def tilting_members(
-    planetary_set: PlanetarySet, supports: WidthSupports, slices: int
-) -> TiltingMembers | None:
+def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) -> TiltingMembers | None:
     """List tilts and twists that the supports allow, with their effect on every slice; None without any.
 
     A member that tilts displaces its section at z like a motion by slope times z; across the flanks of spur

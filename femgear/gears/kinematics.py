@@ -151,7 +151,7 @@ def mesh_normals(planetary_set: GearSet, *, back: bool = False) -> np.ndarray:
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def member_approach(planetary_set: PlanetarySet, *, back: bool = False) -> dict[str, np.ndarray]:
+def member_approach(planetary_set: GearSet, *, back: bool = False) -> dict[str, np.ndarray]:
     """Compute the approach (2N, 2) of all flanks per unit motion of sun, carrier and ring along x and y.
 
     A number without unit; `back` is for the back flanks, as in `mesh_normals`.

@@ -47,11 +47,12 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
+from femgear.gears.planetary import rotation_approach
 from femgear.study.relief import DesignBasis
 from femgear.trains.protocol import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet, rotation_approach
+    from femgear.gears.planetary import PlanetarySet
 
 
 @dataclass(frozen=True, eq=False)
