@@ -138,6 +138,10 @@ class MeshWindows(Windows):
         """Smallest separation in every window [m], shape (meshes, P, pairs)."""
         return self.gap.min(axis=-1)
 
+    def kind(self, mesh: np.ndarray) -> np.ndarray:
+        """Kinds of meshes (...)."""
+        return mesh // self.n_planets % len(self.gears.kinds)
+
     def with_planet_gaps(self, planet_gaps) -> MeshWindows:
         """Add separations (N,) [m] of the sun-side drive flanks of the planets."""
         gap = self.gap.copy()
@@ -537,9 +541,9 @@ def contact_candidates(
     at = mesh[filled[1]], positions[filled[0]], pair[filled]
     polynomials = _window_polynomials(setup.cells)[layout]
     local = np.zeros((*layout.shape, setup.cells, setup.cells))
-    local[filled] = setup.local[at[0] // N % len(setup.gears.kinds), layout[filled]]
+    local[filled] = setup.local[setup.kind(at[0]), layout[filled]]
     local[filled] += _corner_part(setup, bodies, *at, polynomials[filled])
-    local /= bodies.helical
+    local /= bodies.of_kinds(setup.kind(mesh))[:, None, None]
     turns = setup.gears.rotation_approach
     approach = np.vstack([turns, -turns])[:meshes]
     supports = np.zeros((meshes, meshes))
@@ -583,7 +587,8 @@ def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -
         roll = setup.roll[gear, j, positions[:, None], i]
         sectors = smooth[:1] if number == EACH else smooth
         _add_body(sectors, body, members, roll, setup.tooth[gear, j, i], side)
-    return smooth / bodies.helical
+    root = np.sqrt(bodies.of_kinds(setup.kind(mesh)))
+    return smooth / (root[:, None, None, None] * root[:, None])
 
 
 def windows_of_bodies(gears: GearSet, mesh: np.ndarray) -> list[tuple]:

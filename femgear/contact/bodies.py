@@ -134,8 +134,9 @@ class FlankCompliance:
 class Bodies:
     """Flank compliances of the three kinds of gears and their common material.
 
-    ``helical`` is the stiffness of helical teeth over that of spur teeth of the same transverse section, see
-    `helical_stiffness`. A pair has its gears 1 and 2 in place of sun and planet, and no ring.
+    ``helical`` are the stiffnesses of helical teeth over those of spur teeth of the same transverse section,
+    of every kind of mesh, see `helical_stiffness`. A pair has its gears 1 and 2 in place of sun and planet, and
+    no ring.
     """
 
     sun: FlankCompliance
@@ -143,7 +144,11 @@ class Bodies:
     ring: Any
     material: Material
     face_width: float
-    helical: float = 1.0
+    helical: tuple[float, ...] = (1.0, 1.0)
+
+    def of_kinds(self, kind) -> np.ndarray:
+        """Look up `helical` of kinds of mesh (...)."""
+        return np.asarray(self.helical)[kind]
 
     @property
     def gears(self) -> tuple[Any, ...]:
@@ -151,15 +156,15 @@ class Bodies:
         return self.sun, self.planet, self.ring
 
 
-def helical_stiffness(base_helix_angle: float) -> float:
+def helical_stiffness(base_helix_angle: float, *, internal: bool) -> float:
     """Compute the stiffness of helical teeth over that of straight teeth of the same transverse section.
 
-    Both loaded along the same oblique lines: ``cos^2.25 beta_b`` of the base helix angle [rad]. Teeth turn
-    with the axis, and the force is inclined; endless gears of twisted solid elements, with both gears of a
-    mesh external and with a ring, have it within 1 % up to a helix angle of 30 degrees (rows *helix* of
+    Both loaded along the same oblique lines: ``cos^n beta_b`` of the base helix angle [rad], n = 2.2 for two
+    external gears, 2.3 with an internal one. Teeth turn with the axis, and the force is inclined; endless
+    gears of twisted solid elements have it within 1 % up to a helix angle of 30 degrees (rows *helix* of
     docs/validation.md). Ends that stand obliquely are left out.
     """
-    return math.cos(base_helix_angle) ** 2.25
+    return math.cos(base_helix_angle) ** (2.3 if internal else 2.2)
 
 
 def make_sectors(

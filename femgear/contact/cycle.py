@@ -34,7 +34,7 @@ from femgear.contact.batch import (
 )
 from femgear.contact.bodies import Bodies
 from femgear.contact.flank_pairs import mesh_count
-from femgear.contact.slices import SliceState, WidthWaves, solve_slices, with_ends
+from femgear.contact.slices import SliceState, WidthWaves, largest_mean, solve_slices
 from femgear.contact.supports import (
     RIGID,
     UPRIGHT,
@@ -238,18 +238,16 @@ class MeshCycle:
     def face_load_factor(self) -> np.ndarray | None:
         """K_H-beta of every mesh (M,): largest load per width of a tooth pair over the mean of that pair.
 
-        At the position where the load per width is largest; towards the ends of the width it goes on as
-        between the last two slices. Of helical teeth, whose pairs carry on a part of the width each: the
-        largest load of a slice over that of all, in the mean of the positions.
+        The largest over a 25th of the width (`femgear.contact.slices.largest_mean`), at the position where
+        it is largest. Of helical teeth, whose pairs carry on a part of the width each, the load of all pairs
+        in the mean of the positions.
         """
         if self.slice_load is None:
             return None
         load = self.slice_load
         if self.helical:
-            of_slices = load.sum(axis=1).mean(axis=-1)
-            largest, mean = with_ends(of_slices, axis=1).max(axis=1), of_slices.mean(axis=1)
-            return np.divide(largest, mean, out=np.ones(mean.shape), where=mean > 0)
-        largest = with_ends(load, axis=2).max(axis=2).reshape(len(load), -1)
+            load = load.sum(axis=1, keepdims=True).mean(axis=-1, keepdims=True)
+        largest = largest_mean(load, axis=2).reshape(len(load), -1)
         at = largest.argmax(axis=1)[:, None]
         mean = np.take_along_axis(load.mean(axis=2).reshape(len(load), -1), at, axis=1)
         largest = np.take_along_axis(largest, at, axis=1)

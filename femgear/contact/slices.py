@@ -61,6 +61,8 @@ _SOFTEST = 1e-13
 """Spring on every motion, over that of a tooth pair: it holds what no loaded pair holds."""
 _TOGETHER = 8
 """Positions that are solved at once."""
+PARTS = 25
+"""Of the width, over which loads are told."""
 
 
 @dataclass(frozen=True)
@@ -80,10 +82,10 @@ class WidthWaves:
 
     @property
     def local(self) -> np.ndarray:
-        """What the half spaces of both flanks yield beside the load [m/N], (M,)."""
+        """What the half spaces of both flanks yield beside the load, of spur teeth [m/N], (M,)."""
         material, width = self.bodies[0].material, self.bodies[0].face_width
         factor = 2 * (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * width)
-        return -factor / self.bodies[0].helical * (np.log(self.wave_number / 2) + np.euler_gamma)
+        return -factor * (np.log(self.wave_number / 2) + np.euler_gamma)
 
 
 @dataclass(frozen=True)
@@ -117,8 +119,8 @@ class SliceState:
     own: tuple[np.ndarray, ...]
 
     def largest(self) -> np.ndarray:
-        """Largest force of a tooth pair in any slice (P, W) [N], towards the ends as in the last slices."""
-        return with_ends(self.force, axis=1).max(axis=1)
+        """Largest force of a tooth pair in a 25th of the width (P, W) [N]."""
+        return largest_mean(self.force, axis=1)
 
     def of_laws(self, laws: PairLaws) -> np.ndarray:
         """Largest force of every spring in the slices that it stands for, (rows, W) [N]."""
@@ -144,11 +146,27 @@ class SliceState:
         return self.force @ (self.mesh[:, None] == np.arange(self.mesh[-1] + 1))
 
 
-def with_ends(load, *, axis: int) -> np.ndarray:
-    """Append to the loads of slices, two or more, those at both ends: the lines through the last two."""
-    load = np.asarray(load)
-    near, next_to = np.take(load, [0, -1], axis=axis), np.take(load, [1, -2], axis=axis)
-    return np.concatenate([load, 1.5 * near - 0.5 * next_to], axis=axis)
+def largest_mean(load, *, axis: int) -> np.ndarray:
+    """Find the largest mean over a 25th of the width of the loads in equal slices.
+
+    Towards an end at which the flanks stand askew the load grows without limit, as the logarithm of the
+    slices' number: the mirror plane of the end makes a ridge of them. What a part of the width carries does
+    not. 25 slices are such parts themselves.
+    """
+    load = np.moveaxis(np.asarray(load, float), axis, -1)
+    count, part = load.shape[-1], 1.0 / PARTS
+    total = np.concatenate([np.zeros((*load.shape[:-1], 1)), load.cumsum(axis=-1) / count], axis=-1)
+    # the mean is largest where one of its ends is that of a slice
+    edges = np.arange(count + 1) / count
+    start = np.unique(np.clip(np.concatenate([edges, edges - part]), 0.0, 1.0 - part).round(12))
+    first, last = (_between(total, one * count) for one in (start, start + part))
+    return (last - first).max(axis=-1) / part
+
+
+def _between(values: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Values (..., n) at places in between (m,), by straight lines."""
+    low = np.minimum(place.astype(int), values.shape[-1] - 2)
+    return values[..., low] + (place - low) * (values[..., low + 1] - values[..., low])
 
 
 def wave_displacement(x, depth, wave_number: float, material: Material) -> np.ndarray:
@@ -165,7 +183,7 @@ def wave_displacement(x, depth, wave_number: float, material: Material) -> np.nd
 
 
 def width_waves(
-    sectors: Sectors, material: Material, slices: int, ring_foundation=None, helical: float = 1.0
+    sectors: Sectors, material: Material, slices: int, ring_foundation=None, helical=(1.0, 1.0)
 ) -> WidthWaves:
     """Compute the compliance to the waves of as many slices, from sector grids that may be coarse.
 
@@ -318,7 +336,9 @@ def _across(found: Candidates, rows: np.ndarray, waves: WidthWaves, slices: int)
         ]
     ).sum(axis=1)[:, :, :, 1, :, 1]
     change = np.tensordot(between, known, 1)
-    change[:, :, range(W), range(W)] += replace(waves, wave_number=wanted).local[:, None, None]
+    local = replace(waves, wave_number=wanted).local[:, None]
+    local = local / waves.bodies[0].of_kinds(found.setup.kind(found.mesh))
+    change[:, :, range(W), range(W)] += local[:, None]
     return np.einsum("ms,mt,mpvw->psvtw", T, T, change, optimize=True)
 
 
@@ -340,7 +360,8 @@ def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, betwee
         table = (between @ [one.regular.ravel() for one in bodies]).T @ over
         _add_along(across, setup, bodies[0], table.T.copy(), windows, *on_body)
     _add_beside(across, setup, waves, windows, wave_number, over)
-    return across.reshape(P, N, W, N, W) / waves.bodies[0].helical
+    root = np.sqrt(waves.bodies[0].of_kinds(setup.kind(windows[0])))
+    return (across / (root[:, None] * root)).reshape(P, N, W, N, W)
 
 
 def _add_along(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:
@@ -364,7 +385,7 @@ def _add_along(across, setup, body: FlankCompliance, table, windows, members, ge
 def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) -> None:
     """Add what the half spaces of both flanks yield between the contacts of one tooth pair in all slices."""
     mesh, pair, position, piece = windows
-    material, N = waves.bodies[0].material, setup.n_planets
+    material = waves.bodies[0].material
     factor = (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * waves.bodies[0].face_width)
     for number in np.unique(mesh):
         members = np.flatnonzero(mesh == number)
@@ -372,7 +393,7 @@ def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) ->
         p, same = np.nonzero(pair[:, one] == pair[:, two])
         one, two, local = one[same], two[same], 0.0
         shape = over[:, np.abs(piece[one] - piece[two])] + over[:, piece[one] + piece[two] + 1]
-        for gear, body in enumerate(setup.gears.mates[number // N % len(setup.gears.kinds)]):
+        for gear, body in enumerate(setup.gears.mates[setup.kind(number)]):
             rolls = (setup.roll[gear, number, position[p, w], pair[p, w], 1] for w in (one, two))
             arcs = [roll**2 / (2 * waves.bodies[0].gears[body].base_radius) for roll in rolls]
             local += (shape * _beside(np.abs(arcs[0] - arcs[1]), wave_number[:, None])).sum(axis=0)

@@ -87,9 +87,9 @@ def test_loads_balance_the_torque_and_go_over_the_width(gears, bodies, waves):
 
 def test_softer_teeth_are_those_of_a_softer_material(gears, bodies, waves):
     """Young's modulus and section factor scale all separations of one load alike."""
-    soft = helical_stiffness(np.radians(20.0))
-    helical = replace(waves, bodies=tuple(replace(one, helical=soft) for one in waves.bodies))
-    found = walk(gears, replace(bodies, helical=soft), helical, 1.0, positions=6)
+    soft = helical_stiffness(np.radians(18.75), internal=False)
+    helical = replace(waves, bodies=tuple(replace(one, helical=(soft, soft)) for one in waves.bodies))
+    found = walk(gears, replace(bodies, helical=(soft, soft)), helical, 1.0, positions=6)
     steel = replace(STEEL, youngs_modulus=soft * STEEL.youngs_modulus)
     other = make_bodies(make_sectors(gears, steel, flank_elements=12), steel)
     across = width_waves(make_sectors(gears, steel, flank_elements=6, refine=0.5), steel, SLICES)

@@ -144,14 +144,15 @@ def flank_compliances(
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
     foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
     bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
-    return sectors, replace(bodies, helical=_helical(case))
+    return sectors, replace(bodies, helical=_helical(case, gears))
 
 
-def _helical(case: Case) -> float:
+def _helical(case: Case, gears: PlanetarySet) -> tuple[float, ...]:
     """Stiffness of the teeth over that of their transverse section; plane contact knows no helix."""
     if case.helix_angle is None or case.static.slices < 2:
-        return 1.0
-    return helical_stiffness(base_helix_angle(case.sun.pressure_angle, case.helix_angle))
+        return (1.0,) * len(gears.kinds)
+    base = base_helix_angle(case.sun.pressure_angle, case.helix_angle)
+    return tuple(helical_stiffness(base, internal=pair.gear_2.internal) for pair in gears.kinds)
 
 
 def check_slices(case: Case, gears: PlanetarySet) -> None:
@@ -226,7 +227,7 @@ def over_width(
     sectors = make_sectors(gears, material, flank_elements=6, refine=0.5, cache=cache)
     elastic = static.members == "elastic"
     foundation = ring_foundation(case, sectors.ring) if elastic or loaded else None
-    waves = width_waves(sectors, material, count, foundation, _helical(case))
+    waves = width_waves(sectors, material, count, foundation, _helical(case, gears))
     supports = width_supports(case, gears)
     found: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": supports}
     if overlap := _overlap(case, gears):
