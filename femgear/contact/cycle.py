@@ -737,7 +737,7 @@ class _Walk:
     def _leads(self, found: Candidates, P: int) -> tuple[np.ndarray, np.ndarray]:
         """Separations by leads and misalignments, of meshes (2N, S) and windows (P, S, W) [m]."""
         rows, S, mesh = np.arange(len(found.position))[:, None], self.options.slices, found.mesh
-        lead, d = np.zeros((2 * self.sector.n_planets, S)), self.deviations
+        lead, d = np.zeros((mesh_count(self.sector), S)), self.deviations
         if d is not None:
             lead = lead_separation(d, self.sector, S)
         apart = np.broadcast_to(lead[mesh].T, (P, S, len(mesh)))

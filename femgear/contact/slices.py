@@ -190,10 +190,11 @@ def width_waves(
     ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over the face width, which otherwise is held;
     ``helical`` as in `Bodies`.
     """
-    width = sectors.sun.gear.face_width
+    width, ring = sectors.sun.gear.face_width, sectors.ring
     wave_number = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
     gears = [_wave_compliance(one, None, material, wave_number) for one in (sectors.sun, sectors.planet)]
-    gears.append(_wave_compliance(sectors.ring, ring_foundation, material, wave_number))
+    of_ring = ring and _wave_compliance(ring, ring_foundation, material, wave_number)
+    gears.append(of_ring or [None] * len(wave_number))
     return WidthWaves(
         wave_number,
         tuple(

@@ -185,6 +185,8 @@ def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) ->
     ContactError
         E-MECHANISM: free tilts that move no flank.
     """
+    if supports == UPRIGHT:
+        return None
     s, N, width = planetary_set, planetary_set.n_planets, planetary_set.sun.face_width
     along = 2.0 * (np.arange(slices) + 0.5) / slices - 1.0
     tilts = _one_side(s, Supports(supports.sun, supports.carrier, supports.planet), False)

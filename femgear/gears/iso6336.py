@@ -377,17 +377,19 @@ def mesh_stiffness_method_b(
     return single, single * (0.75 * contact_ratio + 0.25)
 
 
-def pair_mesh_stiffness(pair: GearPair) -> tuple[float, float]:
+def pair_mesh_stiffness(pair: GearPair, helix_angle: float = 0.0) -> tuple[float, float]:
     """Compute c' and c_gamma_alpha [N/m^2] of a pair with both gears' racks, see `mesh_stiffness_method_b`.
 
     An internal gear counts as endless, its shift with the sign of the standard; the larger shift stands
-    first of external gears, as the formula has it.
+    first of external gears, as the formula has it. Gears with a helix angle [rad] are given by their
+    transverse section; rack and shifts enter as those of the normal section.
     """
-    one, two = pair.gears
+    (one, two), normal = pair.gears, math.cos(helix_angle)
     if not two.internal and two.profile_shift > one.profile_shift:
         one, two = two, one
     teeth, shift = (math.inf, -two.profile_shift) if two.internal else (two.teeth, two.profile_shift)
     return mesh_stiffness_method_b(
-        one.teeth, teeth, one.profile_shift, shift, pair.contact_ratio,
-        dedendum=0.5 * (one.rack.dedendum + two.rack.dedendum), pressure_angle=one.pressure_angle,
+        one.teeth, teeth, one.profile_shift / normal, shift / normal, pair.contact_ratio,
+        dedendum=0.5 * (one.rack.dedendum + two.rack.dedendum) / normal,
+        pressure_angle=math.atan(math.tan(one.pressure_angle) * normal), helix_angle=helix_angle,
     )  # fmt: skip

@@ -21,9 +21,10 @@ from femgear.case.gear_set import (
     runout_of,
 )
 from femgear.case.mistakes import added_material
-from femgear.case.quantities import LENGTH, TORQUE, Count, Quantity, Section, Title, Values
+from femgear.case.quantities import ANGLE, LENGTH, TORQUE, Count, Quantity, Section, Title, Values
 from femgear.case.sections import (
     FORMAT,
+    LARGEST_HELIX,
     LARGEST_TORQUE,
     FaceWidth,
     GearErrors,
@@ -49,15 +50,16 @@ class SetSection(Section):
 
     ``centre_distance`` may be left out (the profile shifts give it), and so may, where it is given, one of
     the profile shifts (it is found so that the mesh has no play). ``backlash`` is the play on the reference
-    circles: half of it is taken from the tooth thickness of either gear.
+    circles: half of it is taken from the tooth thickness of either gear. With a ``helix_angle``, positive for
+    a right-handed gear 1, module, pressure angle, racks and shifts are of the normal section.
     """
 
-    helix_angle: ClassVar[float] = 0.0
     module: Annotated[float, Quantity(LENGTH, 5e-5, 0.1)]
     pressure_angle: PressureAngle
     face_width: FaceWidth
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-4, 20.0)] | None = None
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
+    helix_angle: Annotated[float, Quantity(ANGLE, -LARGEST_HELIX, LARGEST_HELIX)] = 0.0
 
 
 class GearSection(Section):
@@ -103,7 +105,6 @@ class PairCase(Section, ReadCase):
     format: Annotated[int, Count(1, FORMAT)] = FORMAT
     train: ClassVar[str] = "pair"
     gear_names: ClassVar[tuple[str, ...]] = ("gear_1", "gear_2")
-    helix_angle: ClassVar[None] = None
     model: Literal["pair"]
     title: Title
     set: SetSection
@@ -116,13 +117,18 @@ class PairCase(Section, ReadCase):
 
     @property
     def module(self) -> float:
-        """Module of both gears [m]."""
+        """Module of both gears, of helical teeth the normal one [m]."""
         return self.set.module
 
     @property
     def pressure_angle(self) -> float:
-        """Pressure angle of both gears [rad]."""
+        """Pressure angle of both gears, of helical teeth the normal one [rad]."""
         return self.set.pressure_angle
+
+    @property
+    def helix_angle(self) -> float | None:
+        """Helix angle at the reference circle [rad], positive of a right-handed gear 1; None of spur gears."""
+        return self.set.helix_angle or None
 
 
 @checked_set.register
@@ -183,14 +189,9 @@ def cross_check(case: PairCase) -> Iterator[CaseError]:
             key=f"gear_{1 + shifts.index(None)}.profile_shift",
             remedy="give both profile shifts, or one of them and set.centre_distance",
         )  # fmt: skip
-    for entry, plain, why in (
-        ("members", "fixed", "both gears stand on fixed axes"),
-        ("slices", 0, "the contact of a pair is solved in the plane"),
-    ):
-        if getattr(case.static, entry) != plain:
-            code = "E-SLICES" if entry == "slices" else "E-CHOICE"
-            yield CaseError(why, code=code, key=f"static.{entry}", value=getattr(case.static, entry),
-                            limit=repr(plain), remedy=f"leave static.{entry} out")  # fmt: skip
+    if case.static.members != "fixed":
+        yield CaseError("both gears stand on fixed axes", code="E-CHOICE", key="static.members",
+                        value=case.static.members, limit="'fixed'", remedy="leave static.members out")  # fmt: skip
     yield from check_torque(case.operation.torque)
     yield from check_gear_deviations(case)
 

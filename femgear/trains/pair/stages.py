@@ -50,7 +50,7 @@ def iso_stiffness(case: PairCase) -> tuple[float, float]:
     discs, see `femgear.gears.iso6336.mesh_stiffness_method_b`.
     """
     try:
-        return pair_mesh_stiffness(planetary_set(case).kinds[0])
+        return pair_mesh_stiffness(planetary_set(case).kinds[0], case.helix_angle or 0.0)
     except GeometryError:
         return math.nan, math.nan
 

@@ -219,7 +219,7 @@ def _over_flank(
     """Draw values of a tooth pair over path and face width in both meshes of the first planet."""
     from matplotlib.colors import ListedColormap
 
-    figure, axes = new_figure(columns=2, sharey=True)
+    figure, axes = new_figure(columns=len(_kinds(static)), sharey=True)
     names, place = [str(name) for name in static["mesh"].values], 1e3 * static["slice"].values
     position = static["position"].values
     rows = [next(i for i, one in enumerate(names) if family(one) == kind) for kind in _kinds(static)]

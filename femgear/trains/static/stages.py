@@ -29,7 +29,7 @@ from femgear.contact.root_stress import (
     root_stress_cycle,
 )
 from femgear.contact.slices import width_waves, with_held_ring
-from femgear.contact.supports import RIGID, Supports, WidthSupports, tilting_members
+from femgear.contact.supports import RIGID, UPRIGHT, Supports, WidthSupports, tilting_members
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
 from femgear.errors import CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import foundation
@@ -151,7 +151,7 @@ def _helical(case: Case, gears: PlanetarySet) -> tuple[float, ...]:
     """Stiffness of the teeth over that of their transverse section; plane contact knows no helix."""
     if case.helix_angle is None or case.static.slices < 2:
         return (1.0,) * len(gears.kinds)
-    base = base_helix_angle(case.sun.pressure_angle, case.helix_angle)
+    base = base_helix_angle(case.pressure_angle, case.helix_angle)
     return tuple(helical_stiffness(base, internal=pair.gear_2.internal) for pair in gears.kinds)
 
 
@@ -161,7 +161,7 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
     Slices together with back flanks or with clearance in the bearings of planets, or thinner than a quarter
     of a module.
     """
-    static, count, width = case.static, case.static.slices, gears.gears[0].face_width
+    static, count, first = case.static, case.static.slices, gears.gears[0]
     where, remedy = {"code": "E-SLICES", "file": case.location("static.slices")}, "leave static.slices out"
     overlap = _overlap(case, gears)
     if case.set.helix_angle and count < max(2, _PER_OVERLAP * abs(overlap)):
@@ -188,12 +188,12 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
         raise
     if static.back_flanks:
         raise CaseError("slices have no back flanks", key="static.back_flanks", remedy=remedy, **where)
-    if case.planet.bearing_clearance and static.members == "elastic":
+    if static.members == "elastic" and case.planet.bearing_clearance:
         raise CaseError("slices know no clearance", key="planet.bearing_clearance", remedy=remedy, **where)
-    if width < 0.25 * count * gears.sun.module:
+    if first.face_width < 0.25 * count * first.module:
         raise CaseError(
             "slices are thinner than a quarter of the module", key="static.slices", value=count,
-            limit=f"at most {int(4 * width / gears.sun.module)}", remedy=remedy, **where,
+            limit=f"at most {int(4 * first.face_width / first.module)}", remedy=remedy, **where,
         )  # fmt: skip
 
 
@@ -249,11 +249,12 @@ def record_positions(case: Case, gears: PlanetarySet) -> int:
 
 
 def _overlap(case: Case, gears: PlanetarySet) -> float:
-    """Overlap ratio, positive of a right-handed sun, whose upper slices run ahead; zero of spur teeth."""
+    """Overlap ratio, positive of a right-handed first gear, whose upper slices run ahead; zero of spur teeth."""
     if case.helix_angle is None:
         return 0.0
-    normal = gears.sun.module * math.cos(case.helix_angle)
-    return math.copysign(overlap_ratio(gears.sun.face_width, normal, case.helix_angle), case.helix_angle)
+    first = gears.gears[0]
+    ratio = overlap_ratio(first.face_width, first.module * math.cos(case.helix_angle), case.helix_angle)
+    return math.copysign(ratio, case.helix_angle)
 
 
 @one_blas_thread()
@@ -345,8 +346,11 @@ def case_supports(case: Case) -> Supports:
 def width_supports(case: Case, gears: PlanetarySet) -> WidthSupports:
     """Make what holds the members of a case against tilting and twisting over the face width.
 
-    The sun twists as a tube between its bore and its root circle, or the diameter that the case gives.
+    The sun twists as a tube between its bore and its root circle, or the diameter that the case gives; gears
+    of a pair do neither.
     """
+    if not isinstance(gears, PlanetarySet):
+        return UPRIGHT
     sun, carrier, rigidity = case.sun, case.carrier, None
     if sun.torque_end is not None:
         outer = sun.torsion_diameter or 2.0 * gears.sun.root_radius
