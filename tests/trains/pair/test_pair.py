@@ -128,7 +128,6 @@ def test_a_displaced_tooth_of_gear_2(changes, sign):
         ({"gear_1.profile_shift": None}, "E-KEY-MISSING", "gear_1.profile_shift"),
         ({"gear_2.outer_radius": "70 mm"}, "E-CHOICE", "gear_2.bore_radius"),
         ({"gear_2.cutter_teeth": 30}, "E-CHOICE", "gear_2.cutter_teeth"),
-        ({"static.slices": 25}, "E-SLICES", "static.slices"),
         ({"static.members": "elastic"}, "E-CHOICE", "static.members"),
         ({"operation.torque": "1e-8 N m"}, "E-RANGE", "operation.torque"),
         ({"gear_1.modifications": [{"kind": "lead crowning", "amount": "5 um"}]}, "E-SLICES",

@@ -1,0 +1,140 @@
+"""Pairs in slices over the width: against the plane, against a set, hands, leads, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trains.pair.test_pair import INTERNAL, STEEL, TAU, pair_case
+from validation.planetary import reference_set
+
+from femgear.contact.bodies import Bodies, make_bodies, make_sectors
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.slices import width_waves
+from femgear.errors import FemgearError
+from femgear.gears.deviations import no_deviations
+from femgear.gears.modifications import FlankForm, LeadSlope
+from femgear.gears.pair import GearPair
+from femgear.trains.pair.stages import iso_stiffness
+from femgear.trains.registry import check_case
+from femgear.trains.static.figures import contact_pattern
+from femgear.trains.static.stages import solve_static
+
+SLICES = 12
+HEIGHT = (np.arange(SLICES) + 0.5) / SLICES - 0.5
+SLICED = {"static.slices": SLICES}
+OPEN = {"set.centre_distance": None, "gear_1.profile_shift": 0.3, "gear_2.profile_shift": 0.1, **SLICED}
+KINDS = pytest.mark.parametrize("kind", [{}, INTERNAL], ids=["external", "internal"])
+
+
+def helical(kind, angle, **more):
+    inside = {"gear_2.outer_radius": "110 mm", "gear_2.tip_diameter": None} if kind else {}
+    return pair_case({**kind, **OPEN, **inside, "set.helix_angle": f"{angle} deg", **more})
+
+
+@KINDS
+def test_spur_slices_are_the_plane_pair(kind):
+    plane, sliced = (solve_static(pair_case({**kind, **more})).cycle for more in ({}, SLICED))
+    for name in ("deflection", "force", "stiffness"):
+        expected = getattr(plane, name)
+        assert np.abs(getattr(sliced, name) / expected - 1.0).max() < 1e-10, name
+    assert sliced.face_load_factor == pytest.approx(1.0, abs=1e-9)
+
+
+@KINDS
+def test_the_other_hand_mirrors_the_width(kind):
+    """Under the other torque too, which is that of the other hand from behind."""
+    changes = {"set.helix_angle": "-20 deg"}, {"operation.torque": "-200 N m", "set.helix_angle": "-20 deg"}
+    right, left, behind = (solve_static(helical(kind, 20, **more)).dataset() for more in ({}, *changes))
+    back = -np.arange(right.sizes["position"]) % right.sizes["position"]
+    for name in ("ste", "mesh_stiffness", "mesh_force"):
+        np.testing.assert_allclose(left[name], right[name], rtol=1e-9, err_msg=name)
+        np.testing.assert_allclose(behind[name][:, back], right[name], rtol=1e-9, err_msg=name)
+    load = right.slice_load.values
+    assert np.abs(left.slice_load.values - load[:, :, ::-1]).max() < 1e-9 * load.max()
+    # a right-handed driver that turns counter-clockwise pushes its mate down
+    base = np.arcsin(np.sin(np.radians(20.0)) * np.cos(np.radians(20.0)))
+    assert right.axial_force.values == pytest.approx(-np.tan(base) * right.mesh_force.values, rel=1e-12)
+    assert left.axial_force.values == pytest.approx(-right.axial_force.values, rel=1e-9)
+    overlap = 20.0 * np.sin(np.radians(20.0)) / (np.pi * 3.0)
+    assert right.attrs["overlap_ratio"] == pytest.approx(overlap, rel=1e-12)
+    assert len(contact_pattern(right).axes) == 2  # the mesh and its colours
+
+
+@pytest.mark.parametrize("ahead", [None, 0.8 * HEIGHT], ids=["spur, lead slope", "helical"])
+def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
+    """In slices as in the plane: neither bodies nor their waves carry from one flank to the other."""
+    s = replace(reference_set(), planet_angles=(0.0,))
+    bodies = make_bodies(make_sectors(s, STEEL, flank_elements=12), STEEL)
+    waves = width_waves(make_sectors(s, STEEL, flank_elements=6, refine=0.5), STEEL, SLICES)
+
+    def apart(one):
+        regular, n = one.planet.regular.copy(), len(one.planet.roll)
+        regular[:, :n, n:] = regular[:, n:, :n] = 0.0
+        return replace(one, planet=replace(one.planet, regular=regular))
+
+    bodies, waves = apart(bodies), replace(waves, bodies=tuple(map(apart, waves.bodies)))
+    lead, force = FlankForm(() if ahead is not None else (LeadSlope(3e-6),)), 30.0 / s.sun.base_radius
+
+    def walked(gears, bodies, waves, torque, positions):
+        ideal = no_deviations(gears)
+        # the planet has its slope on the side of the sun and of the ring
+        slope = replace(ideal, planet_sun_side=lead, planet_ring_side=lead)
+        if gears.gears[0].name == "planet":
+            slope = replace(ideal, sun=lead)
+        options = CycleOptions(waves=waves, slices=SLICES, ahead=ahead)
+        return walk_mesh_cycle(
+            gears, bodies, sun_torque=torque, positions=positions, deviations=slope, options=options
+        )
+
+    whole = walked(s, bodies, waves, 30.0, TAU)
+    for mesh, (one, two) in enumerate((("sun", "planet"), ("planet", "ring"))):
+
+        def of_pair(found, one=one, two=two):
+            return Bodies(getattr(found, one), getattr(found, two), None, STEEL, s.sun.face_width)
+
+        pair = GearPair(getattr(s, one), getattr(s, two), s.centre_distance)
+        crosswise = replace(waves, bodies=tuple(map(of_pair, waves.bodies)))
+        torque, at = force * pair.gear_1.base_radius, TAU + s.mesh_phases[mesh]
+        cycle = walked(pair, of_pair(bodies), crosswise, torque, at)
+        for name in ("deflection", "stiffness", "force", "mesh_misalignment"):
+            expected = getattr(whole, name)[mesh]
+            limit = {"rtol": 1e-9, "atol": 1e-9 * np.abs(expected).max(), "err_msg": name}
+            np.testing.assert_allclose(getattr(cycle, name)[0], expected, **limit)
+        loads = [np.sort(one, axis=0)[-2:] for one in (cycle.slice_load[0], whole.slice_load[mesh])]
+        np.testing.assert_allclose(*loads, rtol=1e-8, atol=1e-9 * loads[1].max())
+
+
+@KINDS
+def test_a_slope_loads_one_end_more_than_linear_teeth_would(kind):
+    """ISO 6336-1: ``1 + F_by c_gamma b / (2 F)`` of full contact; slices resist a slope more than a load."""
+
+    def factor(gear, amount):
+        slope = [{"kind": "lead slope", "amount": f"{amount} um"}]
+        case = pair_case({**kind, **SLICED, f"{gear}.modifications": slope})
+        cycle = solve_static(case).cycle
+        linear = 1e-6 * amount * iso_stiffness(case)[1] * case.set.face_width / (2.0 * cycle.force.max())
+        return cycle.face_load_factor[0] - 1.0, linear
+
+    (large, linear), (other, _), (small, _) = factor("gear_1", 4), factor("gear_2", 4), factor("gear_1", 1)
+    assert large > linear and large == pytest.approx(4.0 * small, rel=0.03)
+    assert other == pytest.approx(large, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "key", "words"),
+    [
+        ({"set.helix_angle": "20 deg"}, "E-SLICES", "static.slices", "helical teeth with an overlap ratio"),
+        ({"set.helix_angle": "-40 deg", **SLICED, "static.slices": 6}, "E-SLICES", "static.slices", "1.36"),
+        ({"static.slices": 30}, "E-SLICES", "static.slices", "thinner than a quarter"),
+        ({**SLICED, "static.back_flanks": True}, "E-SLICES", "static.back_flanks", "no back flanks"),
+        ({"set.helix_angle": "35 deg", **SLICED, "set.centre_distance": "91.5 mm"}, "E-CENTRE-DISTANCE",
+         "set.centre_distance", "transverse section"),
+        ({"gear_1.rack": {"root_radius": 0.6}, **SLICED}, "E-ROOT-RADIUS", "gear_1.rack.root_radius",
+         "transverse section"),
+    ],
+)  # fmt: skip
+def test_refusals_name_the_entries_of_the_file(changes, code, key, words):
+    with pytest.raises(FemgearError) as found:
+        check_case(helical({}, 20, **{"static.slices": 0, **changes}))
+    problems = getattr(found.value, "problems", ()) or (found.value,)
+    assert any(one.code == code and one.key == key and words in str(one) for one in problems)
