@@ -57,18 +57,21 @@ def point_load(distance, depth, material):
 
 
 class ContactLine:
-    """A contact line over its whole path: places, weights along the axis, and functions of the load."""
+    """A contact line over (part of) its path: places, weights along the axis, and functions of the load.
 
-    def __init__(self, pair, slope: float):
+    Height zero is where it crosses the path coordinate ``middle`` [m].
+    """
+
+    def __init__(self, path: tuple[float, float], slope: float, middle: float = 0.0, knots: int = KNOTS):
         x, w = np.polynomial.legendre.leggauss(4)
-        cells = np.linspace(*pair.path, POINTS // 4 + 1)
+        cells = np.linspace(*path, POINTS // 4 + 1)
         half = 0.5 * np.diff(cells)[:, None]
         self.path = (cells[:-1, None] + half * (x + 1)).ravel()
         self.weight = (half * w).ravel() / slope
-        knots = np.linspace(*pair.path, KNOTS)
-        self.height = self.path / slope
-        self.path_ends, self.ends = pair.path, np.array(pair.path) / slope
-        self.basis = np.array([np.interp(self.path, knots, one) for one in np.eye(KNOTS)]).T
+        places = np.linspace(*path, knots)
+        self.height = (self.path - middle) / slope
+        self.path_ends, self.ends = path, (np.array(path) - middle) / slope
+        self.basis = np.array([np.interp(self.path, places, one) for one in np.eye(knots)]).T
         self.loads = self.weight[:, None] * self.basis
 
 
@@ -172,7 +175,7 @@ def tooth_stiffness(helix: float, mesh: int, flank_elements: int = 8) -> dict[st
     two = (sectors.sun, sectors.planet) if mesh == 0 else (sectors.planet, sectors.ring)
     pair, angle = mesh_pairs(gears)[mesh], base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
     pitch = two[0].gear.base_radius * two[0].gear.pitch_angle
-    line = ContactLine(pair, math.tan(angle))
+    line = ContactLine(pair.path, math.tan(angle))
     rolls = (lambda at: pair.pitch_roll_1 + at, lambda at: pair.pitch_roll_2 - pair.sign * at)
     one, two_rolls = (roll(line.path) for roll in rolls)
     radius = one * two_rolls / (two_rolls + pair.sign * one)
