@@ -44,3 +44,23 @@ def test_the_internal_pair_can_be_solved():
     changes |= {"gear_2.bore_radius": None, "static.positions": 8}
     changes |= {"set.centre_distance": "54 mm", "gear_1.profile_shift": 0.0}
     assert solve_static(with_values(read_case(CASE), changes)).cycle.stiffness.min() > 0.0
+
+
+def test_helical_pair_and_lead_slope():
+    rows = re.findall(r"(?m)^\| (?:Overlap|STE|Stiff|Axial).*?\|(.*)\|$", PAGE)
+    printed = np.array([[float(one) for one in row.split("|")] for row in rows])
+    (block,) = re.findall(r"```toml\n(set.helix.*?)```", PAGE, re.DOTALL)
+    entries = [line.split(" = ") for line in block.strip().splitlines()]
+    helical = {key: int(v) if v.isdigit() else v.strip('"') for key, v in entries}
+    for column, width in zip(printed.T, (None, "20 mm", "27.6 mm"), strict=True):
+        case = with_values(read_case(CASE), {**helical, "set.face_width": width} if width else {})
+        static = solve_static(case)
+        cycle, force = static.cycle, np.tan(static.base_helix_angle) * static.cycle.force.mean()
+        stiffness = cycle.stiffness.mean() / case.set.face_width, iso_stiffness(case)[1]
+        found = [static.overlap_ratio, cycle.deflection.mean() * 1e6, np.ptp(cycle.deflection) * 1e6]
+        assert np.allclose([*found, *(k / 1e9 for k in stiffness), force], column, rtol=3e-3, atol=4e-3)
+    slope = [{"kind": "lead slope", "amount": "4 um"}]
+    case = with_values(read_case(CASE), {"static.slices": 25, "gear_1.modifications": slope})
+    cycle = solve_static(case).cycle
+    linear = 1.0 + 4e-6 * iso_stiffness(case)[1] * case.set.face_width / (2.0 * cycle.force.max())
+    assert f"K_Hβ = {cycle.face_load_factor[0]:.2f}; linear teeth" in PAGE and f"give {linear:.2f}:" in PAGE

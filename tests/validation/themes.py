@@ -14,6 +14,7 @@ from validation import (
     face_width,
     geometry,
     helical,
+    helical_pair,
     helical_teeth,
     housing,
     impacts,
@@ -118,9 +119,10 @@ THEMES = (
         "Negative tooth numbers are internal gears, shifts positive where they move the flank outwards. "
         "Bodies are held 8 modules beyond their roots, small ones at 0.4 of the reference radius: the "
         "standard's solid disc has no twist between teeth and hub. Whole bodies: all teeth in one plane "
-        "grid, held at the bore.",
+        "grid, held at the bore. Helical pairs: module and shifts of the normal section. Rows *finite*: both "
+        "gears solid over their face width, half as fine as in plane contact, contacts on the path alone.",
         (pairs.iso_stiffness,),
-        (pairs.whole_bodies,),
+        (pairs.whole_bodies, helical_pair.finite_width),
     ),
     Theme(
         "static",

@@ -127,7 +127,7 @@ class PairCase(Section, ReadCase):
 
     @property
     def helix_angle(self) -> float | None:
-        """Helix angle at the reference circle [rad], positive of a right-handed gear 1; None of spur gears."""
+        """Helix angle at the reference circle [rad], positive of a right-handed gear 1; None of spur ones."""
         return self.set.helix_angle or None
 
 
@@ -190,8 +190,10 @@ def cross_check(case: PairCase) -> Iterator[CaseError]:
             remedy="give both profile shifts, or one of them and set.centre_distance",
         )  # fmt: skip
     if case.static.members != "fixed":
-        yield CaseError("both gears stand on fixed axes", code="E-CHOICE", key="static.members",
-                        value=case.static.members, limit="'fixed'", remedy="leave static.members out")  # fmt: skip
+        yield CaseError(
+            "both gears stand on fixed axes", code="E-CHOICE", key="static.members",
+            value=case.static.members, limit="'fixed'", remedy="leave static.members out",
+        )  # fmt: skip
     yield from check_torque(case.operation.torque)
     yield from check_gear_deviations(case)
 

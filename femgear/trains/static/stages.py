@@ -249,7 +249,7 @@ def record_positions(case: Case, gears: PlanetarySet) -> int:
 
 
 def _overlap(case: Case, gears: PlanetarySet) -> float:
-    """Overlap ratio, positive of a right-handed first gear, whose upper slices run ahead; zero of spur teeth."""
+    """Overlap ratio, positive where gear 1 is right-handed and upper slices run ahead; zero of spur teeth."""
     if case.helix_angle is None:
         return 0.0
     first = gears.gears[0]
