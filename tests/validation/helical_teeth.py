@@ -43,7 +43,6 @@ PITCHES, DEPTHS, WAVES = 3.0, 5.0, 24
 """Waves shorter than the pitch over the first do not see the next tooth: some are computed, up to a depth."""
 
 
-ONE_POWER = "one power stands for meshes with and without a ring"
 EXPLAINED = (
     "virtual gears do not know that pieces of a contact line high on a tooth lean on those low on it: "
     "slices without coupling are too soft, the more so the shorter the lines"
@@ -75,6 +74,14 @@ class ContactLine:
         self.loads = self.weight[:, None] * self.basis
 
 
+def at_stations(roll: np.ndarray, stations: np.ndarray) -> np.ndarray:
+    """Shares (points, n) of stations (n,) in what acts at roll lengths (points,) [m]."""
+    index, weight = station_weights(roll, stations)
+    at = np.zeros((len(roll), len(stations)))
+    np.put_along_axis(at, index, weight, axis=1)
+    return at
+
+
 def endless_flank(sector, material, line: ContactLine, roll, angle: float, *, twisted: bool) -> np.ndarray:
     """Regular compliance between the loads of a line, per transverse force, of helical or straight teeth."""
     gear, slope = sector.gear, math.tan(angle)
@@ -88,9 +95,7 @@ def endless_flank(sector, material, line: ContactLine, roll, angle: float, *, tw
     known = np.array(list(wave_compliances(sector.grid, material, twisted * twist, loads, seen, waves)))
     short = CubicSpline(np.log(some[every - 3 :]), known[every - 3 :])
     z = (-1.0 if gear.internal else 1.0) * (roll - roll.mean()) / slope
-    index, weight = station_weights(roll, stations.roll)
-    at = np.zeros((len(roll), len(stations.roll)))
-    np.put_along_axis(at, index, weight, axis=1)
+    at = at_stations(roll, stations.roll)
     total = np.zeros((KNOTS, KNOTS))
     for q in range(last + 1):
         F = at.T @ (np.exp(-1j * q * twist * z)[:, None] * line.loads)
@@ -215,7 +220,7 @@ def factors() -> tuple[Row, ...]:
                 within("helix", source, formula, shared, math.cos(angle) ** power, 0.01),
                 within("helix", source, name + "the same under one load", shared, loaded, 0.01),
                 within("helix", source, name + "helical stiffness of femgear", shared,
-                       helical_stiffness(angle), 0.01, explanation=ONE_POWER),
+                       helical_stiffness(angle, internal=mesh == 1), 0.01),
                 within("helix", source, name + "factor of virtual gears on slices of the transverse section",
                        found["helical"][1] / found["spur"][1], virtual[mesh], 0.05, explanation=EXPLAINED),
             ]  # fmt: skip

@@ -76,15 +76,13 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
     lead, force = FlankForm(() if ahead is not None else (LeadSlope(3e-6),)), 30.0 / s.sun.base_radius
 
     def walked(gears, bodies, waves, torque, positions):
-        ideal = no_deviations(gears)
-        # the planet has its slope on the side of the sun and of the ring
-        slope = replace(ideal, planet_sun_side=lead, planet_ring_side=lead)
-        if gears.gears[0].name == "planet":
-            slope = replace(ideal, sun=lead)
-        options = CycleOptions(waves=waves, slices=SLICES, ahead=ahead)
+        # the planet has its slope on both flanks, gear 1 or gear 2 of a pair
+        flanks = ("sun",) if gears.gears[0].name == "planet" else ("planet_sun_side", "planet_ring_side")
+        slope = replace(no_deviations(gears), **dict.fromkeys(flanks, lead))
         return walk_mesh_cycle(
-            gears, bodies, sun_torque=torque, positions=positions, deviations=slope, options=options
-        )
+            gears, bodies, sun_torque=torque, positions=positions, deviations=slope,
+            options=CycleOptions(waves=waves, slices=SLICES, ahead=ahead),
+        )  # fmt: skip
 
     whole = walked(s, bodies, waves, 30.0, TAU)
     for mesh, (one, two) in enumerate((("sun", "planet"), ("planet", "ring"))):
