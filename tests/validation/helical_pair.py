@@ -151,7 +151,7 @@ def solid_pair(gears, position: float) -> tuple[float, float]:
         forces = approach * found
         if abs(approach - before) < SETTLED * approach:
             assert forces.min() > 0.0, "flanks pull"
-            return approach, whole @ np.linalg.solve(yields(forces, 1.0), whole) / WIDE
+            return float(approach), float(whole @ np.linalg.solve(yields(forces, 1.0), whole)) / WIDE
         before = approach
     raise AssertionError("the widths of the contacts do not settle")
 

@@ -114,8 +114,9 @@ def iso_stiffness() -> tuple[Row, ...]:
         standard = 1e-9 * pair_mesh_stiffness(pair, beta)[1]
         cycle = in_slices(pair, overlap_ratio(WIDTH, MODULE, beta), factor, positions=16)
         name = f"{z_1}/{z_2}, x {x_1:g}, {x_2:g}, {helix:g} degrees, 300 N/mm: c_gamma [N/(mm um)]"
-        rows.append(within("pairs", "ISO 6336-1 method B", name, standard, 1e-9 * cycle.stiffness.mean() / WIDTH,
-                           0.15, explanation=UNCOUPLED if (helix, z_2) == (30.0, -72) else ""))  # fmt: skip
+        k = 1e-9 * cycle.stiffness.mean() / WIDTH
+        rows.append(within("pairs", "ISO 6336-1 method B", name, standard, k, 0.15,
+                           explanation=UNCOUPLED if (helix, z_2) == (30.0, -72) else ""))  # fmt: skip
     return tuple(rows)
 
 
