@@ -94,8 +94,8 @@ _CAPTIONS = {
 }
 _LOWEST, _ABOVE_MODES = 20e3, 2.0
 """The excitation reaches the end of hearing [Hz], and so many times the highest natural frequency."""
-_HARMONICS, _ON_BRANCH = 512, (16, 28)
-"""Most harmonics of the excitation; those of excitation and response on the branch."""
+_LEAST, _HARMONICS, _ON_BRANCH = 8, 512, (16, 28)
+"""Fewest and most harmonics of the excitation; most of excitation and response on the branch."""
 _TOGETHER, _INSTANTS = 500, 1024
 """Speeds that are in memory at a time, and instants of a period at which contact is looked for."""
 _BELOW, _ABOVE = 0.6, 1.05
@@ -181,7 +181,8 @@ def solve_pair_modes(case: PairCase, static: StaticResult) -> PairModesResult:
 def _harmonics(case: PairCase, modes: Modes, mesh_frequency: np.ndarray) -> np.ndarray:
     """Count the harmonics of excitation and response (2, s) at mesh frequencies (s,) [Hz]."""
     given, up_to = case.dynamics, max(_LOWEST, _ABOVE_MODES * float(modes.frequency.max()))
-    count = np.clip(np.floor((given.up_to or up_to) / mesh_frequency * (1.0 + 1e-12)), 1, _HARMONICS)
+    least, up_to = (1, given.up_to) if given.up_to else (_LEAST, up_to)
+    count = np.clip(np.floor(up_to / mesh_frequency * (1.0 + 1e-12)), least, _HARMONICS)
     excitation = np.full(len(count), given.mesh_harmonics) if given.mesh_harmonics else count.astype(int)
     # products with the low harmonics of the stiffness reach beyond the excitation
     response = given.response_harmonics or excitation + 2 * np.minimum(excitation, 6)
@@ -337,7 +338,9 @@ def _branch(case: PairCase, modes: PairModesResult, speeds: np.ndarray, lowest: 
     along = found.parameter[:kept] / teeth
     parts, folds = along[motion.drive < 1.0] / RPM, np.sort(along[found.folds[found.folds < kept]]) / RPM
     span = f"from {parts.min():.6g} to {parts.max():.6g} rpm" if len(parts) else "nowhere"
-    listed, ending = ", ".join(f"{one:.6g}" for one in folds) or "none", found.message
+    listed, ending = ", ".join(f"{one:.6g}" for one in folds) or "none", "it came to the end of its range"
+    if not found.complete:
+        ending = found.message
     if far.any():
         ending = f"it ends at {along[-1] / RPM:.6g} rpm, before flanks travel {LARGEST_APPROACH:g} modules"
     words = f"along the branch flanks part {span}, limit points at {listed} rpm; {ending}"
