@@ -58,7 +58,7 @@ def _check_operation(case: Case):
         )  # fmt: skip
 
 
-def check_speeds(case: Case) -> Iterator[CaseError]:
+def check_speeds(case: Any) -> Iterator[CaseError]:
     """Refuse operating speeds given twice, and a run-up that ends where it begins or before."""
     speeds = case.operation.speeds
     if len(set(speeds)) < len(speeds):
@@ -86,7 +86,7 @@ def check_torque(torque: float) -> Iterator[CaseError]:
         )  # fmt: skip
 
 
-def runup_range(case: Case) -> tuple[float, float]:
+def runup_range(case: Any) -> tuple[float, float]:
     """Find the first and the last speed of the run-up [rad/s], as the case gives them or by default."""
     speeds, section = case.operation.speeds, case.runup
     return section.start or min(0.8 * min(speeds), 0.25 * max(speeds)), section.to or 1.25 * max(speeds)

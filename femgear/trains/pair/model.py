@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -127,7 +128,7 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
 
 def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
     """Compute mesh stiffness, transmission error and force of the loaded pair over one mesh period."""
-    gears, deviations = static.planetary_set, set_deviations(case)
+    gears, deviations = cast(GearPair, static.planetary_set), set_deviations(case)
     state = loaded_period(
         gears, static.bodies, static.bodies, sun_torque=static.sun_torque, positions=case.static.positions,
         contact=case.static.contact, deviations=None if deviations.ideal else deviations,

@@ -13,7 +13,7 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from femgear.errors import ConvergenceError, Finding, GeometryError
 from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import pair_mesh_stiffness
+from femgear.gears.pair import GearPair
 from femgear.report.tables import Block, chosen, describe_modes, tabulate
 from femgear.solvers.continuation.branches import frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
@@ -171,11 +172,12 @@ def solve_pair_modes(case: PairCase, static: StaticResult) -> PairModesResult:
     CaseError: a static solution of another case (E-OTHER-CASE), or none (E-TYPE).
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
-    model, excitation = pair_model(case, static.planetary_set), pair_excitation(case, static)
+    gears = cast(GearPair, static.planetary_set)
+    model, excitation = pair_model(case, gears), pair_excitation(case, static)
     mean, ratio = excitation.stiffness.mean(axis=1), case.dynamics.damping_ratio
     modes = solve_modes(model.system, mean, damping_ratio=ratio)
     modes = replace(modes, kind=pair_kinds(modes, model.system.M))
-    return PairModesResult(static.planetary_set, model, excitation, modes, modal_entries(case))
+    return PairModesResult(gears, model, excitation, modes, modal_entries(case))
 
 
 def _harmonics(case: PairCase, modes: Modes, mesh_frequency: np.ndarray) -> np.ndarray:
@@ -331,7 +333,7 @@ def _branch(case: PairCase, modes: PairModesResult, speeds: np.ndarray, lowest: 
     # teeth that strike travel as far as the flanks approach at rest and the play together
     scale = float(modes.excitation.deflection.max() + modes.excitation.backlash[0])
     options = {"harmonics": size, "radius": False, "scale": scale, "options": _STEPS}
-    found = frequency_response_curve(problem, (high * teeth, low * teeth), **options)
+    found = frequency_response_curve(problem, (float(high * teeth), float(low * teeth)), **options)
     far = np.abs(found.lines[:, 0]).sum(axis=1) > LARGEST_APPROACH * case.module
     kept = int(far.argmax()) if far.any() else len(far)
     motion = _parted(modes.model, problem, found.solutions[:kept], size)

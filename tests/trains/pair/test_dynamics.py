@@ -1,4 +1,4 @@
-"""Vibration of a pair: closed forms, the dimensionless pair of impacts, integration in time, energy, units."""
+"""Vibration of a pair: closed forms, the pair of the impacts, integration in time, energy, units."""
 
 import math
 from dataclasses import replace
@@ -73,7 +73,7 @@ def test_bearings_that_hardly_give_way_leave_the_torsional_mode():
 
 def test_one_degree_of_freedom_under_a_small_error():
     """``m x'' + 2 zeta sqrt(k m) x' + k (x - e) = F``: the transfer function in closed form."""
-    _, mass, modes, excitation = one_mass(0.0)
+    _, _, modes, excitation = one_mass(0.0)
     error = 1e-9 * np.cos(2.0 * np.pi * TAU)
     excitation = replace(excitation, deflection=excitation.deflection + error)
     hertz = modes.frequency[1] * np.array([0.3, 0.95, 1.0, 2.0])
@@ -86,7 +86,7 @@ def test_one_degree_of_freedom_under_a_small_error():
 @pytest.mark.parametrize("ratio", [0.5, 0.95, 1.1])
 def test_flanks_that_part_as_in_the_dimensionless_pair(ratio):
     """Stiffness waves alone: both models damp the same velocity."""
-    model, mass, modes, excitation = one_mass(0.15, play=60e-6)
+    model, _, modes, excitation = one_mass(0.15, play=60e-6)
     problem = separating_pair(model, modes, excitation, 60)
     options = {"harmonics": 20, "samples": 1024, "stability": False}
     unit = 30e-6 * STIFFNESS
@@ -104,7 +104,7 @@ def test_flanks_that_part_as_in_the_dimensionless_pair(ratio):
 
 
 def test_contact_loss_against_integration_in_time():
-    case, modes, dynamics = solved()
+    _, modes, dynamics = solved()
     s = 2
     assert dynamics.response.method[s] == "harmonic balance" and 0.5 < dynamics.motion.drive[s] < 0.9
     count = 8
@@ -135,7 +135,7 @@ def test_the_mean_mesh_force_carries_the_torque_at_every_speed(changes):
 
 
 def test_slow_gears_follow_the_static_solution():
-    case, modes, dynamics = solved(("operation.speeds", ("30 rpm",)))
+    _, modes, dynamics = solved(("operation.speeds", ("30 rpm",)))
     static = modes.excitation.deflection[0]
     assert dynamics.dataset().dte_rms.item() == pytest.approx(static.std(), rel=5e-3)
 
