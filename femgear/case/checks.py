@@ -48,7 +48,20 @@ def _check_operation(case: Case):
             limit="one member driven, another held, the third is the output",
             remedy="drive the sun and hold the ring, or name two other members",
         )  # fmt: skip
-    if len(set(operation.speeds)) < len(operation.speeds):
+    yield from check_speeds(case)
+    yield from check_torque(operation.torque)
+    if not case.rigid and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
+        yield CaseError(
+            "the ring is the fixed member but nothing keeps it from turning", code="E-MECHANISM",
+            key="ring.foundation_tangential", value="0 N/m^3", limit="above 0 N/m^3",
+            remedy="give a tangential foundation, or hold another member",
+        )  # fmt: skip
+
+
+def check_speeds(case: Any) -> Iterator[CaseError]:
+    """Refuse operating speeds given twice, and a run-up that ends where it begins or before."""
+    speeds = case.operation.speeds
+    if len(set(speeds)) < len(speeds):
         yield CaseError(
             "a speed is given twice", code="E-DUPLICATE", key="operation.speeds", remedy="keep one of them"
         )
@@ -60,13 +73,6 @@ def _check_operation(case: Case):
             value=SPEED.show(value),
             limit=f"below {SPEED.show(to)}" if name == "from" else f"above {SPEED.show(start)}",
             remedy="give runup.from below runup.to; defaults are around operation.speeds",
-        )  # fmt: skip
-    yield from check_torque(operation.torque)
-    if not case.rigid and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
-        yield CaseError(
-            "the ring is the fixed member but nothing keeps it from turning", code="E-MECHANISM",
-            key="ring.foundation_tangential", value="0 N/m^3", limit="above 0 N/m^3",
-            remedy="give a tangential foundation, or hold another member",
         )  # fmt: skip
 
 
@@ -80,7 +86,7 @@ def check_torque(torque: float) -> Iterator[CaseError]:
         )  # fmt: skip
 
 
-def runup_range(case: Case) -> tuple[float, float]:
+def runup_range(case: Any) -> tuple[float, float]:
     """Find the first and the last speed of the run-up [rad/s], as the case gives them or by default."""
     speeds, section = case.operation.speeds, case.runup
     return section.start or min(0.8 * min(speeds), 0.25 * max(speeds)), section.to or 1.25 * max(speeds)

@@ -44,7 +44,7 @@ _HELIX = {"helical.helix_angle"}
 """All that the transverse section of helical gears depends on."""
 
 
-def static_entries(case: Case) -> Entries:
+def static_entries(case: Any) -> Entries:
     """List the entries that decide the static solution; supports only where members move."""
     left_out, parts = _WORDS | _MACHINES | {"static.stresses", "helical"}, {"mass", "inertia", "density"}
     if case.static.members == "fixed":
@@ -60,7 +60,7 @@ def state_entries(case: Case) -> Entries:
     return _entries(case, _DYNAMIC | {"operation.speeds", "dynamics"})
 
 
-def modal_entries(case: Case) -> Entries:
+def modal_entries(case: Any) -> Entries:
     """List the entries that decide the modal basis: all but speeds, harmonics, tolerance and sensor."""
     kept = {"dynamics.damping_ratio", "dynamics.up_to"}
     return _entries(case, _DYNAMIC | {"operation.speeds", "dynamics"}, kept=kept)

@@ -53,7 +53,10 @@ _DYNAMIC = 80.0
 """Range of the waterfall [dB]."""
 _PIXELS = (400, 640)
 _CUTS, _NAMED = 6, 8
-KIND_COLOURS = {"rotational": BLUE, "translational": VERMILION, "planet": GREEN, "mixed": PURPLE}
+KIND_COLOURS = {
+    "rotational": BLUE, "translational": VERMILION, "planet": GREEN, "mixed": PURPLE,
+    "torsional": BLUE, "lateral": VERMILION, "coupled": GREEN,
+}  # fmt: skip
 _MESHES = (BLUE, VERMILION)
 
 

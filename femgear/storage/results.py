@@ -209,12 +209,13 @@ def mode_entries(modes: Any) -> dict[str, tuple]:
 def response_entries(result: Any) -> dict[str, tuple]:
     """List what is known of a periodic response, (speed,) each: frequency [Hz], convergence, stability.
 
-    Of any result with a response, its stability and the speeds of the members.
+    Of any result with a response, its stability and, where there is a carrier, the speeds of the members.
     """
     response, stability, speed = result.response, result.stability, ("speed",)
+    carrier = [one.carrier for one in getattr(result, "speeds", ())]
     return {
         "mesh_frequency": (speed, response.mesh_frequency, "Hz", "mesh frequency"),
-        "carrier_speed": (speed, [s.carrier for s in result.speeds], "rad/s", "speed of the carrier"),
+        **({"carrier_speed": (speed, carrier, "rad/s", "speed of the carrier")} if carrier else {}),
         "converged": (speed, response.converged, "1", "whether the solution satisfies its tolerance"),
         "iterations": (speed, response.iterations, "1", "iterations of the fixed point"),
         "residual": (speed, response.residual, "1", "relative residual of the harmonic equations"),

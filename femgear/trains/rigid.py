@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 Entry = TypeVar("Entry")
-AnyCase = TypeVar("AnyCase", bound=Case)
+AnyCase = TypeVar("AnyCase", bound=Any)
 
 
 def listed(names: list[str]) -> str:

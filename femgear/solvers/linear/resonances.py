@@ -26,6 +26,8 @@ EXCITED = 1e-3
 """Share of the largest modal force of a harmonic from which on a mode counts as excited by it."""
 ONE_FREQUENCY = 1e-6
 """Modes closer than this (relative) are one: any mixture of them is a mode."""
+_REFINED = 40
+"""Resonances that get speeds of their own, at most."""
 
 
 @dataclass(frozen=True)
@@ -138,3 +140,32 @@ def crossings(forces: ModalForces, lowest: float, highest: float, up_to: float) 
     along = np.argsort(at[row, column], kind="stable")
     row, column = row[along], column[along]
     return Crossings(row, harmonic[column], at[row, column])
+
+
+def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray):
+    """Add speeds at resonances (c,) whose peaks are narrower than the steps between speeds (s,), ascending.
+
+    A peak of damping ratio z at speed w falls to half its power at ``w (1 - z)`` and ``w (1 + z)``. The
+    resonances of the highest expected levels, from `ModalForces.heard`, get these three speeds; undamped
+    ones, which have no largest level, none.
+    """
+    step = np.diff(speeds).max(initial=0.0) if len(speeds) > 1 else np.inf
+    narrow = np.flatnonzero((damping > 0.0) & (damping * resonance < step))
+    strongest = narrow[np.argsort(-heard[narrow] / damping[narrow], kind="stable")[:_REFINED]]
+    around = resonance[strongest, None] * (1.0 + damping[strongest, None] * np.array([-1.0, 0.0, 1.0]))
+    inside = (around >= speeds[0]) & (around <= speeds[-1])
+    return np.unique(np.concatenate([speeds, around[inside]]))
+
+
+def unresolved(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray) -> int:
+    """Count the resonances (c,) that matter with no speed (s,) within half the half width of their peaks.
+
+    There an amplitude is 11 % below its peak. Those count of which a twentieth of the highest level is
+    expected; arguments as of `refined_speeds`.
+    """
+    expected = heard / np.where(damping > 0.0, damping, np.inf)
+    counted = (
+        (expected > 0.05 * expected.max(initial=0.0)) & (resonance >= speeds[0]) & (resonance <= speeds[-1])
+    )
+    distance = np.abs(speeds[:, None] - resonance[counted]).min(axis=0)
+    return int(np.count_nonzero(distance > 0.5 * damping[counted] * resonance[counted]))

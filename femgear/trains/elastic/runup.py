@@ -1,8 +1,9 @@
 """Run-up of a case with an elastic ring: sensor, mesh forces and resonances over the speed, runup.nc.
 
 The speeds of the case's section `runup` are equally spaced; operating speeds stand among them, and resonances
-whose peaks are narrower than the steps get speeds of their own (`refined_speeds`). Lines of the sensor are
-those of the exact circumferential components, whatever form the housing has.
+whose peaks are narrower than the steps get speeds of their own
+(`femgear.solvers.linear.resonances.refined_speeds`). Lines of the sensor are those of the exact
+circumferential components, whatever form the housing has.
 """
 
 from __future__ import annotations
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 KINDS = ("sun-planet", "planet-ring")
 _SILENT = 1e-6
 """Lines below this share of the largest one of all speeds are left out."""
-_REFINED = 40
-"""Resonances that get speeds of their own, at most."""
 _SHOWN = 12
 """Rows of the table of resonances."""
 
@@ -98,35 +97,6 @@ def joined(parts: Sequence[HeardSpeeds]) -> HeardSpeeds:
     names = {one.name for one in fields(HeardSpeeds)} - {"order", "lines"}
     rest = {name: np.concatenate([getattr(one, name) for one in parts]) for name in names}
     return HeardSpeeds(order=order[heard], lines=lines[:, heard], **rest)
-
-
-def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray):
-    """Add speeds at resonances (c,) whose peaks are narrower than the steps between speeds (s,), ascending.
-
-    A peak of damping ratio z at speed w falls to half its power at ``w (1 - z)`` and ``w (1 + z)``. The
-    resonances of the highest expected levels, from `ModalForces.heard`, get these three speeds; undamped
-    ones, which have no largest level, none.
-    """
-    step = np.diff(speeds).max(initial=0.0) if len(speeds) > 1 else np.inf
-    narrow = np.flatnonzero((damping > 0.0) & (damping * resonance < step))
-    strongest = narrow[np.argsort(-heard[narrow] / damping[narrow], kind="stable")[:_REFINED]]
-    around = resonance[strongest, None] * (1.0 + damping[strongest, None] * np.array([-1.0, 0.0, 1.0]))
-    inside = (around >= speeds[0]) & (around <= speeds[-1])
-    return np.unique(np.concatenate([speeds, around[inside]]))
-
-
-def unresolved(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray) -> int:
-    """Count the resonances (c,) that matter with no speed (s,) within half the half width of their peaks.
-
-    There an amplitude is 11 % below its peak. Those count of which a twentieth of the highest level is
-    expected; arguments as of `refined_speeds`.
-    """
-    expected = heard / np.where(damping > 0.0, damping, np.inf)
-    counted = (
-        (expected > 0.05 * expected.max(initial=0.0)) & (resonance >= speeds[0]) & (resonance <= speeds[-1])
-    )
-    distance = np.abs(speeds[:, None] - resonance[counted]).min(axis=0)
-    return int(np.count_nonzero(distance > 0.5 * damping[counted] * resonance[counted]))
 
 
 def mode_levels(response: Response, field: np.ndarray, alike, harmonic, heard_speed: np.ndarray, at):

@@ -47,7 +47,13 @@ from femgear.housing.sound import Cylinder, Microphone
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
-from femgear.solvers.linear.resonances import ONE_FREQUENCY, crossings, modal_forces
+from femgear.solvers.linear.resonances import (
+    ONE_FREQUENCY,
+    crossings,
+    modal_forces,
+    refined_speeds,
+    unresolved,
+)
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
@@ -100,10 +106,8 @@ from femgear.trains.elastic.runup import (
     heard_speeds,
     joined,
     mode_levels,
-    refined_speeds,
     resonances,
     runup_warnings,
-    unresolved,
 )
 from femgear.trains.protocol import (
     Progress,

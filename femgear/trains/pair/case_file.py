@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from femgear.case.checks import check_gear_deviations, check_torque
+from femgear.case.checks import check_gear_deviations, check_speeds, check_torque
 from femgear.case.csv_columns import embed_profiles
 from femgear.case.gear_set import (
     checked_set,
@@ -26,16 +26,22 @@ from femgear.case.sections import (
     FORMAT,
     LARGEST_HELIX,
     LARGEST_TORQUE,
+    DynamicsSection,
     FaceWidth,
     GearErrors,
+    Inertia,
+    MachineSection,
+    Mass,
     MaterialSection,
     ModificationSection,
     PressureAngle,
     RackSection,
     Radius,
+    RunupSection,
     Shift,
     Speed,
     StaticSection,
+    Stiffness,
     speed_range,
 )
 from femgear.case.text import CaseFile, ReadCase
@@ -63,11 +69,18 @@ class SetSection(Section):
 
 
 class GearSection(Section):
-    """Gear 1, the driving one."""
+    """Gear 1, the driving one.
+
+    Mass and inertia left out are those of a disc from the bore to the root circle, of an internal gear of a
+    ring from the root circle to its outer surface; without a bearing stiffness the axis is held.
+    """
 
     teeth: Annotated[int, Count(5, 5000)]
     profile_shift: Shift | None = None
     bore_radius: Radius
+    mass: Mass | None = None
+    inertia: Inertia | None = None
+    bearing_stiffness: Stiffness | None = None
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
@@ -90,7 +103,10 @@ class WheelSection(GearSection):
 
 
 class OperationSection(Section):
-    """Torque on gear 1, of either sign, and speeds of gear 1; gear 2 is held while the contact is solved."""
+    """Torque on gear 1, of either sign, and speeds of gear 1; gear 2 is held while the contact is solved.
+
+    Behind couplings the torques act on motor and brake.
+    """
 
     torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
     speeds: Annotated[tuple[Speed, ...], Values(max_length=100_000), BeforeValidator(speed_range)] = ()
@@ -113,7 +129,11 @@ class PairCase(Section, ReadCase):
     gear_1: GearSection
     gear_2: WheelSection
     operation: OperationSection
+    motor: MachineSection | None = None
+    brake: MachineSection | None = None
     static: StaticSection = StaticSection()
+    dynamics: DynamicsSection = DynamicsSection()
+    runup: RunupSection = RunupSection()
 
     @property
     def module(self) -> float:
@@ -195,6 +215,7 @@ def cross_check(case: PairCase) -> Iterator[CaseError]:
             value=case.static.members, limit="'fixed'", remedy="leave static.members out",
         )  # fmt: skip
     yield from check_torque(case.operation.torque)
+    yield from check_speeds(case) if case.operation.speeds else ()
     yield from check_gear_deviations(case)
 
 

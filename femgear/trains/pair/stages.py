@@ -1,34 +1,86 @@
-"""Train "pair": two gears on a centre distance from their teeth, static contact and stresses.
+"""Train "pair": two gears on a centre distance from their teeth: static contact, stresses, vibration.
 
-Stages, files and pictures are those of the static solution of a planetary set, with one mesh; beside the
-mesh stiffness of the finite elements stands that of ISO 6336-1, method B.
+Static stages, files and pictures are those of a planetary set, with one mesh; beside the mesh stiffness of
+the finite elements stands that of ISO 6336-1, method B. The linear response about the loaded contact is that
+of the spectral solver. Where it pulls, flanks part: the motion is then that of harmonic balance with play,
+begun at the linear one, and the run-up follows the branch of these motions past its limit points. The
+excitation ends at a frequency, the same at all speeds.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
-from femgear.case.gear_set import planetary_set
+import numpy as np
+
+from femgear.case.checks import runup_range
+from femgear.case.dependencies import check_entries, modal_entries, static_entries
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.quantities import RPM
-from femgear.errors import Finding, GeometryError
+from femgear.errors import ConvergenceError, Finding, GeometryError
 from femgear.gears.checks import check_meshes
+from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import pair_mesh_stiffness
-from femgear.report.tables import Block, chosen, tabulate
+from femgear.gears.pair import GearPair
+from femgear.report.tables import Block, chosen, describe_modes, tabulate
+from femgear.solvers.continuation.branches import frequency_response_curve
+from femgear.solvers.continuation.corrector import StepOptions
+from femgear.solvers.linear.modal import output_load, output_response, residual_output, solve_modes
+from femgear.solvers.linear.resonances import crossings, modal_forces, refined_speeds, unresolved
+from femgear.solvers.periodic.equations import reduced
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.periodic.solution import PeriodicSolution
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.stability.parametric import decisive_harmonics, stability
+from femgear.system.force_laws import GearMeshes
+from femgear.system.fourier import sample
+from femgear.system.system import Modes, NonlinearSystem, Response
 from femgear.trains.pair.case_file import PairCase
-from femgear.trains.protocol import Figures, Train
+from femgear.trains.pair.figures import DYNAMICS, RUNUP
+from femgear.trains.pair.model import (
+    PairModel,
+    pair_excitation,
+    pair_kinds,
+    pair_model,
+    separating_pair,
+)
+from femgear.trains.pair.results import (
+    PairDynamicsResult,
+    PairModesResult,
+    PairMotion,
+    PairRunupResult,
+    describe_dynamics,
+    describe_runup,
+    dynamics_warnings,
+    runup_warnings,
+)
+from femgear.trains.protocol import (
+    Figures,
+    Progress,
+    Stage,
+    Train,
+    modes_verdict,
+    one_blas_thread,
+    silent,
+)
+from femgear.trains.rigid import parts_of_speeds
 from femgear.trains.static.figures import FIGURES
 from femgear.trains.static.results import (
+    StaticResult,
     describe_gears,
     describe_meshes,
     describe_static,
     load_warnings,
 )
-from femgear.trains.static.stages import STATIC, STRESS
+from femgear.trains.static.stages import LARGEST_APPROACH, STATIC, STRESS
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from femgear.storage.results import Results
 
 _CAPTIONS = {
@@ -41,6 +93,17 @@ _CAPTIONS = {
         "The teeth that carry bend; what is pale hardly moves."
     ),
 }
+_LOWEST, _ABOVE_MODES = 20e3, 2.0
+"""The excitation reaches the end of hearing [Hz], and so many times the highest natural frequency."""
+_LEAST, _HARMONICS, _ON_BRANCH = 8, 512, (16, 28)
+"""Fewest and most harmonics of the excitation; most of excitation and response on the branch."""
+_TOGETHER, _INSTANTS = 500, 1024
+"""Speeds that are in memory at a time, and instants of a period at which contact is looked for."""
+_BELOW, _ABOVE = 0.6, 1.05
+"""Ends of the branch over the lowest and the highest speed at which the linear response pulls."""
+_STEPS = StepOptions(largest=0.05, max_points=1500)
+_TOLD = ("converged", "residual", "iterations", "tail", "spectral_radius")
+"""What a response tells of every speed."""
 
 
 def iso_stiffness(case: PairCase) -> tuple[float, float]:
@@ -86,10 +149,247 @@ def _warnings(case: PairCase) -> Iterator[Finding]:
     yield from load_warnings(case)
 
 
+def _no_modes(case: PairCase) -> str:
+    """Tell why there are no modes of a case, empty where there are."""
+    if case.operation.torque == 0.0:
+        return "without torque no flanks touch"
+    periods, _ = common_period(set_deviations(case), planetary_set(case), limit=sys.maxsize)
+    return f"its errors span {periods} mesh periods; modes and dynamics take one" if periods > 1 else ""
+
+
+def _damping(mode: xr.Dataset) -> str:
+    return f"{float(mode.damping_ratio):.4g}"
+
+
+def _no_speeds(case: PairCase) -> str:
+    return _no_modes(case) or ("" if case.operation.speeds else "operation.speeds gives no speed")
+
+
+@one_blas_thread()
+def solve_pair_modes(case: PairCase, static: StaticResult) -> PairModesResult:
+    """Solve for the modes with mean mesh stiffness, torsional and lateral.
+
+    CaseError: a static solution of another case (E-OTHER-CASE), or none (E-TYPE).
+    """
+    check_entries(static, StaticResult, static_entries(case), "static solution")
+    gears = cast(GearPair, static.planetary_set)
+    model, excitation = pair_model(case, gears), pair_excitation(case, static)
+    mean, ratio = excitation.stiffness.mean(axis=1), case.dynamics.damping_ratio
+    modes = solve_modes(model.system, mean, damping_ratio=ratio)
+    modes = replace(modes, kind=pair_kinds(modes, model.system.M))
+    return PairModesResult(gears, model, excitation, modes, modal_entries(case))
+
+
+def _harmonics(case: PairCase, modes: Modes, mesh_frequency: np.ndarray) -> np.ndarray:
+    """Count the harmonics of excitation and response (2, s) at mesh frequencies (s,) [Hz]."""
+    given, up_to = case.dynamics, max(_LOWEST, _ABOVE_MODES * float(modes.frequency.max()))
+    least, up_to = (1, given.up_to) if given.up_to else (_LEAST, up_to)
+    count = np.clip(np.floor(up_to / mesh_frequency * (1.0 + 1e-12)), least, _HARMONICS)
+    excitation = np.full(len(count), given.mesh_harmonics) if given.mesh_harmonics else count.astype(int)
+    # products with the low harmonics of the stiffness reach beyond the excitation
+    response = given.response_harmonics or excitation + 2 * np.minimum(excitation, 6)
+    return np.stack([excitation, np.maximum(response, excitation)])
+
+
+def _linear(
+    case: PairCase, found: PairModesResult, frequency: np.ndarray, harmonics: np.ndarray
+) -> tuple[Response, PairMotion]:
+    """Solve for the response with flanks held together at mesh frequencies (s,) [Hz]."""
+    basis, model = found.modes, found.model
+    response = solve_spectral(
+        basis, found.excitation, frequency, excitation_harmonics=harmonics[0],
+        response_harmonics=harmonics[1], tolerance=case.dynamics.tolerance,
+    )  # fmt: skip
+    motion = output_response(
+        basis, response, model.rows @ basis.shape, load=output_load(model.system, basis, model.rows),
+        residual=residual_output(model.system, basis, model.rows),
+    )  # fmt: skip
+    force = sample(response.force[:, 0], 4 * response.force.shape[-1])
+    measured = model.measured(motion, response.force[:, 0])
+    extremes, closed = (force.max(axis=1), force.min(axis=1)), np.ones(len(force))
+    lines = np.array(response.deflection), np.array(response.force)
+    return response, PairMotion(*lines, *measured, *extremes, closed, np.zeros(len(force)))
+
+
+def _parted(
+    model: PairModel, problem: NonlinearSystem, found: Sequence[PeriodicSolution], size: int
+) -> PairMotion:
+    """Collect the motion of solutions with play, their lines filled with zeros up to a harmonic."""
+    lines, known, mesh = np.zeros((len(found), 7, size + 1), complex), reduced(problem), problem.elements[0]
+    assert isinstance(mesh, GearMeshes)
+    for own, one in zip(lines, found, strict=True):
+        parts = one.deflection, one.force, displacements(problem, one, model.rows, reduction=known)
+        own[:, : len(one.orders)] = np.concatenate(parts)
+    phase = 2.0 * np.pi * np.arange(_INSTANTS)[:, None] / _INSTANTS
+    x = sample(lines[:, 0], _INSTANTS)[..., None, None]
+    _, drive, back, has_back = mesh.flank_forces(x, phase)
+    force, closed = mesh.evaluate(x, phase)[0][..., 0, 0], (drive > 0.0, has_back & (back < 0.0))
+    told = force.max(axis=1), force.min(axis=1), *(one.mean(axis=(1, 2)) for one in closed)
+    return PairMotion(lines[:, :1], lines[:, 1:2], *model.measured(lines[:, 2:], lines[:, 1]), *told)
+
+
+def _with_play(
+    problem: NonlinearSystem, frequency: float, start: np.ndarray, case: PairCase
+) -> PeriodicSolution:
+    """Solve the balance with play at a mesh frequency [Hz] from lines (1, H + 1) of the approach on."""
+    options = {"harmonics": start.shape[-1] - 1, "radius": False}
+    found = solve_harmonic_balance(problem, 2.0 * np.pi * frequency, start=start, **options)
+    if not found.converged:
+        found = solve_harmonic_balance(problem, 2.0 * np.pi * frequency, **options)
+    if not found.converged:
+        key = "operation.speeds"
+        raise ConvergenceError(
+            f"no motion with contact loss at a mesh frequency of {frequency:.6g} Hz; {found.message}",
+            code="E-CONVERGENCE", key=key, value=f"relative residual {found.residual:.2e}",
+            remedy="raise the damping, or leave the speed out", file=case.location(key),
+        )  # fmt: skip
+    return found
+
+
+@one_blas_thread()
+def solve_pair_dynamics(
+    case: PairCase, modes: PairModesResult, *, progress: Progress = silent
+) -> PairDynamicsResult:
+    """Solve for the periodic response at all speeds, with play where the linear one pulls, and its stability.
+
+    ConvergenceError: an undamped resonance, or a motion with contact loss that is not found.
+    """
+    return next(pair_dynamics_parts(case, modes, progress=progress, most=len(case.operation.speeds)))[1]
+
+
+def pair_dynamics_parts(
+    case: PairCase, modes: PairModesResult, *, progress: Progress = silent, most: int = _TOGETHER
+) -> Iterator[tuple[PairCase, PairDynamicsResult]]:
+    """Solve as `solve_pair_dynamics` for ``most`` speeds after the others, each with the case of these."""
+    check_entries(modes, PairModesResult, modal_entries(case), "modal basis")
+    basis, excitation, count = modes.modes, modes.excitation, len(case.operation.speeds)
+    for own, part in parts_of_speeds(case, np.ones(count), most):
+        speeds = np.array(part.operation.speeds)
+        frequency = speeds * case.gear_1.teeth / (2.0 * np.pi)
+        harmonics = _harmonics(case, basis, frequency)
+        response, motion = _linear(case, modes, frequency, harmonics)
+        decisive = decisive_harmonics(basis, excitation, int(harmonics[0].max()))
+        judged = stability(basis, excitation, frequency, excitation_harmonics=decisive)
+        multiplier, method = judged.multiplier.copy(), list(response.method)
+        told = {name: np.array(getattr(response, name)) for name in _TOLD}
+        for s in np.flatnonzero(motion.lowest < 0.0):
+            problem = separating_pair(modes.model, basis, excitation, int(harmonics[0, s]))
+            start = response.deflection[s, :, : harmonics[1, s] + 1]
+            found = _with_play(problem, frequency[s], start, case)
+            one = _parted(modes.model, problem, [found], motion.dte.shape[-1] - 1)
+            for name, values in vars(one).items():
+                getattr(motion, name)[s] = values[0]
+            for name in _TOLD:
+                told[name][s] = getattr(found, name)
+            multiplier[s], method[s] = [*found.verdict.multipliers, np.nan][0], "harmonic balance"
+        lines = {"deflection": motion.deflection, "force": motion.force, "lowest_force": motion.lowest}
+        response = replace(response, **lines, **told, method=tuple(method))
+        judged, reach = replace(judged, multiplier=multiplier), harmonics[0] * frequency
+        yield part, PairDynamicsResult(modes.gears, speeds, motion, response, judged, reach)
+        progress("dynamics", float(own[-1] + 1), float(count))
+
+
+@one_blas_thread()
+def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
+    """Follow transmission error, mesh and bearing forces over the speed, and the branch where flanks part.
+
+    ConvergenceError: as `solve_pair_dynamics`.
+    """
+    check_entries(modes, PairModesResult, modal_entries(case), "modal basis")
+    basis, per_speed = modes.modes, case.gear_1.teeth / (2.0 * np.pi)
+    operating, (first, last) = np.array(case.operation.speeds), runup_range(case)
+    row, most = modes.model.rotation @ basis.shape, _harmonics(case, basis, np.array([first * per_speed]))
+    forces = modal_forces(basis, modes.excitation, int(most[0, 0]), output=row[:, None])
+    met = crossings(forces, first * per_speed, last * per_speed, math.inf)
+    resonance, mode = met.mesh_frequency / per_speed, forces.mode[met.row]
+    heard, damping = forces.heard[met.row, met.harmonic - 1], forces.damping_ratio[met.row]
+    speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, heard, damping)
+    speeds = np.union1d(speeds, operating[(operating >= first) & (operating <= last)])
+    harmonics = _harmonics(case, basis, speeds * per_speed)
+    response, motion = _linear(case, modes, speeds * per_speed, harmonics)
+    nearest, beside = (np.abs(one[:, None] - resonance).argmin(axis=0) for one in (speeds, operating))
+    alone = np.abs(row[mode] * response.modal[nearest, mode, met.harmonic]) / math.sqrt(2.0)
+    found = {
+        "mode": mode + 1, "kind": [basis.kind[i] for i in mode], "mesh_harmonic": met.harmonic,
+        "frequency": forces.frequency[met.row], "resonance_speed": resonance / RPM,
+        "share": forces.share[met.row, met.harmonic - 1], "resonance_alone": alone,
+        "operating_speed": operating[beside] / RPM, "distance": 100.0 * (resonance / operating[beside] - 1.0),
+    }  # fmt: skip
+    return PairRunupResult(
+        modes.gears, speeds, speeds * per_speed, motion, harmonics[0] * speeds * per_speed, found, operating,
+        unresolved(speeds, resonance, heard, damping), *_branch(case, modes, speeds, motion.lowest),
+    )  # fmt: skip
+
+
+def _branch(case: PairCase, modes: PairModesResult, speeds: np.ndarray, lowest: np.ndarray):
+    """Follow the motions with play from above the speeds at which the linear one pulls to below them."""
+    apart, teeth = np.flatnonzero(lowest < 0.0), case.gear_1.teeth
+    if not len(apart):
+        return None, True, "flanks stay in contact at all speeds"
+    high, low = min(_ABOVE * speeds[apart[-1]], speeds[-1]), max(_BELOW * speeds[apart[0]], speeds[0])
+    harmonics = _harmonics(case, modes.modes, np.array([low * teeth / (2.0 * np.pi)]))[:, 0]
+    count, size = (min(int(one), most) for one, most in zip(harmonics, _ON_BRANCH, strict=True))
+    problem = separating_pair(modes.model, modes.modes, modes.excitation, count)
+    # teeth that strike travel as far as the flanks approach at rest and the play together
+    scale = float(modes.excitation.deflection.max() + modes.excitation.backlash[0])
+    options = {"harmonics": size, "radius": False, "scale": scale, "options": _STEPS}
+    found = frequency_response_curve(problem, (float(high * teeth), float(low * teeth)), **options)
+    far = np.abs(found.lines[:, 0]).sum(axis=1) > LARGEST_APPROACH * case.module
+    kept = int(far.argmax()) if far.any() else len(far)
+    motion = _parted(modes.model, problem, found.solutions[:kept], size)
+    along = found.parameter[:kept] / teeth
+    parts, folds = along[motion.drive < 1.0] / RPM, np.sort(along[found.folds[found.folds < kept]]) / RPM
+    span = f"from {parts.min():.6g} to {parts.max():.6g} rpm" if len(parts) else "nowhere"
+    listed, ending = ", ".join(f"{one:.6g}" for one in folds) or "none", "it came to the end of its range"
+    if not found.complete:
+        ending = found.message
+    if far.any():
+        ending = f"it ends at {along[-1] / RPM:.6g} rpm, before flanks travel {LARGEST_APPROACH:g} modules"
+    words = f"along the branch flanks part {span}, limit points at {listed} rpm; {ending}"
+    return (along, motion, found.stable[:kept]), bool(found.complete and not far.any()), words
+
+
 PAIR = Train(
     name="pair",
     words="a pair",
-    stages=(replace(STATIC, describe=_describe_static), STRESS),
+    stages=(
+        replace(STATIC, describe=_describe_static),
+        STRESS,
+        Stage(
+            name="modes",
+            title="Modes",
+            solve=solve_pair_modes,
+            takes=("static",),
+            verdict=modes_verdict,
+            describe=lambda results: describe_modes(results.modes, {"damping ratio": _damping}),
+            unavailable=_no_modes,
+        ),
+        Stage(
+            name="dynamics",
+            title="Dynamics",
+            solve=solve_pair_dynamics,
+            parts=pair_dynamics_parts,
+            takes=("modes",),
+            options=("progress",),
+            verdict=lambda result: result.verdict,
+            describe=lambda results: describe_dynamics(results.dynamics),
+            unavailable=_no_speeds,
+            warnings=dynamics_warnings,
+        ),
+        Stage(
+            name="runup",
+            title="Run-up",
+            solve=solve_pair_runup,
+            takes=("modes",),
+            verdict=lambda result: result.verdict,
+            describe=lambda results: describe_runup(results.runup),
+            wanted=lambda case: case.runup.count > 1,
+            unavailable=lambda case: (
+                _no_speeds(case) or ("" if case.runup.count > 1 else "runup.count leaves it out")
+            ),
+            warnings=runup_warnings,
+        ),
+    ),
     describe=_describe_case,
     warnings=_warnings,
     figures={
@@ -97,5 +397,6 @@ PAIR = Train(
         if name == "static"
         else figures
         for name, figures in FIGURES.items()
-    },
+    }
+    | {"dynamics": DYNAMICS, "runup": RUNUP},
 )

@@ -9,11 +9,12 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError
 from femgear.housing.orders import order_level
+from femgear.solvers.linear.resonances import unresolved
 from femgear.storage.results import Manifest, Results
 from femgear.system.fourier import fluctuation, sample
 from femgear.trains.elastic.checks import runup_ends
 from femgear.trains.elastic.results import verdict
-from femgear.trains.elastic.runup import describe_runup, runup_warnings, unresolved
+from femgear.trains.elastic.runup import describe_runup, runup_warnings
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value, with_values
 from femgear.trains.registry import check_case, stages_of

@@ -1,0 +1,283 @@
+"""Results of the vibration of a pair: modes.nc, dynamics.nc, runup.nc, and their tables and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.case.dependencies import Entries
+from femgear.case.quantities import RPM
+from femgear.errors import Finding
+from femgear.gears.pair import GearPair
+from femgear.report.tables import Block, chosen, first_speeds, response_warnings, tabulate
+from femgear.storage.results import (
+    FOURIER,
+    as_written,
+    complex_entries,
+    coordinates,
+    dataset,
+    declared,
+    mode_entries,
+    response_entries,
+)
+from femgear.system.fourier import fluctuation
+from femgear.trains.pair.model import PairModel
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.solvers.stability.parametric import Stability
+    from femgear.system.system import MeshExcitation, Modes, Response
+
+_SHOWN = 12
+"""Rows of the table of resonances."""
+_LEVELS = {
+    "dte_rms": ("m", "root mean square of the dynamic transmission error about its mean"),
+    "dynamic_factor": ("1", "largest mesh force over its mean, K_v"),
+    "lowest_force": ("N", "smallest mesh force"),
+    "bearing_rms": ("N", "root mean square of the bearing force about its mean"),
+    "drive_contact": ("1", "share of the time with drive flanks in contact"),
+    "back_contact": ("1", "share of the time with back flanks in contact"),
+}
+_RESONANCE = {
+    "mode": ("1", "mode, from 1"),
+    "kind": ("1", "kind of mode"),
+    "mesh_harmonic": ("1", "harmonic of the mesh frequency"),
+    "frequency": ("Hz", "natural frequency"),
+    "resonance_speed": ("rpm", "speed of gear 1 where both meet"),
+    "share": ("1", "modal force over the largest of the harmonic"),
+    "resonance_alone": ("m", "r.m.s. transmission error there by mode and harmonic alone"),
+    "resonance_dte": ("m", "r.m.s. transmission error at that speed"),
+    "resonance_factor": ("1", "dynamic factor K_v at that speed"),
+    "operating_speed": ("rpm", "nearest operating speed"),
+    "distance": ("%", "distance of the resonance from that speed"),
+}
+
+
+@dataclass(frozen=True)
+class PairModesResult:
+    """Modes with the mean mesh stiffness, and what excites them."""
+
+    gears: GearPair
+    model: PairModel
+    excitation: MeshExcitation
+    modes: Modes
+    entries: Entries
+
+    def dataset(self) -> xr.Dataset:
+        """Collect the contents of modes.nc."""
+        modes, play = self.modes, self.excitation.backlash
+        variables = mode_entries(modes) | {
+            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+            "mesh_stiffness": ("mesh", modes.mesh_stiffness, "N/m", "mean mesh stiffness"),
+            "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
+            "backlash": ("mesh", play, "m", "play along the line of action, 0: no back side"),
+        }
+        axes = {"mode": np.arange(len(modes.frequency)), "dof": modes.dofs, "mesh": self.gears.mesh_names}
+        title = "modes of the pair with its mean mesh stiffness"
+        return dataset(variables, coordinates(**axes), {"title": title})
+
+
+@dataclass(frozen=True)
+class PairMotion:
+    """What a pair does at some speeds (s,), complex lines as far as they have an axis of harmonics.
+
+    Parameters
+    ----------
+    deflection, force, dte : (s, 1, H + 1) arrays
+        Approach of the flanks [m], mesh force [N], transmission error of the rotations [m].
+    bearing : (s, 2, 2, H + 1) array
+        Forces of gear 1 and gear 2 on their bearings, x and y [N].
+    peak, lowest : (s,) arrays
+        Largest and smallest mesh force [N]; back flanks press with a negative one.
+    drive, back : (s,) arrays
+        Shares of the time in which drive and back flanks touch.
+    """
+
+    deflection: np.ndarray
+    force: np.ndarray
+    dte: np.ndarray
+    bearing: np.ndarray
+    peak: np.ndarray
+    lowest: np.ndarray
+    drive: np.ndarray
+    back: np.ndarray
+
+    def levels(self, along: str, prefix: str = "") -> dict[str, tuple]:
+        """Make the entries of a dataset that tell the motion at every speed, over a dimension."""
+        power = (np.abs(self.bearing[..., 1:]) ** 2).sum(axis=(-2, -1))
+        factor = self.peak / np.real(self.force[:, 0, 0])
+        values = fluctuation(self.dte)[:, 0], factor, self.lowest, np.sqrt(0.5 * power), self.drive, self.back
+        return {
+            f"{prefix}{name}": (f"{along} gear" if one.ndim > 1 else along, one, *_LEVELS[name])
+            for name, one in zip(_LEVELS, values, strict=True)
+        }
+
+
+@dataclass(frozen=True)
+class PairDynamicsResult:
+    """Motion at every ``input_speed`` (s,) [rad/s], its stability, and end of the excitation (s,) [Hz].
+
+    Where the linear response pulls, all are those of the harmonic balance with play.
+    """
+
+    gears: GearPair
+    input_speed: np.ndarray
+    motion: PairMotion
+    response: Response
+    stability: Stability
+    excitation_limit: np.ndarray
+
+    def dataset(self) -> xr.Dataset:
+        """Collect the contents of dynamics.nc."""
+        motion, lines, on_bearing = self.motion, "speed mesh harmonic", "speed gear axis harmonic"
+        entries = (
+            ("dte", lines, motion.dte, "m", "dynamic transmission error of the rotations"),
+            ("mesh_deflection", lines, motion.deflection, "m", "approach of the flanks"),
+            ("mesh_force", lines, motion.force, "N", "dynamic mesh force"),
+            ("bearing_force", on_bearing, motion.bearing, "N", "force of the gear on its bearing"),
+        )
+        reach = ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation")
+        known = response_entries(self) | {"excitation_limit": reach} | motion.levels("speed")
+        title = {"title": "periodic response of the pair", "message": self.response.message}
+        return dataset(
+            known | complex_entries(entries),
+            _coordinates(self, axis=["x", "y"], harmonic=np.arange(motion.dte.shape[-1])),
+            title | {"fourier_convention": FOURIER},
+        )
+
+    @property
+    def verdict(self) -> dict:
+        """Tell for the manifest whether it converged, is stable, and at how many speeds flanks part."""
+        apart = int((self.motion.drive < 1.0).sum())
+        return {
+            "converged": bool(np.all(self.response.converged)),
+            "stable": bool(np.all(self.stability.stable)),
+            "residual": float(np.max(self.response.residual)),
+            "separated": apart,
+            "message": self.response.message + (f" Flanks part at {apart} speeds." if apart else ""),
+        }
+
+
+@dataclass(frozen=True)
+class PairRunupResult:
+    """Linear motion over ``input_speed`` (s,) [rad/s], resonances, and the branch on which flanks part.
+
+    ``branch`` are speeds [rad/s] (p,), motions along it and whether they are stable (p,), None where the
+    flanks stay in contact; ``message`` tells how it ended.
+    """
+
+    gears: GearPair
+    input_speed: np.ndarray
+    mesh_frequency: np.ndarray
+    motion: PairMotion
+    excitation_limit: np.ndarray
+    resonances: Mapping[str, Any]
+    operating_speeds: np.ndarray
+    unresolved: int
+    branch: tuple[np.ndarray, PairMotion, np.ndarray] | None
+    complete: bool
+    message: str
+
+    def dataset(self) -> xr.Dataset:
+        """Collect the contents of runup.nc."""
+        levels, known = self.motion.levels("speed"), dict(self.resonances)
+        for name, of in (("resonance_dte", "dte_rms"), ("resonance_factor", "dynamic_factor")):
+            known[name] = np.interp(known["resonance_speed"] * RPM, self.input_speed, levels[of][1])
+        variables = {
+            "mesh_frequency": ("speed", self.mesh_frequency, "Hz", "mesh frequency"),
+            "excitation_limit": ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation"),
+            **levels,
+            **declared({name: ("resonance", *words) for name, words in _RESONANCE.items()}, known),
+        }
+        if self.branch is not None:
+            speed, own, stable = self.branch
+            words = "whether the motion is known to be stable"
+            variables |= own.levels("point", "branch_") | {
+                "branch_speed": ("point", speed / RPM, "rpm", "speed of gear 1 along the branch with play"),
+                "branch_stable": ("point", stable, "1", words),
+            }
+        attrs = {
+            "title": "run-up of the pair, linear and with play",
+            "operating_speeds": as_written(self.operating_speeds / RPM),
+            "unresolved_resonances": self.unresolved,
+            **self.verdict,
+        }
+        return dataset(variables, _coordinates(self), attrs)
+
+    @property
+    def verdict(self) -> dict:
+        """Tell for the manifest at how many speeds the linear response pulls, and how the branch ended."""
+        apart = int((self.motion.lowest < 0.0).sum())
+        return {"separated": apart, "complete": int(self.complete), "message": self.message}
+
+
+def _coordinates(result: PairDynamicsResult | PairRunupResult, **axes: Any) -> dict[str, tuple]:
+    names = result.gears.mesh_names
+    gear = {"gear": ("gear", ["gear 1", "gear 2"], "1", "gear")}
+    return gear | coordinates(speed=result.input_speed / RPM, mesh=names, **axes)
+
+
+def describe_dynamics(data: xr.Dataset) -> Block:
+    """Tabulate transmission error, mesh and bearing forces, contact and stability of dynamics.nc by speed."""
+    columns = {
+        "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
+        "mesh [Hz]": lambda one: f"{float(one.mesh_frequency):.2f}",
+        "DTE rms [um]": lambda one: f"{1e6 * float(one.dte_rms):.4f}",
+        "K_v": lambda one: f"{float(one.dynamic_factor):.4f}",
+        "lowest force [N]": lambda one: f"{float(one.lowest_force):.5g}",
+        "bearings rms [N]": lambda one: ", ".join(f"{value:.4g}" for value in one.bearing_rms.values),
+        "contact": lambda one: f"{float(one.drive_contact):.4f}",
+        "method": lambda one: str(one.method.values),
+        "Floquet": lambda one: f"{float(one.floquet_multiplier):.4f}",
+    }
+    notes = (
+        "K_v: largest over mean mesh force; contact: share of the time with drive flanks closed; Floquet: "
+        "largest multiplier, stable up to 1",
+    )
+    return tabulate("Dynamics", (data.isel(speed=i) for i in chosen(data.sizes["speed"])), columns, notes)
+
+
+def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """Name the speeds of dynamics.nc that are not stable, and those at which flanks part (W-SEPARATION)."""
+    yield from (one for one in response_warnings(data) if one.code != "W-PULL")
+    speed, apart, back = data["speed"].values, data["drive_contact"] < 1.0, data["back_contact"] > 0.0
+    if apart.any():
+        text = f"flanks part at {first_speeds(speed[apart])}"
+        text += f", back flanks are struck at {first_speeds(speed[back])}" if back.any() else ""
+        remedy = "look at the branch of the run-up for other motions there"
+        yield Finding("W-SEPARATION", "operation.speeds", text, remedy=remedy)
+
+
+def describe_runup(data: xr.Dataset) -> Block:
+    """Tabulate the strongest resonances of runup.nc by speed."""
+    value = {str(name): one.values for name, one in data.items() if one.dims == ("resonance",)}
+    columns = {
+        "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
+        "from operating": lambda i: f"{np.round(value['distance'][i], 1) + 0.0:+.1f} %",
+        "mode": lambda i: f"{value['mode'][i]} {value['kind'][i]}",
+        "[Hz]": lambda i: f"{value['frequency'][i]:.1f}",
+        "mesh harmonic": lambda i: str(value["mesh_harmonic"][i]),
+        "alone [um]": lambda i: f"{1e6 * value['resonance_alone'][i]:.4g}",
+        "DTE rms [um]": lambda i: f"{1e6 * value['resonance_dte'][i]:.4g}",
+        "K_v": lambda i: f"{value['resonance_factor'][i]:.3f}",
+    }
+    strongest = np.sort(np.argsort(-value["resonance_alone"], kind="stable")[:_SHOWN])
+    notes = (
+        f"{len(strongest)} of {data.sizes['resonance']} meetings of a mode with a mesh harmonic that excites "
+        "it, flanks held together; alone: r.m.s. transmission error by this mode at this harmonic",
+        str(data.attrs["message"]),
+    )
+    return tabulate("Run-up", strongest, columns, notes)
+
+
+def runup_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """Tell of peaks between the speeds of runup.nc (W-STEPS), and of a branch that ended early (W-BRANCH)."""
+    if missed := int(data.attrs["unresolved_resonances"]):
+        text = f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels may be higher"
+        yield Finding("W-STEPS", "runup.count", text, remedy="take more speeds, or a narrower range")
+    if not data.attrs["complete"]:
+        yield Finding("W-BRANCH", "runup", str(data.attrs["message"]))

@@ -1,0 +1,206 @@
+"""Vibration of a pair: closed forms, the pair of the impacts, integration in time, energy, units."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.errors import CaseError
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.system import MeshExcitation
+from femgear.trains.gear_pair.model import ImpactPair
+from femgear.trains.pair.model import body_of, pair_model, separating_pair
+from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, solve_pair_runup
+from femgear.trains.reading import read_case, with_values
+from femgear.trains.registry import stages_of
+from femgear.trains.static.stages import solve_static
+
+CASE = Path(__file__).parents[3] / "cases" / "spur_pair.toml"
+PLAIN = {
+    "static.positions": 16, "static.stresses": False, "set.backlash": "0.1 mm",
+    "operation.speeds": ["1500 rpm", "9400 rpm", "18500 rpm"], "runup.count": 60,
+}  # fmt: skip
+BEARINGS = {"gear_1.bearing_stiffness": "8e8 N/m", "gear_2.bearing_stiffness": "1e9 N/m"}
+STIFFNESS, TAU = 4e8, np.arange(512) / 512
+
+
+def pair_case(**changes):
+    return with_values(read_case(CASE), {**PLAIN, **changes})
+
+
+@cache
+def solved(*changes):
+    case = pair_case(**{k: list(v) if isinstance(v, tuple) else v for k, v in changes})
+    modes = solve_pair_modes(case, solve_static(case))
+    return case, modes, solve_pair_dynamics(case, modes)
+
+
+@cache
+def gears():
+    return solved()[1].gears
+
+
+def one_mass(wave, load=200.0, play=0.0):
+    """Torsional pair, its equivalent mass [kg], modes and an excitation whose unloaded flanks are ideal."""
+    case = pair_case(**{"operation.torque": f"{load} N m"})
+    model, radii = pair_model(case, gears()), [gear.base_radius for gear in gears().gears]
+    inertia = [body_of(s, g, case.material)[1] for s, g in zip((case.gear_1, case.gear_2), gears().gears)]
+    mass = 1.0 / sum(r * r / i for r, i in zip(radii, inertia))
+    k = STIFFNESS * (1.0 + wave * np.cos(2.0 * np.pi * TAU))[None]
+    force = np.full_like(k, load / radii[0])
+    excitation = MeshExcitation(k, force / k, force, backlash=np.array([play]))
+    return model, mass, solve_modes(model.system, [STIFFNESS], damping_ratio=0.05), excitation
+
+
+def test_natural_frequency_in_closed_form():
+    _, mass, modes, _ = one_mass(0.0)
+    assert modes.frequency[0] == 0.0
+    assert modes.frequency[1] == pytest.approx(math.sqrt(STIFFNESS / mass) / (2.0 * math.pi), rel=1e-9)
+
+
+def test_bearings_that_hardly_give_way_leave_the_torsional_mode():
+    stiff = {key: "1e14 N/m" for key in BEARINGS}
+    found = [solve_modes(pair_model(c, gears()).system, [STIFFNESS], damping_ratio=0.05)
+             for c in (pair_case(), pair_case(**stiff))]  # fmt: skip
+    assert found[1].frequency[1] == pytest.approx(found[0].frequency[1], rel=1e-4)
+
+
+def test_one_degree_of_freedom_under_a_small_error():
+    """``m x'' + 2 zeta sqrt(k m) x' + k (x - e) = F``: the transfer function in closed form."""
+    _, _, modes, excitation = one_mass(0.0)
+    error = 1e-9 * np.cos(2.0 * np.pi * TAU)
+    excitation = replace(excitation, deflection=excitation.deflection + error)
+    hertz = modes.frequency[1] * np.array([0.3, 0.95, 1.0, 2.0])
+    response = solve_spectral(modes, excitation, hertz, excitation_harmonics=2, response_harmonics=4)
+    ratio = hertz / modes.frequency[1]
+    expected = 1e-9 / (1.0 - ratio**2 + 0.1j * ratio)
+    np.testing.assert_allclose(response.deflection[:, 0, 1], expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [0.5, 0.95, 1.1])
+def test_flanks_that_part_as_in_the_dimensionless_pair(ratio):
+    """Stiffness waves alone: both models damp the same velocity."""
+    model, _, modes, excitation = one_mass(0.15, play=60e-6)
+    problem = separating_pair(model, modes, excitation, 60)
+    options = {"harmonics": 20, "samples": 1024, "stability": False}
+    unit = 30e-6 * STIFFNESS
+    there = ImpactPair(damping_ratio=0.05, load=excitation.force[0, 0] / unit, stiffness=(0.15,))
+    known = solve_harmonic_balance(there.problem(ratio), 1.0, **options)
+    # a length of zero is the end of the play here, its middle there
+    start = known.deflection * 30e-6
+    start = start - 30e-6 * np.eye(1, start.shape[1])
+    omega = ratio * 2.0 * math.pi * modes.frequency[1]
+    found = solve_harmonic_balance(problem, omega, start=start, **options)
+    assert found.converged and known.converged
+    np.testing.assert_allclose(found.force / unit, known.force, atol=1e-6 * abs(known.force).max())
+    np.testing.assert_allclose(found.deflection, start, atol=1e-6 * abs(start).max())
+    assert (known.at(2 * np.pi * TAU).min() < 1.0) == (ratio == 0.95)
+
+
+def test_contact_loss_against_integration_in_time():
+    _, modes, dynamics = solved()
+    s = 2
+    assert dynamics.response.method[s] == "harmonic balance" and 0.5 < dynamics.motion.drive[s] < 0.9
+    count = 8
+    problem = separating_pair(modes.model, modes.modes, modes.excitation, count)
+    hertz = float(dynamics.response.mesh_frequency[s])
+    start = np.zeros((1, 61), complex)
+    start[:, :21] = dynamics.motion.deflection[s, :, :21]
+    found = solve_harmonic_balance(problem, 2 * np.pi * hertz, harmonics=60, start=start)
+    times = np.arange(0, 40 * 64 + 1) / (64 * hertz)
+    q = np.zeros((2, 2))
+    q[0] = modes.model.system.W[:, 0] * found.at(0.0)[0] / (modes.model.system.W[:, 0] ** 2).sum()
+    motion = solve_transient(problem, 2 * np.pi * hertz, times, start=(q[0], q[1]), method="DOP853")
+    x = motion.displacement[-65:] @ modes.model.system.W[:, 0]
+    expected = found.at(times[-65:])[:, 0]
+    assert found.stable
+    np.testing.assert_allclose(x, expected, atol=2e-3 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("changes", [(), tuple(BEARINGS.items())], ids=["held", "bearings"])
+def test_the_mean_mesh_force_carries_the_torque_at_every_speed(changes):
+    case, modes, dynamics = solved(*changes)
+    force = case.operation.torque / gears().gear_1.base_radius
+    np.testing.assert_allclose(dynamics.motion.force[:, 0, 0], force, rtol=1e-7)
+    # and the bearings what the mesh exerts on the gears, both along the line of action at rest
+    mean = np.real(dynamics.motion.bearing[..., 0])
+    np.testing.assert_allclose(mean[:, 1], force * np.tile(modes.model.normal, (3, 1)), rtol=1e-6)
+    np.testing.assert_allclose(mean[:, 0], -mean[:, 1], rtol=1e-6)
+
+
+def test_slow_gears_follow_the_static_solution():
+    _, modes, dynamics = solved(("operation.speeds", ("30 rpm",)))
+    static = modes.excitation.deflection[0]
+    assert dynamics.dataset().dte_rms.item() == pytest.approx(static.std(), rel=5e-3)
+
+
+def test_the_sign_of_the_torque_turns_time_around_at_rest_and_not_the_modes():
+    (_, one, _), (_, two, _) = (
+        solved(("operation.torque", t), *BEARINGS.items()) for t in ("200 N m", "-200 N m")
+    )
+    np.testing.assert_allclose(two.modes.frequency[1:], one.modes.frequency[1:], rtol=1e-6)
+    np.testing.assert_allclose(two.model.normal, one.model.normal * [1.0, -1.0], rtol=1e-12)
+    assert (two.model.system.load == -one.model.system.load).all()
+
+
+def test_twice_the_size_under_eight_times_the_torque_at_half_the_speed():
+    """Similar pairs of one material: stiffness and lengths times 2, frequencies a half, forces times 4."""
+    sizes = {"set.module": 6, "set.face_width": 40, "set.centre_distance": 183, "gear_1.bore_radius": 30}
+    large = {k: f"{v} mm" for k, v in {**sizes, "gear_2.bore_radius": 50, "set.backlash": 0.2}.items()}
+    speeds = ("750 rpm", "4700 rpm", "9250 rpm")
+    reach = "10 kHz"
+    one = solved(("dynamics.up_to", "20 kHz"))[2]
+    two = solved(*large.items(), ("operation.torque", "1600 N m"), ("operation.speeds", speeds),
+                 ("dynamics.up_to", reach))[2]  # fmt: skip
+    np.testing.assert_allclose(two.motion.dte, 2.0 * one.motion.dte, atol=1e-5 * abs(one.motion.dte).max())
+    np.testing.assert_allclose(two.motion.peak, 4.0 * one.motion.peak, rtol=1e-5)
+
+
+def test_the_branch_of_the_run_up_passes_through_the_operating_points():
+    case, modes, dynamics = solved()
+    data = solve_pair_runup(case, modes).dataset()
+    assert data.attrs["complete"] and data.attrs["separated"] and (data.branch_drive_contact < 1.0).any()
+    turns = np.diff(np.sign(np.diff(data.branch_speed))) != 0
+    assert turns.sum() == 2 and not data.branch_stable.all()
+    near = np.abs(data.branch_speed.values - 18500.0).argmin()
+    assert data.branch_dte_rms[near] == pytest.approx(dynamics.dataset().dte_rms[2].item(), rel=0.02)
+    strongest = data.resonance_alone.values.argmax()
+    assert data.frequency[strongest] == pytest.approx(modes.modes.frequency[1])
+
+
+@pytest.mark.parametrize(
+    ("changes", "only", "words"),
+    [
+        ({"operation.torque": "0 N m"}, "modes", "without torque"),
+        ({"operation.speeds": None}, "dynamics", "no speed"),
+        ({"gear_1.errors": {"runout_amplitude": "5 um"}}, "dynamics", "24 mesh periods"),
+        ({"runup.count": 0}, "runup", "leaves it out"),
+    ],
+)
+def test_stages_that_a_case_cannot_have(changes, only, words):
+    with pytest.raises(CaseError, match=words) as found:
+        stages_of(pair_case(**changes), only)
+    assert found.value.code == "E-STAGE"
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "key"),
+    [
+        ({"gear_1.mass": "-1 kg"}, "E-RANGE", "gear_1.mass"),
+        ({"gear_2.bearing_stiffness": "5 N"}, "E-UNIT", "gear_2.bearing_stiffness"),
+        ({"motor.inertia": "1 kg m^2"}, "E-KEY-MISSING", "motor.coupling_stiffness"),
+        ({"operation.speeds": ["10 rpm", "10 rpm"]}, "E-DUPLICATE", "operation.speeds"),
+        ({"runup.to": "1 rpm"}, "E-RANGE", "runup.to"),
+    ],
+)
+def test_refusals_name_the_entries(changes, code, key):
+    with pytest.raises(CaseError) as found:
+        pair_case(**changes)
+    problems = getattr(found.value, "problems", ()) or (found.value,)
+    assert (code, key) in [(one.code, one.key) for one in problems]
