@@ -135,8 +135,8 @@ class Bodies:
     """Flank compliances of the three kinds of gears and their common material.
 
     ``helical`` are the stiffnesses of helical teeth over those of spur teeth of the same transverse section,
-    of every kind of mesh, see `helical_stiffness`. A pair has its gears 1 and 2 in place of sun and planet, and
-    no ring.
+    of every kind of mesh, see `helical_stiffness`. A pair has its gears 1 and 2 in place of sun and planet,
+    and no ring.
     """
 
     sun: FlankCompliance

@@ -192,14 +192,15 @@ def width_waves(
     """
     width, ring = sectors.sun.gear.face_width, sectors.ring
     wave_number = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
-    gears = [_wave_compliance(one, None, material, wave_number) for one in (sectors.sun, sectors.planet)]
-    of_ring = ring and _wave_compliance(ring, ring_foundation, material, wave_number)
-    gears.append(of_ring or [None] * len(wave_number))
+    of_gears = [_wave_compliance(one, None, material, wave_number) for one in (sectors.sun, sectors.planet)]
+    of_ring: Any = [None] * len(wave_number)
+    if ring is not None:
+        of_ring = _wave_compliance(ring, ring_foundation, material, wave_number)
     return WidthWaves(
         wave_number,
         tuple(
             Bodies(sun, planet, ring, material, width, helical)
-            for sun, planet, ring in zip(*gears, strict=True)
+            for sun, planet, ring in zip(*of_gears, of_ring, strict=True)
         ),
     )
 

@@ -14,13 +14,8 @@ from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear, tooth_thickness
 from femgear.gears.iso6336 import mesh_stiffness_method_b, theoretical_single_stiffness
 from femgear.gears.kinematics import torques
-from femgear.gears.planetary import (
-    PlanetarySet,
-    equal_planet_angles,
-    feasible_angles,
-    working_pressure_angle,
-    zero_backlash_distance,
-)
+from femgear.gears.pair import working_pressure_angle, zero_backlash_distance
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles
 from femgear.gears.profile import BasicRack
 from validation.reference import gear_limits as limits
 from validation.reference.gear_limits import neighbour_limit

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from contact.test_cycle import reference_set
 from published.planetary_sets import kahraman_set
 from scipy.integrate import quad
 
@@ -109,6 +110,6 @@ def test_height_runs_ahead_by_the_twist_of_the_flanks(helix):
 
 
 def test_a_record_without_stiffness_is_refused():
-    empty = cycle_without_load(1, TAU, periods=1, contact="profile")
+    empty = cycle_without_load(reference_set(), TAU, periods=1, contact="profile")
     with pytest.raises(CaseError, match="E-STIFFNESS"):
         helical_excitation(empty, 1.0)
