@@ -31,9 +31,10 @@ from validation.reference.twisted import (
 )
 from validation.rows import Row, within
 
-HELIX = math.radians(20.0)
-BASE, WIDE = base_helix_angle(math.radians(20.0), HELIX), math.pi * MODULE / math.sin(HELIX)
-"""Base helix angle, and the face width [m] of an overlap ratio of 1."""
+HELIX = {degrees: math.radians(degrees) for degrees in (20, 10)}
+BASE = {degrees: base_helix_angle(math.radians(20.0), helix) for degrees, helix in HELIX.items()}
+WIDE = {degrees: math.pi * MODULE / math.sin(helix) for degrees, helix in HELIX.items()}
+"""Helix angles and base helix angles, and the face widths [m] of an overlap ratio of 1."""
 HEIGHTS = (1, 8)
 """Elements over the width and their order, in three dimensions."""
 SETTLED, STEPS = 1e-10, 50
@@ -45,9 +46,9 @@ ENDS = (
 
 
 @cache
-def helical_pair():
-    """The pair, and its sectors for both, half as fine as in plane contact."""
-    pair = pair_of(*TEETH[1], helix=HELIX, width=WIDE)
+def helical_pair(degrees: int):
+    """The pair of a helix angle, and its sectors for both, half as fine as in plane contact."""
+    pair = pair_of(*TEETH[1], helix=HELIX[degrees], width=WIDE[degrees])
     return pair, make_sectors(pair, STEEL, flank_elements=6, refine=0.5)
 
 
@@ -55,7 +56,7 @@ def helical_pair():
 class SolidGear:
     """Compliance (teeth, stations p, stations p) [m/N] of a gear to normal forces at p heights.
 
-    ``angle`` is its base helix angle [rad], zero of straight teeth.
+    ``angle`` is its base helix angle [rad], zero of straight teeth, ``width`` its face width [m].
     """
 
     roll: np.ndarray
@@ -63,10 +64,11 @@ class SolidGear:
     depth: np.ndarray
     compliance: np.ndarray
     angle: float
+    width: float
 
     def loads(self, line: ContactLine, roll: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Loads (stations p, knots) of the functions of a line at roll lengths and heights (points,) [m]."""
-        at, shapes = at_stations(roll, self.roll), axial_shapes(WIDE, *HEIGHTS, z)
+        at, shapes = at_stations(roll, self.roll), axial_shapes(self.width, *HEIGHTS, z)
         return np.einsum("za,zp,zk->apk", at, shapes, line.loads).reshape(-1, line.loads.shape[1])
 
     def at_depth(self, line: ContactLine, roll: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -86,26 +88,27 @@ class SolidGear:
         return total
 
 
-def solid_gear(sector, angle: float, *, mirrors: bool = False) -> SolidGear:
-    """Compute a gear with a base helix angle [rad]; its ends are free, or mirror planes."""
+def solid_gear(sector, angle: float, width: float, *, mirrors: bool = False) -> SolidGear:
+    """Compute a gear with a base helix angle [rad] and a width [m]; its ends are free, or mirror planes."""
     gear, slope = sector.gear, math.tan(angle)
     stations, depths, loads, seen = observed_flanks(sector.grid, gear)
     loads, seen = (flank_columns(one, stations.normals, slope) for one in (loads, seen))
     section = section_matrices(sector.grid, STEEL, slope / gear.base_radius)
-    axial = axial_matrices(WIDE, *HEIGHTS)
+    axial = axial_matrices(width, *HEIGHTS)
     found = solid_compliance(sector.grid, section, axial, gear.teeth, loads, seen, mirrors=mirrors)
-    return SolidGear(stations.roll, gear.base_radius, depths[:, 0], found, angle)
+    return SolidGear(stations.roll, gear.base_radius, depths[:, 0], found, angle, width)
 
 
-def contact_lines(position: float) -> dict[int, ContactLine]:
+def contact_lines(degrees: int, position: float) -> dict[int, ContactLine]:
     """Lines of all tooth pairs that touch at a position [mesh periods], by the number of the pair."""
-    pair, reach, found = helical_pair()[0], 0.5 * math.tan(BASE) * WIDE, {}
+    pair, slope, found = helical_pair(degrees)[0], math.tan(BASE[degrees]), {}
+    reach = 0.5 * slope * WIDE[degrees]
     for number in range(-4, 5):
         middle = pair.base_pitch * (position + number)
         path = max(pair.path[0], middle - reach), min(pair.path[1], middle + reach)
         if path[1] > path[0]:
             knots = max(3, round(KNOTS * (path[1] - path[0]) / (2.0 * reach)))
-            found[number] = ContactLine(path, math.tan(BASE), middle, knots)
+            found[number] = ContactLine(path, slope, middle, knots)
     return found
 
 
@@ -122,11 +125,11 @@ def body_part(starts, gears, lines: dict[int, ContactLine]) -> np.ndarray:
     return 0.5 * (H + H.T)
 
 
-def solid_pair(gears, position: float) -> tuple[float, float]:
+def solid_pair(gears, degrees: int, position: float) -> tuple[float, float]:
     """Compute approach [m] and tangent stiffness over width [N/m^2] at a position."""
-    along, numbered = math.cos(gears[0].angle), contact_lines(position)
-    (flanks,) = mesh_pairs(helical_pair()[0])
-    starts, load = (flanks.pitch_roll_1, flanks.pitch_roll_2), LINE_LOAD * WIDE
+    along, numbered, width = math.cos(gears[0].angle), contact_lines(degrees, position), WIDE[degrees]
+    (flanks,) = mesh_pairs(helical_pair(degrees)[0])
+    starts, load = (flanks.pitch_roll_1, flanks.pitch_roll_2), LINE_LOAD * width
     H, lines = body_part(starts, gears, numbered), list(numbered.values())
     whole = np.concatenate([one.loads.sum(axis=0) for one in lines])
     every = np.split(np.arange(len(whole)), np.cumsum([one.loads.shape[1] for one in lines])[:-1])
@@ -151,35 +154,42 @@ def solid_pair(gears, position: float) -> tuple[float, float]:
         forces = approach * found
         if abs(approach - before) < SETTLED * approach:
             assert forces.min() > 0.0, "flanks pull"
-            return float(approach), float(whole @ np.linalg.solve(yields(forces, 1.0), whole)) / WIDE
+            return float(approach), float(whole @ np.linalg.solve(yields(forces, 1.0), whole)) / width
         before = approach
     raise AssertionError("the widths of the contacts do not settle")
 
 
-def solid_means(angle: float, *, mirrors: bool = False) -> np.ndarray:
-    """Mean approach [m] and stiffness over width [N/m^2] of solid gears, base helix angle in rad."""
-    gears = [solid_gear(one, angle, mirrors=mirrors) for one in helical_pair()[1].gears]
-    return np.mean([solid_pair(gears, at) for at in POSITIONS], axis=0)
+def solid_means(degrees: int, *, straight: bool = False, mirrors: bool = False) -> np.ndarray:
+    """Mean approach [m] and stiffness over width [N/m^2] of solid gears, of straight or helical teeth."""
+    angle, sectors = 0.0 if straight else BASE[degrees], helical_pair(degrees)[1].gears
+    gears = [solid_gear(one, angle, WIDE[degrees], mirrors=mirrors) for one in sectors]
+    return np.mean([solid_pair(gears, degrees, at) for at in POSITIONS], axis=0)
 
 
-def femgear_means(helical: float) -> np.ndarray:
-    """The same of femgear, with a stiffness of the teeth over that of straight ones."""
+def femgear_means(degrees: int, *, straight: bool = False) -> np.ndarray:
+    """The same of femgear."""
     line = {"positions": 32, "contact": "line_of_action"}
-    cycle = in_slices(helical_pair()[0], 1.0, helical, fine=False, **line)
-    return np.array([cycle.deflection.mean(), cycle.stiffness.mean() / WIDE])
+    helical = 1.0 if straight else helical_stiffness(BASE[degrees], internal=False)
+    cycle = in_slices(helical_pair(degrees)[0], 1.0, helical, fine=False, **line)
+    return np.array([cycle.deflection.mean(), cycle.stiffness.mean() / WIDE[degrees]])
 
 
 def finite_width() -> tuple[Row, ...]:
-    """Straight teeth under oblique contact lines, and helical ones with free ends, over one face width."""
-    straight, helical = femgear_means(1.0), femgear_means(helical_stiffness(BASE, internal=False))
-    name, oblique = "24/36, 20 degrees, overlap ratio 1, 300 N/mm, ", "straight teeth under oblique lines, "
+    """Helical teeth with free ends, and straight ones under the same oblique contact lines."""
     of = (1e6, "mean approach [um]"), (1e-9, "mean tangent stiffness over width [N/(mm um)]")
-    return tuple(
-        within("finite", SOLID, f"{name}{words}: {text}", c * solid[i], c * ours[i], gate, explanation=why)
-        for words, solid, ours, gate, why in (
-            (f"{oblique}mirror planes", solid_means(0.0, mirrors=True), straight, 0.01, ""),
-            (f"{oblique}free ends", solid_means(0.0), straight, 0.03, ""),
-            ("helical teeth, free ends", solid_means(BASE), helical, 0.03, ENDS),
-        )
-        for i, (c, text) in enumerate(of)
+    oblique, free = {"straight": True}, "helical teeth, free ends"
+    variants = (
+        (20, "straight teeth under oblique lines, mirror planes", oblique, {"mirrors": True}, 0.01, ""),
+        (20, "straight teeth under oblique lines, free ends", oblique, {}, 0.03, ""),
+        (10, free, {}, {}, 0.03, ""),
+        (20, free, {}, {}, 0.03, ENDS),
     )
+    rows = []
+    for degrees, words, teeth, ends, gate, why in variants:
+        solid, ours = solid_means(degrees, **teeth, **ends), femgear_means(degrees, **teeth)
+        name = f"24/36, {degrees} degrees, overlap ratio 1, 300 N/mm, {words}: "
+        rows += [
+            within("finite", SOLID, name + text, c * solid[i], c * ours[i], gate, explanation=why)
+            for i, (c, text) in enumerate(of)
+        ]
+    return tuple(rows)
