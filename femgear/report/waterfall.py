@@ -60,11 +60,11 @@ KIND_COLOURS = {
 _MESHES = (BLUE, VERMILION)
 
 
-def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset) -> Figure:
-    """Draw modes and mesh harmonics over the speeds of runup.nc, the excited crossings marked."""
+def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset, *, rays: int = _RAYS) -> Figure:
+    """Draw modes and so many mesh harmonics over the speeds of runup.nc, the excited crossings marked."""
     figure, (ax,) = new_figure(height=5.8)
     speed, mesh = runup["speed"].values, runup["mesh_frequency"].values * 1e-3
-    top = min(float(runup["excitation_limit"].max()) * 1e-3, (_RAYS - 2) * mesh[-1])
+    top = min(float(runup["excitation_limit"].max()) * 1e-3, (rays - 2) * mesh[-1])
     ax.set_xlim(speed[0], speed[-1])
     ax.set_ylim(0.0, top)
     for frequency, kind in zip(modes["frequency"].values * 1e-3, map(str, modes["kind"].values)):
@@ -72,13 +72,17 @@ def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset) -> Figure:
             name = kind.removeprefix("ring, ")
             style = {"color": KIND_COLOURS.get(name, GREY), "linestyle": "--" if name != kind else "-"}
             ax.axhline(frequency, linewidth=1.2, label=f"{kind} mode", **style)
-    for h in range(1, _RAYS + 1):
+    named = np.inf
+    for h in range(1, rays + 1):
         ax.plot(speed, h * mesh, color="0.55", linewidth=0.9)
         inside = h * mesh[-1] <= top
         at = (speed[-1], h * mesh[-1]) if inside else (top * speed[-1] / (h * mesh[-1]), top)
         side = {"xytext": (4, 0), "va": "center"} if inside else {"xytext": (0, 3), "ha": "center"}
+        if not inside and named - at[0] < 0.07 * np.ptp(speed):
+            continue  # its name would lie on that of the ray before it
+        named = named if inside else at[0]
         ax.annotate(f"h = {h}", at, textcoords="offset points", fontsize=SMALL, color="0.35", **side)
-    rows = (runup["mesh_harmonic"].values <= _RAYS) & (runup["frequency"].values * 1e-3 <= top)
+    rows = (runup["mesh_harmonic"].values <= rays) & (runup["frequency"].values * 1e-3 <= top)
     level = runup["resonance_alone"].values[rows]
     place = runup["resonance_speed"].values[rows], runup["frequency"].values[rows] * 1e-3
     size = 12.0 + 180.0 * level / max(level.max(initial=0.0), np.finfo(float).tiny)

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _OF = ("", "gear 2: ")
+_RAYS = 10, 24
+"""Fewest and most mesh harmonics of the Campbell diagram."""
 _PANELS = (
     ("dte_rms", 1e6, "transmission error,\nr.m.s. about its mean [µm]"),
     ("dynamic_factor", 1.0, "dynamic factor K_v [1]"),
@@ -44,13 +46,14 @@ def pair_levels(runup: xr.Dataset) -> Figure:
     """
     figure, axes = new_figure(rows=3, height=8.2, sharex=True)
     speed, pulls = runup["speed"].values, runup["lowest_force"].values < 0.0
+    thin = " (thin: it pulls)" if pulls.any() else ""
     for ax, (name, unit, words) in zip(axes, _PANELS, strict=True):
         curves = _curves(unit * runup[name].values)
         for number, curve in enumerate(curves):
             dash, colour = ("-", BLUE) if not number else ("-.", GREY)
             ax.plot(speed, np.where(pulls, np.nan, curve), dash, color=colour, linewidth=1.7)
             ax.plot(speed, curve, dash, color=colour, linewidth=0.7)
-            ax.plot([], [], dash, color=colour, label=f"{_OF[number]}flanks held together (thin: it pulls)")
+            ax.plot([], [], dash, color=colour, label=f"{_OF[number]}flanks held together{thin}")
         if "branch_speed" in runup:
             _draw_branch(ax, runup, f"branch_{name}", unit)
         for one in np.atleast_1d(runup.attrs["operating_speeds"])[:8]:
@@ -90,9 +93,11 @@ def _dynamics(drawn: Drawn) -> dict[str, Figure]:
 
 
 def _campbell(runup: xr.Dataset, modes: xr.Dataset) -> Figure:
-    """Draw the Campbell diagram up to a half above the highest mode, however far the excitation goes."""
-    most = 1.5 * float(modes["frequency"].max())
-    return campbell_diagram(runup.assign(excitation_limit=runup["excitation_limit"].clip(max=most)), modes)
+    """Draw the Campbell diagram up to a quarter above the highest mode, with the harmonics that meet it."""
+    most, mesh = 1.25 * float(modes["frequency"].max()), runup["mesh_frequency"].values
+    rays = int(np.clip(np.ceil(most / mesh.mean()), *_RAYS))
+    limited = runup.assign(excitation_limit=runup["excitation_limit"].clip(max=most))
+    return campbell_diagram(limited, modes, rays=rays)
 
 
 DYNAMICS = Figures(RESPONSE_CAPTIONS, _dynamics)

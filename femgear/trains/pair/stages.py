@@ -37,7 +37,7 @@ from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import sample
+from femgear.system.fourier import fluctuation, sample
 from femgear.system.system import Modes, NonlinearSystem, Response
 from femgear.trains.pair.case_file import PairCase
 from femgear.trains.pair.figures import DYNAMICS, RUNUP
@@ -95,7 +95,7 @@ _CAPTIONS = {
 }
 _LOWEST, _ABOVE_MODES = 20e3, 2.0
 """The excitation reaches the end of hearing [Hz], and so many times the highest natural frequency."""
-_LEAST, _HARMONICS, _ON_BRANCH = 8, 512, (16, 28)
+_LEAST, _HARMONICS, _ON_BRANCH = 16, 512, (16, 28)
 """Fewest and most harmonics of the excitation; most of excitation and response on the branch."""
 _TOGETHER, _INSTANTS = 500, 1024
 """Speeds that are in memory at a time, and instants of a period at which contact is looked for."""
@@ -335,7 +335,7 @@ def _branch(case: PairCase, modes: PairModesResult, speeds: np.ndarray, lowest: 
     options = {"harmonics": size, "radius": False, "scale": scale, "options": _STEPS}
     found = frequency_response_curve(problem, (float(high * teeth), float(low * teeth)), **options)
     far = np.abs(found.lines[:, 0]).sum(axis=1) > LARGEST_APPROACH * case.module
-    kept = int(far.argmax()) if far.any() else len(far)
+    kept = max(int(far.argmax()), 1) if far.any() else len(far)
     motion = _parted(modes.model, problem, found.solutions[:kept], size)
     along = found.parameter[:kept] / teeth
     parts, folds = along[motion.drive < 1.0] / RPM, np.sort(along[found.folds[found.folds < kept]]) / RPM
@@ -344,9 +344,24 @@ def _branch(case: PairCase, modes: PairModesResult, speeds: np.ndarray, lowest: 
     if not found.complete:
         ending = found.message
     if far.any():
-        ending = f"it ends at {along[-1] / RPM:.6g} rpm, before flanks travel {LARGEST_APPROACH:g} modules"
+        grown = float(fluctuation(motion.dte[-1:])[0, 0])
+        ending = f"it ends at {along[-1] / RPM:.6g} rpm, {_unbounded(modes, along[-1] * teeth, count, grown)}"
     words = f"along the branch flanks part {span}, limit points at {listed} rpm; {ending}"
     return (along, motion, found.stable[:kept]), bool(found.complete and not far.any()), words
+
+
+def _unbounded(modes: PairModesResult, omega: float, count: int, grown: float) -> str:
+    """Tell how far flanks travel at the end of a branch, and how near the linear motion is to growing.
+
+    To motions that large the play is nothing, and the linear equations decide whether they decay.
+    """
+    hertz = np.array([omega / (2.0 * np.pi)])
+    judged = stability(modes.modes, modes.excitation, hertz, excitation_harmonics=count)
+    return (
+        f"where the transmission error has {1e3 * grown:.3g} mm r.m.s.: beyond, flanks travel more than "
+        f"{LARGEST_APPROACH:g} modules; with flanks held together the largest Floquet multiplier is "
+        f"{float(np.abs(judged.multiplier[0])):.4f} there, and from 1 on nothing bounds motions"
+    )
 
 
 PAIR = Train(
