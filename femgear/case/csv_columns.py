@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from pathlib import PurePath
+from typing import Any
 
 from femgear.case import text
 from femgear.case.quantities import ANGLE, LENGTH, Dimension, to_si
@@ -220,7 +221,7 @@ def embed_points(
         if isinstance(table, dict) and isinstance(table.get("file"), str) and plain(table):
             key, file = f"{entry}[{i}]", table.pop("file")
             if (path := PurePath(file)) not in known:
-                points = _embedded(file, name, f"{key}.file", read)
+                points = embedded(file, name, f"{key}.file", read)
                 known[path] = {
                     one: [f"{value:.13g} {units[one]}" for value in values] for one, values in points.items()
                 }
@@ -229,8 +230,11 @@ def embed_points(
     return found
 
 
-def _embedded(file: str, name: str, key: str, read: Callable[[str], Mapping[str, list[float]]]):
-    """What `read` finds in a file beside the case file or below, no link leading out of there."""
+def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
+    """Read a file that the entry ``key`` names, beside the case file or below, no link leading out of there.
+
+    CaseError: a path that leads out of the folder (E-FILE), and what ``read`` raises, with the key.
+    """
     folder, path = os.path.dirname(name), PurePath(file)
     try:
         home = os.path.realpath(folder)

@@ -33,6 +33,7 @@ from femgear.gears.deviations import (
     Ovality,
     Runout,
     SetDeviations,
+    body_separation,
     check_deviations,
     no_deviations,
     tooth_displacements,
@@ -61,6 +62,8 @@ from femgear.gears.profile import BasicRack, PinionCutter, transverse_rack, tran
 if TYPE_CHECKING:
     from femgear.case.sections import CarrierSection, ModificationSection
 
+_PLAY = 1e-9
+"""Play below which there is no back side [m]: what rounding leaves of none."""
 _ON_SHAFTS = ("sun", "carrier")
 """Members that may stand on a shaft."""
 
@@ -382,6 +385,13 @@ def _range(gear: Gear, low: float, high: float) -> str:
     angles = (math.degrees(roll / gear.base_radius) for roll in (low, high))
     diameters = (2e3 * math.hypot(roll, gear.base_radius) for roll in (low, high))
     return "roll angles {:.4g} to {:.4g} deg, diameters {:.6g} to {:.6g} mm".format(*angles, *diameters)
+
+
+def line_play(case: Any) -> float:
+    """Compute the play of a pair along the line of action [m] with thickness errors; zero for rounding."""
+    gears = planetary_set(case)
+    play = gears.backlash + body_separation(set_deviations(case), gears, 0.0, back=True)[0, 0]
+    return float(play) if play > _PLAY else 0.0
 
 
 def with_shafts(case: Case) -> Case:

@@ -8,16 +8,21 @@ from __future__ import annotations
 import difflib
 import math
 import os
+import sys
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, StrictBool
 
-from femgear.case.csv_columns import Columns, embed_points, read_columns
+from femgear.case import text as case_text
+from femgear.case.csv_columns import Columns, embed_points, embed_profiles, embedded, read_columns
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.quantities import (
     ACCELERATION,
+    ANGLE,
     FREQUENCY,
     LENGTH,
     TIME,
@@ -31,7 +36,8 @@ from femgear.case.quantities import (
 )
 from femgear.case.sections import FORMAT, DampingRatio, Speed
 from femgear.case.text import CaseFile, ReadCase
-from femgear.errors import CaseError, Finding
+from femgear.errors import CaseError, FemgearError, Finding
+from femgear.gears.deviations import common_period
 from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
@@ -41,6 +47,7 @@ from femgear.trains.drivetrain.parts import (
     ShaftSection,
     TorqueHistory,
 )
+from femgear.trains.reading import parse_case
 
 FASTEST_RATE = 1e7
 _MOST_PARTS = 200
@@ -50,6 +57,8 @@ _LARGEST_TORQUE, _LATEST = 1e9, 1e6
 
 # Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
 _RATIO_TOLERANCE = 0.01
+# Angles and radii of a stage and of the pair that gives its stiffness, of digits as printed.
+_UNLIKE = 1e-3
 # Ratios of radii and teeth that differ by more are worth a remark.
 _REMARK = 1e-4
 # Teeth of a planet that profile shifts may add or take.
@@ -174,7 +183,7 @@ def settle_time(case: DrivetrainCase) -> float:
 def check_entries_together(case: DrivetrainCase) -> list[CaseError]:
     """Refuse what no entry shows alone."""
     names = list(_names(case))
-    checks = (_bodies, _bearings, _shafts, _sizes, _torques, _simulation, _coordinates)
+    checks = (_bodies, _bearings, _shafts, _sizes, _meshes, _torques, _simulation, _coordinates)
     found = [*names, *(problem for check in checks for problem in check(case))]
     return found if names else [*found, *_chain(case)]
 
@@ -417,6 +426,94 @@ def _sizes(case: DrivetrainCase) -> Iterator[CaseError]:
         yield from _assembly(stage, key)
 
 
+def _meshes(case: DrivetrainCase) -> Iterator[CaseError]:
+    """Parallel stages with a mesh, or with the teeth of a pair that are theirs."""
+    for i, stage in enumerate(case.parallel):
+        key = f"parallel[{i}]"
+        if stage.mesh is None and stage.stiffness is None:
+            remedy = 'add it, or stiffness = "pair.toml", the case file of a pair'
+            yield CaseError("missing", code="E-KEY-MISSING", key=f"{key}.mesh", remedy=remedy)
+        elif stage.mesh is not None and stage.stiffness is not None:
+            yield CaseError(
+                "the stiffness of the mesh is given twice", code="E-CHOICE", key=f"{key}.stiffness",
+                limit="mesh, or stiffness with the case file of a pair", remedy="leave one of them out",
+            )  # fmt: skip
+        elif stage.stiffness is not None:
+            try:
+                pair = pair_of(case_text.write(stage.stiffness))
+                found = [*_unlike(pair, stage, key), *_unfit(pair, case.simulation.harmonics)]
+            except FemgearError as error:
+                found = [CaseError(one.message, **_told(one)) for one in getattr(error, "problems", (error,))]
+            for one in found:
+                if not (one.key or "").startswith(key):
+                    one.key = f"{key}.stiffness.{one.key}"
+                yield one
+
+
+@lru_cache(maxsize=8)
+def pair_of(text: str) -> Any:
+    """Read the case of a pair from the text of its file.
+
+    CaseError: as `femgear.trains.reading.parse_case`; another kind of case (E-CHOICE).
+    """
+    pair = parse_case(text, numbered=False)
+    if pair.train != "pair":
+        value = f"a case of the train {pair.train}"
+        raise CaseError("not a case of two gears", code="E-CHOICE", key="model", value=value, limit="'pair'")
+    return pair
+
+
+def _told(error: FemgearError) -> dict[str, Any]:
+    return {name: getattr(error, name) for name in ("code", "key", "value", "limit", "remedy")}
+
+
+def _unlike(pair: Any, stage: ParallelSection, key: str) -> Iterator[CaseError]:
+    """Entries of a stage that are not those of its pair: teeth, helix, pressure angle, base circles."""
+    gears, helix = planetary_set(pair), abs(pair.helix_angle or 0.0)
+    if gears.gear_2.internal:
+        words = "the gears of a parallel stage are external"
+        yield CaseError(words, code="E-CHOICE", key="gear_2.outer_radius", remedy="leave it out")
+    angle = stage.pressure_angle
+    nearest = min(gears.gear_1.pressure_angle, gears.working_pressure_angle, key=lambda one: abs(one - angle))
+    radii = [math.cos(angle) * radius for radius in stage.pitch_radii], [g.base_radius for g in gears.gears]
+    teeth = list(stage.teeth), [gear.teeth for gear in gears.gears]
+    words = tuple(f"base radii {' and '.join(map(LENGTH.show, one))}" for one in radii)
+    size = next(iter(stage.given("radii", "base_radii", "module")), "module")
+    for name, found, wanted, shown in (
+        ("teeth", *teeth, teeth),
+        ("helix_angle", abs(stage.helix_angle), helix, tuple(map(ANGLE.show, (stage.helix_angle, helix)))),
+        ("pressure_angle", angle, nearest, tuple(map(ANGLE.show, (angle, nearest)))),
+        (size, radii[0] or radii[1], radii[1], words),
+    ):
+        if not np.allclose(found, wanted, rtol=_UNLIKE, atol=0.0):
+            limit = f"{shown[1]}, transverse module {LENGTH.show(gears.gear_1.module)}"
+            yield CaseError(
+                "the stage has not the gears of the pair that gives its stiffness", code="E-TEETH",
+                key=f"{key}.{name}", value=shown[0], limit=limit if name == size else shown[1],
+                remedy="give the stage the gears of the pair, or name the case file of its own",
+            )  # fmt: skip
+
+
+def _unfit(pair: Any, harmonics: int) -> Iterator[CaseError]:
+    """What leaves no stiffness over one mesh period: no torque, errors of several periods, few positions."""
+    if not pair.operation.torque:
+        yield CaseError(
+            "without torque no flanks touch", code="E-RANGE", key="operation.torque", value="0 N m"
+        )
+    periods, _ = common_period(set_deviations(pair), planetary_set(pair), limit=sys.maxsize)
+    if periods > 1:
+        yield CaseError(
+            f"the errors of the pair span {periods} mesh periods", code="E-RANGE", key="gear_1.errors",
+            limit="one mesh period", remedy="leave pitch errors and runout out",
+        )  # fmt: skip
+    if pair.static.positions <= 2 * harmonics:
+        yield CaseError(
+            f"so few positions hold no {harmonics} harmonics", code="E-RANGE", key="static.positions",
+            value=pair.static.positions, limit=f"more than {2 * harmonics}",
+            remedy="take more of them, or fewer simulation.harmonics",
+        )  # fmt: skip
+
+
 def _gear_sizes(stage: ParallelSection | PlanetarySection, kind: str, key: str) -> Iterator[CaseError]:
     """One way of giving the sizes of the gears, and teeth that fit it."""
     ways, words = _WAYS[kind]
@@ -521,6 +618,24 @@ def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
         )
 
 
+def embed_files(data: dict, name: str) -> dict[str, str]:
+    """Put torques, and the tables of pairs that give stages their stiffness, in the place of their files."""
+    found, stages = embed_torques(data, name), data.get("parallel")
+    for i, table in enumerate(stages if isinstance(stages, list) else ()):
+        if isinstance(table, dict) and isinstance(table.get("stiffness"), str):
+            key, file = f"parallel[{i}].stiffness", table.pop("stiffness")
+            table["stiffness"] = embedded(file, name, key, _pair_tables)
+            found[key] = case_text.printable(file)
+    return found
+
+
+def _pair_tables(path: str) -> dict:
+    """Read the tables of the case file of a pair, with the points of its measured profiles."""
+    data = case_text.parse(case_text.read_text(path), path)
+    embed_profiles(data, path)
+    return data
+
+
 def embed_torques(data: dict, name: str) -> dict[str, str]:
     """Put the points of every ``file`` of a torque in its place; see `embed_points`."""
 
@@ -578,5 +693,5 @@ FILE = CaseFile(
     check_entries_together,
     lambda tables, case: drivetrain_notices(case),
     claims=lambda tables: "bodies" if isinstance(tables.get("body"), list) else "",
-    embed=embed_torques,
+    embed=embed_files,
 )

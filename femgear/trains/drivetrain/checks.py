@@ -19,13 +19,18 @@ from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.case_file import (
     FASTEST_RATE,
     DrivetrainCase,
-    drivetrain_of,
     record_problems,
     settle_time,
     torque_histories,
 )
 from femgear.trains.drivetrain.kinematics import springs_of
-from femgear.trains.drivetrain.model import DrivetrainModel, case_model, drivetrain_model, refusals_located
+from femgear.trains.drivetrain.model import (
+    DrivetrainModel,
+    case_model,
+    computed_drivetrain,
+    drivetrain_model,
+    refusals_located,
+)
 from femgear.trains.drivetrain.parts import Drivetrain, TorqueHistory
 from femgear.trains.drivetrain.simulation import PASS_BAND
 
@@ -180,7 +185,7 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
         meshes (E-RATE); records that are too many (E-RANGE).
     """
     with refusals_located(case):
-        train = drivetrain_of(case)
+        train = computed_drivetrain(case)
         count, names = loose_motions(train, turning=case.simulation.turning)
         if count:
             raise CaseError(

@@ -14,7 +14,7 @@ from femgear.report.style import COLOURS, GREY, SIZE, digits, label, legend_belo
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.mode_pictures import write_mode_pictures
 from femgear.trains.drivetrain.model import DrivetrainModel, case_model
-from femgear.trains.drivetrain.parts import numbered
+from femgear.trains.drivetrain.parts import ComputedMesh, MeshSection, numbered
 from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
 from femgear.trains.drivetrain.simulation import PASS_BAND
 from femgear.trains.protocol import Drawn, Figures
@@ -207,11 +207,10 @@ def stiffness_figure(model: DrivetrainModel) -> Figure:
     for ax in axes[len(first) :]:
         figure.delaxes(ax)
     for ax, (row, wave) in zip(axes, first):
-        low, high, share = wave.levels
-        inside = (phase + wave.phase + 0.5 * share) % 1.0 < share
+        known, words = _known_stiffness(wave, phase)
         series = 1e-6 * FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]
         mean = 1e-6 * float(np.real(model.stiffness[row, 0]))
-        ax.plot(phase, 1e-6 * np.where(inside, high, low), color=GREY, linewidth=1.4, label="rectangular")
+        ax.plot(phase, 1e-6 * known, color=GREY, linewidth=1.4, label=words)
         words = f"series of {model.stiffness.shape[1] - 1} terms"
         ax.plot(phase, series, color=COLOURS[0], label=words)
         ax.axhline(mean, color=COLOURS[1], linestyle="--", linewidth=1.2, label="mean")
@@ -221,6 +220,15 @@ def stiffness_figure(model: DrivetrainModel) -> Figure:
         label(ax, "position in the mesh period [1]", "mesh stiffness [N/µm]", words)
     legend_below(figure)
     return figure
+
+
+def _known_stiffness(wave: MeshSection, phase: np.ndarray) -> tuple[np.ndarray, str]:
+    """Stiffness that the series takes, at phases of the mesh period [N/m], and what it is."""
+    if isinstance(wave, ComputedMesh):
+        count = len(wave.samples)
+        return np.interp(phase, np.arange(count) / count, wave.samples, period=1.0), "computed, first drives"
+    low, high, share = wave.levels
+    return np.where((phase + wave.phase + 0.5 * share) % 1.0 < share, high, low), "rectangular"
 
 
 def _campbell_figure(modes: xr.Dataset) -> Figure:

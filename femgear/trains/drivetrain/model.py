@@ -19,16 +19,19 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.case.gear_set import line_play
+from femgear.case.text import write
+from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import beam_element, disc_matrices
 from femgear.solvers.linear.modal import modal_damping
 from femgear.system.force_laws import positive_part
 from femgear.system.fourier import FourierSeries, orders_of, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
-from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, torque_histories
+from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, pair_of, torque_histories
 from femgear.trains.drivetrain.kinematics import (
     Coordinates,
     FlankContacts,
@@ -42,7 +45,15 @@ from femgear.trains.drivetrain.kinematics import (
     speed_ratios,
     springs_of,
 )
-from femgear.trains.drivetrain.parts import BearingSection, Drivetrain, MeshSection, TorqueHistory, numbered
+from femgear.trains.drivetrain.parts import (
+    BearingSection,
+    ComputedMesh,
+    Drivetrain,
+    MeshSection,
+    TorqueHistory,
+    numbered,
+)
+from femgear.trains.static.stages import solve_static
 
 BENDING, TORSIONAL = "with bending", "torsional"
 # Terms of the mesh stiffness: as many as the paper takes.
@@ -359,6 +370,11 @@ def _stiffness(train: Drivetrain, place: Coordinates, spin: np.ndarray, harmonic
             sense = math.copysign(1.0, float(spin[place.body[stage.carrier] + 4])) / (2.0 * math.pi)
             ahead, first = (teeth * sense * stage.angles[p] for p in (mesh.planet, 0))
             wave = wave.changed(phase=wave.phase + (ahead - first))
+        if isinstance(wave, ComputedMesh):
+            # the path of contact is passed the other way where the second gear drives
+            series = wave.series(harmonics)
+            waves.append(series if train.stages[mesh.stage].flank > 0 else series.conj())
+            continue
         waves.append(rectangular_series(wave, harmonics))
     return np.array(waves).reshape(len(waves), harmonics + 1)
 
@@ -419,9 +435,40 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
     build = drivetrain_model if variant == BENDING else torsional_model
     options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
     with refusals_located(case):
-        train = drivetrain_of(case)
+        train = computed_drivetrain(case)
         torques = torque_histories(case, speed_ratios(train))
         return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
+
+
+def computed_drivetrain(case: DrivetrainCase) -> Drivetrain:
+    """Make the chain of a case, the stiffness of its pairs computed from their teeth.
+
+    FemgearError: the contact of a pair has no solution; it names the entry of the stage.
+    """
+    train, stages = drivetrain_of(case), []
+    for i, stage in enumerate(train.parallel):
+        if stage.stiffness is not None:
+            try:
+                stage = stage.changed(mesh=_computed_mesh(write(stage.stiffness)))
+            except FemgearError as error:
+                error.key = ".".join(filter(None, (f"parallel[{i}].stiffness", error.key)))
+                error.file = case.location(error.key)
+                raise
+        stages.append(stage)
+    return replace(train, parallel=tuple(stages))
+
+
+@lru_cache(maxsize=8)
+def _computed_mesh(text: str) -> ComputedMesh:
+    """Solve the static contact of the pair of a case file for its mesh stiffness."""
+    pair = pair_of(text)
+    static = solve_static(pair)
+    values = static.cycle.stiffness[0]
+    # a negative torque is the drive of gear 2: positions run backwards
+    samples = values if pair.operation.torque > 0.0 else values[-np.arange(len(values)) % len(values)]
+    ratio = static.planetary_set.contact_ratio + abs(static.overlap_ratio)
+    known = {"stiffness": float(values.mean()), "contact_ratio": ratio, "backlash": line_play(pair) or None}
+    return ComputedMesh.in_si(samples=tuple(samples.tolist()), **known)
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, StrictBool, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, StrictBool, ValidationInfo, WithJsonSchema
 
 from femgear.case.quantities import (
     ANGLE,
@@ -66,6 +66,13 @@ def _two(value: object) -> object:
     return value
 
 
+def _tables(value: object) -> object:
+    if not isinstance(value, dict):
+        what = f"the case file of a pair is needed, not {described(value)}"
+        raise CaseError(what, code="E-TYPE", value=value, remedy='name it, as in "pair.toml"')
+    return value
+
+
 def _driver(value: str | None, info: ValidationInfo) -> str | None:
     """The driver of a stage; where the ends themselves are wrong, they alone are refused."""
     ends = info.data.get("between", ()) or [info.data[key] for key in ("carrier", "sun") if key in info.data]
@@ -89,6 +96,12 @@ Module = Annotated[float, Quantity(LENGTH, 5e-5, 0.5)]
 Joint = Annotated[float, StiffnessOrRigid(TORSION, 1e-3, 1e15)]
 BOTH = BeforeValidator(_two)
 """Of entries of the first and the second body, in `Annotated`."""
+
+
+PairTables = Annotated[
+    dict[str, Any], BeforeValidator(_tables), WithJsonSchema({"type": ["string", "object"]})
+]
+"""Of the name of a case file, in whose place its tables stand when it was read."""
 
 
 class Part(Section):
@@ -179,6 +192,18 @@ class MeshSection(Part):
         return ratio * high, high, share
 
 
+class ComputedMesh(MeshSection):
+    """Mesh stiffness of a pair of gears, computed from their teeth."""
+
+    samples: tuple[float, ...]
+    """At equal steps of the mesh period while the first gear drives [N/m]."""
+
+    def series(self, harmonics: int) -> np.ndarray:
+        """Compute the complex harmonics 0 to H (H + 1,) of the samples [N/m]."""
+        lines = 2.0 / len(self.samples) * np.fft.rfft(self.samples)[: harmonics + 1]
+        return np.append(0.5 * lines[0], lines[1:])
+
+
 class ParallelSection(Part):
     """Two external gears; sizes by pitch radii, base radii, or the transverse module."""
 
@@ -187,7 +212,9 @@ class ParallelSection(Part):
     radii: Annotated[tuple[Radius, ...], BOTH] | None = None
     base_radii: Annotated[tuple[Radius, ...], BOTH] | None = None
     module: Module | None = None
-    mesh: MeshSection
+    mesh: MeshSection | None = None
+    stiffness: PairTables | None = None
+    """In place of the mesh: case file of a pair, whose tables take the place of its name."""
     pressure_angle: PressureAngle = math.radians(20.0)
     """In the transverse section."""
     helix_angle: Annotated[float, Quantity(ANGLE, -math.radians(60), math.radians(60))] = 0.0
@@ -357,7 +384,9 @@ class Drivetrain:
             for names, entry, mesh in ((suns, "sun_mesh", one.sun_mesh), (rings, "ring_mesh", one.ring_mesh)):
                 found += [Mesh(name, i, f"planetary[{i}].{entry}", mesh, p) for p, name in enumerate(names)]
         for i, one in enumerate(self.parallel):
-            found.append(Mesh(one.name, len(self.planetary) + i, f"parallel[{i}].mesh", one.mesh))
+            assert one.mesh is not None  # given, or computed by `femgear.trains.drivetrain.model`
+            entry = "mesh" if one.stiffness is None else "stiffness"
+            found.append(Mesh(one.name, len(self.planetary) + i, f"parallel[{i}].{entry}", one.mesh))
         return tuple(found)
 
     def planet_names(self, stage: PlanetarySection) -> list[str]:

@@ -19,10 +19,9 @@ from typing import cast
 
 import numpy as np
 
-from femgear.case.gear_set import set_deviations
+from femgear.case.gear_set import line_play, set_deviations
 from femgear.case.sections import MaterialSection
 from femgear.contact.loaded_period import loaded_period
-from femgear.gears.deviations import body_separation
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import mesh_normals
 from femgear.gears.pair import GearPair
@@ -34,8 +33,6 @@ from femgear.trains.static.results import StaticResult
 
 _RECORD = 2**13
 """Positions of the excitation in the mesh period."""
-_PLAY = 1e-9
-"""Play below which there is no back side [m]: what rounding leaves of none."""
 _ONE_KIND = 0.9
 """Share of the kinetic energy from which on a mode is torsional, or lateral."""
 _NAMES = ("x", "y", "rotation")
@@ -134,13 +131,7 @@ def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
         contact=case.static.contact, deviations=None if deviations.ideal else deviations,
     )  # fmt: skip
     record = (state.resampled(name, _RECORD) for name in ("stiffness", "deflection", "force"))
-    return MeshExcitation(*record, backlash=line_play(case, gears))
-
-
-def line_play(case: PairCase, gears: GearPair) -> np.ndarray:
-    """Compute the play (1,) along the line of action [m] with thickness errors; zero where there is none."""
-    play = gears.backlash + body_separation(set_deviations(case), gears, 0.0, back=True)[:, 0]
-    return np.where(play > _PLAY, play, 0.0)
+    return MeshExcitation(*record, backlash=np.array([line_play(case)]))
 
 
 def separating_pair(
