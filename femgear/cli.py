@@ -323,7 +323,8 @@ class Formats:
     mat
         All numbers as results.mat for MATLAB.
     wav
-        Accelerometer and microphone at every speed, in m/s^2 and Pa over the full scale.
+        Accelerometer and microphone at every speed, in m/s^2 and Pa over the full scale; of pairs
+        transmission error and bearing forces, in m/s^2 and N.
     uff
         Universal files: the same signals and their lines (dataset 58), modes of the ring (15, 55).
     quality

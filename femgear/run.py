@@ -19,6 +19,7 @@ import numpy as np
 from femgear.case.dependencies import fingerprint
 from femgear.errors import CaseError, Finding, StorageError
 from femgear.exchange.formats import (
+    SCALES,
     Sampling,
     Signal,
     write_functions,
@@ -118,6 +119,8 @@ def _options(stage: Stage, progress: Progress) -> dict[str, Any]:
     return {name: known[name] for name in stage.options}
 
 
+_RECORDED = "wav", "uff", "quality"
+"""Formats of what a test bench would record."""
 _LOSS = -0.1
 """Change of the level that is told when a rate leaves lines out [dB]."""
 
@@ -304,17 +307,21 @@ def export_results(
     run has no signals or modes (E-STAGE), the library of a format is not installed (E-LIBRARY).
     """
     recorded, found = train_of(results.case).recorded, list[str]()
-    for stage, chosen in (("housing", {"wav", "uff", "quality"}), ("modes", {"uff"})):
-        if not chosen.isdisjoint(formats) and (recorded is None or stage not in results.stages):
-            raise CaseError(
-                "the run has nothing that these formats hold", code="E-STAGE",
-                value=", ".join(f"--{one}" for one in formats if one in chosen),
-                limit=f"runs with an elastic ring up to the stage {stage}",
-                remedy="export tables, or run such a case without --only",
-            )  # fmt: skip
+    needs = {} if recorded is None else recorded.needs
+    without = [one for one in formats if one in _RECORDED and one not in needs]
+    for one, stages in needs.items():
+        without += [one] if one in formats and not {*stages} <= {*results.stages} else []
+    if without:
+        known = "; ".join(f"--{one} with the stages {', '.join(stages)}" for one, stages in needs.items())
+        raise CaseError(
+            "the run has nothing that these formats hold", code="E-STAGE",
+            value=", ".join(f"--{one}" for one in without),
+            limit=known or "runs with an elastic ring, and --wav of pairs",
+            remedy="export tables, or run such a case without --only",
+        )  # fmt: skip
     if "csv" in formats:
         found += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
-        if recorded is not None and {"runup", "housing"} <= {*results.stages}:
+        if recorded is not None and recorded.cuts and {"runup", "housing"} <= {*results.stages}:
             header, rows = recorded.cuts(results, how.level)
             write_csv(folder / "order_cuts.csv", header, ([float(x) for x in row] for row in rows))
             found.append("order_cuts.csv")
@@ -329,13 +336,13 @@ def export_results(
         found.append("results.mat")
     if recorded is not None and {"wav", "uff", "quality"} & {*formats}:
         how = _scaled(how, recorded.extent(results, how.rate))
-    if recorded is not None and "uff" in formats:
+    if recorded is not None and recorded.shapes and "uff" in formats:
         signals = (one for one in recorded.signals(results, how) if one.steady)
         write_functions(signals, recorded.spectra(results), folder / "signals.uff")
         write_modes(recorded.shapes(results), folder / "modes.uff")
         found += ["signals.uff", "modes.uff"]
     if recorded is not None and not {"wav", "quality"}.isdisjoint(formats):
-        steps = 2 * results["housing"].sizes["speed"] + 2 * ("runup" in results.stages)
+        steps = recorded.each * (results[needs["wav"][0]].sizes["speed"] + ("runup" in results.stages))
         signals = _told(recorded.signals(results, how), progress, steps)
         found += _export_sound(signals, folder, formats, how)
     return found
@@ -352,7 +359,7 @@ def _told(signals: Iterable[Signal], progress: Progress, steps: int) -> Iterator
 def _scaled(sampling: Sampling, extent: Mapping[str, tuple[float, float, float]]) -> Sampling:
     """Give WAV files full scales that nothing exceeds, and warn of lines that the rate leaves out."""
     for unit, (most, lost, level) in extent.items():
-        name = "pressure_scale" if unit == "Pa" else "acceleration_scale"
+        name = SCALES[unit]
         if getattr(sampling, name) is None:
             sampling = replace(sampling, **{name: float(f"{1.05 * most or 1.0:.1e}")})
         left = 10.0 * np.log10(max(1.0 - (lost / (level or 1.0)) ** 2, 1e-20))
@@ -370,7 +377,7 @@ def _export_sound(
 ) -> list[str]:
     """Write signals as WAV files, what is heard of those of microphones as a table; returns their names."""
     found, rows, peaks = list[str](), list[list](), dict[str, float]()
-    scales = {"Pa": sampling.pressure_scale or 1.0, "m/s^2": sampling.acceleration_scale or 1.0}
+    scales = {unit: getattr(sampling, name) or 1.0 for unit, name in SCALES.items()}
     for signal in signals:
         if "wav" in formats:
             peaks[signal.unit] = max(peaks.get(signal.unit, 0.0), float(np.abs(signal.values).max()))
@@ -384,7 +391,7 @@ def _export_sound(
         text = (
             f"samples reach {peaks[unit]:.4g} {unit}, the full scale is {scales[unit]:g}: most players clip"
         )
-        remedy = f"raise --{'pressure' if unit == 'Pa' else 'acceleration'}-scale to hear it"
+        remedy = f"raise --{SCALES[unit].replace('_', '-')} to hear it"
         warnings.warn(str(Finding("W-CLIPPING", "", text, remedy=remedy)), stacklevel=4)
     if rows:
         header = (

@@ -389,7 +389,7 @@ def _range(gear: Gear, low: float, high: float) -> str:
 
 def line_play(case: Any) -> float:
     """Compute the play of a pair along the line of action [m] with thickness errors; zero for rounding."""
-    gears = planetary_set(case)
+    gears: Any = planetary_set(case)
     play = gears.backlash + body_separation(set_deviations(case), gears, 0.0, back=True)[0, 0]
     return float(play) if play > _PLAY else 0.0
 

@@ -47,6 +47,8 @@ class Sampling:
         files, which the sum of the amplitudes of no speed exceeds.
     acceleration_scale
         Full scale of WAV files of acceleration [m/s^2], with the same default.
+    force_scale
+        Full scale of WAV files of force [N], with the same default.
     level
         Unit and detector of order_cuts.csv: "mm/s rms", "g peak", "um peak", "dB rms" (re 1e-6 m/s^2), ...
     """
@@ -56,6 +58,7 @@ class Sampling:
     run_up: float = 30.0
     pressure_scale: float | None = None
     acceleration_scale: float | None = None
+    force_scale: float | None = None
     level: str = LEVELS[0]
 
     def __post_init__(self):
@@ -78,6 +81,10 @@ class Sampling:
                 "signals of so many samples take too much memory", code="E-MEMORY", value=f"{samples:.4g}",
                 limit=f"{_SAMPLES:.4g}", remedy="lower --rate, --duration or --run-up",
             )  # fmt: skip
+
+
+SCALES = {"Pa": "pressure_scale", "m/s^2": "acceleration_scale", "N": "force_scale"}
+"""Full scale of WAV files by unit."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +116,23 @@ class Shapes:
     frequency: np.ndarray
     damping_ratio: np.ndarray
     shape: np.ndarray
+
+
+def line_extent(parts: Iterable[tuple], rate: float) -> dict[str, tuple[float, float, float]]:
+    """Find by unit the largest sum of amplitudes of a speed, and what half a rate [Hz] and above has of it.
+
+    That is the largest root mean square of these lines, with the one of all lines at that speed; of parts
+    ``(unit, orders (n,), speeds (s,) [rad/s], amplitudes (s, n))``.
+    """
+    found = dict[str, tuple[float, float, float]]()
+    for unit, order, speed, values in parts:
+        power, above = 0.5 * np.abs(values) ** 2, order * speed[:, None] >= np.pi * rate
+        lost, (most, least, _) = (power * above).sum(axis=1), found.get(unit, (0.0, 0.0, 0.0))
+        worst = int(lost.argmax())
+        level = (float(np.sqrt(lost[worst])), float(np.sqrt(power[worst].sum())))
+        sums = max(most, float(np.abs(values).sum(axis=1).max()))
+        found[unit] = (sums, *(level if level[0] >= least else found[unit][1:]))
+    return found
 
 
 def write_wav(signal: Signal, path: Path, *, full_scale: float = 1.0) -> None:

@@ -162,16 +162,20 @@ class Stage:
 class Recorded:
     """What a test bench would record of a run: signals of every sensor, spectra, modes at points, order cuts.
 
-    ``cuts`` takes results and a form of `femgear.housing.sound.LEVELS`, and gives header and rows of a table;
+    ``needs`` are the stages that each format takes, of "wav", "uff" and "quality" those that there are, the
+    first one that of the signals, of which every speed and the run-up have ``each``. ``cuts`` takes
+    results and a form of `femgear.housing.sound.LEVELS`, and gives header and rows of a table;
     ``extent`` takes results and a rate [Hz], and gives by unit the largest sum of the amplitudes of a speed,
     and the largest level that lines at half the rate and above have, with that of all lines, r.m.s.
     """
 
     signals: Callable[[Results, Sampling], Iterator[Signal]]
-    spectra: Callable[[Results], Iterator[Spectrum]]
-    shapes: Callable[[Results], Shapes]
-    cuts: Callable[[Results, str], tuple[Sequence[str], Iterable[Sequence[float]]]]
     extent: Callable[[Results, float], Mapping[str, tuple[float, float, float]]]
+    needs: Mapping[str, tuple[str, ...]]
+    each: int
+    spectra: Callable[[Results], Iterator[Spectrum]] = lambda results: iter(())
+    shapes: Callable[[Results], Shapes] | None = None
+    cuts: Callable[[Results, str], tuple[Sequence[str], Iterable[Sequence[float]]]] | None = None
 
 
 @dataclass(frozen=True)

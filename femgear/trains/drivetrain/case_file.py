@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, StrictBool
@@ -38,6 +38,7 @@ from femgear.case.sections import FORMAT, DampingRatio, Speed
 from femgear.case.text import CaseFile, ReadCase
 from femgear.errors import CaseError, FemgearError, Finding
 from femgear.gears.deviations import common_period
+from femgear.gears.pair import GearPair
 from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
@@ -469,7 +470,7 @@ def _told(error: FemgearError) -> dict[str, Any]:
 
 def _unlike(pair: Any, stage: ParallelSection, key: str) -> Iterator[CaseError]:
     """Entries of a stage that are not those of its pair: teeth, helix, pressure angle, base circles."""
-    gears, helix = planetary_set(pair), abs(pair.helix_angle or 0.0)
+    gears, helix = cast(GearPair, planetary_set(pair)), abs(pair.helix_angle or 0.0)
     if gears.gear_2.internal:
         words = "the gears of a parallel stage are external"
         yield CaseError(words, code="E-CHOICE", key="gear_2.outer_radius", remedy="leave it out")
@@ -480,7 +481,7 @@ def _unlike(pair: Any, stage: ParallelSection, key: str) -> Iterator[CaseError]:
     words = tuple(f"base radii {' and '.join(map(LENGTH.show, one))}" for one in radii)
     size = next(iter(stage.given("radii", "base_radii", "module")), "module")
     for name, found, wanted, shown in (
-        ("teeth", *teeth, teeth),
+        ("teeth", *teeth, tuple(map(str, teeth))),
         ("helix_angle", abs(stage.helix_angle), helix, tuple(map(ANGLE.show, (stage.helix_angle, helix)))),
         ("pressure_angle", angle, nearest, tuple(map(ANGLE.show, (angle, nearest)))),
         (size, radii[0] or radii[1], radii[1], words),

@@ -20,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import cast
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from femgear.case.gear_set import line_play
 from femgear.case.text import write
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import beam_element, disc_matrices
+from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
 from femgear.system.force_laws import positive_part
 from femgear.system.fourier import FourierSeries, orders_of, phase_of
@@ -466,7 +468,7 @@ def _computed_mesh(text: str) -> ComputedMesh:
     values = static.cycle.stiffness[0]
     # a negative torque is the drive of gear 2: positions run backwards
     samples = values if pair.operation.torque > 0.0 else values[-np.arange(len(values)) % len(values)]
-    ratio = static.planetary_set.contact_ratio + abs(static.overlap_ratio)
+    ratio = cast(GearPair, static.planetary_set).contact_ratio + abs(static.overlap_ratio)
     known = {"stiffness": float(values.mean()), "contact_ratio": ratio, "backlash": line_play(pair) or None}
     return ComputedMesh.in_si(samples=tuple(samples.tolist()), **known)
 

@@ -17,7 +17,7 @@ from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
-from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
+from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
 from femgear.gears.iso6336 import contact_safety, root_safety, single_pair_factor
 from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
@@ -457,24 +457,13 @@ def run_up_lines(runup: xr.Dataset, known: Mapping[str, Any]) -> tuple[SensorLin
 
 
 def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
-    """Find by unit the largest sum of amplitudes of a speed, and what half a rate [Hz] and above has of it.
-
-    That is the largest root mean square of these lines, with the one of all lines at that speed.
-    """
+    """Find the extent of all lines of both sensors by unit, see `femgear.exchange.formats.line_extent`."""
     parts = [(unit, order, np.array([speed]), v[None]) for speed, _, unit, order, v in _recordings(results)]
     if "runup" in results.stages:
         lines, pressure = run_up_lines(results.runup, results.housing.attrs)
         heard = ("m/s^2", lines.acceleration), ("Pa", pressure)
         parts += [(unit, lines.order, lines.base_speed, values) for unit, values in heard]
-    found = dict[str, tuple[float, float, float]]()
-    for unit, order, speed, values in parts:
-        power, above = 0.5 * np.abs(values) ** 2, order * speed[:, None] >= np.pi * rate
-        lost, (most, least, _) = (power * above).sum(axis=1), found.get(unit, (0.0, 0.0, 0.0))
-        worst = int(lost.argmax())
-        level = (float(np.sqrt(lost[worst])), float(np.sqrt(power[worst].sum())))
-        sums = max(most, float(np.abs(values).sum(axis=1).max()))
-        found[unit] = (sums, *(level if level[0] >= least else found[unit][1:]))
-    return found
+    return line_extent(parts, rate)
 
 
 def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:

@@ -590,6 +590,10 @@ def _warnings(case: Case) -> Iterator[Finding]:
         )  # fmt: skip
 
 
+_FORMATS = {"wav": ("housing",), "uff": ("housing", "modes"), "quality": ("housing",)}
+"""Formats of what a test bench would record, and the stages that they take."""
+
+
 ELASTIC = Train(
     name="elastic", words="a case with an elastic ring",
     stages=(
@@ -625,5 +629,7 @@ ELASTIC = Train(
         ),
     ),
     describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,
-    recorded=Recorded(sensor_signals, sensor_spectra, ring_shapes, order_cuts, signal_extent),
+    recorded=Recorded(
+        sensor_signals, signal_extent, _FORMATS, 2, sensor_spectra, ring_shapes, order_cuts
+    ),
 )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,9 @@ import numpy as np
 from femgear.case.dependencies import Entries
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
+from femgear.exchange.formats import Sampling, Signal, line_extent
 from femgear.gears.pair import GearPair
+from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
 from femgear.report.tables import Block, chosen, first_speeds, response_warnings, tabulate
 from femgear.storage.results import (
     FOURIER,
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.solvers.stability.parametric import Stability
+    from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
 
 _SHOWN = 12
@@ -133,12 +137,11 @@ class PairDynamicsResult:
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
-        motion, lines, on_bearing = self.motion, "speed mesh harmonic", "speed gear axis harmonic"
+        motion, lines = self.motion, "speed mesh harmonic"
         entries = (
-            ("dte", lines, motion.dte, "m", "dynamic transmission error of the rotations"),
+            *_lines(motion),
             ("mesh_deflection", lines, motion.deflection, "m", "approach of the flanks"),
             ("mesh_force", lines, motion.force, "N", "dynamic mesh force"),
-            ("bearing_force", on_bearing, motion.bearing, "N", "force of the gear on its bearing"),
         )
         reach = ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation")
         known = response_entries(self) | {"excitation_limit": reach} | motion.levels("speed")
@@ -191,6 +194,7 @@ class PairRunupResult:
             "mesh_frequency": ("speed", self.mesh_frequency, "Hz", "mesh frequency"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation"),
             **levels,
+            **complex_entries(_lines(self.motion), single=True),
             **declared({name: ("resonance", *words) for name, words in _RESONANCE.items()}, known),
         }
         if self.branch is not None:
@@ -206,13 +210,66 @@ class PairRunupResult:
             "unresolved_resonances": self.unresolved,
             **self.verdict,
         }
-        return dataset(variables, _coordinates(self), attrs)
+        axes = {"axis": ["x", "y"], "harmonic": np.arange(self.motion.dte.shape[-1])}
+        return dataset(variables, _coordinates(self, **axes), attrs | {"fourier_convention": FOURIER})
 
     @property
     def verdict(self) -> dict:
         """Tell for the manifest at how many speeds the linear response pulls, and how the branch ended."""
         apart = int((self.motion.lowest < 0.0).sum())
         return {"separated": apart, "complete": int(self.complete), "message": self.message}
+
+
+def _lines(motion: PairMotion) -> tuple[tuple, tuple]:
+    """What signals are made of."""
+    dte = "speed mesh harmonic", motion.dte, "m", "dynamic transmission error of the rotations"
+    bearing = "speed gear axis harmonic", motion.bearing, "N", "force of the gear on its bearing"
+    return ("dte", *dte), ("bearing_force", *bearing)
+
+
+def signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
+    """Sample acceleration of the transmission error and bearing forces at every speed, and over the run-up.
+
+    At one speed they last whole turns of gear 1. The run-up has flanks held together.
+    """
+    rate = sampling.rate
+    for stage in ("dynamics", *({"runup"} & {*results.stages})):
+        for name, unit, order, speed, values in _recordings(results, stage):
+            if stage == "runup":
+                found = run_up_signal(order, values, speed, duration=sampling.run_up, rate=rate)
+                yield Signal(f"{name}_run_up", unit, rate, found, steady=False)
+                continue
+            for one, lines, rpm in zip(speed, values, results[stage]["speed"].values, strict=True):
+                samples = whole_turns(one, sampling.duration, rate=rate)
+                found = sampled_signal(order, lines, one, samples=samples, rate=rate)
+                text = np.format_float_positional(rpm, 9, fractional=False, trim="-")
+                yield Signal(f"{name}_{text}_rpm", unit, rate, found)
+    if "runup" in results.stages and results.runup.attrs["separated"]:
+        text = "the sound of the run-up is that of flanks held together, which pull at some of its speeds"
+        warnings.warn(str(Finding("W-PULL", "runup", text, remedy="listen to the speeds")), stacklevel=2)
+
+
+def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
+    """Find the extent of the lines of all signals by unit, see `femgear.exchange.formats.line_extent`."""
+    stages = ("dynamics", *({"runup"} & {*results.stages}))
+    return line_extent((one[1:] for stage in stages for one in _recordings(results, stage)), rate)
+
+
+def _recordings(results: Results, stage: str) -> Iterator[tuple[str, str, np.ndarray, np.ndarray, Any]]:
+    """Name, unit, orders of gear 1 (n,), its speeds (s,) [rad/s] and amplitudes (s, n) of every signal.
+
+    Bearing forces are their fluctuations along the mean force, which is the line of action.
+    """
+    data = results[stage]
+    order, speed = data["harmonic"].values * results.case.gear_1.teeth, data["speed"].values * RPM
+    dte, force = (data[f"{name}_real"].values + 1j * data[f"{name}_imag"].values
+                  for name in ("dte", "bearing_force"))  # fmt: skip
+    yield "transmission_error", "m/s^2", order, speed, -(np.outer(speed, order) ** 2) * dte[:, 0]
+    mean = np.real(force[..., :1])
+    along = (mean / np.linalg.norm(mean, axis=2, keepdims=True) * force).sum(axis=2)
+    along[..., 0] = 0.0
+    for gear in range(2):
+        yield f"bearing_force_gear_{gear + 1}", "N", order, speed, along[:, gear]
 
 
 def _coordinates(result: PairDynamicsResult | PairRunupResult, **axes: Any) -> dict[str, tuple]:

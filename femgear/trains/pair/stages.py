@@ -57,10 +57,13 @@ from femgear.trains.pair.results import (
     describe_runup,
     dynamics_warnings,
     runup_warnings,
+    signal_extent,
+    signals,
 )
 from femgear.trains.protocol import (
     Figures,
     Progress,
+    Recorded,
     Stage,
     Train,
     modes_verdict,
@@ -305,6 +308,8 @@ def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
     heard, damping = forces.heard[met.row, met.harmonic - 1], forces.damping_ratio[met.row]
     speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, heard, damping)
     speeds = np.union1d(speeds, operating[(operating >= first) & (operating <= last)])
+    # equal but for rounding
+    speeds = speeds[np.diff(speeds, prepend=0.0) > 1e-9 * speeds]
     harmonics = _harmonics(case, basis, speeds * per_speed)
     response, motion = _linear(case, modes, speeds * per_speed, harmonics)
     nearest, beside = (np.abs(one[:, None] - resonance).argmin(axis=0) for one in (speeds, operating))
@@ -414,4 +419,5 @@ PAIR = Train(
         for name, figures in FIGURES.items()
     }
     | {"dynamics": DYNAMICS, "runup": RUNUP},
+    recorded=Recorded(signals, signal_extent, {"wav": ("dynamics",)}, 3),
 )

@@ -1,23 +1,29 @@
 """Vibration of a pair: closed forms, the pair of the impacts, integration in time, energy, units."""
 
 import math
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
+from femgear import cli, open_results
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.stability.parametric import stability
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.system import MeshExcitation
 from femgear.trains.gear_pair.model import ImpactPair
+from femgear.trains.pair import stages
 from femgear.trains.pair.model import body_of, pair_model, separating_pair
+from femgear.trains.pair.results import runup_warnings
 from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, solve_pair_runup
-from femgear.trains.reading import read_case, with_values
+from femgear.trains.reading import read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
 from femgear.trains.static.stages import solve_static
 
@@ -172,6 +178,75 @@ def test_the_branch_of_the_run_up_passes_through_the_operating_points():
     assert data.branch_dte_rms[near] == pytest.approx(dynamics.dataset().dte_rms[2].item(), rel=0.02)
     strongest = data.resonance_alone.values.argmax()
     assert data.frequency[strongest] == pytest.approx(modes.modes.frequency[1])
+
+
+@pytest.mark.parametrize(
+    "finer",
+    [{"_LEAST": 32, "_ON_BRANCH": (32, 56)}, {"_STEPS": replace(stages._STEPS, largest=0.025)}],
+    ids=["harmonics", "steps"],
+)
+def test_twice_the_harmonics_and_half_the_steps_leave_the_largest_amplitude(finer, monkeypatch):
+    """Within 1 %: of the run-up with flanks held together, of the branch, and of the operating speeds."""
+
+    def peaks():
+        case, modes, _ = solved()
+        data = solve_pair_runup(case, modes).dataset()
+        found = solve_pair_dynamics(case, modes).dataset()
+        return [data.dte_rms.max(), data.branch_dte_rms.max(), *found.dte_rms.values]
+
+    known = peaks()
+    for name, value in finer.items():
+        monkeypatch.setattr(stages, name, value)
+    np.testing.assert_allclose(peaks(), known, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("points", "words"), [(400, "nothing bounds motions"), (40, "after 4. points: raise max_points")]
+)
+def test_a_branch_that_is_cut_says_so_and_why(points, words, monkeypatch):
+    """At little damping it grows without bound towards speeds at which the linear motion is not stable."""
+    monkeypatch.setattr(stages, "_STEPS", replace(stages._STEPS, max_points=points))
+    case = pair_case(**{"dynamics.damping_ratio": 0.02})
+    result = solve_pair_runup(case, solve_pair_modes(case, solve_static(case)))
+    data = result.dataset()
+    (said,) = (one for one in runup_warnings(data) if one.code == "W-BRANCH")
+    assert not result.complete and re.search(words, said.text)
+    if points == 400:
+        end = float(data.branch_speed[-1]) * 24.0 / 60.0
+        modes = solve_pair_modes(case, solve_static(case))
+        hertz = end * np.array([0.995, 1.01])
+        below, above = stability(modes.modes, modes.excitation, hertz, excitation_harmonics=16).multiplier
+        assert abs(below) < 1.0 < abs(above)
+        travel = np.abs(result.branch[1].deflection[-1]).sum()
+        assert 0.45 * 3e-3 < travel <= 0.5 * 3e-3
+        assert f"{1e3 * float(data.branch_dte_rms[-1]):.3g} mm" in said.text
+
+
+def test_sound_of_a_pair_is_that_of_its_lines(tmp_path):
+    changes = {"operation.speeds": ["1500 rpm"], "runup.count": 4, "dynamics.up_to": "4 kHz"}
+    folder = tmp_path / "case.toml"
+    folder.write_text(to_toml(pair_case(**changes)), encoding="utf-8")
+    assert cli.main(["run", str(folder), "-o", str(tmp_path / "out"), "--no-pictures"]) == 0
+    options = ["--wav", "--duration", "0.5", "--run-up", "0.3", "--force-scale", "1"]
+    assert cli.main(["export", str(tmp_path / "out"), *options]) == 0
+    found, data = tmp_path / "out" / "exported", open_results(tmp_path / "out").dynamics
+    names = ["bearing_force_gear_1", "bearing_force_gear_2", "transmission_error"]
+    known = [f"{name}_{end}.wav" for name in names for end in ("1500_rpm", "run_up")]
+    assert sorted(one.name for one in found.iterdir()) == known
+    rate, force = wavfile.read(found / "bearing_force_gear_2_1500_rpm.wav")
+    assert force.std() == pytest.approx(data.bearing_rms[0, 1].item(), rel=1e-3)
+    assert b"1.0 = 1 N" in (found / "bearing_force_gear_2_1500_rpm.wav").read_bytes()
+    _, error = wavfile.read(found / "transmission_error_1500_rpm.wav")
+    scale = float(
+        re.search(rb"1\.0 = (\S+) m/s\^2", (found / "transmission_error_1500_rpm.wav").read_bytes())[1]
+    )
+    harmonic = np.arange(data.sizes["harmonic"])
+    dte = np.hypot(data.dte_real, data.dte_imag).values[0, 0]
+    rms = np.sqrt(0.5 * ((2.0 * np.pi * 600.0 * harmonic) ** 4 * dte**2).sum())
+    assert scale * error.std() == pytest.approx(rms, rel=1e-3) and abs(error).max() <= 1.0
+    line = 2.0 * np.abs(np.exp(-2j * np.pi * 600.0 / rate * np.arange(len(error))) @ error) / len(error)
+    assert scale * line == pytest.approx((2.0 * np.pi * 600.0) ** 2 * dte[1], rel=1e-3)
+    assert cli.main(["export", str(tmp_path / "out"), "--uff"]) == 2
 
 
 @pytest.mark.parametrize(
