@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from page_examples import read_page, run_examples
 
 from femgear.study.relief import design_basis, harris_map, with_tip_relief
 from femgear.trains.pair.stages import iso_stiffness
@@ -64,3 +65,23 @@ def test_helical_pair_and_lead_slope():
     cycle = solve_static(case).cycle
     linear = 1.0 + 4e-6 * iso_stiffness(case)[1] * case.set.face_width / (2.0 * cycle.force.max())
     assert f"K_Hβ = {cycle.face_load_factor[0]:.2f}; linear teeth" in PAGE and f"give {linear:.2f}:" in PAGE
+
+
+def test_stiffness_for_ross(tmp_path, monkeypatch):
+    """Mean and first harmonic of what ROSS interpolates are those of the static solution."""
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    monkeypatch.chdir(tmp_path)
+    _, examples, printed = read_page("pair.md")
+    assert run_examples("pair.md", examples) == printed
+    known = np.load("spur_pair_stiffness.npz")
+    theta, stiffness = known["theta"], known["stiffness"]
+    assert theta[0] == 0.0 and theta[-1] == 2.0 * np.pi / 24 and stiffness[-1] == stiffness[0]
+    k = solve_static(read_case(CASE)).cycle.stiffness[0]
+    # the middle of the third period, and all positions of the first
+    turned = 2.0 * np.pi / 24 * np.append(2.5, np.arange(len(k)) / len(k))
+    expected = np.append(k[len(k) // 2], k)
+    np.testing.assert_allclose(np.interp(turned % theta[-1], theta, stiffness), expected, rtol=1e-9)
+    ross = pytest.importorskip("ross")
+    mesh = object.__new__(ross.multi_rotor.mesh.Mesh)
+    mesh.theta_range, mesh.stiffness_range = theta, stiffness
+    np.testing.assert_allclose(mesh.interpolate_stiffness(turned), expected, rtol=1e-9)

@@ -54,6 +54,16 @@ RUNS = {
             "simulation.modes": 1,
         },
     ),
+    "pair": (
+        "spur_pair",
+        {
+            "static.positions": 16,
+            "static.stresses": False,
+            "set.backlash": "0.1 mm",
+            "operation.speeds": ["18500 rpm"],
+            "runup": {"from": "17000 rpm", "to": "19000 rpm", "count": 3},
+        },
+    ),
     "multistage": ("four_stage_reducer", {"response.points": 3, "response.balance_points": 1}),
     "gear_pair": (
         "gear_pair",
