@@ -82,6 +82,6 @@ def test_stiffness_for_ross(tmp_path, monkeypatch):
     expected = np.append(k[len(k) // 2], k)
     np.testing.assert_allclose(np.interp(turned % theta[-1], theta, stiffness), expected, rtol=1e-9)
     ross = pytest.importorskip("ross")
-    mesh = object.__new__(ross.multi_rotor.mesh.Mesh)
+    mesh = object.__new__(ross.multi_rotor.Mesh)
     mesh.theta_range, mesh.stiffness_range = theta, stiffness
     np.testing.assert_allclose(mesh.interpolate_stiffness(turned), expected, rtol=1e-9)

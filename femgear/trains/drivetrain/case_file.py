@@ -19,7 +19,7 @@ from pydantic import Field, StrictBool
 
 from femgear.case import text as case_text
 from femgear.case.csv_columns import Columns, embed_points, embed_profiles, embedded, read_columns
-from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.case.gear_set import line_play, planetary_set, set_deviations
 from femgear.case.quantities import (
     ACCELERATION,
     ANGLE,
@@ -499,8 +499,9 @@ def _unfit(pair: Any, harmonics: int) -> Iterator[CaseError]:
     """What leaves no stiffness over one mesh period: no torque, errors of several periods, few positions."""
     if not pair.operation.torque:
         yield CaseError(
-            "without torque no flanks touch", code="E-RANGE", key="operation.torque", value="0 N m"
-        )
+            "without torque no flanks touch", code="E-RANGE", key="operation.torque", value="0 N m",
+            remedy="give the torque that the stage carries",
+        )  # fmt: skip
     periods, _ = common_period(set_deviations(pair), planetary_set(pair), limit=sys.maxsize)
     if periods > 1:
         yield CaseError(
@@ -610,7 +611,10 @@ def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
     if not stages:
         yield Finding("W-BACKLASH", "simulation.contact_loss", "there are no meshes that could part")
     meshes = [(f"{key}.{name}", getattr(stage, name, None)) for key, stage in stages for name in _MESHES]
-    if bare := [key for key, mesh in meshes if mesh is not None and mesh.backlash is None]:
+    bare = [key for key, mesh in meshes if mesh is not None and mesh.backlash is None]
+    pairs = [(i, stage.stiffness) for i, stage in enumerate(case.parallel) if stage.stiffness is not None]
+    bare += [f"parallel[{i}].stiffness" for i, one in pairs if not line_play(pair_of(case_text.write(one)))]
+    if bare:
         yield Finding(
             "W-BACKLASH",
             ", ".join(bare),

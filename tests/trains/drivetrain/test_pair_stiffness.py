@@ -86,6 +86,13 @@ def test_the_case_holds_the_pair_and_changes_with_it(chain):
     assert {"string", "object"} <= set(entry["anyOf"][0]["type"])
 
 
+def test_flanks_without_play_have_no_back_side_and_it_is_said(chain):
+    loose = with_values(chain, {"simulation.contact_loss": True})
+    tight = with_values(loose, {f"{ENTRY}.set.backlash": None})
+    assert not loose.notices and [one.key for one in tight.notices] == [ENTRY]
+    assert np.isinf(case_model(tight).backlash[0])
+
+
 @pytest.mark.parametrize(
     ("changes", "code", "key"),
     [

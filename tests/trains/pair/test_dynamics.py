@@ -12,6 +12,7 @@ from scipy.io import wavfile
 
 from femgear import cli, open_results
 from femgear.errors import CaseError
+from femgear.report.charts import chart
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
@@ -20,9 +21,11 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.system import MeshExcitation
 from femgear.trains.gear_pair.model import ImpactPair
 from femgear.trains.pair import stages
+from femgear.trains.pair.figures import RUNUP
 from femgear.trains.pair.model import body_of, pair_model, separating_pair
 from femgear.trains.pair.results import runup_warnings
 from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, solve_pair_runup
+from femgear.trains.protocol import Drawn
 from femgear.trains.reading import read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
 from femgear.trains.static.stages import solve_static
@@ -220,6 +223,18 @@ def test_a_branch_that_is_cut_says_so_and_why(points, words, monkeypatch):
         travel = np.abs(result.branch[1].deflection[-1]).sum()
         assert 0.45 * 3e-3 < travel <= 0.5 * 3e-3
         assert f"{1e3 * float(data.branch_dte_rms[-1]):.3g} mm" in said.text
+
+
+@pytest.mark.parametrize(("speeds", "crossings"), [(("1500 rpm", "1900 rpm"), True), (("20 rpm",), False)])
+def test_campbell_diagram_shows_the_mode_and_the_harmonics_that_meet_it(speeds, crossings):
+    case, modes, _ = solved(("operation.speeds", speeds))
+    runup = solve_pair_runup(case, modes).dataset()
+    figure = RUNUP.draw(Drawn(case, {"runup": runup, "modes": modes.dataset()}))["campbell"]
+    (ax,) = figure.axes
+    labels = [line.get_label() for line in ax.get_lines()]
+    met = len(ax.collections[0].get_offsets())
+    assert (met > 3) == ("torsional mode" in labels) == crossings
+    assert chart(figure) is not None
 
 
 def test_sound_of_a_pair_is_that_of_its_lines(tmp_path):
