@@ -248,7 +248,7 @@ def _areas(ax: Any) -> list[dict[str, Any]]:
         elif isinstance(one, PolyCollection):
             found += [_area(path.vertices, one, ax) for path in one.get_paths()]
         elif isinstance(one, PathCollection):
-            found += [_points(one, ax)] if len(one.get_offsets()) else []
+            found += [_points(one, ax)] if np.size(one.get_offsets()) else []
         else:
             raise _PictureOnly
     return found
