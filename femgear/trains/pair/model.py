@@ -21,6 +21,7 @@ import numpy as np
 
 from femgear.case.gear_set import line_play, set_deviations
 from femgear.case.sections import MaterialSection
+from femgear.contact.cycle import CycleOptions
 from femgear.contact.loaded_period import loaded_period
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import mesh_normals
@@ -30,6 +31,7 @@ from femgear.system.mesh_directions import assemble, stiffness_matrix
 from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem, gear_meshes
 from femgear.trains.pair.case_file import GearSection, PairCase
 from femgear.trains.static.results import StaticResult
+from femgear.trains.static.stages import over_width, record_positions
 
 _RECORD = 2**13
 """Positions of the excitation in the mesh period."""
@@ -126,9 +128,12 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
 def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
     """Compute mesh stiffness, transmission error and force of the loaded pair over one mesh period."""
     gears, deviations = cast(GearPair, static.planetary_set), set_deviations(case)
+    if slices := over_width(case, gears):
+        slices |= {"held_waves": slices["waves"]}
     state = loaded_period(
-        gears, static.bodies, static.bodies, sun_torque=static.sun_torque, positions=case.static.positions,
-        contact=case.static.contact, deviations=None if deviations.ideal else deviations,
+        gears, static.bodies, static.bodies, sun_torque=static.sun_torque,
+        positions=record_positions(case, gears), contact=case.static.contact,
+        deviations=None if deviations.ideal else deviations, options=CycleOptions(**slices),
     )  # fmt: skip
     record = (state.resampled(name, _RECORD) for name in ("stiffness", "deflection", "force"))
     return MeshExcitation(*record, backlash=np.array([line_play(case)]))

@@ -59,6 +59,7 @@ _RESONANCE = {
     "operating_speed": ("rpm", "nearest operating speed"),
     "distance": ("%", "distance of the resonance from that speed"),
 }
+_PLAY = "m", "play along the line of action, 0: no back side"
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class PairModesResult:
             "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape"),
             "mesh_stiffness": ("mesh", modes.mesh_stiffness, "N/m", "mean mesh stiffness"),
             "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
-            "backlash": ("mesh", play, "m", "play along the line of action, 0: no back side"),
+            "backlash": ("mesh", play, *_PLAY),
         }
         axes = {"mode": np.arange(len(modes.frequency)), "dof": modes.dofs, "mesh": self.gears.mesh_names}
         title = "modes of the pair with its mean mesh stiffness"
@@ -125,7 +126,7 @@ class PairMotion:
 class PairDynamicsResult:
     """Motion at every ``input_speed`` (s,) [rad/s], its stability, and end of the excitation (s,) [Hz].
 
-    Where the linear response pulls, all are those of the harmonic balance with play.
+    Where the linear response pulls, all are those of the harmonic balance with play, ``backlash`` (1,) [m].
     """
 
     gears: GearPair
@@ -134,6 +135,7 @@ class PairDynamicsResult:
     response: Response
     stability: Stability
     excitation_limit: np.ndarray
+    backlash: np.ndarray
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
@@ -145,6 +147,7 @@ class PairDynamicsResult:
         )
         reach = ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation")
         known = response_entries(self) | {"excitation_limit": reach} | motion.levels("speed")
+        known["backlash"] = ("mesh", self.backlash, *_PLAY)
         title = {"title": "periodic response of the pair", "message": self.response.message}
         return dataset(
             known | complex_entries(entries),
@@ -306,6 +309,9 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
         text = f"flanks part at {first_speeds(speed[apart])}"
         text += f", back flanks are struck at {first_speeds(speed[back])}" if back.any() else ""
         remedy = "look at the branch of the run-up for other motions there"
+        if not data["backlash"].item() > 0.0:
+            text += "; without backlash the pair has no back flanks to strike, as if its play had no end"
+            remedy = f"give set.backlash or smaller profile shifts; {remedy}"
         yield Finding("W-SEPARATION", "operation.speeds", text, remedy=remedy)
 
 

@@ -109,16 +109,26 @@ _TOLD = ("converged", "residual", "iterations", "tail", "spectral_radius")
 """What a response tells of every speed."""
 
 
+_STEEL, _FULL_LOAD = 206e9, 100e3
+"""Young's modulus [Pa] and least load [N/m] for which the stiffness of ISO 6336-1 is given."""
+
+
 def iso_stiffness(case: PairCase) -> tuple[float, float]:
     """Compute c' and c_gamma_alpha of ISO 6336-1, method B, of a case [N/m^2].
 
-    Both are NaN where the profile shifts are outside the range of the method; they hold for steel and solid
-    discs, see `femgear.gears.iso6336.mesh_stiffness_method_b`.
+    Both are NaN where the profile shifts are outside the range of the method. They hold for solid discs, see
+    `femgear.gears.iso6336.mesh_stiffness_method_b`; the standard takes them in proportion to Young's modulus
+    over that of steel, and to the fourth root of loads below 100 N/mm at the reference circle.
     """
+    (gears,) = planetary_set(case).kinds
+    first = gears.gears[0]
+    load = abs(case.operation.torque) / (first.reference_radius * first.face_width)
+    factor = case.material.youngs_modulus / _STEEL * min(1.0, load / _FULL_LOAD) ** 0.25
     try:
-        return pair_mesh_stiffness(planetary_set(case).kinds[0], case.helix_angle or 0.0)
+        single, mean = pair_mesh_stiffness(gears, case.helix_angle or 0.0)
     except GeometryError:
         return math.nan, math.nan
+    return factor * single, factor * mean
 
 
 def _describe_case(case: PairCase) -> tuple[Block, ...]:
@@ -288,7 +298,8 @@ def pair_dynamics_parts(
         lines = {"deflection": motion.deflection, "force": motion.force, "lowest_force": motion.lowest}
         response = replace(response, **lines, **told, method=tuple(method))
         judged, reach = replace(judged, multiplier=multiplier), harmonics[0] * frequency
-        yield part, PairDynamicsResult(modes.gears, speeds, motion, response, judged, reach)
+        play = modes.excitation.backlash
+        yield part, PairDynamicsResult(modes.gears, speeds, motion, response, judged, reach, play)
         progress("dynamics", float(own[-1] + 1), float(count))
 
 

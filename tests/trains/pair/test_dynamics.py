@@ -23,7 +23,7 @@ from femgear.trains.gear_pair.model import ImpactPair
 from femgear.trains.pair import stages
 from femgear.trains.pair.figures import RUNUP
 from femgear.trains.pair.model import body_of, pair_model, separating_pair
-from femgear.trains.pair.results import runup_warnings
+from femgear.trains.pair.results import dynamics_warnings, runup_warnings
 from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, solve_pair_runup
 from femgear.trains.protocol import Drawn
 from femgear.trains.reading import read_case, to_toml, with_values
@@ -143,10 +143,18 @@ def test_the_mean_mesh_force_carries_the_torque_at_every_speed(changes):
     np.testing.assert_allclose(mean[:, 0], -mean[:, 1], rtol=1e-6)
 
 
-def test_slow_gears_follow_the_static_solution():
-    _, modes, dynamics = solved(("operation.speeds", ("30 rpm",)))
-    static = modes.excitation.deflection[0]
-    assert dynamics.dataset().dte_rms.item() == pytest.approx(static.std(), rel=5e-3)
+HELICAL = (("set.helix_angle", "20 deg"), ("set.centre_distance", "97 mm"), ("static.slices", 9))
+CROWNED = (("static.slices", 9), ("gear_1.modifications", [{"kind": "lead crowning", "amount": "10 um"}]))
+
+
+@pytest.mark.parametrize("changes", [(), HELICAL, CROWNED], ids=["spur", "helical", "crowned"])
+def test_slow_gears_follow_the_static_solution(changes):
+    case = pair_case(**dict(changes), **{"operation.speeds": ["30 rpm"], "static.positions": 64})
+    static = solve_static(case)
+    dynamics = solve_pair_dynamics(case, solve_pair_modes(case, static)).dataset()
+    error = static.cycle.deflection[0]
+    assert dynamics.dte_real.isel(harmonic=0).item() == pytest.approx(error.mean(), rel=5e-3)
+    assert dynamics.dte_rms.item() == pytest.approx(error.std(), rel=5e-3)
 
 
 def test_the_sign_of_the_torque_turns_time_around_at_rest_and_not_the_modes():
@@ -294,3 +302,11 @@ def test_refusals_name_the_entries(changes, code, key):
         pair_case(**changes)
     problems = getattr(found.value, "problems", ()) or (found.value,)
     assert (code, key) in [(one.code, one.key) for one in problems]
+
+
+@pytest.mark.parametrize(("play", "said"), [("0.1 mm", False), ("0 mm", True)])
+def test_flanks_that_part_without_backlash_are_told_to_have_no_back(play, said):
+    case = pair_case(**{"set.backlash": play, "operation.speeds": ["9400 rpm"]})
+    data = solve_pair_dynamics(case, solve_pair_modes(case, solve_static(case))).dataset()
+    (found,) = [one for one in dynamics_warnings(data) if one.code == "W-SEPARATION"]
+    assert ("no back flanks" in found.text) == said

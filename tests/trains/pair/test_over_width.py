@@ -136,3 +136,13 @@ def test_refusals_name_the_entries_of_the_file(changes, code, key, words):
         check_case(helical({}, 20, **{"static.slices": 0, **changes}))
     problems = getattr(found.value, "problems", ()) or (found.value,)
     assert any(one.code == code and one.key == key and words in str(one) for one in problems)
+
+
+def test_stiffness_of_the_standard_knows_material_and_small_loads():
+    steel, light, small = (
+        iso_stiffness(pair_case(changes))[1]
+        for changes in ({}, {"material.youngs_modulus": "70 GPa"}, {"operation.torque": "20 N m"})
+    )
+    assert light == pytest.approx(steel * 70.0 / 206.0)
+    # 20 N m on a reference radius of 36 mm and 20 mm of width are 27.8 N/mm
+    assert small == pytest.approx(steel * (20.0 / 0.036 / 0.020 / 100e3) ** 0.25)
