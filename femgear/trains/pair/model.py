@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -127,12 +127,13 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
 
 def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
     """Compute mesh stiffness, transmission error and force of the loaded pair over one mesh period."""
-    gears, deviations = cast(GearPair, static.planetary_set), set_deviations(case)
-    if slices := over_width(case, gears):
+    gears: Any = static.planetary_set
+    deviations, slices = set_deviations(case), over_width(cast(Any, case), gears)
+    if slices:
         slices |= {"held_waves": slices["waves"]}
     state = loaded_period(
         gears, static.bodies, static.bodies, sun_torque=static.sun_torque,
-        positions=record_positions(case, gears), contact=case.static.contact,
+        positions=record_positions(cast(Any, case), gears), contact=case.static.contact,
         deviations=None if deviations.ideal else deviations, options=CycleOptions(**slices),
     )  # fmt: skip
     record = (state.resampled(name, _RECORD) for name in ("stiffness", "deflection", "force"))

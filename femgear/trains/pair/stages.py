@@ -120,7 +120,7 @@ def iso_stiffness(case: PairCase) -> tuple[float, float]:
     `femgear.gears.iso6336.mesh_stiffness_method_b`; the standard takes them in proportion to Young's modulus
     over that of steel, and to the fourth root of loads below 100 N/mm at the reference circle.
     """
-    (gears,) = planetary_set(case).kinds
+    gears = cast(GearPair, planetary_set(case))
     first = gears.gears[0]
     load = abs(case.operation.torque) / (first.reference_radius * first.face_width)
     factor = case.material.youngs_modulus / _STEEL * min(1.0, load / _FULL_LOAD) ** 0.25
