@@ -9,14 +9,30 @@ body, all its teeth under all its loads, gives both in the right order: a tooth 
 mesh period takes the place of its neighbour, so the field of all places over one mesh period is the history
 of one tooth over one turn. Which place is which is told by the tooth numbers of the cycle, and they carry the
 phase between the mesh with the sun and that with the ring.
+
+Loads that differ over the width b are sums of cosines ``cos(k_m z)``, ``k_m = m pi / b``, as displacements
+``(U cos kz, V cos kz, W sin kz)`` are (`femgear.contact.slices`); the ends of the width are mirror planes.
+The surface of the fillet is free, so that the stress along it follows from the strains in it, ``e_t`` along
+the section and ``e_z = k W``, as in plane stress:
+
+    sigma_t = E / (1 - nu^2) (e_t + nu e_z).
+
+Every wave has a response ``s_m`` of its own, of the same sector; between N equal slices
+
+    sigma = sum_m T_m^T s_m T_m p
+
+with the orthonormal cosine transform T and loads p, each at its own place on the flank: s_0 is the plane
+response, to which a uniform load leads back.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import coo_array, csc_array
 
 from femgear.contact.bodies import (
     ObservedRoot,
@@ -27,9 +43,10 @@ from femgear.contact.bodies import (
 )
 from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks, mesh_count
+from femgear.contact.slices import cosines
 from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
 from femgear.fe.compliance import condense_sector, tooth_compliance
-from femgear.fe.elasticity import Material, stiffness
+from femgear.fe.elasticity import Material, plane_modulus, stiffness, wave_stiffness
 from femgear.fe.grid import Grid
 from femgear.gears.gear import Gear
 from femgear.gears.pair import EACH
@@ -37,6 +54,8 @@ from femgear.gears.planetary import GearSet
 
 LOADED, BACK = 0, 1
 """Root of the loaded flank and of the back flank in `RootCycle.stress`."""
+_WAVES = 9
+"""Wave numbers at which responses are computed; between them they are interpolated, within 0.1 %."""
 
 
 @dataclass(frozen=True)
@@ -54,15 +73,31 @@ class _RootStress:
     points: np.ndarray  # (m, 2) root points of the left flank in the tooth frame [m]
     slope: np.ndarray  # (m,) between the tangent of the root and the centreline of the tooth, 0 .. pi/2 [rad]
     influence: np.ndarray  # (teeth, 2 m, 2 n) [Pa/N]
+    waves: np.ndarray | None = None  # (K, teeth, 2 m, 2 n) the same of loads cos(kz) across the width
 
 
 @dataclass(frozen=True)
 class RootStresses:
-    """Root stress influences of the three kinds of gears; a pair has gears 1 and 2 for sun and planet."""
+    """Root stress influences of the three kinds of gears; a pair has gears 1 and 2 for sun and planet.
+
+    ``ahead`` (slices,) are the places of slices before mid-width [mesh periods], zero for spur teeth, where
+    loads differ over the width.
+    """
 
     sun: _RootStress
     planet: _RootStress
     ring: _RootStress | None = None
+    ahead: np.ndarray | None = None
+
+    def loads(self, planetary_set: GearSet, cycle: MeshCycle, *, reverse: bool) -> list[LoadedTeeth]:
+        """Take the tooth loads of every slice from a cycle, each at its place on the path of contact."""
+        if self.ahead is None or cycle.slice_load is None:
+            return [loaded_teeth(cycle, reverse=reverse)]
+        pitch, slices = planetary_set.base_pitch, zip(np.moveaxis(cycle.slice_load, 2, 0), self.ahead)
+        return [
+            loaded_teeth(replace(cycle, tooth_load=load, path=cycle.path + ahead * pitch), reverse=reverse)
+            for load, ahead in slices
+        ]
 
     def of_bodies(self, planetary_set: GearSet) -> list[tuple[int, _RootStress, list]]:
         """Number of the gear, influence and drive flanks (mesh, gear of the pair, side) of every body."""
@@ -78,6 +113,7 @@ class _RootHistory:
     path: np.ndarray  # (S,) path coordinate of its tooth pair in base pitches, 0 at the pitch point
     load: np.ndarray  # (S,) [N]
     stress: np.ndarray  # (S, 2, m) along the roots of the loaded and of the back flank [Pa]
+    over_width: np.ndarray  # (S, slices) largest along the root of the loaded flank [Pa]
 
 
 @dataclass(frozen=True)
@@ -98,11 +134,14 @@ class RootCycle:
     load : (T, P) array
         On the drive flank [N].
     stress : (T, P, 2, m) array
-        Tangential stress along the root of the loaded flank (0) and of the back flank (1) [Pa].
+        Tangential stress along the root of the loaded flank (0) and of the back flank (1) [Pa]; over the
+        width where the largest of the one and the lowest of the other are.
     arc, slope : (m,) arrays
         Arc length from the end of the flank [m], and angle between root and centreline of the tooth [rad].
     periods : int
         Mesh periods in the P positions.
+    over_width : (T, P, slices) array
+        Largest stress along the root of the loaded flank in every slice of the width [Pa].
     """
 
     kind: str
@@ -114,6 +153,13 @@ class RootCycle:
     arc: np.ndarray
     slope: np.ndarray
     periods: int
+    over_width: np.ndarray
+
+    @property
+    def face_load_factor(self) -> float:
+        """K_F-beta: largest over mean of the stresses in all slices, each at its own largest."""
+        largest = self.over_width.max(axis=(0, 1))
+        return float(largest.max() / largest.mean()) if largest.any() else 1.0
 
     @property
     def tension(self) -> np.ndarray:
@@ -144,7 +190,8 @@ class RootCycle:
         each = positions // self.periods
         slot = np.repeat(np.arange(slots), each)
         position = (start + slot) % self.periods * each + np.tile(np.arange(each), slots)
-        return _RootHistory(self.path[slot, position], self.load[slot, position], self.stress[slot, position])
+        values = self.path, self.load, self.stress, self.over_width
+        return _RootHistory(*(one[slot, position] for one in values))
 
 
 @dataclass(frozen=True)
@@ -155,8 +202,8 @@ class RootRange:
     ----------
     kind, mesh, gear
         As those of `RootCycle`: the flank is that which the gear has in the mesh.
-    point : int
-        Root point with the largest difference of the two stresses.
+    point, piece : int
+        Root point with the largest difference of the two stresses, and its slice of the width.
     maximum, minimum : float
         There [Pa].
     tooth_maximum, tooth_minimum : (z,) arrays
@@ -173,6 +220,7 @@ class RootRange:
     mesh: int
     gear: int
     point: int
+    piece: int
     maximum: float
     minimum: float
     tooth_maximum: np.ndarray
@@ -243,6 +291,53 @@ def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:
     )
 
 
+def root_waves(
+    grid: Grid, gear: Gear, material: Material, wave_number: np.ndarray, *, foundation=None
+) -> np.ndarray:
+    """Compute the root stress influences (K, teeth, 2 m, 2 n) of loads ``cos(kz)`` across the width [Pa/N].
+
+    Loads are those over the whole width; see the head of the module. Wave numbers (K,) [1/m]; other arguments
+    as in `root_stress`.
+    """
+    along, stations = root_functionals(grid, gear, material, state="plane strain"), flank_stations(grid, gear)
+    loads, columns = (
+        np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0)
+        for one in (flank_load_columns(grid, stations), along.columns)
+    )
+    if foundation is not None:
+        rests = coo_array(foundation)
+        place = tuple(3 * (one // 2) + one % 2 for one in rests.coords)
+        foundation = csc_array((rests.data, place), shape=(3 * grid.n_nodes,) * 2)
+    parts = [gear.face_width * one for one in wave_stiffness(grid, material)]
+    axial = plane_modulus(material, "plane strain") * material.poisson_ratio
+    options, found = {"count": gear.teeth, "rim": "rim", "loads": loads}, []
+    for k in wave_number:
+        observed = columns.copy()
+        observed[3 * along.nodes + 2, np.arange(len(along.nodes))] += axial * k
+        matrix = (parts[0] + k * parts[1] + k**2 * parts[2]).tocsc()
+        sector = condense_sector(grid, matrix, observations=observed, **options).supported(foundation)
+        found.append(observed_root_stress(gear, ObservedRoot(along, stations, sector)).influence)
+    return np.array(found)
+
+
+def computed_waves(slices: int) -> np.ndarray:
+    """Choose the waves that are computed for N slices, half waves over the width (K,); not all are whole."""
+    last = max(slices - 1, 2)
+    return np.geomspace(1.0, last, min(_WAVES, last))
+
+
+def _between_slices(slices: int) -> np.ndarray:
+    """Parts (1 + K, N, N) of a slice's load in the stress of a slice, of the plane response and of waves."""
+    from scipy.interpolate import CubicSpline
+
+    if slices == 1:
+        return np.ones((1, 1, 1))
+    T, known = cosines(slices), computed_waves(slices)
+    weights = CubicSpline(np.log(known), np.eye(len(known)))(np.log(np.arange(1, slices)))
+    waves = np.einsum("mk,ms,mt->kst", weights, T[1:], T[1:])
+    return np.concatenate([np.full((1, slices, slices), 1.0 / slices), waves])
+
+
 def root_stress_cycle(
     planetary_set: GearSet, roots: RootStresses, cycle: MeshCycle, *, reverse: bool = False
 ) -> tuple[RootCycle, ...]:
@@ -254,56 +349,65 @@ def root_stress_cycle(
     image of that on the other flanks.
     """
     s = planetary_set
-    teeth = loaded_teeth(cycle, reverse=reverse)
+    slices = roots.loads(s, cycle, reverse=reverse)
     samples = np.arange(len(cycle.position))
     found = {}
     for number, root, acting in roots.of_bodies(s):
         slots = [_slots(cycle.tooth[gear, mesh], s.senses[number]) for mesh, gear, _ in acting]
         # seen from behind the teeth are counted the other way round
         numbers = np.concatenate(slots) * (-1 if reverse else 1)
-        field = body_stress(planetary_set, root, acting, teeth, samples, numbers)
+        field = body_stress(planetary_set, root, acting, slices, samples, numbers)
         for target, stress in zip(acting, np.split(field, len(acting)), strict=True):
             found[target[:2]] = _root_cycle(s, s.gears[number].name, root, cycle, target, stress)
     return tuple(found[mesh, gear] for mesh in range(mesh_count(planetary_set)) for gear in (0, 1))
 
 
 def root_ranges(
-    planetary_set: GearSet, roots: RootStresses, teeth: LoadedTeeth, *, closes: bool = True
+    planetary_set: GearSet, roots: RootStresses, slices: Sequence[LoadedTeeth], *, closes: bool = True
 ) -> tuple[RootRange, ...]:
     """Find the stress range in the root of every loaded flank, from the field of whole bodies.
 
-    Of gear 1 and gear 2 of mesh 0, then of mesh 1, and so on. Where the record ``closes``, that is, repeats
-    after its end, every tooth meets every state that tooth numbers and periods without a common divisor
-    allow; otherwise each tooth has what the record shows of it.
+    Of gear 1 and gear 2 of mesh 0, then of mesh 1, and so on, under the loads of all slices of the width, see
+    `RootStresses.loads`. Where the record ``closes``, that is, repeats after its end, every tooth meets every
+    state that tooth numbers and periods without a common divisor allow; otherwise each tooth has what the
+    record shows of it.
     """
     found = {}
     for number, root, acting in roots.of_bodies(planetary_set):
-        for one in _body_ranges(planetary_set, number, root, acting, teeth, closes):
+        for one in _body_ranges(planetary_set, number, root, acting, slices, closes):
             found[one.mesh, one.gear] = one
     return tuple(found[mesh, gear] for mesh in range(mesh_count(planetary_set)) for gear in (0, 1))
 
 
 def body_stress(
-    planetary_set: GearSet, root: _RootStress, acting, teeth: LoadedTeeth, samples, numbers
+    planetary_set: GearSet, root: _RootStress, acting, slices: Sequence[LoadedTeeth], samples, numbers
 ) -> np.ndarray:
-    """Superpose the root stress (t, 2 m, p) [Pa] of some teeth of a body at some positions, left root first.
+    """Superpose the root stress (t, 2 m, slices, p) [Pa] of some teeth of a body, left root first.
 
     Parameters
     ----------
     root, acting
         Of the body, see `RootStresses.of_bodies`.
+    slices : sequence of LoadedTeeth
+        Loads of every slice of the width, see `RootStresses.loads`; one is the plane state.
     samples, numbers : (p,), (t,) int arrays
         Positions of the record, and teeth by their numbers in the first mesh period.
     """
-    z, n = len(root.influence), len(root.roll)
-    total = np.zeros((len(numbers), root.influence.shape[1], len(samples)))
-    for one in teeth.on_body(planetary_set, acting):
-        if one.load[samples].any():
-            forces = _station_forces(one.roll[samples], one.load[samples], root.roll)
-            flank = slice(one.flank * n, (one.flank + 1) * n)
-            columns = root.influence[(numbers - one.tooth) % z, :, flank].reshape(-1, n)
-            total += (columns @ forces).reshape(total.shape)
-    return total
+    z, n, shape = len(root.influence), len(root.roll), (len(slices), len(samples))
+    forces = {}
+    for i, teeth in enumerate(slices):
+        for one in teeth.on_body(planetary_set, acting):
+            if one.load[samples].any():
+                own = forces.setdefault((one.tooth, one.flank), np.zeros((n, *shape)))
+                own[:, i] += _station_forces(one.roll[samples], one.load[samples], root.roll)
+    between = _between_slices(len(slices))
+    waves = root.influence[None] if root.waves is None else np.array([root.influence, *root.waves])
+    total = np.zeros((len(numbers) * root.influence.shape[1], math.prod(shape)))
+    for (tooth, flank), own in forces.items():
+        columns = waves[:, (numbers - tooth) % z, :, flank * n : (flank + 1) * n]
+        columns = np.moveaxis(columns, 0, -2).reshape(len(total), -1)
+        total += columns @ (between[:, None] @ own).reshape(-1, total.shape[1])
+    return total.reshape(len(numbers), -1, *shape)
 
 
 def _station_forces(roll, load, stations) -> np.ndarray:
@@ -315,9 +419,13 @@ def _station_forces(roll, load, stations) -> np.ndarray:
 
 
 def _root_cycle(planetary_set, kind, root: _RootStress, cycle: MeshCycle, target, stress) -> RootCycle:
-    """Root cycle of one mesh (mesh, gear, side) from the stress (T, 2 m, P) of the teeth in its slots."""
+    """Root cycle of one mesh (mesh, gear, side) from the stress (T, 2 m, slices, P) of its slots."""
     mesh, gear, side = target
-    stress = stress.reshape(len(stress), 2, -1, len(cycle.position)).transpose(0, 3, 1, 2)
+    stress = stress.reshape(len(stress), 2, -1, *stress.shape[2:]).transpose(0, 4, 1, 2, 3)
+    stress = stress if side == LEFT else stress[:, :, ::-1]
+    over_width = stress[:, :, LOADED].max(axis=2)
+    worst = over_width.argmax(axis=-1), stress[:, :, BACK].min(axis=2).argmin(axis=-1)
+    worst = np.stack(worst, axis=-1)[..., None, None]
     path = cycle.path[mesh] / planetary_set.base_pitch
     load = np.zeros(stress.shape[:2])
     load[1:-1] = cycle.tooth_load[mesh]
@@ -327,10 +435,11 @@ def _root_cycle(planetary_set, kind, root: _RootStress, cycle: MeshCycle, target
         gear=gear,
         path=np.vstack([path[:1] - 1.0, path, path[-1:] + 1.0]),
         load=load,
-        stress=stress if side == LEFT else stress[:, :, ::-1],
+        stress=np.take_along_axis(stress, worst, axis=-1)[..., 0],
         arc=root.arc,
         slope=root.slope,
         periods=cycle.periods,
+        over_width=over_width,
     )
 
 
@@ -340,17 +449,18 @@ def _slots(teeth, step: int) -> np.ndarray:
     return np.concatenate([teeth[:1] - step, teeth, teeth[-1:] + step])
 
 
-def _body_ranges(planetary_set, number, root: _RootStress, acting, teeth: LoadedTeeth, closes):
+def _body_ranges(planetary_set, number, root: _RootStress, acting, slices: Sequence[LoadedTeeth], closes):
     """Ranges of the roots of the acting flanks of one body."""
-    z, m = len(root.influence), len(root.arc)
+    z, m, S = len(root.influence), len(root.arc), len(slices)
+    teeth = replace(slices[0], path=np.mean([one.path for one in slices], axis=0))
     # with every period the sun's teeth go on to the next higher place, those of planets and ring back
     step = planetary_set.senses[number]
     alike = math.gcd(z, teeth.periods) if closes else z
-    high, low = np.full((alike, 2 * m), -np.inf), np.full((alike, 2 * m), np.inf)
+    high, low = np.full((alike, 2 * m, S), -np.inf), np.full((alike, 2 * m, S), np.inf)
     worst = {}
     one = closes and teeth.periods == 1
     for samples in [_one_turn(teeth)] if one else _by_turn(teeth):
-        field = body_stress(planetary_set, root, acting, teeth, samples, np.arange(z))
+        field = body_stress(planetary_set, root, acting, slices, samples, np.arange(z))
         of_tooth = (np.arange(z) - step * teeth.turn[samples[0]]) % alike
         np.maximum.at(high, of_tooth, field.max(axis=-1))
         np.minimum.at(low, of_tooth, field.min(axis=-1))
@@ -359,11 +469,11 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, teeth: Loaded
             worst[target] = max(worst.get(target, found), found)
     for target in acting:
         rows = slice(target[2] * m, (target[2] + 1) * m)
-        top, bottom = high[:, rows], low[:, rows]
+        top, bottom = (one[:, rows].reshape(alike, -1) for one in (high, low))
         widest = (top - bottom).argmax(axis=1)
         own = np.arange(alike), widest
         tooth = int((top - bottom)[own].argmax())
-        point = int(widest[tooth])
+        point, piece = divmod(int(widest[tooth]), S)
         # seen from behind the teeth are counted the other way round
         counted = (-1 if teeth.reverse else 1) * np.arange(z) % alike
         start = acting[0] if number == EACH else target
@@ -372,12 +482,13 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, teeth: Loaded
             mesh=target[0],
             gear=target[1],
             point=point,
-            maximum=float(top[tooth, point]),
-            minimum=float(bottom[tooth, point]),
+            piece=piece,
+            maximum=float(top[tooth, widest[tooth]]),
+            minimum=float(bottom[tooth, widest[tooth]]),
             tooth_maximum=top[own][counted],
             tooth_minimum=bottom[own][counted],
             worst=worst[target][1:],
-            history=_history(field[:, rows][:, point], teeth, start[:2], step) if one else None,
+            history=_history(field[:, rows][:, point, piece], teeth, start[:2], step) if one else None,
         )
 
 
@@ -394,7 +505,7 @@ def _one_turn(teeth: LoadedTeeth) -> np.ndarray:
 def _largest_tension(field, teeth: LoadedTeeth, target, m, samples) -> tuple[float, int, int]:
     """Largest stress in the loaded roots of the teeth in one mesh, its slot and its position."""
     mesh, gear, side = target
-    loaded = field[teeth.tooth[gear, mesh] % len(field), side * m : (side + 1) * m].max(axis=1)
+    loaded = field[teeth.tooth[gear, mesh] % len(field), side * m : (side + 1) * m].max(axis=(1, 2))
     slot, sample = np.unravel_index(loaded.argmax(), loaded.shape)
     slot_of_cycle = len(loaded) - 1 - slot if teeth.reverse else slot
     return float(loaded[slot, sample]), int(slot_of_cycle), int(samples[sample])

@@ -219,6 +219,16 @@ def single_pair_factor(
     return math.sqrt(max(curvature(high - pitch), curvature(low + pitch), curvature(0.0)) / curvature(0.0))
 
 
+def bending_face_factor(contact_factor, face_width: float, tooth_height: float):
+    """Compute the face load factor of the root stress K_F-beta from K_H-beta of the contact (ISO 6336-1).
+
+    ``K_Hbeta^N_F``, ``N_F = 1 / (1 + h/b + (h/b)^2)`` with h/b at most 1/3; face width b and tooth height h
+    from root to tip of the gear with the smaller b/h [m].
+    """
+    ratio = min(tooth_height / face_width, 1 / 3)
+    return contact_factor ** (1 / (1 + ratio + ratio**2))
+
+
 def _standard_signs(gear: Gear) -> tuple[float, float, float]:
     """Teeth, profile shift and dedendum of the rack [modules] as the standard counts them."""
     sign = -1.0 if gear.internal else 1.0

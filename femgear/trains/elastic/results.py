@@ -337,6 +337,9 @@ def _strength(results: Results, factors: np.ndarray, notes: list[str]) -> Iterat
     contact, worst = largest("contact_pressure").reshape(2, -1).max(axis=1), int(root.argmax())
     yield "largest root stress, static", f"{root[worst] * 1e-6:.1f} MPa, {parts[worst]}"
     yield "largest contact pressure, static", _kinds("{:.1f} MPa", contact * 1e-6)
+    if results.case.helix_angle is not None:
+        notes.append("no safeties of helical teeth: nominal stresses of ISO 6336 are those of spur teeth")
+        return
     limits = material.root_stress_limit, material.contact_stress_limit
     if limits[0] is not None:
         safe = [

@@ -314,6 +314,30 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
     return _panels(draw, "stress [MPa]", len(gears), columns=2)
 
 
+def root_stress_over_width(stress: xr.Dataset) -> Figure:
+    """Draw the stress in the root of the loaded flank over path and face width (stress.nc of slices).
+
+    Of one tooth of each gear on its way through the mesh, on the planet with the largest.
+    """
+    gears, place = _flanks_of(stress), 1e3 * stress["slice"].values
+    largest = max(float(row["root_over_width"].max()) for _, row in gears) * 1e-6 or 1.0
+
+    def draw(number: int, ax) -> str:
+        title, row = gears[number]
+        shown = _while_loaded(row["root_load"].values > 0.0)
+        values = row["root_over_width"].values[shown].T * 1e-6
+        scale = {"cmap": "cividis", "vmin": 0.0, "vmax": largest, "shading": "nearest"}
+        ax.pcolormesh(row["root_path"].values[shown], place, np.maximum(values, 0.0), **scale)
+        if number >= len(gears) - 2:
+            label(ax, "path from the pitch point [base pitches]")
+        return f"{title}\nup to {values.max():.3g} MPa, K_Fβ = {float(row['root_face_factor']):.3f}"
+
+    figure = _panels(draw, "place over the face width [mm]", len(gears), columns=2)
+    image = figure.axes[0].collections[0]
+    figure.colorbar(image, ax=list(figure.axes), label="stress in the loaded root [MPa]", pad=0.02)
+    return figure
+
+
 def contact_pressure(stress: xr.Dataset) -> Figure:
     """Draw the contact pressure of a tooth pair over its path (stress.nc), on the planet with the largest."""
     kinds = _kinds(stress)
@@ -586,6 +610,8 @@ def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
         "root_profile": root_stress_profile(stress),
         "load_spectrum": load_spectrum(stress),
     }
+    if "root_over_width" in stress:
+        figures["root_over_width"] = root_stress_over_width(stress)
     if "pressure_distribution" in stress:
         figures["contact_pressure"] = contact_pressure(stress)
     if "planet_root_stress" in stress:
@@ -734,6 +760,10 @@ _STRESSES = Figures(
         "root_stress": (
             "Stress in the roots of one tooth on its way through the mesh, beside the nominal stress of ISO "
             "6336-3."
+        ),
+        "root_over_width": (
+            "Largest stress in the root of the loaded flank over path and face width, and the face load "
+            "factor K_Fβ: the largest root stress over its mean across the width."
         ),
         "root_profile": (
             "Stress along the roots of the tooth when its tension is largest; dotted the section of ISO "

@@ -24,6 +24,7 @@ from femgear.errors import Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import tooth_thickness
+from femgear.gears.iso6336 import bending_face_factor
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_set, phasing_table
 from femgear.report.style import family
@@ -109,6 +110,9 @@ STRESS_VARIABLES = {
     "root_compression": ("mesh gear step", "Pa", "lowest stress in the root of the back flank"),
     "root_path": ("mesh gear step", "1", "path from the pitch point in base pitches"),
     "root_load": ("mesh gear step", "N", "load of the tooth pair"),
+    "root_over_width": ("mesh gear step slice", "Pa", "largest stress in the loaded root by slice"),
+    "root_face_factor": ("mesh gear", "1", "K_F-beta: largest root stress over its mean across the width"),
+    "iso_face_factor": ("mesh", "1", "K_F-beta from K_H-beta, ISO 6336-1"),
     "root_profile": ("mesh gear root point", "Pa", "stress along the root at the largest tension"),
     "root_arc": ("mesh gear point", "m", "arc length from the end of the flank"),
     "root_slope": ("mesh gear point", "rad", "angle of the root to the centreline of the tooth"),
@@ -137,7 +141,10 @@ STRESS_VARIABLES = {
     "iso_contact_stress": ("mesh", "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
     "iso_root_stress": ("mesh gear", "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
 }
-"""Variables of stress.nc; records of one mesh period have none of single teeth, longer ones no pressures."""
+"""Variables of stress.nc; records of one mesh period have none of single teeth, longer ones no pressures.
+
+Contact in slices has those over the width and no pressures of cells.
+"""
 
 _HARMONICS, _ROWS = 6, 8
 """Harmonics whose phasing is listed, and neighbouring sets."""
@@ -227,11 +234,16 @@ class StaticResult:
         if self.cycle.slice_load is None:
             return {}
         count = self.cycle.slice_load.shape[2]
-        place = width * ((np.arange(count) + 0.5) / count - 0.5)
         return {
-            "slice": ("slice", place, "m", "place of a slice from the middle of the face width"),
+            "slice": _slice_places(width, count),
             "tilt": ("tilt", list(self.cycle.tilt_names), "1", "member and direction of its end z > 0"),
         }
+
+
+def _slice_places(width: float, count: int) -> tuple:
+    """Coordinate of the slices of a face width [m]."""
+    place = width * ((np.arange(count) + 0.5) / count - 0.5)
+    return "slice", place, "m", "place of a slice from the middle of the face width"
 
 
 @dataclass(frozen=True)
@@ -246,6 +258,11 @@ class NominalStresses:
     contact: np.ndarray
     root: np.ndarray
     message: str
+
+    @classmethod
+    def of_none(cls, gears: GearSet, message: str) -> NominalStresses:
+        """Give none of a set of gears, and why."""
+        return cls(np.full(len(gears.kinds), np.nan), np.full((len(gears.kinds), 2), np.nan), message)
 
 
 @dataclass(frozen=True)
@@ -306,6 +323,10 @@ class StressResult:
             "root": ("root", ["loaded", "back"], "1", "flank above the root"),
             "load_bin": ("load_bin", 0.5 * (edges[1:] + edges[:-1]), "N", "middle of the load class"),
         }
+        if cycle.slice_load is not None:
+            values |= self._over_width()
+            width = self.planetary_set.gears[0].face_width
+            coords["slice"] = _slice_places(width, cycle.slice_load.shape[2])
         if "planet_root_stress" in values:
             n = values["planet_root_stress"].shape[1]
             words = "turns of the planet against the carrier since the pitch point with the sun"
@@ -347,6 +368,20 @@ class StressResult:
             values["tooth_root_maximum"] = _by_gear([one.tooth_maximum for one in ranges])
             values["tooth_root_minimum"] = _by_gear([one.tooth_minimum for one in ranges])
         return values
+
+    def _over_width(self) -> dict[str, np.ndarray]:
+        """Stresses over the face width, and face load factors of the root."""
+        s, factor = self.planetary_set, self.cycle.face_load_factor
+        heights = [[abs(gear.tip_radius - gear.root_radius) for gear in pair.gears] for pair in s.kinds]
+        highest = np.repeat(np.max(heights, axis=1), s.n_planets)
+        width = s.gears[0].face_width
+        return {
+            "root_over_width": _by_gear([root.history().over_width for root in self.roots]),
+            "root_face_factor": _by_gear([root.face_load_factor for root in self.roots]),
+            "iso_face_factor": np.array(
+                [bending_face_factor(k, width, h) for k, h in zip(factor, highest, strict=True)]
+            ),
+        }
 
     def _loads(self) -> dict[str, np.ndarray]:
         """Load classes, how often the teeth are in them, and nominal stresses, the same for every planet."""
@@ -423,12 +458,7 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
             "and is not given"
         )
         yield Finding("W-EDGE", "", text)
-    if "face_load_factor" in data and (factor := data["face_load_factor"].values.max()) > 1.02:
-        text = (
-            f"root stresses are those of the load as a mean over the width, of which up to K_Hbeta = "
-            f"{factor:.2f} times stands at one place"
-        )
-        yield Finding("W-FACE-LOAD", "", text)
+    if "face_load_factor" in data and data["face_load_factor"].values.max() > 1.02:
         count = data.sizes["slice"]
         if count < SLICES:
             text = f"K_Hbeta is the mean over a {count}th of the width: take {SLICES} slices or more"
@@ -552,6 +582,7 @@ def describe_stress(data: xr.Dataset) -> Block:
     equal, against = (
         ("", "") if len(names) == 1 else ("equal load on all planets and ", " against the carrier")
     )
+    header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [deg]", "range", "cycles"
     notes = [
         f"ISO 6336: nominal stresses sigma_H0 and sigma_F0 (method B) with {equal}no "
         "load factors; FE: largest contact pressure away from flank ends, and largest tension in the root",
@@ -560,10 +591,16 @@ def describe_stress(data: xr.Dataset) -> Block:
         f"once{against}; cycles: load cycles of the flank in that turn",
     ]
     if data.attrs.get("iso"):
-        notes.append(f"outside the range of ISO 6336: {data.attrs['iso']}")
+        notes.append(f"not by ISO 6336: {data.attrs['iso']}")
+    if "root_face_factor" in data:
+        header = *header, "K_Fbeta", "by ISO"
+        contact = [(*row, "-", "-") for row in contact]
+        notes.append(
+            "K_Fbeta: largest root stress over its mean across the width, by ISO: K_Hbeta^N_F (ISO 6336-1); "
+            "ranges and positions are those of the slice with the largest"
+        )
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
-    header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [deg]", "range", "cycles"
     return Block("Stresses", header, (*contact, *roots), tuple(notes))
 
 
@@ -591,6 +628,7 @@ def _root_row(title: str, data: xr.Dataset) -> tuple[str, ...]:
         *place,
         f"{low:.1f} to {high:.1f}",
         f"{one['load_cycles']:g}",
+        *[f"{one[name]:.3f}" for name in ("root_face_factor", "iso_face_factor") if name in one],
     )
 
 

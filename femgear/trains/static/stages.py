@@ -23,10 +23,12 @@ from femgear.contact.bodies import Bodies, Sector, Sectors, helical_stiffness, m
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.root_stress import (
     RootStresses,
+    computed_waves,
     observed_root_stress,
     root_ranges,
     root_stress,
     root_stress_cycle,
+    root_waves,
 )
 from femgear.contact.slices import width_waves, with_held_ring
 from femgear.contact.supports import RIGID, UPRIGHT, Supports, WidthSupports, tilting_members
@@ -231,7 +233,7 @@ def over_width(
     supports = width_supports(case, gears)
     found: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": supports}
     if overlap := _overlap(case, gears):
-        found["ahead"] = overlap * ((np.arange(count) + 0.5) / count - 0.5)
+        found["ahead"] = slices_ahead(overlap, count)
     return found | ({"held_waves": with_held_ring(waves, sectors)} if loaded else {})
 
 
@@ -268,12 +270,11 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
-    influences = _influences(case, static)
-    progress("stress", 1, 2)
+    influences = _influences(case, static, progress)
     repeats, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
     closes = repeats == cycle.periods
     teeth = loaded_teeth(cycle, reverse=reverse)
-    ranges = root_ranges(gears, influences, teeth, closes=closes)
+    ranges = root_ranges(gears, influences, influences.loads(gears, cycle, reverse=reverse), closes=closes)
     roots, first = _root_cycles(gears, influences, cycle, ranges, reverse)
     return StressResult(
         planetary_set=gears,
@@ -285,7 +286,9 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
         spectrum=load_spectrum(teeth, gears.mates, closes=closes),
         nominal=nominal_stresses(
             gears, static.sun_torque, case.material.youngs_modulus, case.material.poisson_ratio
-        ),
+        )
+        if case.helix_angle is None
+        else NominalStresses.of_none(gears, "helical teeth: nominal stresses are those of spur teeth"),
         sun_torque=static.sun_torque,
         closes=closes,
     )
@@ -378,21 +381,37 @@ def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
     return np.repeat([pair.backlash for pair in gears.kinds], gears.n_planets)
 
 
-def _influences(case: Case, static: StaticResult) -> RootStresses:
-    """Find the root influences of the bodies as the static solution holds them.
+def _influences(case: Case, static: StaticResult, progress: Progress) -> RootStresses:
+    """Find the root influences of the bodies as the static solution holds them, and of waves over the width.
 
     External gears were observed with their flanks; only an internal one, whose contact has two plane states,
     is solved again.
     """
-    found = []
-    for sector, body in zip(static.sectors.gears, static.bodies.gears, strict=False):
-        if sector.gear.internal:
+    found, loads, material, ahead = [], static.cycle.slice_load, material_of(case), None
+    for i, (sector, body) in enumerate(zip(static.sectors.gears, static.bodies.gears, strict=False)):
+        progress("stress", i, len(static.sectors.gears) + 1)
+        gear, support = sector.gear, None
+        if gear.internal:
             support = ring_foundation(case, sector) if case.static.members == "elastic" else None
-            found.append(root_stress(sector.grid, sector.gear, material_of(case), foundation=support))
+            found.append(root_stress(sector.grid, gear, material, foundation=support))
         else:
             assert body is not None and body.root is not None
-            found.append(observed_root_stress(sector.gear, body.root))
-    return RootStresses(*found)
+            found.append(observed_root_stress(gear, body.root))
+        if loads is not None:
+            waves = computed_waves(loads.shape[2]) * np.pi / gear.face_width
+            waves = root_waves(sector.grid, gear, material, waves, foundation=support)
+            # helical teeth are weaker than straight ones as they are softer: within 1 %
+            weaker = 1.0 / helical_stiffness(static.base_helix_angle, internal=gear.internal)
+            one = found[-1]
+            found[-1] = replace(one, influence=weaker * one.influence, waves=weaker * waves)
+    if loads is not None:
+        ahead = slices_ahead(static.overlap_ratio, loads.shape[2])
+    return RootStresses(*found, ahead=ahead)
+
+
+def slices_ahead(overlap: float, slices: int) -> np.ndarray:
+    """Find by how much slices run ahead of mid-width at an overlap ratio, signed as `_overlap` [periods]."""
+    return overlap * ((np.arange(slices) + 0.5) / slices - 0.5)
 
 
 def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
@@ -419,8 +438,9 @@ def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
     """Take the loads of some mesh periods of a cycle; tooth numbers stay those of its first period."""
     each = len(cycle.position) // cycle.periods
     take = (start * each + np.arange(length * each)) % len(cycle.position)
-    names = ("tooth_load", "path", "back_tooth_load", "back_path", "back_force")
-    parts = {name: getattr(cycle, name)[..., take] for name in names}
+    names = ("tooth_load", "slice_load", "path", "back_tooth_load", "back_path", "back_force")
+    values = {name: getattr(cycle, name) for name in names}
+    parts = {name: one[..., take] for name, one in values.items() if one is not None}
     return replace(cycle, position=np.arange(len(take)) / each, periods=length, **parts)
 
 
@@ -452,7 +472,7 @@ STRESS = Stage(
     describe=lambda results: describe_stress(results.stress),
     wanted=lambda case: case.static.stresses,
     unavailable=lambda case: (
-        "" if case.helix_angle is None else "it takes teeth that carry over the whole width at once"
+        "" if case.helix_angle is None or case.static.slices > 1 else "helical teeth need static.slices = 25"
     ),
     asked=lambda case: case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})}),
 )  # fmt: skip
