@@ -15,10 +15,13 @@ from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.root_stress import (
     BACK,
     LOADED,
+    _between_slices,
+    computed_waves,
     observed_root_stress,
     root_ranges,
     root_stress,
     root_stress_cycle,
+    root_waves,
 )
 from femgear.contact.tooth_loads import deformed_set, loaded_teeth
 from femgear.fe.compliance import symmetric_factor
@@ -200,6 +203,30 @@ def test_an_elastic_support_bends_the_rim():
     assert rested.max() > 1.01 * held.max()
 
 
+def test_waves_across_the_width():
+    """Long ones are the plane load, to the second order; short ones decay along the tooth."""
+    grid = sector(EXTERNAL, flank_elements=8, refine=0.7)
+    plane = root_stress(grid, EXTERNAL, STEEL).influence
+    top, m, number = plane.max(), plane.shape[1] // 2, np.array([1.0, 2.0, 3e3, 6e3])
+    one, two, short, shorter = root_waves(grid, EXTERNAL, STEEL, number)
+    assert np.abs(one - plane).max() < 1e-4 * top
+    change = (two - plane)[0, :m].sum() / (one - plane)[0, :m].sum()
+    assert change == pytest.approx(4.0, rel=1e-2)
+    high = slice(6, 8)
+    near, far = (np.abs(wave[0, 1:m, high]).max() / top for wave in (short, shorter))
+    assert far < 0.1 * near < 0.01
+
+
+def test_slices_have_the_mean_of_their_loads():
+    """The plane response to the mean load, at every root point, whatever the loads: to rounding."""
+    between, load = _between_slices(9), np.random.default_rng(1).uniform(0, 2, 9)
+    assert between.sum(axis=1) == pytest.approx(np.eye(len(between))[0][:, None] * np.ones(9), abs=1e-12)
+    assert between[0] @ load == pytest.approx(np.full(9, load.mean()))
+    # all waves alike are no waves: every slice has its own load
+    assert between.sum(axis=0) == pytest.approx(np.eye(9), abs=1e-12)
+    assert computed_waves(25)[[0, -1]] == pytest.approx([1.0, 24.0])
+
+
 @pytest.fixture(scope="module")
 def loaded():
     gears = reference_set()
@@ -341,7 +368,7 @@ def test_equal_planets_give_equal_stresses(loaded):
 def test_ranges_are_those_of_the_point_with_the_widest_one(loaded):
     """Planets, bent by the sun one way and by the ring the other way: no point of either root has more."""
     gears, _, _, cycle, roots, stresses = loaded
-    ranges = root_ranges(gears, roots, loaded_teeth(cycle, reverse=False))
+    ranges = root_ranges(gears, roots, [loaded_teeth(cycle, reverse=False)])
     for n in range(3):
         sun_side, ring_side = stresses[2 * n + 1], stresses[2 * (3 + n)]
         for number, pulled, other in (
@@ -360,7 +387,7 @@ def test_ranges_are_those_of_the_point_with_the_widest_one(loaded):
 def test_ranges_of_a_part_of_a_turn_are_those_of_the_tooth_with_the_widest_one(loaded):
     """A period of which every tooth of the sun sees another part: some are pulled all the time."""
     gears, _, _, cycle, roots, stresses = loaded
-    ranges = root_ranges(gears, roots, loaded_teeth(cycle, reverse=False), closes=False)
+    ranges = root_ranges(gears, roots, [loaded_teeth(cycle, reverse=False)], closes=False)
     of_teeth = [np.ptp(stresses[2 * mesh].stress[:, :, LOADED], axis=1).max(axis=-1) for mesh in range(3)]
     for mesh in range(3):
         found = ranges[2 * mesh]

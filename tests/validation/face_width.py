@@ -14,12 +14,25 @@ from scipy.interpolate import CubicSpline
 from femgear.case.gear_set import planetary_set
 from femgear.contact import slices
 from femgear.contact.batch import PairLaws
-from femgear.contact.bodies import make_bodies, make_sectors, observed_flanks, station_weights
+from femgear.contact.bodies import (
+    make_bodies,
+    make_sectors,
+    observed_flanks,
+    root_functionals,
+    station_weights,
+)
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.local_compliance import hertz_half_width
+from femgear.contact.root_stress import (
+    _between_slices,
+    _station_forces,
+    computed_waves,
+    root_stress,
+    root_waves,
+)
 from femgear.contact.slices import cosines, wave_displacement, width_waves
 from femgear.fe.compliance import condense_sector, symmetric_factor, tooth_compliance
-from femgear.fe.elasticity import Material, basis, wave_stiffness
+from femgear.fe.elasticity import Material, basis, plane_modulus, wave_stiffness
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope
 from validation.cases import reference_case
@@ -242,6 +255,43 @@ def _waves_of_solid(grid, twist) -> tuple[Row, ...]:
     )
 
 
+@cache
+def solid_sun(*, mirrors: bool):
+    """Compliance of the sun to means of slices at the pitch point, in three dimensions, coarse.
+
+    And the tangential stress along the root of that tooth at mid-slice under their forces, (m, N, N) [Pa/N].
+    """
+    gears, grid = reference_set(), coarse_sectors().sun.grid
+    stations, _, loads, seen = observed_flanks(grid, gears.sun)
+    along = root_functionals(grid, gears.sun, STEEL, state="plane strain")
+    loads, seen = (_at_roll(one, stations.roll, _pitch_roll()) for one in (loads, seen))
+    loads, seen, root = (_solid_columns(one) for one in (loads, seen, along.columns))
+    axial = np.zeros(root.shape)
+    axial[3 * along.nodes + 2, np.arange(len(along.nodes))] = 1.0
+    columns, m = np.hstack([seen, root, axial]), len(along.nodes)
+    axial, section = axial_matrices(WIDTH, 1, ORDER), section_matrices(grid, STEEL, 0.0)
+    found = solid_compliance(grid, section, axial, gears.sun.teeth, loads, columns, mirrors=mirrors)[0]
+    s, w = legendre.leggauss(ORDER)
+    places = WIDTH / SLICES * (np.arange(SLICES) + 0.5) - 0.5 * WIDTH
+    z = (places[:, None] + WIDTH / SLICES * 0.5 * s).ravel()
+    mean = np.einsum("nsp,s->np", axial_shapes(WIDTH, 1, ORDER, z).reshape(SLICES, ORDER, -1), 0.5 * w)
+    found = found.reshape(2 * m + 1, ORDER + 1, ORDER + 1) @ mean.T
+    # slopes along the axis are of the same polynomials
+    lateral = plane_modulus(STEEL, "plane strain") * STEEL.poisson_ratio
+    extended = lateral * np.linalg.solve(axial[1], axial[2]) @ found[1 + m :]
+    return mean @ found[0], axial_shapes(WIDTH, 1, ORDER, places) @ (found[1 : 1 + m] + extended)
+
+
+def _pitch_roll() -> float:
+    gears = reference_set()
+    return gears.sun.base_radius * np.tan(gears.working_pressure_angle_sun_planet)
+
+
+def _solid_columns(columns):
+    """Loads or observations of plane displacements as those of three components."""
+    return np.insert(columns, range(2, len(columns) + 1, 2), 0.0, axis=0)
+
+
 @dataclass(frozen=True)
 class SunLikePair:
     """Two suns that touch at the pitch point, per load of a width.
@@ -271,22 +321,11 @@ def sun_like_pair() -> SunLikePair:
     gears, coarse = reference_set(), coarse_sectors()
     gear, grid = gears.sun, coarse.sun.grid
     stations, _, loads, seen = observed_flanks(grid, gear)
-    roll = gear.base_radius * np.tan(gears.working_pressure_angle_sun_planet)
+    roll = _pitch_roll()
     loads, seen = (_at_roll(one, stations.roll, roll) for one in (loads, seen))
     whole = {"count": gear.teeth, "rim": "rim"}
-    solid = [np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, seen)]
-    axial, section = axial_matrices(WIDTH, 1, ORDER), section_matrices(grid, STEEL, 0.0)
-    s, w = legendre.leggauss(ORDER)
-    z = (WIDTH / SLICES * (np.arange(SLICES)[:, None] + 0.5 + 0.5 * s)).ravel() - 0.5 * WIDTH
-    mean = np.einsum("nsp,s->np", axial_shapes(WIDTH, 1, ORDER, z).reshape(SLICES, ORDER, -1), 0.5 * w)
-    mirror, free = (
-        WIDTH
-        / SLICES
-        * mean
-        @ solid_compliance(grid, section, axial, gear.teeth, *solid, mirrors=one)[0]
-        @ mean.T
-        for one in (True, False)
-    )
+    solid = [_solid_columns(one) for one in (loads, seen)]
+    mirror, free = (WIDTH / SLICES * solid_sun(mirrors=one)[0] for one in (True, False))
     parts, T, compared = wave_stiffness(grid, STEEL), cosines(SLICES), []
     for m in range(1, 5):
         K = (parts[0] + (k := m * np.pi / WIDTH) * parts[1] + k**2 * parts[2]).tocsc()
@@ -342,6 +381,40 @@ def ends_of_teeth() -> tuple[Row, ...]:
         information("ends", trial, f"{name} less 1, mirror planes over no coupling", 1.107, ratios[0]),
         information("ends", trial, f"{name} less 1, free ends over mirror planes", 1.013, ratios[1]),
     )
+
+
+def root_stresses() -> tuple[Row, ...]:
+    """Root stress of the sun under loads that differ over the width, beside that of solids.
+
+    Largest along the root of each slice, over that of the same load over the whole width. The first point,
+    where the flank ends, is left out.
+    """
+    sector, each, rows = make_sectors(reference_set(), STEEL, flank_elements=24).sun, 3, []
+    plane = root_stress(sector.grid, sector.gear, STEEL)
+    waves = root_waves(sector.grid, sector.gear, STEEL, computed_waves(each * SLICES) * np.pi / WIDTH)
+    at = _station_forces(np.array([_pitch_roll()]), np.ones(1), plane.roll)[:, 0]
+    both = np.array([plane.influence, *waves])[:, 0, 1 : len(plane.arc), : len(at)] @ at
+    between = _between_slices(each * SLICES)
+    mirror, free = (solid_sun(mirrors=one)[1] for one in (True, False))
+    whole = mirror[1:].sum(axis=2).max()
+    ramp, few = 2 * (np.arange(SLICES) + 0.5) / SLICES, np.zeros((2, SLICES))
+    few[0, 5:8] = few[1, -3:] = SLICES / 3
+    inner = slice(1, -1)
+    for text, load in (("on 3 of 13 slices amid the width", few[0]), ("on 3 of 13 slices at the end", few[1]),
+                       ("that rises from one end to the other", ramp)):  # fmt: skip
+        stress = np.einsum("kst,t,km->sm", between, np.repeat(load, each), both)[each // 2 :: each]
+        ours, name = stress.max(axis=1) / both[0].max(), f"sun, load {text}: "
+        closed, opened = ((one[1:] @ load).max(axis=0) / whole for one in (mirror, free))
+        top, ends = closed.max(), opened.max() / closed.max()
+        rows += [
+            within("root", SOLID, f"{name}largest root stress, mirror planes", top, ours.max(), 0.05),
+            at_most("root", SOLID, f"{name}error of a slice over the largest, mirror planes", 0.05,
+                    np.abs(ours - closed).max() / top),
+            at_most("root", SOLID, f"{name}error of a slice amid free ends over the largest", 0.05,
+                    np.abs(ours - opened)[inner].max() / top),
+            information("root", SOLID, f"{name}largest with free ends over that of mirror planes", 1.0, ends),
+        ]  # fmt: skip
+    return tuple(rows)
 
 
 # --- sets ------------------------------------------------------------------------------------------

@@ -20,6 +20,8 @@ from scipy.interpolate import CubicSpline
 
 from femgear.case.gear_set import material_of, planetary_set
 from femgear.contact.bodies import (
+    flank_load_columns,
+    flank_stations,
     helical_stiffness,
     make_sectors,
     observed_flanks,
@@ -28,8 +30,10 @@ from femgear.contact.bodies import (
 )
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.local_compliance import depth_displacement, hertz_half_width
+from femgear.contact.root_stress import root_stress
 from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import stiffness
+from femgear.fe.grid import boundary_edges
 from femgear.gears.profile import base_helix_angle
 from femgear.trains.helical.model import _line_load, section_stiffness
 from femgear.trains.reading import read_case, with_values
@@ -53,6 +57,12 @@ def point_load(distance, depth, material):
     """Displacement into the half space under a unit point load [m/N] (Johnson, section 3.2)."""
     r, nu = np.hypot(distance, depth), material.poisson_ratio
     return (2 * (1 - nu) / r + depth**2 / r**3) * (1 + nu) / (2 * np.pi * material.youngs_modulus)
+
+
+LOW_LOADS = (
+    "the factor is that of the stiffness, of bending: loads low on the flank shear teeth as well, which the "
+    "helix raises less; the largest stresses come from loads higher up"
+)
 
 
 class ContactLine:
@@ -224,6 +234,59 @@ def factors() -> tuple[Row, ...]:
                 within("helix", source, name + "factor of virtual gears on slices of the transverse section",
                        found["helical"][1] / found["spur"][1], virtual[mesh], 0.05, explanation=EXPLAINED),
             ]  # fmt: skip
+    return tuple(rows)
+
+
+def helical_root_stress(sector, material, station: int, angle: float) -> float:
+    """Largest stress across the root line of an endless tooth under a unit force per width at a station.
+
+    The field is the same at all heights. Its strains in the surface are those along the section t and along
+    the helix h, where ``d/dh`` of the displacement is the turn of the section; across h the surface is free.
+    """
+    gear, grid, slope = sector.gear, sector.grid, math.tan(angle)
+    twist, stations = slope / gear.base_radius, flank_stations(grid, gear)
+    loads = flank_columns(flank_load_columns(grid, stations), stations.normals, slope)[:, [station]]
+    names = [name for name in ("fillet_left", "root_left") if name in grid.boundaries]
+    edges = np.vstack([boundary_edges(grid, one) for one in names[:: -1 if gear.internal else 1]])
+    nodes = np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])
+    seen = np.zeros((3 * grid.n_nodes, 3 * len(nodes)))
+    seen[(3 * nodes[:, None] + np.arange(3)).ravel(), np.arange(3 * len(nodes))] = 1.0
+    waves = [(0.0, 2 * np.pi * n / gear.teeth) for n in range(gear.teeth // 2 + 1)]
+    share = np.array([1 if n == 0 or 2 * n == gear.teeth else 2 for n in range(len(waves))]) / gear.teeth
+    found = list(wave_compliances(grid, material, twist, loads, seen, waves))
+    v, x = np.tensordot(share, found, 1)[:, 0].real.reshape(-1, 3), np.asarray(grid.points)[nodes]
+    arc = np.append(0.0, np.cumsum(np.hypot(*np.diff(x, axis=0).T)))
+    along = CubicSpline(arc, np.insert(x, 2, 0.0, axis=1))(arc, 1)
+    size = np.linalg.norm(along, axis=1)[:, None]
+    axis, length = np.array([0.0, 0.0, 1.0]), np.sqrt(1 + twist**2 * (x**2).sum(axis=1))[:, None]
+    t, h = along / size, (axis + twist * np.cross(axis, np.insert(x, 2, 0.0, axis=1))) / length
+    by_t, by_h = CubicSpline(arc, v)(arc, 1) / size, twist * np.cross(axis, v) / length
+    tt, hh, th, c = ((a * b).sum(axis=1) for a, b in ((t, by_t), (h, by_h), (h, by_t), (t, h)))
+    th = 0.5 * (th + (t * by_h).sum(axis=1))
+    across = (tt - 2 * c * th + c**2 * hh) / (1 - c**2)
+    modulus = material.youngs_modulus / (1 - material.poisson_ratio**2)
+    return float((modulus * (across + material.poisson_ratio * hh))[2:-2].max())
+
+
+def root_stresses() -> tuple[Row, ...]:
+    """Largest root stress under a uniform load high and amid the flank, of solids and of femgear."""
+    rows, source = [], "helical teeth in three dimensions"
+    for helix in (20.0, 30.0):
+        case = _case(helix)
+        gears, material = planetary_set(case), material_of(case)
+        angle = base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
+        for sector in make_sectors(gears, material, flank_elements=8).gears:
+            gear = sector.gear
+            plane = root_stress(sector.grid, gear, material)
+            m, last = len(plane.arc), len(plane.roll) - 1
+            for text, place, why in (("high on", 0.9, ""), ("amid", 0.5, LOW_LOADS)):
+                station = round((1 - place if gear.internal else place) * last)
+                straight = gear.face_width * plane.influence[0, 1:m, station].max()
+                solid = helical_root_stress(sector, material, station, angle)
+                ours = straight / helical_stiffness(angle, internal=gear.internal)
+                name = f"{helix:g} degrees, {gear.name}, uniform load {text} the flank: largest root stress"
+                row = within("helix", source, f"{name} per load [1/m]", solid, ours, 0.05, explanation=why)
+                rows.append(row)
     return tuple(rows)
 
 

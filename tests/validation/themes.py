@@ -152,10 +152,12 @@ THEMES = (
         ),
         (
             face_width.ends_of_teeth,
+            face_width.root_stresses,
             face_width.whole_sets,
             face_width.refinement,
             helical_teeth.factors,
             helical_teeth.refined,
+            helical_teeth.root_stresses,
         ),
     ),
     Theme(

@@ -66,7 +66,9 @@ class HelicalSection(Section):
 def helical_notices(data: dict) -> Iterator[Finding]:
     """List what a helical case gives without effect, by the tables of its checked file."""
     unused = entries_without_effect(data)
-    unused += [f"static.{key}" for key in ("stresses", "back_flanks") if key in data.get("static", {})]
+    static = data.get("static", {})
+    without = ("back_flanks",) if static.get("slices", 0) > 1 else ("stresses", "back_flanks")
+    unused += [f"static.{key}" for key in without if key in static]
     if data["planet"].get("bearing_clearance"):
         unused.append("planet.bearing_clearance")
     if unused:

@@ -59,13 +59,14 @@ from femgear.trains.rigid import (
     parts_of_speeds,
     rotation_sense,
 )
-from femgear.trains.static.results import StaticResult, describe_set, set_warnings
-from femgear.trains.static.stages import STATIC, mesh_backlash, solve_static
+from femgear.trains.static.results import StaticResult, StressResult, describe_set, set_warnings
+from femgear.trains.static.stages import STATIC, STRESS, mesh_backlash, solve_static, solve_stress
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
 
 _NOTHING_EXCITES = "a given helical.mesh_stiffness does not vary: nothing excites the set"
+_NO_TEETH = "a given helical.mesh_stiffness takes the place of the static solution"
 _TOGETHER = 500
 """Speeds that are in memory at a time."""
 _SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "tooth_loads")
@@ -76,6 +77,13 @@ def solve_helical_static(
 ) -> StaticResult:
     """Solve the spur gears of the transverse section, the whole face width loaded at once."""
     return solve_static(_drive_flanks(case), cache=cache, progress=progress)
+
+
+def solve_helical_stress(
+    case: HelicalCase, static: StaticResult, *, progress: Progress = silent
+) -> StressResult:
+    """Find the stresses of the teeth whose contact was solved in slices over the width."""
+    return solve_stress(_drive_flanks(case), static, progress=progress)
 
 
 def _drive_flanks(case: HelicalCase) -> HelicalCase:
@@ -240,10 +248,14 @@ HELICAL = Train(
                 module=planetary_set(results.case).sun.module,
             ),
             unavailable=lambda case: (
-                "a given helical.mesh_stiffness takes the place of the static solution"
-                if _given(case)
-                else ""
+                _NO_TEETH if _given(case) else ""
             ),
+        ),
+        replace(
+            STRESS,
+            solve=solve_helical_stress,
+            wanted=lambda case: not _given(case) and case.static.slices > 1 and case.static.stresses,
+            unavailable=lambda case: _NO_TEETH if _given(case) else STRESS.unavailable(case),
         ),
         Stage(
             name="modes",

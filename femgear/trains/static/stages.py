@@ -381,7 +381,7 @@ def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
     return np.repeat([pair.backlash for pair in gears.kinds], gears.n_planets)
 
 
-def _influences(case: Case, static: StaticResult, progress: Progress) -> RootStresses:
+def _influences(case: Case, static: StaticResult, progress: Progress = silent) -> RootStresses:
     """Find the root influences of the bodies as the static solution holds them, and of waves over the width.
 
     External gears were observed with their flanks; only an internal one, whose contact has two plane states,

@@ -1,15 +1,17 @@
 """Helical sets whose meshes come from contact over the width: both models, from case to result."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import femgear
+from femgear.contact.bodies import helical_stiffness
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError
 from femgear.trains.helical.stages import solve_helical_modes, solve_helical_static
-from femgear.trains.static.stages import record_positions, solve_static
+from femgear.trains.static.stages import record_positions, solve_static, solve_stress
 
 ROOT = Path(__file__).parents[3]
 TEXT = (ROOT / "cases" / "helical_23_24_73.toml").read_text(encoding="utf-8")
@@ -39,6 +41,24 @@ def test_elastic_set_with_a_helix(tmp_path):
     assert found.cycle.helical and data["slice_load"].sizes["slice"] == 12
     # a right-handed sun that turns counter-clockwise pushes the planets down, and they the ring
     base = np.arcsin(np.sin(np.radians(15.5)) * np.cos(np.radians(17.5)))
+    stress = solve_stress(case, found)
+    loads, ahead = found.cycle.slice_load, stress.influences.ahead
+    path = found.cycle.path[:, :, None] / gears.base_pitch + ahead[:, None]
+    for kind, pair in enumerate(gears.kinds):
+        meshes, ends = slice(3 * kind, 3 * kind + 3), np.array(pair.path) / gears.base_pitch
+        carries = loads[meshes] > 0.0
+        assert carries.any()
+        # bent teeth touch a little before and behind the path
+        there = path[meshes][carries]
+        assert (there > ends[0] - 0.2).all() and (there < ends[1] + 0.2).all()
+    file = stress.dataset()
+    assert np.isnan(file["iso_root_stress"].values).all() and "spur" in file.attrs["iso"]
+    assert file["root_face_factor"].values == pytest.approx(1.0, abs=0.06)
+    straight = replace(found, base_helix_angle=0.0)
+    ratio = file["root_worst"].values / solve_stress(case, straight).dataset()["root_worst"].values
+    stiff = [helical_stiffness(found.base_helix_angle, internal=ring) for ring in (False, True)]
+    expected = 1.0 / np.array([[stiff[0], stiff[0]]] * 3 + [[stiff[0], stiff[1]]] * 3)
+    assert ratio == pytest.approx(expected, rel=1e-9)
     assert data["axial_force"].values == pytest.approx(-np.tan(base) * found.cycle.force, rel=1e-12)
     assert data.attrs["overlap_ratio"] == pytest.approx(overlap, rel=1e-12)
 

@@ -1,17 +1,20 @@
 """Slices in a case file: what the stages store, draw, warn of and refuse."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from page_examples import check_documented
 
+from femgear.contact.root_stress import body_stress
+from femgear.contact.tooth_loads import loaded_teeth
 from femgear.errors import CaseError, FemgearError
 from femgear.trains.elastic.stages import solve_modes
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.figures import contact_pattern, face_load
-from femgear.trains.static.results import HELIX_VARIABLES, describe_static
-from femgear.trains.static.stages import solve_static
+from femgear.trains.static.figures import contact_pattern, face_load, root_stress_over_width
+from femgear.trains.static.results import HELIX_VARIABLES, describe_static, describe_stress
+from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).parents[3]
 WIND_UP = {"carrier.wind_up_stiffness": "1e5 N m/rad", "carrier.torque_end": "front"}
@@ -58,6 +61,47 @@ def test_the_load_over_the_width_is_drawn(misaligned):
     # the largest pressure is that of the load as it goes on to the end of the width
     largest = misaligned[1].cycle.max_pressure[0].max()
     assert pressure.max() <= largest < 1.1 * pressure.max()
+
+
+def test_root_stresses_of_a_load_without_leads_are_those_of_the_plane(case):
+    """In every slice, over the whole record and in the range over a turn."""
+    plane, sliced = (
+        solve_stress(one, solve_static(one)) for one in (with_values(case, {"static.slices": 0}), case)
+    )
+    for a, b in zip(plane.roots, sliced.roots, strict=True):
+        assert b.over_width.shape[-1] == 7 and b.face_load_factor == pytest.approx(1.0, rel=1e-9)
+        assert np.abs(b.over_width - a.over_width).max() < 1e-9 * a.over_width.max()
+        assert np.abs(b.stress - a.stress).max() < 1e-9 * a.over_width.max()
+    for a, b in zip(plane.ranges, sliced.ranges, strict=True):
+        assert (b.maximum, b.minimum, b.point) == pytest.approx((a.maximum, a.minimum, a.point), rel=1e-9)
+        assert b.history == pytest.approx(a.history, abs=1e-9 * a.maximum)
+
+
+def test_root_stresses_follow_the_load_over_the_width(misaligned):
+    """Their mean is the plane stress of the mean load, since all slices touch at one place."""
+    case, static = misaligned
+    result = solve_stress(case, static)
+    gears, cycle, roots, numbers = static.planetary_set, static.cycle, result.influences, np.arange(6)
+    for _, root, acting in roots.of_bodies(gears):
+        loads = roots.loads(gears, cycle, reverse=False)
+        field = body_stress(gears, root, acting, loads, np.arange(8), numbers)
+        mean = [loaded_teeth(cycle, reverse=False)]
+        plane = body_stress(gears, replace(root, waves=None), acting, mean, np.arange(8), numbers)
+        assert np.abs(field.mean(axis=2) - plane[:, :, 0]).max() < 1e-9 * plane.max()
+    data = result.dataset()
+    factor = data["root_face_factor"].values
+    contact = static.cycle.face_load_factor
+    # bending spreads the load: less than K_H-beta, more than one
+    assert (factor[:3] < contact[:3, None]).all() and factor[:3].min() > 1.4
+    assert data["root_over_width"].max(("step", "slice")).values == pytest.approx(data["root_worst"].values)
+    assert (np.diff(data["root_over_width"].max("step").values[:3], axis=-1) > 0).all()
+    height = 1.0 / (1.0 + (h := 3.375e-3 / 25e-3) + h**2)
+    assert data["iso_face_factor"].values[:3] == pytest.approx(contact[:3] ** height, rel=1e-2)
+    block = describe_stress(data)
+    assert all(len(row) == len(block.header) for row in block.rows)
+    assert block.rows[2][block.header.index("K_Fbeta")] == f"{factor[0, 0]:.3f}"
+    image = root_stress_over_width(data).axes[0].collections[0].get_array()
+    assert image.max() == pytest.approx(float(data["root_worst"][0, 0]) * 1e-6)
 
 
 def test_modes_follow_the_softer_meshes(case, misaligned):

@@ -35,7 +35,8 @@ def cycle(mesh, gear, *, periods=1):
     load = load * (1 + 0.5 * (np.arange(positions) // P == periods - 1))
     stress = 1e5 * load[..., None, None] * np.array([1.0, -1.2])[:, None] * bump
     slope = np.linspace(0.1, 1.5, points)
-    return RootCycle(kind, mesh, gear, path, load, stress, arc, slope, periods)
+    over_width = stress[:, :, 0].max(axis=-1)[..., None]
+    return RootCycle(kind, mesh, gear, path, load, stress, arc, slope, periods, over_width)
 
 
 def cycles(**options):

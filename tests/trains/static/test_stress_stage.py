@@ -61,7 +61,8 @@ def fields(static, result, *, reverse=False):
     positions = np.arange(static.cycle.position.size)
     for root, acting in bodies:
         numbers = np.arange(len(root.influence))
-        yield body_stress(static.planetary_set, root, acting, teeth, positions, numbers), acting, teeth
+        field = body_stress(static.planetary_set, root, acting, [teeth], positions, numbers)
+        yield field[:, :, 0], acting, teeth
 
 
 def assert_fields_are_root_cycles(static, result, cycles, *, reverse=False):
