@@ -372,6 +372,7 @@ class StressResult:
     def _over_width(self) -> dict[str, np.ndarray]:
         """Stresses over the face width, and face load factors of the root."""
         s, factor = self.planetary_set, self.cycle.face_load_factor
+        assert factor is not None
         heights = [[abs(gear.tip_radius - gear.root_radius) for gear in pair.gears] for pair in s.kinds]
         highest = np.repeat(np.max(heights, axis=1), s.n_planets)
         width = s.gears[0].face_width
