@@ -10,7 +10,8 @@ import femgear
 from femgear.contact.bodies import helical_stiffness
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError
-from femgear.trains.helical.stages import solve_helical_modes, solve_helical_static
+from femgear.trains.helical.stages import solve_helical_modes, solve_helical_static, solve_helical_stress
+from femgear.trains.registry import stages_of
 from femgear.trains.static.stages import record_positions, solve_static, solve_stress
 
 ROOT = Path(__file__).parents[3]
@@ -77,11 +78,16 @@ def test_rigid_set_takes_the_meshes_of_the_contact(tmp_path):
     sliced = quick.static.model_copy(update={"slices": 12, "positions": 16})
     full = quick.model_copy(update={"static": sliced})
     quick = quick.model_copy(update={"static": quick.static.model_copy(update={"positions": 16})})
-    modes = [solve_helical_modes(one, solve_helical_static(one)) for one in (quick, full)]
+    statics = [solve_helical_static(one) for one in (quick, full)]
+    modes = [solve_helical_modes(*both) for both in zip((quick, full), statics, strict=True)]
     stiffness = [one.excitation.stiffness.mean(axis=1) for one in modes]
     assert stiffness[1] == pytest.approx(stiffness[0], rel=0.1)
     frequency = [one.modes.frequency[one.modes.frequency > 100.0][:6] for one in modes]
     assert frequency[1] == pytest.approx(frequency[0], rel=0.05)
+    assert [any(stage.name == "stress" for stage in stages_of(one, None)) for one in (quick, full)] == [0, 1]
+    stress = solve_helical_stress(full, statics[1])
+    assert np.ptp(stress.influences.ahead) == pytest.approx(statics[1].overlap_ratio * 11 / 12, rel=1e-9)
+    assert np.isfinite(stress.dataset()["root_over_width"].values).all()
 
 
 @pytest.mark.parametrize(
