@@ -140,9 +140,10 @@ THEMES = (
         "face width",
         "Contact over the face width",
         "Slices over the width, joined by waves of the bodies between mirror planes; sets are 27/40/108. "
-        "Rows *solid* and *ends*: a sector in three dimensions, section coordinates turning with the teeth, "
-        "all teeth by cyclic symmetry. Rows *helix*: endless gears of 30/20/70 teeth, m_n 1.6 mm, as in "
-        "docs/helical.md. Love's patch and Hertz's ellipse have no rows: femgear has no contact of points.",
+        "Rows *solid*, *ends* and *root*: a sector in three dimensions, section coordinates turning with the "
+        "teeth, all teeth by cyclic symmetry. Rows *helix*: endless gears of 30/20/70 teeth, m_n 1.6 mm, as "
+        "in docs/helical.md. Love's patch and Hertz's ellipse have no rows: femgear has no contact of "
+        "points.",
         (
             face_width.springs,
             face_width.half_space,
