@@ -210,7 +210,7 @@ def test_growth_over_slices(benchmark, reference, medians, slices):
 def test_growth_of_slices_over_planets(benchmark, planets, medians, n_planets):
     from femgear.contact.bodies import make_sectors
     from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-    from femgear.contact.slices import width_waves
+    from femgear.contact.width_waves import width_waves
 
     gears = planets.gears(n_planets)
     sectors = make_sectors(gears, planets.bodies.material, flank_elements=6, refine=0.5)

@@ -138,6 +138,14 @@ class MeshWindows(Windows):
         """Smallest separation in every window [m], shape (meshes, P, pairs)."""
         return self.gap.min(axis=-1)
 
+    @property
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mesh with windows that stands for each mesh of the set (M,), and which image of it that is (M,)."""
+        n, N = self.n_planets, self.n_planets * self.images
+        kind, planet = np.divmod(np.arange(self.meshes * self.images), N)
+        image, first = np.divmod(planet, n)
+        return kind * n + first, image
+
     def kind(self, mesh: np.ndarray) -> np.ndarray:
         """Kinds of meshes (...)."""
         return mesh // self.n_planets % len(self.gears.kinds)
@@ -299,6 +307,14 @@ class Candidates:
         at_last = np.take_along_axis(active, last[..., None], axis=-1)[..., 0]
         return (active[..., 0] & self.at_edge[0]) | (at_last & self.at_edge[1])
 
+    def equal_cell_pressure(self, loads: np.ndarray) -> np.ndarray:
+        """Mean pressures of equal cells under loads (P, W, C) [N], however windows are divided [Pa]."""
+        pressure, area = np.zeros(loads.shape), self.setup.cell_area[self.mesh].mean(axis=(1, 2))
+        for layout, of_cells in enumerate(equal_cells(self.setup.cells)):
+            rows = self.layout == layout
+            pressure[rows] = loads[rows] @ of_cells.T
+        return pressure / area[:, None]
+
     def problem(self, at: int) -> ContactProblem:
         """The contact problem at one of the positions."""
         window, cell = np.nonzero(self.candidate[at])
@@ -380,6 +396,17 @@ def mesh_windows(
             found.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
         teeth.append(tooth)
     return _gathered(found, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
+
+
+def first_windows(planetary_set: GearSet, bodies: Bodies, sun_torque: float) -> tuple[float, float]:
+    """Share [N] and nearest [m] of the first windows under a torque [N m], as `mesh_windows` takes them."""
+    s, width = planetary_set, bodies.face_width
+    # without torque what one micrometre of wedging may carry
+    share = sun_torque / (s.gears[0].base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
+    rough = share / (ROUGH_STIFFNESS * width)
+    # a ring on a soft foundation lets flanks come nearer than teeth alone do
+    yields = max(body.regular[0].diagonal().max() for body in bodies.gears if body is not None)
+    return share, max(3.0 * rough, rough + share * yields)
 
 
 def in_windows(

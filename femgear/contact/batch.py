@@ -23,7 +23,10 @@ from femgear.contact.active_set import NULL, RIGID, ROUNDING, factor, settle
 from femgear.contact.assembly import ROUGH_STIFFNESS, Candidates
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import BearingSprings
+from femgear.errors import ContactError
 
+LARGEST_RESIDUAL = 1e-9
+"""Of contact conditions and equilibrium; rounding leaves 1e-14."""
 _MOST_STEPS = 30
 """Linear solutions before a position is left to the single solver."""
 _FAINT = 1e-9
@@ -88,6 +91,19 @@ def solve_batch(
     batch.solve()
     state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
     return BatchState(*state)
+
+
+def check_residual(found: Candidates, state: BatchState) -> None:
+    """Refuse (E-CONTACT) a solution that violates its conditions by more than `LARGEST_RESIDUAL`."""
+    if not (state.residual <= LARGEST_RESIDUAL).all():
+        worst = int(np.argmax(~(state.residual <= LARGEST_RESIDUAL)))
+        raise ContactError(
+            f"the contact solution at position {found.position[worst]} violates its conditions by "
+            f"{state.residual[worst]:.2g}",
+            code="E-CONTACT",
+            limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
+            remedy="look for stiffnesses, clearances or separations of very different size",
+        )
 
 
 def check_definite(found: Candidates) -> None:

@@ -14,52 +14,45 @@ from typing import Any
 import numpy as np
 
 from femgear.contact.assembly import (
-    ROUGH_STIFFNESS,
     Candidates,
     MeshWindows,
     contact_candidates,
     cycle_positions,
     enlarged,
-    equal_cells,
+    first_windows,
     in_windows,
     mesh_windows,
 )
 from femgear.contact.batch import (
     BatchState,
     ContactTangents,
-    PairLaws,
     check_definite,
-    pair_laws,
+    check_residual,
     solve_batch,
 )
 from femgear.contact.bodies import Bodies
+from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
 from femgear.contact.flank_pairs import mesh_count
-from femgear.contact.slices import SliceState, WidthWaves, largest_mean, solve_slices
+from femgear.contact.slices import largest_mean
 from femgear.contact.supports import (
     RIGID,
     UPRIGHT,
     BearingSprings,
     MovingMembers,
     Supports,
-    TiltingMembers,
     WidthSupports,
     bearing_springs,
     moving_members,
     pin_forces,
     tilting_members,
 )
-from femgear.errors import ContactError
-from femgear.gears.deviations import SetDeviations, lead_separation, mirrored_deviations
-from femgear.gears.modifications import FlankTwist
+from femgear.contact.width_waves import WidthWaves
+from femgear.gears.deviations import SetDeviations, mirrored_deviations
 from femgear.gears.pair import EACH
 from femgear.gears.planetary import GearSet, PlanetarySet, mirrored_set
 
-LARGEST_RESIDUAL = 1e-9
-"""Of contact conditions and equilibrium; rounding leaves 1e-14."""
 _TOGETHER = 64
 """Positions that are solved at once."""
-_FORCES, _LEAST = 32, 1e-4
-"""Of the curves of tooth pairs in slices: their number, and the share of the torque at which they begin."""
 
 
 @dataclass(frozen=True)
@@ -381,37 +374,15 @@ def walk_mesh_cycle(
         if springs is None and options.planet_gaps is None and not options.both_flanks and not options.waves:
             images = math.gcd(planet_symmetry(solved, deviations), solved.gears[0].teeth)
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
-        tilting = tilting_members(solved, options.width_supports, options.slices) if options.waves else None
+        width = _face_width(solved, options, members, deviations)
         walk = _Walk(
-            solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, tilting
+            solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, width
         )
         found = in_windows(walk.attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
-    if record.helical and not np.ndim(positions):
-        record = replace(record, **over_slices(record, options, periods=periods))
+    if options.ahead is not None and not np.ndim(positions):
+        record = replace(record, **over_slices(record, options.ahead, periods=periods))
     return _seen_from_front(record, planetary_set, order) if mirrored else record
-
-
-_EVEN = ("deflection", "sun_arc", "force", "stiffness", "member_motion", "held_stiffness")
-"""What all slices of helical teeth have in common, and forces and stiffnesses that are sums over them."""
-
-
-def over_slices(record, options: CycleOptions, *, periods: int = 1) -> dict[str, np.ndarray]:
-    """Compute what a record of helical teeth has where every slice stands for the places around its middle.
-
-    Slices at single places come into contact one after the other, with a frequency of their own, which is
-    none of the teeth: the mean over the mesh periods from one to the next takes it out. The record, with
-    names of `MeshCycle`, is at equidistant positions of whole mesh periods.
-    """
-    assert options.ahead is not None
-    step, found = np.ptp(options.ahead) / (len(options.ahead) - 1), {}
-    for name in _EVEN:
-        values = getattr(record, name, None)
-        if values is not None:
-            count = values.shape[-1]
-            mean = np.sinc(np.fft.rfftfreq(count, periods / count) * step)
-            found[name] = np.fft.irfft(mean * np.fft.rfft(values), n=count)
-    return found
 
 
 def cycle_without_load(
@@ -471,6 +442,21 @@ def planet_symmetry(planetary_set: GearSet, deviations: SetDeviations | None = N
     return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
 
 
+def _face_width(
+    planetary_set: GearSet, options: CycleOptions, members: MovingMembers, deviations: SetDeviations | None
+) -> FaceWidth | None:
+    """What the contact over the face width takes of the options; None without slices."""
+    if options.waves is None:
+        return None
+    held = None
+    if options.held_bodies is not None and options.held_waves is not None:
+        held = options.held_bodies, options.held_waves
+    tilting = tilting_members(planetary_set, options.width_supports, options.slices)
+    return FaceWidth(
+        options.waves, options.slices, members, deviations, tilting, held, options.ahead is not None
+    )
+
+
 def _first_planets(
     planetary_set: GearSet, count: int, deviations: SetDeviations | None
 ) -> tuple[GearSet, SetDeviations | None]:
@@ -490,30 +476,6 @@ def _first_planets(
     return replace(planetary_set, planet_angles=planetary_set.planet_angles[:count]), deviations
 
 
-def first_windows(planetary_set: GearSet, bodies: Bodies, sun_torque: float) -> tuple[float, float]:
-    """Share [N] and nearest [m] of the first windows under a torque [N m], as `mesh_windows` takes them."""
-    s, width = planetary_set, bodies.face_width
-    # without torque what one micrometre of wedging may carry
-    share = sun_torque / (s.gears[0].base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
-    rough = share / (ROUGH_STIFFNESS * width)
-    # a ring on a soft foundation lets flanks come nearer than teeth alone do
-    yields = max(body.regular[0].diagonal().max() for body in bodies.gears if body is not None)
-    return share, max(3.0 * rough, rough + share * yields)
-
-
-def check_residual(found: Candidates, state: BatchState) -> None:
-    """Refuse (E-CONTACT) a solution that violates its conditions by more than `LARGEST_RESIDUAL`."""
-    if not (state.residual <= LARGEST_RESIDUAL).all():
-        worst = int(np.argmax(~(state.residual <= LARGEST_RESIDUAL)))
-        raise ContactError(
-            f"the contact solution at position {found.position[worst]} violates its conditions by "
-            f"{state.residual[worst]:.2g}",
-            code="E-CONTACT",
-            limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
-            remedy="look for stiffnesses, clearances or separations of very different size",
-        )
-
-
 @dataclass(frozen=True)
 class _Walk:
     """A set under a torque that is not negative, and the record without load at the positions to solve.
@@ -530,20 +492,12 @@ class _Walk:
     springs: BearingSprings | None
     empty: MeshCycle
     options: CycleOptions
-    tilting: TiltingMembers | None = None
+    width: FaceWidth | None = None
 
     @property
     def images(self) -> int:
         """Sectors that are in the same state."""
         return self.planetary_set.n_planets // self.sector.n_planets
-
-    @property
-    def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of all meshes the one that is solved, (M,), and the image of it that they are, (M,)."""
-        n, N = self.sector.n_planets, self.planetary_set.n_planets
-        kind, planet = np.divmod(np.arange(mesh_count(self.planetary_set)), N)
-        image, first = np.divmod(planet, n)
-        return kind * n + first, image
 
     def attempt(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
         """Solve all positions in windows of one size, or up to one that needs more, see `in_windows`."""
@@ -579,10 +533,10 @@ class _Walk:
             state = solve_batch(candidates, load, self.springs)
             check_residual(candidates, state)
             found.append({} if empty.helical else self._at_positions(candidates, state))
-            if options.waves is None:
+            if self.width is None:
                 reach = found[-1]["deflection"]
             else:
-                sliced = self._over_width(candidates, state, load, found[-1])
+                sliced = contact_over_width(self.width, candidates, state, load, found[-1])
                 overflow, reach = overflow | sliced.pop("overflow"), sliced.pop("reach")
                 found[-1] |= sliced
             missed = setup.missed(rows, reach)
@@ -609,16 +563,16 @@ class _Walk:
         # sprung members yield under the mesh forces, free ones are unknowns of the problem
         motion, sprung = np.zeros((len(members.names), P)), ~members.free
         motion[members.free] = state.motions.T[rotations:] if self.images == 1 else 0.0
-        whole = force if self.images == 1 else force[self._places[0]]
+        whole = force if self.images == 1 else force[setup.places[0]]
         pulled = members.approach[:, sprung].T @ whole[: len(members.approach)]
         motion[sprung] = -pulled / members.stiffness[sprung, None]
         at_edge = found.at_flank_end(state.active)
-        pressure = _equal_cell_pressure(found, state.loads)
+        pressure = found.equal_cell_pressure(state.loads)
         inner = np.where(at_edge, 0.0, pressure.max(axis=2))
         tangents = ContactTangents(found, state)
         values = {
             "deflection": turns @ state.motions.T[:rotations]
-            + members.approach[: meshes * self.images][self._places[1] == 0] @ motion,
+            + members.approach[: meshes * self.images][setup.places[1] == 0] @ motion,
             "sun_arc": state.motions[:, driver],
             "force": force[:meshes],
             "back_force": force[meshes:],
@@ -641,119 +595,14 @@ class _Walk:
             coupling = tangents.between_meshes(held, meshes)
             coupling[:, loaded] = np.linalg.inv(coupling[:, loaded])
             coupling[:, ~loaded] = 0.0
-            between, (every, sector) = np.fft.irfft(coupling, n=self.images, axis=0), self._places
+            between, (every, sector) = np.fft.irfft(coupling, n=self.images, axis=0), setup.places
             away = (sector - sector[:, None]) % self.images
             values["held_compliance"] = between[away, :, every[:, None], every]
         return values
 
-    def _over_width(
-        self, found: Candidates, state: BatchState, load, plane: dict[str, Any]
-    ) -> dict[str, Any]:
-        """What slices change in the plane solution of some positions, by the names of `MeshCycle`."""
-        options, N, members, W = self.options, self.sector.n_planets, self.members, len(found.mesh)
-        driver, turns = found.setup.driver, found.setup.gears.rotation_approach
-        assert options.waves is not None
-        curves = np.geomspace(_LEAST * load[driver] / N, 4.0 * load[driver], _FORCES)
-        S, rows = options.slices, len(found.position)
-        P = rows if options.ahead is None else rows // S
-        lead, apart = self._leads(found, P)
-        held = None
-        if options.held_bodies is not None and options.held_waves is not None:
-            held = found.images_of(options.held_bodies).sum(axis=0), options.held_waves
-        laws = pair_laws(found, state, curves)
-        sliced = solve_slices(found, laws, load, options.waves, apart, held, self.tilting)
-        force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
-        motion = np.zeros((len(members.names), P))
-        count = driver + 1 + int(members.free.sum())
-        motion[members.free] = sliced.motions.T[driver + 1 : count]
-        # approach of every mesh in every slice by tilts, (2N, S, P)
-        tilts, turned = sliced.motions.T[count:], np.zeros((len(force), S, P))
-        twisted, angles = turned, tilts
-        if self.tilting is not None:
-            angles = self.tilting.angle[:, None] * tilts
-            turned = self.tilting.approach @ tilts
-            twisted = turned - np.einsum("vswt,ptw->vsp", self.tilting.coupling, sliced.of_meshes())
-        motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung, None]
-        base = turns @ sliced.motions.T[: driver + 1] + members.approach @ motion
-        nearest = (apart - np.moveaxis(twisted, -1, 0).swapaxes(1, 2)[..., found.mesh]).min(axis=1)
-        values = self._of_pairs(found, state, laws, sliced) | {
-            "deflection": base + turned.mean(axis=1),
-            "sun_arc": sliced.motions[:, driver],
-            "force": force,
-            "member_motion": motion,
-            "mesh_misalignment": _rise(twisted - lead[..., None]),
-            "lead_offset": apart.reshape(P, -1, len(force), W // len(force)).min(axis=(1, 3)).T,
-            "member_tilt": angles,
-        }
-        # the slice that comes nearest decides which pairs may touch
-        reach = base - nearest.reshape(P, len(force), W // (len(force))).min(axis=-1).T
-        values["reach"] = np.repeat(reach, rows // P, axis=1)
-        for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
-            # tangents of the springs change; what they begin at is that of the cells
-            values[name] = plane.get(name, 0.0) + tangent.T
-        if held is not None:
-            loaded, between = (force > 0).all(axis=0), np.zeros((P, len(force), len(force)))
-            if P == rows:
-                between = np.moveaxis(plane["held_compliance"], -1, 0).copy()
-                between[loaded] = np.linalg.inv(between[loaded])
-            between[loaded] = np.linalg.inv(between[loaded] + sliced.tangents[1][loaded])
-            values["held_compliance"] = np.moveaxis(between, 0, -1)
-        return values
-
-    def _of_pairs(
-        self, found: Candidates, state: BatchState, laws: PairLaws, sliced: SliceState
-    ) -> dict[str, Any]:
-        """Loads and pressures of tooth pairs in slices, by the names of `MeshCycle`."""
-        (P, S, W), rows, width = sliced.force.shape, len(found.position), self.bodies.face_width
-        contact, spur = sliced.contact_width(found, laws), P == rows
-        _check_lines(sliced.force if spur else None, contact, width, S)
-        # by Hertz's law the largest pressure of a slice grows with the root of its force
-        pressure, before = _equal_cell_pressure(found, state.loads).max(axis=2), state.loads.sum(axis=-1)
-        at_edge, of_rows = sliced.reaches_ends(found, laws), sliced.force.reshape(rows, -1, W)
-
-        def pressed(force):
-            raised = np.divide(force, before, out=np.zeros(force.shape), where=before > 0)
-            return np.where(at_edge, 0.0, pressure * np.sqrt(raised))
-
-        def over_width(values):
-            """Springs (rows, slices of each, W) stand for all slices of spur teeth, for one of helical."""
-            by_pair = found.by_pairs(np.moveaxis(values, 1, 2))
-            by_pair = by_pair.reshape(*by_pair.shape[:3], P, -1).swapaxes(3, 4)
-            return by_pair.reshape(*by_pair.shape[:2], S, P)
-
-        inner = found.by_pairs(pressed(sliced.largest() if spur else sliced.of_laws(laws))).max(axis=1)
-        slice_load = over_width(of_rows)
-        return {
-            "tooth_load": slice_load.mean(axis=2),
-            "slice_load": slice_load,
-            "slice_pressure": over_width(pressed(of_rows.swapaxes(0, 1)).swapaxes(0, 1)),
-            "max_pressure": inner.reshape(len(inner), P, -1).max(axis=-1),
-            "edge_contact": found.by_pairs(at_edge).any(axis=1).reshape(len(inner), P, -1).any(axis=-1),
-            "residual": np.maximum(state.residual.reshape(P, -1).max(axis=1), sliced.residual),
-            "iterations": state.iterations.reshape(P, -1).sum(axis=1) + sliced.iterations,
-            "overflow": sliced.overflows(found, laws),
-        }
-
-    def _leads(self, found: Candidates, P: int) -> tuple[np.ndarray, np.ndarray]:
-        """Separations by leads and misalignments, of meshes (2N, S) and windows (P, S, W) [m]."""
-        rows, S, mesh = np.arange(len(found.position))[:, None], self.options.slices, found.mesh
-        lead, d = np.zeros((mesh_count(self.sector), S)), self.deviations
-        if d is not None:
-            lead = lead_separation(d, self.sector, S)
-        apart = np.broadcast_to(lead[mesh].T, (P, S, len(mesh)))
-        forms = () if d is None else (d.sun, d.planet_sun_side, d.planet_ring_side, d.ring)
-        if d is not None and any(isinstance(one, FlankTwist) for form in forms for one in form.lead):
-            # a twist by the places of the pairs on the flanks, of helical teeth a row a slice
-            rolls = found.setup.roll[:, : len(lead), found.position][..., 1]
-            every = lead_separation(d, self.sector, S, rolls)[mesh, rows, found.pair]
-            helical = len(rows) != P
-            apart = every[rows[:, 0], :, rows[:, 0] % S] if helical else every.swapaxes(1, 2)
-            apart = apart.reshape(P, S, len(mesh))
-        return lead, apart
-
     def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
         """The record from what was found at its positions: with places of the tooth pairs, pins, message."""
-        N, cells, every = self.planetary_set.n_planets, setup.cells, self._places[0]
+        N, cells, every = self.planetary_set.n_planets, setup.cells, setup.places[0]
         meshes = mesh_count(self.planetary_set)
         drive, back = slice(0, meshes), slice(meshes, 2 * meshes)
         values = {name: np.concatenate([some[name] for some in found], axis=-1) for name in found[0]}
@@ -764,7 +613,7 @@ class _Walk:
             for kind, place, number in ((k, p, pair[p]) for k, pair in enumerate(s.mates) for p in (0, 1)):
                 if number != EACH:
                     teeth = s.gears[number].teeth // self.images
-                    turned[place, kind * N : (kind + 1) * N] = self._places[1][:N] * teeth
+                    turned[place, kind * N : (kind + 1) * N] = setup.places[1][:N] * teeth
             tooth = tooth[:, every] + turned[..., None]
         values |= {"path": path[drive], "tooth": tooth[:, drive]}
         looked = self.options.both_flanks
@@ -779,6 +628,7 @@ class _Walk:
             if axes[0] == "m" and axes[1] != "m":
                 values |= {name: values[name][every] for name in names if name in values}
         record = replace(self.empty, **values)
+        tilting = None if self.width is None else self.width.tilting
         unloaded = record.force[:N] + record.back_force[:N] <= 0.0
         message = "all positions by the active set"
         if unloaded.any():
@@ -795,55 +645,9 @@ class _Walk:
             open_planets=unloaded,
             unknowns=unknowns,
             member_names=self.members.names,
-            tilt_names=() if self.tilting is None else self.tilting.names,
+            tilt_names=() if tilting is None else tilting.names,
             message=message,
         )
-
-
-def _rise(approach: np.ndarray) -> np.ndarray:
-    """Rise over the width of the least-squares lines through values (2N, S, P) in slices."""
-    place = 2.0 * (np.arange(approach.shape[1]) + 0.5) / approach.shape[1] - 1.0
-    return 2.0 * np.einsum("s,msp->mp", place, approach) / (place @ place)
-
-
-def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, slices: int) -> None:
-    """Refuse (E-SLICES) contacts that are wider than slices, or of spur teeth points rather than lines.
-
-    Forces are (P, S, W) [N], widths of the contacts along the profile (P, W) [m]. One or two slices amid the
-    width may carry less than their length.
-    """
-    thinnest = float(contact.max(initial=0.0))
-    if width / slices < thinnest:
-        raise ContactError(
-            f"contacts of {thinnest * 1e3:.3g} mm along the profile are wider than slices",
-            code="E-SLICES", key="static.slices", value=slices,
-            limit=f"at most {int(width / thinnest)}",
-            remedy="use fewer slices or reduce operation.torque",
-        )  # fmt: skip
-    if force is None:
-        return
-    load, carries = force.mean(axis=1), force > 0.0
-    length, most = carries.mean(axis=1) * width, 2.5 * width / slices
-    amid = ~(carries[:, 0] | carries[:, -1]) & (length < most) & (load > 0.25 * load.max())
-    point = (contact > 0.4 * length) | amid
-    if point.any():
-        raise ContactError(
-            f"a tooth pair touches over no more than {length[point].min() * 1e3:.3g} mm of the width and "
-            f"{contact[point].max() * 1e3:.3g} mm along the profile: slices hold for lines, not for points",
-            code="E-SLICES", key="static.slices", value=slices,
-            limit="contacts over three slices, and longer than five half widths",
-            remedy="reduce lead crowning and end relief, or take more slices",
-        )  # fmt: skip
-
-
-def _equal_cell_pressure(found: Candidates, loads) -> np.ndarray:
-    """Mean pressures of equal cells, however the windows are divided, (P, W, cells) [Pa]."""
-    setup, pressure = found.setup, np.zeros(loads.shape)
-    area = setup.cell_area[found.mesh].mean(axis=(1, 2))
-    for layout, of_cells in enumerate(equal_cells(setup.cells)):
-        rows = found.layout == layout
-        pressure[rows] = loads[rows] @ of_cells.T
-    return pressure / area[:, None]
 
 
 def _both_flanks(tangents: ContactTangents, images, meshes: int) -> np.ndarray:

@@ -15,7 +15,8 @@ from math import gcd
 import numpy as np
 
 from femgear.contact.bodies import Bodies
-from femgear.contact.cycle import CycleOptions, MeshCycle, over_slices, planet_symmetry, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, MeshCycle, planet_symmetry, walk_mesh_cycle
+from femgear.contact.face_width import over_slices
 from femgear.contact.supports import RIGID, Supports
 from femgear.gears.deviations import SetDeviations
 from femgear.gears.planetary import GearSet
@@ -141,7 +142,7 @@ def loaded_period(
         shares = (smooth, 0.5), (jumps, 0.25), (jumps, 0.5), (jumps, 0.75)
         wanted = np.concatenate([tau[some] + share * gap[some] for some, share in shares])
     found = _whole_period(planetary_set, record, symmetry, parts)
-    return replace(found, **over_slices(found, options)) if options.ahead is not None else found
+    return found if options.ahead is None else replace(found, **over_slices(found, options.ahead))
 
 
 _OVER_POSITIONS = ("position", "deflection", "force", "stiffness", "held_stiffness", "held_compliance")

@@ -43,8 +43,8 @@ from femgear.contact.bodies import (
 )
 from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks, mesh_count
-from femgear.contact.slices import cosines
 from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
+from femgear.contact.width_waves import cosines
 from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import Material, plane_modulus, stiffness, wave_stiffness
 from femgear.fe.grid import Grid

@@ -28,9 +28,22 @@ from femgear.case.gear_set import need_set
 from femgear.case.mistakes import combine, translate
 from femgear.case.quantities import Section
 from femgear.case.sections import LARGEST_DEVIATION, Amplitude, Case, Deviation
-from femgear.contact.assembly import Candidates, contact_candidates, cycle_positions, in_windows, mesh_windows
-from femgear.contact.batch import ContactTangents, PairLaws, pair_laws, solve_batch, solve_laws
-from femgear.contact.cycle import check_residual, first_windows
+from femgear.contact.assembly import (
+    Candidates,
+    contact_candidates,
+    cycle_positions,
+    first_windows,
+    in_windows,
+    mesh_windows,
+)
+from femgear.contact.batch import (
+    ContactTangents,
+    PairLaws,
+    check_residual,
+    pair_laws,
+    solve_batch,
+    solve_laws,
+)
 from femgear.contact.flank_pairs import pair_separations
 from femgear.contact.supports import MovingMembers, moving_members
 from femgear.errors import CaseError, FemgearError, StorageError

@@ -8,7 +8,7 @@ from contact.test_cycle import STEEL, TORQUE, reference_set
 
 from femgear.contact.bodies import helical_stiffness, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.slices import _beside, width_waves
+from femgear.contact.width_waves import _beside, width_waves
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope
 

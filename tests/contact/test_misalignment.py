@@ -10,8 +10,8 @@ from scipy.optimize import minimize_scalar
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.slices import width_waves
 from femgear.contact.supports import UPRIGHT, TiltingMembers, WidthSupports, tilting_members
+from femgear.contact.width_waves import width_waves
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import lead_separation, least_play, misaligned_approach, no_deviations

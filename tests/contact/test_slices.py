@@ -10,8 +10,9 @@ from scipy.spatial import KDTree
 from femgear.contact import cycle, slices
 from femgear.contact.bodies import flank_load_columns, flank_stations, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.slices import _SliceNewton, cosines, wave_displacement, width_waves
+from femgear.contact.slices import _SliceNewton
 from femgear.contact.supports import Supports
+from femgear.contact.width_waves import cosines, wave_displacement, width_waves
 from femgear.fe.compliance import (
     boundary_nodes,
     condense_sector,
@@ -227,7 +228,7 @@ def _no_coupling(found, some, waves, count):
 def test_coupling_raises_the_largest_load(gears, bodies, waves, monkeypatch):
     """Slices that are gears of their own spread a misalignment better than one body: by 1 to 11 %."""
     coupled = walk(gears, bodies, waves, LeadSlope(4e-6)).face_load_factor[0]
-    monkeypatch.setattr(slices, "_across", _no_coupling)
+    monkeypatch.setattr(slices, "slice_compliance", _no_coupling)
     loose = walk(gears, bodies, waves, LeadSlope(4e-6)).face_load_factor[0]
     assert 1.01 < coupled / loose < 1.11
 

@@ -30,7 +30,7 @@ from femgear.contact.root_stress import (
     root_stress,
     root_waves,
 )
-from femgear.contact.slices import cosines, wave_displacement, width_waves
+from femgear.contact.width_waves import cosines, wave_displacement, width_waves
 from femgear.fe.compliance import condense_sector, symmetric_factor, tooth_compliance
 from femgear.fe.elasticity import Material, basis, plane_modulus, wave_stiffness
 from femgear.gears.deviations import no_deviations
@@ -465,7 +465,7 @@ def whole_sets() -> tuple[Row, ...]:
     for amount in (2, 4):
         lead = [LeadSlope(1e-6 * amount)]
         coupled = walk(lead).face_load_factor[0]
-        with patch.object(slices, "_across", apart):
+        with patch.object(slices, "slice_compliance", apart):
             alone = walk(lead).face_load_factor[0]
         text = f"{name}slope {amount} um, K_Hbeta over that without coupling, less 1, in %"
         rows.append(within("set", "slices without coupling", text, 6.0, 100 * (coupled / alone - 1), 5.0,

@@ -14,7 +14,7 @@ import numpy as np
 
 from femgear.contact.bodies import helical_stiffness, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.slices import width_waves
+from femgear.contact.width_waves import width_waves
 from femgear.fe.compliance import node_dofs, symmetric_factor
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import Grid, mirror, ordered_nodes

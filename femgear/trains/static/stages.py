@@ -30,9 +30,9 @@ from femgear.contact.root_stress import (
     root_stress_cycle,
     root_waves,
 )
-from femgear.contact.slices import width_waves, with_held_ring
 from femgear.contact.supports import RIGID, UPRIGHT, Supports, WidthSupports, tilting_members
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
+from femgear.contact.width_waves import width_waves, with_held_ring
 from femgear.errors import CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import foundation
 from femgear.gears.deviations import common_period

@@ -9,7 +9,7 @@ from validation.planetary import reference_set
 
 from femgear.contact.bodies import Bodies, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.slices import width_waves
+from femgear.contact.width_waves import width_waves
 from femgear.errors import FemgearError
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadSlope

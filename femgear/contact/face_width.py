@@ -1,0 +1,244 @@
+"""Contact over the face width: what slices of the width change in the plane contact at some positions.
+
+Leads, misalignments and tilts of the members part the flanks by different amounts along the width; the
+tooth pairs of the plane solution become the springs of `femgear.contact.slices`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from femgear.contact.assembly import Candidates
+from femgear.contact.batch import BatchState, PairLaws, pair_laws
+from femgear.contact.bodies import Bodies
+from femgear.contact.slices import SliceState, solve_slices
+from femgear.contact.supports import MovingMembers, TiltingMembers
+from femgear.contact.width_waves import WidthWaves
+from femgear.errors import ContactError
+from femgear.gears.deviations import SetDeviations, lead_separation
+from femgear.gears.modifications import FlankTwist
+
+_FORCES, _LEAST = 32, 1e-4
+"""Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
+_EVEN = ("deflection", "sun_arc", "force", "stiffness", "member_motion", "held_stiffness")
+"""What all slices of helical teeth have in common, and forces and stiffnesses that are sums over them."""
+
+
+@dataclass(frozen=True)
+class FaceWidth:
+    """What the contact in slices takes besides the plane contact.
+
+    Parameters
+    ----------
+    waves : WidthWaves
+        Of the bodies.
+    slices : int
+        Their number.
+    members : MovingMembers
+    deviations : SetDeviations, optional
+    tilting : TiltingMembers, optional
+    held : Bodies and WidthWaves, optional
+        Other bodies with the same flanks, for whose tangents the contact is taken too.
+    helical : bool
+        Whether every slice is at a position of its own.
+    """
+
+    waves: WidthWaves
+    slices: int
+    members: MovingMembers
+    deviations: SetDeviations | None = None
+    tilting: TiltingMembers | None = None
+    held: tuple[Bodies, WidthWaves] | None = None
+    helical: bool = False
+
+
+def contact_over_width(
+    over: FaceWidth, found: Candidates, state: BatchState, load, plane: dict[str, Any]
+) -> dict[str, Any]:
+    """Solve the contact in slices at some positions: what they change, by the names of `MeshCycle`.
+
+    Parameters
+    ----------
+    over : FaceWidth
+    found, state : Candidates, BatchState
+        The plane contact at all positions, or, of helical teeth, in all slices at each of them.
+    load : (m,) array
+        External load on the motions [N].
+    plane : dict
+        What the plane contact has by these names; empty of helical teeth.
+
+    Returns
+    -------
+    dict
+        With ``reach`` (meshes, rows), the approach up to which pairs may touch [m], and ``overflow``, whether
+        a contact leaves its window.
+    """
+    N, members, W = found.setup.n_planets, over.members, len(found.mesh)
+    driver, turns = found.setup.driver, found.setup.gears.rotation_approach
+    curves = np.geomspace(_LEAST * load[driver] / N, 4.0 * load[driver], _FORCES)
+    S, rows = over.slices, len(found.position)
+    P = rows // S if over.helical else rows
+    lead, apart = _leads(over, found, P)
+    held = None
+    if over.held is not None:
+        held = found.images_of(over.held[0]).sum(axis=0), over.held[1]
+    laws = pair_laws(found, state, curves)
+    sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
+    force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
+    motion = np.zeros((len(members.names), P))
+    count = driver + 1 + int(members.free.sum())
+    motion[members.free] = sliced.motions.T[driver + 1 : count]
+    angles, turned, twisted = _by_tilts(over.tilting, sliced, sliced.motions.T[count:])
+    motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung, None]
+    base = turns @ sliced.motions.T[: driver + 1] + members.approach @ motion
+    nearest = (apart - np.moveaxis(twisted, -1, 0).swapaxes(1, 2)[..., found.mesh]).min(axis=1)
+    values = _of_pairs(found, state, laws, sliced) | {
+        "deflection": base + turned.mean(axis=1),
+        "sun_arc": sliced.motions[:, driver],
+        "force": force,
+        "member_motion": motion,
+        "mesh_misalignment": _rise(twisted - lead[..., None]),
+        "lead_offset": apart.reshape(P, -1, len(force), W // len(force)).min(axis=(1, 3)).T,
+        "member_tilt": angles,
+    }
+    # the slice that comes nearest decides which pairs may touch
+    reach = base - nearest.reshape(P, len(force), W // len(force)).min(axis=-1).T
+    values["reach"] = np.repeat(reach, rows // P, axis=1)
+    for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
+        # tangents of the springs change; what they begin at is that of the cells
+        values[name] = plane.get(name, 0.0) + tangent.T
+    if held is not None:
+        values["held_compliance"] = _held_compliance(plane.get("held_compliance"), sliced.tangents[1], force)
+    return values
+
+
+def _held_compliance(plane: np.ndarray | None, tangents: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Compliance between the meshes (meshes, meshes, P) with what slices add to their tangents [m/N]."""
+    loaded, between = (force > 0).all(axis=0), np.zeros(tangents.shape)
+    if plane is not None:
+        between = np.moveaxis(plane, -1, 0).copy()
+        between[loaded] = np.linalg.inv(between[loaded])
+    between[loaded] = np.linalg.inv(between[loaded] + tangents[loaded])
+    return np.moveaxis(between, 0, -1)
+
+
+def _by_tilts(tilting: TiltingMembers | None, sliced: SliceState, tilts: np.ndarray) -> tuple:
+    """Angles (k, P) [rad], and approach of the meshes in all slices by tilts alone, and with twists [m].
+
+    Approaches are (meshes, S, P), ``tilts`` the motions of `TiltingMembers` (k, P) [m].
+    """
+    force = sliced.of_meshes()
+    if tilting is None:
+        turned = np.zeros(force.T.shape)
+        return tilts, turned, turned
+    turned = tilting.approach @ tilts
+    twisted = turned - np.einsum("vswt,ptw->vsp", tilting.coupling, force)
+    return tilting.angle[:, None] * tilts, turned, twisted
+
+
+def _of_pairs(found: Candidates, state: BatchState, laws: PairLaws, sliced: SliceState) -> dict[str, Any]:
+    """Loads and pressures of tooth pairs in slices, by the names of `MeshCycle`."""
+    (P, S, W), rows, width = sliced.force.shape, len(found.position), found.bodies.face_width
+    contact, spur = sliced.contact_width(found, laws), P == rows
+    _check_lines(sliced.force if spur else None, contact, width, S)
+    # by Hertz's law the largest pressure of a slice grows with the root of its force
+    pressure, before = found.equal_cell_pressure(state.loads).max(axis=2), state.loads.sum(axis=-1)
+    at_edge, of_rows = sliced.reaches_ends(found, laws), sliced.force.reshape(rows, -1, W)
+
+    def pressed(force):
+        raised = np.divide(force, before, out=np.zeros(force.shape), where=before > 0)
+        return np.where(at_edge, 0.0, pressure * np.sqrt(raised))
+
+    def over_width(values):
+        """Springs (rows, slices of each, W) stand for all slices of spur teeth, for one of helical."""
+        by_pair = found.by_pairs(np.moveaxis(values, 1, 2))
+        by_pair = by_pair.reshape(*by_pair.shape[:3], P, -1).swapaxes(3, 4)
+        return by_pair.reshape(*by_pair.shape[:2], S, P)
+
+    inner = found.by_pairs(pressed(sliced.largest() if spur else sliced.of_laws(laws))).max(axis=1)
+    slice_load = over_width(of_rows)
+    return {
+        "tooth_load": slice_load.mean(axis=2),
+        "slice_load": slice_load,
+        "slice_pressure": over_width(pressed(of_rows.swapaxes(0, 1)).swapaxes(0, 1)),
+        "max_pressure": inner.reshape(len(inner), P, -1).max(axis=-1),
+        "edge_contact": found.by_pairs(at_edge).any(axis=1).reshape(len(inner), P, -1).any(axis=-1),
+        "residual": np.maximum(state.residual.reshape(P, -1).max(axis=1), sliced.residual),
+        "iterations": state.iterations.reshape(P, -1).sum(axis=1) + sliced.iterations,
+        "overflow": sliced.overflows(found, laws),
+    }
+
+
+def _leads(over: FaceWidth, found: Candidates, P: int) -> tuple[np.ndarray, np.ndarray]:
+    """Separations by leads and misalignments, of meshes (2N, S) and windows (P, S, W) [m]."""
+    rows, S, mesh = np.arange(len(found.position))[:, None], over.slices, found.mesh
+    lead, d = np.zeros((found.setup.meshes, S)), over.deviations
+    if d is not None:
+        lead = lead_separation(d, found.setup.gears, S)
+    apart = np.broadcast_to(lead[mesh].T, (P, S, len(mesh)))
+    forms = () if d is None else (d.sun, d.planet_sun_side, d.planet_ring_side, d.ring)
+    if d is not None and any(isinstance(one, FlankTwist) for form in forms for one in form.lead):
+        # a twist by the places of the pairs on the flanks, of helical teeth a row a slice
+        rolls = found.setup.roll[:, : len(lead), found.position][..., 1]
+        every = lead_separation(d, found.setup.gears, S, rolls)[mesh, rows, found.pair]
+        helical = len(rows) != P
+        apart = every[rows[:, 0], :, rows[:, 0] % S] if helical else every.swapaxes(1, 2)
+        apart = apart.reshape(P, S, len(mesh))
+    return lead, apart
+
+
+def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.ndarray]:
+    """Compute what a record of helical teeth has where every slice stands for the places around its middle.
+
+    Slices at single places come into contact one after the other, with a frequency of their own, which is
+    none of the teeth: the mean over the mesh periods from one to the next takes it out. The record, with
+    names of `MeshCycle`, is at equidistant positions of whole mesh periods; ``ahead`` (slices,) is that of
+    its slices [mesh periods].
+    """
+    step, found = np.ptp(ahead) / (len(ahead) - 1), {}
+    for name in _EVEN:
+        values = getattr(record, name, None)
+        if values is not None:
+            count = values.shape[-1]
+            mean = np.sinc(np.fft.rfftfreq(count, periods / count) * step)
+            found[name] = np.fft.irfft(mean * np.fft.rfft(values), n=count)
+    return found
+
+
+def _rise(approach: np.ndarray) -> np.ndarray:
+    """Rise over the width of the least-squares lines through values (2N, S, P) in slices."""
+    place = 2.0 * (np.arange(approach.shape[1]) + 0.5) / approach.shape[1] - 1.0
+    return 2.0 * np.einsum("s,msp->mp", place, approach) / (place @ place)
+
+
+def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, slices: int) -> None:
+    """Refuse (E-SLICES) contacts that are wider than slices, or of spur teeth points rather than lines.
+
+    Forces are (P, S, W) [N], widths of the contacts along the profile (P, W) [m]. One or two slices amid the
+    width may carry less than their length.
+    """
+    thinnest = float(contact.max(initial=0.0))
+    if width / slices < thinnest:
+        raise ContactError(
+            f"contacts of {thinnest * 1e3:.3g} mm along the profile are wider than slices",
+            code="E-SLICES", key="static.slices", value=slices,
+            limit=f"at most {int(width / thinnest)}",
+            remedy="use fewer slices or reduce operation.torque",
+        )  # fmt: skip
+    if force is None:
+        return
+    load, carries = force.mean(axis=1), force > 0.0
+    length, most = carries.mean(axis=1) * width, 2.5 * width / slices
+    amid = ~(carries[:, 0] | carries[:, -1]) & (length < most) & (load > 0.25 * load.max())
+    point = (contact > 0.4 * length) | amid
+    if point.any():
+        raise ContactError(
+            f"a tooth pair touches over no more than {length[point].min() * 1e3:.3g} mm of the width and "
+            f"{contact[point].max() * 1e3:.3g} mm along the profile: slices hold for lines, not for points",
+            code="E-SLICES", key="static.slices", value=slices,
+            limit="contacts over three slices, and longer than five half widths",
+            remedy="reduce lead crowning and end relief, or take more slices",
+        )  # fmt: skip

@@ -1,0 +1,265 @@
+"""Waves of load across the face width: what bodies yield to each, and between slices of the width.
+
+Load and displacement are sums of cosines over the width b, ``cos(k_m z)``, ``k_m = m pi / b``; its ends are
+mirror planes. A body answers each with a compliance ``h_m`` of its own, a plane problem of three
+displacements (`femgear.fe.elasticity.wave_stiffness`). Between N equal slices, for forces over the whole
+width,
+
+    H = H_plane delta + T^T diag(h_m - h_0) T,    T_ms = sqrt(eps_m / N) cos(k_m z_s),  eps_0 = 1, eps_m = 2,
+
+``T`` being the orthonormal cosine transform. The singular field beside a load is the same in all ``h_m``, so
+that ``h_m - h_0`` is smooth and may come from a coarse grid. Without it every slice were a gear of its own.
+A load ``cos(k z)`` along a line on the half space moves the point at depth d and distance x into it by
+
+    w = (1 + nu)/(pi E) (2 (1 - nu) K0(k r) + d^2 k K1(k r)/r),    r^2 = x^2 + d^2,
+
+the Fourier transform of Boussinesq's point load (K. L. Johnson, "Contact Mechanics", 1985, section 3.2). Its
+limit for long waves is Flamant's line load. As in `femgear.contact.bodies` this part is taken out at depth
+and put back at the surface; there waves yield less than a uniform load by ``-K0(k x) - ln x``, beside the
+load by ``ln(k/2) + gamma``.
+
+The slices of helical teeth are each at a position of its own, ahead of the one before; their contacts are not
+beside one another on the flanks, and ``h_m`` holds between the places where they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+
+from femgear.contact.assembly import Candidates, body_compliance, windows_of_bodies
+from femgear.contact.bodies import (
+    RING_STATE,
+    TEETH_STATE,
+    Bodies,
+    FlankCompliance,
+    Sector,
+    Sectors,
+    observed_flanks,
+    regular_compliance,
+    station_weights,
+)
+from femgear.contact.local_compliance import depth_displacement, tip_corner
+from femgear.fe.compliance import condense_sector, tooth_compliance
+from femgear.fe.elasticity import Material, stiffness, wave_stiffness
+
+_WAVES = 9
+"""Wave numbers at which bodies are computed; between them their compliance is interpolated."""
+
+
+@dataclass(frozen=True)
+class WidthWaves:
+    """Compliance to waves of load across the width, less that to a uniform load.
+
+    Parameters
+    ----------
+    wave_number : (M,) array
+        [1/m], ascending.
+    bodies : tuple of Bodies
+        One for every wave number: what bodies yield beyond the half space.
+    """
+
+    wave_number: np.ndarray
+    bodies: tuple[Bodies, ...]
+
+    @property
+    def local(self) -> np.ndarray:
+        """What the half spaces of both flanks yield beside the load, of spur teeth [m/N], (M,)."""
+        material, width = self.bodies[0].material, self.bodies[0].face_width
+        factor = 2 * (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * width)
+        return -factor * (np.log(self.wave_number / 2) + np.euler_gamma)
+
+
+def wave_displacement(x, depth, wave_number: float, material: Material) -> np.ndarray:
+    """Compute the displacement into the half space under a line load ``cos(k z)`` [m per N/m].
+
+    At distances and depths (arrays that broadcast) [m], for a wave number over 0 [1/m]; see the head of the
+    module.
+    """
+    from scipy.special import k0, k1
+
+    r, nu = np.hypot(x, depth), material.poisson_ratio
+    wave = 2 * (1 - nu) * k0(wave_number * r) + depth**2 * wave_number * k1(wave_number * r) / r
+    return (1 + nu) / (np.pi * material.youngs_modulus) * wave
+
+
+def width_waves(
+    sectors: Sectors, material: Material, slices: int, ring_foundation=None, helical=(1.0, 1.0)
+) -> WidthWaves:
+    """Compute the compliance to the waves of as many slices, from sector grids that may be coarse.
+
+    ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over the face width, which otherwise is held;
+    ``helical`` as in `Bodies`.
+    """
+    width, ring = sectors.sun.gear.face_width, sectors.ring
+    wave_number = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
+    of_gears = [_wave_compliance(one, None, material, wave_number) for one in (sectors.sun, sectors.planet)]
+    of_ring: Any = [None] * len(wave_number)
+    if ring is not None:
+        of_ring = _wave_compliance(ring, ring_foundation, material, wave_number)
+    return WidthWaves(
+        wave_number,
+        tuple(
+            Bodies(sun, planet, ring, material, width, helical)
+            for sun, planet, ring in zip(*of_gears, of_ring, strict=True)
+        ),
+    )
+
+
+def with_held_ring(waves: WidthWaves, sectors: Sectors) -> WidthWaves:
+    """Exchange the ring for that which is held at its outer surface."""
+    rings = _wave_compliance(sectors.ring, None, waves.bodies[0].material, waves.wave_number)
+    bodies = (replace(one, ring=ring) for one, ring in zip(waves.bodies, rings, strict=True))
+    return replace(waves, bodies=tuple(bodies))
+
+
+def _wave_compliance(
+    sector: Sector, foundation, material: Material, wave_number: np.ndarray
+) -> list[FlankCompliance]:
+    """Flank compliance of a gear to every wave, less that to a uniform load, beyond the half space."""
+    gear, grid, mu = sector.gear, sector.grid, material.shear_modulus
+    stations, depths, loads, observations = observed_flanks(grid, gear)
+
+    def compliance(matrix, support, loads, observations) -> np.ndarray:
+        options = {"count": gear.teeth, "rim": "rim", "loads": loads, "observations": observations}
+        return tooth_compliance(condense_sector(grid, matrix, **options).supported(support))
+
+    support = None if foundation is None else foundation / gear.face_width
+    state: Any = RING_STATE if gear.internal else TEETH_STATE
+    uniform = compliance(stiffness(grid, material, state=state), support, loads, observations)
+    loads, observations = (
+        np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, observations)
+    )
+    if support is not None:
+        support = coo_array(support)
+        place = tuple(3 * (one // 2) + one % 2 for one in support.coords)
+        support = csc_array((support.data, place), shape=(3 * grid.n_nodes,) * 2)
+    parts, corner = wave_stiffness(grid, material), tip_corner(gear, material)
+    arc = stations.roll**2 / (2 * gear.base_radius)
+    offset, found = arc[:, None] - arc[None, :], []
+    for k in wave_number:
+        matrix = (parts[0] + k * parts[1] + k**2 * parts[2]).tocsc()
+        change = compliance(matrix, support, loads, observations) - uniform
+        once, twice = (
+            wave_displacement(offset, depth, k, material)
+            - depth_displacement(offset, depth, mu, material.poisson_ratio)
+            for depth in (depths, 2 * depths)
+        )
+        local = (2 * once - twice) / gear.face_width
+        regular = regular_compliance(change / gear.face_width, local)
+        found.append(
+            FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0)
+        )
+    return found
+
+
+def cosines(slices: int) -> np.ndarray:
+    """Make the orthonormal cosine transform over the middles of equal slices, (waves, slices)."""
+    m, z = np.arange(slices)[:, None], (np.arange(slices) + 0.5) / slices
+    return np.sqrt(np.where(m == 0, 1.0, 2.0) / slices) * np.cos(np.pi * m * z)
+
+
+def slice_compliance(found: Candidates, rows: np.ndarray, waves: WidthWaves, slices: int) -> np.ndarray:
+    """Compliance between the slices of all windows beyond the plane one [m/N], (P, N, W, N, W)."""
+    from scipy.interpolate import CubicSpline
+
+    W, (P, each) = len(found.mesh), rows.shape
+    if slices == 1:
+        return np.zeros((P, 1, W, 1, W))
+    wanted = np.pi / waves.bodies[0].face_width * np.arange(1, slices)
+    # weights of the waves that were computed in those of the slices, which are cubics between them
+    between = CubicSpline(np.log(waves.wave_number), np.eye(len(waves.wave_number)))(np.log(wanted))
+    T = cosines(slices)[1:]
+    if each > 1:
+        return _along_helix(found, rows, waves, wanted, between)
+    known = np.array(
+        [
+            body_compliance(found.setup, one, found.position[rows[:, 0]], found.mesh, found.pair[rows[:, 0]])
+            for one in waves.bodies
+        ]
+    ).sum(axis=1)[:, :, :, 1, :, 1]
+    change = np.tensordot(between, known, 1)
+    local = replace(waves, wave_number=wanted).local[:, None]
+    local = local / waves.bodies[0].of_kinds(found.setup.kind(found.mesh))
+    change[:, :, range(W), range(W)] += local[:, None]
+    return np.einsum("ms,mt,mpvw->psvtw", T, T, change, optimize=True)
+
+
+def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, between) -> np.ndarray:
+    """`slice_compliance` of helical teeth, whose slices are at positions of their own, (P, N, W, N, W).
+
+    ``between`` (N - 1, K) are the weights of the waves that were computed in those of ``wave_number``.
+    """
+    setup, W, (P, N) = found.setup, len(found.mesh), rows.shape
+    windows = (
+        np.tile(found.mesh, N), found.pair[rows].reshape(P, N * W),
+        np.repeat(found.position[rows], W, axis=1), np.repeat(np.arange(N), W),
+    )  # fmt: skip
+    # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
+    over = np.cos(np.pi / N * np.arange(1, N)[:, None] * np.arange(2 * N)) / N
+    across = np.zeros((P, N * W, N * W))
+    for number, *on_body in windows_of_bodies(setup.gears, windows[0]):
+        bodies = [one.gears[number] for one in waves.bodies]
+        table = (between @ [one.regular.ravel() for one in bodies]).T @ over
+        _add_along(across, setup, bodies[0], table.T.copy(), windows, *on_body)
+    _add_beside(across, setup, waves, windows, wave_number, over)
+    root = np.sqrt(waves.bodies[0].of_kinds(setup.kind(windows[0])))
+    return (across / (root[:, None] * root)).reshape(P, N, W, N, W)
+
+
+def _add_along(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:
+    """Add what one body yields between its windows, by a table (2 N, ...) over distances of slices."""
+    mesh, pair, position, piece = windows
+    count, stations = body.regular.shape[:2]
+    j, i = mesh[members], pair[:, members]
+    index, weight = station_weights(setup.roll[gear, j, position[:, members], i, 1], body.roll)
+    index, tooth = index + side[:, None] * len(body.roll), setup.tooth[gear, j, i]
+    one, two = np.triu_indices(len(members))
+    lag = (tooth[:, one] - tooth[:, two]) % count * stations
+    slices = piece[members[one]], piece[members[two]]
+    starts = [table.shape[1] * place for place in (np.abs(slices[0] - slices[1]), sum(slices) + 1)]
+    values, table = np.zeros(lag.shape), table.ravel()
+    for a, b in np.ndindex(4, 4):
+        place = (lag + index[:, one, a]) * stations + index[:, two, b]
+        values += weight[:, one, a] * weight[:, two, b] * sum(table[place + start] for start in starts)
+    _add_both(across, slice(None), members[one], members[two], values)
+
+
+def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) -> None:
+    """Add what the half spaces of both flanks yield between the contacts of one tooth pair in all slices."""
+    mesh, pair, position, piece = windows
+    material = waves.bodies[0].material
+    factor = (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * waves.bodies[0].face_width)
+    for number in np.unique(mesh):
+        members = np.flatnonzero(mesh == number)
+        one, two = (members[rows] for rows in np.triu_indices(len(members)))
+        p, same = np.nonzero(pair[:, one] == pair[:, two])
+        one, two, local = one[same], two[same], 0.0
+        shape = over[:, np.abs(piece[one] - piece[two])] + over[:, piece[one] + piece[two] + 1]
+        for gear, body in enumerate(setup.gears.mates[setup.kind(number)]):
+            rolls = (setup.roll[gear, number, position[p, w], pair[p, w], 1] for w in (one, two))
+            arcs = [roll**2 / (2 * waves.bodies[0].gears[body].base_radius) for roll in rolls]
+            local += (shape * _beside(np.abs(arcs[0] - arcs[1]), wave_number[:, None])).sum(axis=0)
+        _add_both(across, p, one, two, factor * local)
+
+
+def _add_both(matrices, number, one, two, values) -> None:
+    """Add values to symmetric matrices on both sides of their diagonals."""
+    matrices[number, one, two] += values
+    off = one != two
+    if isinstance(number, slice):
+        matrices[:, two[off], one[off]] += values[:, off]
+    else:
+        matrices[number[off], two[off], one[off]] += values[off]
+
+
+def _beside(distance, wave_number) -> np.ndarray:
+    """``K0(k x) + ln x`` at distances [m]: what a wave yields on the surface, less a uniform load."""
+    from scipy.special import k0
+
+    near = wave_number * distance < 1e-6
+    some = np.where(near, 1.0, distance)
+    return np.where(near, -np.log(wave_number / 2) - np.euler_gamma, k0(wave_number * some) + np.log(some))
