@@ -124,13 +124,13 @@ def check_definite(found: Candidates) -> None:
     size, axes = np.linalg.eigh(values.swapaxes(1, 2) @ _local_solution(local, some, values))
     root = axes * np.sqrt(np.maximum(size, 0.0))[:, None] @ axes.swapaxes(1, 2)
     size = 3 * len(filled)
-    for smooth in _cyclic(found.images[:, 0, filled][:, :, :, filled]):
+    for smooth in cyclic_harmonics(found.images[:, 0, filled][:, :, :, filled]):
         coupled = np.einsum("wab,wbvc,vcd->wavd", root, smooth, root, optimize=True).reshape(size, size)
         whole = np.block([[coupled.real, -coupled.imag], [coupled.imag, coupled.real]])
         factor(np.eye(2 * size) + whole)
 
 
-def _cyclic(images: np.ndarray) -> np.ndarray:
+def cyclic_harmonics(images: np.ndarray) -> np.ndarray:
     """Harmonics over the images of a sector, (I // 2 + 1, ...); the images (I, ...) of a single one."""
     return np.fft.rfft(images, axis=0) if len(images) > 1 else images
 
@@ -228,7 +228,7 @@ class ContactTangents:
         every harmonic over the ``images`` (I, P, W, 3, W, 3) of the candidates or of other bodies [m/N].
         """
         W = int((self.mesh < meshes).sum())
-        Q, S = self.Q[:, :W], _cyclic(images[:, :, :W, :, :W]).reshape(-1, len(self.Q), W, 3, 3 * W)
+        Q, S = self.Q[:, :W], cyclic_harmonics(images[:, :, :W, :, :W]).reshape(-1, len(self.Q), W, 3, 3 * W)
         of_mesh = (self.mesh[:W, None] == np.arange(meshes)).astype(float)
         right = Q.sum(axis=-1)[..., None] * of_mesh[:, None]
         matrix = (Q @ S).reshape(*S.shape[:2], 3 * W, 3 * W) + np.eye(3 * W)
@@ -472,7 +472,8 @@ class PairLaws:
     touching : (P, W, C) array
         Force under which every cell begins to touch [N], infinite where it never does.
     smooth, supports : (P, W, 3, W, 3), (W, W) arrays
-        Compliance of the bodies between different windows, and of sprung members between all [m/N].
+        Compliance of the bodies between different windows, images of a window among them, and of sprung
+        members between all [m/N].
     separation : (P, W) array
         Smallest one in the field of the others; infinite where there is no window [m].
     mesh, approach : (W,), (W, m) arrays
@@ -531,8 +532,10 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
     (P, W, C), own = found.gap.shape, np.arange(found.gap.shape[1])
     smooth, supports = found.smooth.copy(), found.supports[np.ix_(found.mesh, found.mesh)]
     Pi, onto = found.polynomials, found.polynomials.swapaxes(-1, -2)
-    local = found.local + Pi @ np.moveaxis(smooth[:, own, :, own], 0, 1) @ onto
-    smooth[:, own, :, own] = 0.0
+    own_window = found.images[0][:, own, :, own]
+    local = found.local + Pi @ np.moveaxis(own_window, 0, 1) @ onto
+    # what is left are the images of the window
+    smooth[:, own, :, own] -= own_window
     loads = (onto @ state.loads[..., None])[..., 0]
     field = (smooth.reshape(P, 3 * W, 3 * W) @ loads.reshape(P, -1, 1)).reshape(P, W, 3, 1)
     field += (loads.sum(axis=-1) @ supports)[..., None, None]

@@ -371,10 +371,11 @@ def walk_mesh_cycle(
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
         springs, images = bearing_springs(solved, supports, members), 1
-        if springs is None and options.planet_gaps is None and not options.both_flanks and not options.waves:
+        width = _face_width(solved, options)
+        uneven = options.both_flanks or springs or options.planet_gaps is not None
+        if not uneven and (width is None or width.tilting is None):
             images = math.gcd(planet_symmetry(solved, deviations), solved.gears[0].teeth)
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
-        width = _face_width(solved, options, members, deviations)
         walk = _Walk(
             solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, width
         )
@@ -442,9 +443,7 @@ def planet_symmetry(planetary_set: GearSet, deviations: SetDeviations | None = N
     return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
 
 
-def _face_width(
-    planetary_set: GearSet, options: CycleOptions, members: MovingMembers, deviations: SetDeviations | None
-) -> FaceWidth | None:
+def _face_width(planetary_set: GearSet, options: CycleOptions) -> FaceWidth | None:
     """What the contact over the face width takes of the options; None without slices."""
     if options.waves is None:
         return None
@@ -452,9 +451,7 @@ def _face_width(
     if options.held_bodies is not None and options.held_waves is not None:
         held = options.held_bodies, options.held_waves
     tilting = tilting_members(planetary_set, options.width_supports, options.slices)
-    return FaceWidth(
-        options.waves, options.slices, members, deviations, tilting, held, options.ahead is not None
-    )
+    return FaceWidth(options.waves, options.slices, tilting, held, options.ahead is not None)
 
 
 def _first_planets(
@@ -536,9 +533,14 @@ class _Walk:
             if self.width is None:
                 reach = found[-1]["deflection"]
             else:
-                sliced = contact_over_width(self.width, candidates, state, load, found[-1])
+                sliced = contact_over_width(
+                    self.width, candidates, state, load, found[-1], self.members, self.deviations
+                )
                 overflow, reach = overflow | sliced.pop("overflow"), sliced.pop("reach")
                 found[-1] |= sliced
+            if "held_tangents" in found[-1]:
+                tangents = found[-1].pop("held_tangents")
+                found[-1]["held_compliance"] = _between_meshes(setup, tangents, found[-1]["force"])
             missed = setup.missed(rows, reach)
             if empty.contact == "profile" and (missed > nearest).any():
                 return None, share, 1.2 * missed[missed > nearest][0]
@@ -591,13 +593,7 @@ class _Walk:
         if options.held_bodies is not None:
             held = found.images_of(options.held_bodies)
             values["held_stiffness"] = _both_flanks(tangents, held, meshes)
-            loaded = (values["force"] > 0).all(axis=0)
-            coupling = tangents.between_meshes(held, meshes)
-            coupling[:, loaded] = np.linalg.inv(coupling[:, loaded])
-            coupling[:, ~loaded] = 0.0
-            between, (every, sector) = np.fft.irfft(coupling, n=self.images, axis=0), setup.places
-            away = (sector - sector[:, None]) % self.images
-            values["held_compliance"] = between[away, :, every[:, None], every]
+            values["held_tangents"] = tangents.between_meshes(held, meshes)
         return values
 
     def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
@@ -648,6 +644,18 @@ class _Walk:
             tilt_names=() if tilting is None else tilting.names,
             message=message,
         )
+
+
+def _between_meshes(setup: MeshWindows, tangents: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Compliance between all meshes (M, M, P) [m/N], zero where a mesh carries nothing.
+
+    From the tangents between those that are solved, (H, P, meshes, meshes) in the harmonics over images.
+    """
+    loaded, (every, sector) = (force > 0).all(axis=0), setup.places
+    between = np.zeros(tangents.shape, tangents.dtype)
+    between[:, loaded] = np.linalg.inv(tangents[:, loaded])
+    away = (sector - sector[:, None]) % setup.images
+    return np.fft.irfft(between, n=setup.images, axis=0)[away, :, every[:, None], every]
 
 
 def _both_flanks(tangents: ContactTangents, images, meshes: int) -> np.ndarray:

@@ -37,8 +37,6 @@ class FaceWidth:
         Of the bodies.
     slices : int
         Their number.
-    members : MovingMembers
-    deviations : SetDeviations, optional
     tilting : TiltingMembers, optional
     held : Bodies and WidthWaves, optional
         Other bodies with the same flanks, for whose tangents the contact is taken too.
@@ -48,15 +46,19 @@ class FaceWidth:
 
     waves: WidthWaves
     slices: int
-    members: MovingMembers
-    deviations: SetDeviations | None = None
     tilting: TiltingMembers | None = None
     held: tuple[Bodies, WidthWaves] | None = None
     helical: bool = False
 
 
 def contact_over_width(
-    over: FaceWidth, found: Candidates, state: BatchState, load, plane: dict[str, Any]
+    over: FaceWidth,
+    found: Candidates,
+    state: BatchState,
+    load,
+    plane: dict[str, Any],
+    members: MovingMembers,
+    deviations: SetDeviations | None,
 ) -> dict[str, Any]:
     """Solve the contact in slices at some positions: what they change, by the names of `MeshCycle`.
 
@@ -69,6 +71,8 @@ def contact_over_width(
         External load on the motions [N].
     plane : dict
         What the plane contact has by these names; empty of helical teeth.
+    members, deviations : MovingMembers, SetDeviations or None
+        Of the whole set, and of the planets that are solved.
 
     Returns
     -------
@@ -76,24 +80,25 @@ def contact_over_width(
         With ``reach`` (meshes, rows), the approach up to which pairs may touch [m], and ``overflow``, whether
         a contact leaves its window.
     """
-    N, members, W = found.setup.n_planets, over.members, len(found.mesh)
+    N, W = found.setup.n_planets, len(found.mesh)
     driver, turns = found.setup.driver, found.setup.gears.rotation_approach
-    curves = np.geomspace(_LEAST * load[driver] / N, 4.0 * load[driver], _FORCES)
+    whole, places = found.setup.images * load[driver], found.setup.places
+    curves = np.geomspace(_LEAST * load[driver] / N, 4.0 * whole, _FORCES)
     S, rows = over.slices, len(found.position)
     P = rows // S if over.helical else rows
-    lead, apart = _leads(over, found, P)
+    lead, apart = _leads(found, deviations, S, P)
     held = None
     if over.held is not None:
-        held = found.images_of(over.held[0]).sum(axis=0), over.held[1]
+        held = found.images_of(over.held[0]), over.held[1]
     laws = pair_laws(found, state, curves)
     sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
     force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
     motion = np.zeros((len(members.names), P))
-    count = driver + 1 + int(members.free.sum())
-    motion[members.free] = sliced.motions.T[driver + 1 : count]
-    angles, turned, twisted = _by_tilts(over.tilting, sliced, sliced.motions.T[count:])
-    motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung, None]
-    base = turns @ sliced.motions.T[: driver + 1] + members.approach @ motion
+    motion[members.free] = sliced.motions.T[driver + 1 : len(load)] if found.setup.images == 1 else 0.0
+    angles, turned, twisted = _by_tilts(over.tilting, sliced, sliced.motions.T[len(load) :])
+    pulled = members.approach[:, sprung].T @ force[places[0]]
+    motion[sprung] = -pulled / members.stiffness[sprung, None]
+    base = turns @ sliced.motions.T[: driver + 1] + members.approach[places[1] == 0] @ motion
     nearest = (apart - np.moveaxis(twisted, -1, 0).swapaxes(1, 2)[..., found.mesh]).min(axis=1)
     values = _of_pairs(found, state, laws, sliced) | {
         "deflection": base + turned.mean(axis=1),
@@ -111,18 +116,8 @@ def contact_over_width(
         # tangents of the springs change; what they begin at is that of the cells
         values[name] = plane.get(name, 0.0) + tangent.T
     if held is not None:
-        values["held_compliance"] = _held_compliance(plane.get("held_compliance"), sliced.tangents[1], force)
+        values["held_tangents"] = plane.get("held_tangents", 0.0) + sliced.joint
     return values
-
-
-def _held_compliance(plane: np.ndarray | None, tangents: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Compliance between the meshes (meshes, meshes, P) with what slices add to their tangents [m/N]."""
-    loaded, between = (force > 0).all(axis=0), np.zeros(tangents.shape)
-    if plane is not None:
-        between = np.moveaxis(plane, -1, 0).copy()
-        between[loaded] = np.linalg.inv(between[loaded])
-    between[loaded] = np.linalg.inv(between[loaded] + tangents[loaded])
-    return np.moveaxis(between, 0, -1)
 
 
 def _by_tilts(tilting: TiltingMembers | None, sliced: SliceState, tilts: np.ndarray) -> tuple:
@@ -172,10 +167,9 @@ def _of_pairs(found: Candidates, state: BatchState, laws: PairLaws, sliced: Slic
     }
 
 
-def _leads(over: FaceWidth, found: Candidates, P: int) -> tuple[np.ndarray, np.ndarray]:
+def _leads(found: Candidates, d: SetDeviations | None, S: int, P: int) -> tuple[np.ndarray, np.ndarray]:
     """Separations by leads and misalignments, of meshes (2N, S) and windows (P, S, W) [m]."""
-    rows, S, mesh = np.arange(len(found.position))[:, None], over.slices, found.mesh
-    lead, d = np.zeros((found.setup.meshes, S)), over.deviations
+    rows, mesh, lead = np.arange(len(found.position))[:, None], found.mesh, np.zeros((found.setup.meshes, S))
     if d is not None:
         lead = lead_separation(d, found.setup.gears, S)
     apart = np.broadcast_to(lead[mesh].T, (P, S, len(mesh)))

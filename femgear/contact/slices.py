@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.contact.assembly import Candidates
-from femgear.contact.batch import PairLaws
+from femgear.contact.batch import PairLaws, cyclic_harmonics
 from femgear.contact.supports import TiltingMembers
 from femgear.contact.width_waves import WidthWaves, slice_compliance
 from femgear.errors import ContactError
@@ -44,12 +44,12 @@ class SliceState:
     mesh : (W,) array
     iterations, residual : (P,) arrays
         Linear solutions, and largest violation of the contact conditions over the largest displacement.
-    tangents : tuple of (P, meshes, meshes) arrays
-        For every compliance between windows that was asked for: increments of the mesh forces per unit
-        approach of each mesh while the others hold theirs [N/m]. Of spur teeth less those of the plane
-        solution.
     own : tuple of (P, meshes) arrays
-        The same of every mesh at constant loads of the others.
+        For the bodies, and others that were asked for: increments of the mesh forces per unit approach of
+        every mesh at constant loads of the others [N/m]. Of spur teeth less those of the plane solution.
+    joint : (H, P, meshes, meshes) array
+        Of the last of these bodies: the same per unit approach of each mesh while the others hold theirs, in
+        every harmonic over the images.
     """
 
     force: np.ndarray
@@ -57,8 +57,8 @@ class SliceState:
     mesh: np.ndarray
     iterations: np.ndarray
     residual: np.ndarray
-    tangents: tuple[np.ndarray, ...]
     own: tuple[np.ndarray, ...]
+    joint: np.ndarray
 
     def largest(self) -> np.ndarray:
         """Largest force of a tooth pair in a 25th of the width (P, W) [N]."""
@@ -134,8 +134,8 @@ def solve_slices(
         External load on the motions [N].
     separations : (P, N, W) array
         What leads, crowning and misalignment add in the slices to whole pairs [m].
-    held : (rows, W, 3, W, 3) array and WidthWaves, optional
-        Compliance of other bodies between all windows [m/N], for whose tangents the contact is taken too.
+    held : (I, rows, W, 3, W, 3) array and WidthWaves, optional
+        `Candidates.images` of other bodies [m/N], for whose tangents the contact is taken too.
     tilting : TiltingMembers, optional
         Motions that differ from slice to slice; they follow the others.
 
@@ -150,31 +150,34 @@ def solve_slices(
         some = np.arange(first, min(first + _TOGETHER, P))
         rows = some[:, None] * each + np.arange(each)
         across = slice_compliance(found, rows, waves, N)
-        bodies = [(found.smooth[rows], across)]
+        bodies = [(found.images[:, rows], across)]
         if held is not None:
-            bodies.append((held[0][rows], slice_compliance(found, rows, held[1], N)))
-        newton = _SliceNewton(laws, rows, load, across, separations[some], found.smooth[rows], tilting)
-        before = [part for one in bodies for part in newton.tangents(*one)] if each == 1 else []
+            bodies.append((held[0][:, rows], slice_compliance(found, rows, held[1], N)))
+        newton = _SliceNewton(
+            laws, rows, load, across.sum(axis=0), separations[some], found.images[0][rows], tilting
+        )
+        before = newton.tangents(bodies) if each == 1 else []
         if tilting is not None:
             mesh, window = laws.mesh, np.arange(N)[:, None]
             coupling = tilting.coupling[mesh, window][:, :, mesh, window]
             newton.across = newton.across + coupling / newton.unit
             bodies = [(smooth, change + coupling) for smooth, change in bodies]
         solved = newton.solve()
-        after = [part for one in bodies for part in newton.tangents(*one)]
+        after = newton.tangents(bodies)
         after = [b - a for a, b in zip(before, after, strict=True)] if before else after
-        parts.append((*solved, *after))
-    force, motions, iterations, residual, *tangents = (
+        # positions come first
+        parts.append((*solved, after[0].swapaxes(0, 1), *after[1:]))
+    force, motions, iterations, residual, joint, *own = (
         np.concatenate(part) for part in zip(*parts, strict=True)
     )
-    between, own = tuple(tangents[0::2]), tuple(tangents[1::2])
-    return SliceState(force, motions, laws.mesh, iterations, residual, between, own)
+    return SliceState(force, motions, laws.mesh, iterations, residual, tuple(own), joint.swapaxes(0, 1))
 
 
 class _SliceNewton:
     """Newton's method of `solve_slices` at some positions; motions and compliances over ``unit``.
 
-    Springs are those of the ``rows`` (P, L) of the laws: one for all slices, or one for each of them.
+    Springs are those of the ``rows`` (P, L) of the laws: one for all slices, or one for each of them;
+    ``smooth`` (P, L, W, 3, W, 3) is the compliance that they contain of their own windows [m/N].
     """
 
     def __init__(self, laws: PairLaws, rows, load, across, separations, smooth, tilting=None):
@@ -275,49 +278,63 @@ class _SliceNewton:
             remedy="look for modifications, clearances or stiffnesses of very different size",
         )
 
-    def tangents(self, smooth: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Increments of the mesh forces per approach of each mesh, (P, meshes, meshes) [N/m].
+    def tangents(self, bodies) -> list[np.ndarray]:
+        """Compute joint and own tangents, as `SliceState` has them.
 
-        And those of each at constant loads of the others, (P, meshes).
+        ``bodies`` are pairs of compliances between all windows and their images, (I, P, L, W, 3, W, 3) and
+        across the width, (I, P, N, W, N, W) [m/N].
+
+        Returns
+        -------
+        list
+            ``joint`` (H, P, meshes, meshes) of the last bodies, and ``own`` (P, meshes) of each [N/m].
         """
-        (P, N, W), n, laws, L = self.shape, self.size, self.laws, self.rows.shape[1]
+        (P, N, _), meshes = self.shape, np.arange(int(self.laws.mesh[-1]) + 1)
+        on, at = _first((self.force > 0.0).reshape(P, self.size))
+        c, k, rows = at.shape[1], self.tilts.shape[-1], np.arange(P)[:, None]
+        ones = (np.tile(self.laws.mesh, N)[at][..., None] == meshes) * on[..., None].astype(float)
+        ones = np.concatenate([ones, np.zeros((P, k, len(meshes)))], axis=1)
+        found, A = [], np.zeros((1, P, c + k, c + k))
+        for smooth, across in bodies:
+            A, alone = self._bordered(smooth, across, on, at), []
+            for j in meshes:
+                own, some = _first(ones[:, :c, j] > 0.0)
+                own = np.hstack([own, np.ones((P, k), bool)])
+                some = np.hstack([some, np.tile(np.arange(c, c + k), (P, 1))])
+                part = np.where(
+                    own[:, :, None] & own[:, None],
+                    A[0, rows[..., None], some[:, :, None], some[:, None]],
+                    np.eye(own.shape[1]),
+                )
+                own = np.where(some < c, own, False)
+                alone.append((own * np.linalg.solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
+            found.append(np.stack(alone, axis=1) / (N * self.unit))
+        joint = ones.swapaxes(1, 2) @ np.linalg.solve(cyclic_harmonics(A), ones)
+        return [joint / (N * self.unit), *found]
+
+    def _bordered(self, smooth: np.ndarray, across: np.ndarray, on, at) -> np.ndarray:
+        """Compliance between the loaded slices and to their images, (I, P, c + k, c + k), over the unit."""
+        (P, N, W), n, L = self.shape, self.size, self.rows.shape[1]
         mu = self._moments(self.force).reshape(P, L, self.each, W, 3).swapaxes(2, 3)
-        half = mu @ smooth.swapaxes(4, 5).reshape(P, L, W, 3, -1)
-        between = half.reshape(P, L, W, self.each, 3, W) * mu.transpose(0, 1, 3, 4, 2)[:, :, None]
-        between = between.sum(axis=-2).swapaxes(2, 3)
+        half = mu @ smooth.swapaxes(5, 6).reshape(-1, P, L, W, 3, 3 * W)
+        between = half.reshape(-1, P, L, W, self.each, 3, W) * mu.transpose(0, 1, 3, 4, 2)[:, :, None]
+        between = between.sum(axis=-2).swapaxes(3, 4)
         # the springs contain what bodies yield under their own window
         own = np.diagonal(self.smooth, axis1=2, axis2=4).transpose(0, 1, 4, 2, 3)
-        between[..., range(W), range(W)] -= np.einsum("plwsa,plwab,plwsb->plsw", mu, own, mu)
-        between = between.reshape(P, N, W, W)
+        between[0][..., range(W), range(W)] -= np.einsum("plwsa,plwab,plwsb->plsw", mu, own, mu)
         A, window = across / self.unit, np.arange(N)
-        A[:, window, :, window] += between.swapaxes(0, 1) / self.unit
-        A = A.reshape(P, n, n)
-        A[:, range(n), range(n)] += self.gaps(self.force)[1].reshape(P, n)
-        (on, at), rows = _first((self.force > 0.0).reshape(P, n)), np.arange(P)[:, None]
-        c = at.shape[1]
-        A = np.where(on[:, :, None] & on[:, None], A[rows[..., None], at[:, :, None], at[:, None]], np.eye(c))
-        meshes = np.arange(int(laws.mesh[-1]) + 1)
-        ones = (np.tile(laws.mesh, N)[at][..., None] == meshes) * on[..., None].astype(float)
+        A[:, :, window, :, window] += between.reshape(-1, P, N, W, W).transpose(2, 0, 1, 3, 4) / self.unit
+        A = A.reshape(-1, P, n, n)
+        A[0][:, range(n), range(n)] += self.gaps(self.force)[1].reshape(P, n)
+        A = A[:, np.arange(P)[:, None, None], at[:, :, None], at[:, None]]
+        c, k, tilts = at.shape[1], self.tilts.shape[-1], self.tilts.reshape(n, -1)[at] * on[..., None]
+        found = np.zeros((len(A), P, c + k, c + k))
+        found[..., :c, :c] = np.where(on[:, :, None] & on[:, None], A, 0.0)
+        found[0][:, range(c), range(c)] += ~on
         # tilts follow the increments: the border of the rows that carry
-        k, tilts = self.tilts.shape[-1], self.tilts.reshape(n, -1)[at] * on[..., None]
-        A, plain = np.zeros((P, c + k, c + k)), A
-        A[:, :c, :c], A[:, :c, c:], A[:, c:, :c] = plain, -tilts, tilts.swapaxes(1, 2) / N
-        A[:, range(c, c + k), range(c, c + k)] = self.springs[len(self.load) - k :]
-        ones = np.concatenate([ones, np.zeros((P, k, len(meshes)))], axis=1)
-        together = ones.swapaxes(1, 2) @ np.linalg.solve(A, ones)
-        alone = []
-        for j in meshes:
-            own, some = _first(ones[:, :c, j] > 0.0)
-            own = np.hstack([own, np.ones((P, k), bool)])
-            some = np.hstack([some, np.tile(np.arange(c, c + k), (P, 1))])
-            part = np.where(
-                own[:, :, None] & own[:, None],
-                A[rows[..., None], some[:, :, None], some[:, None]],
-                np.eye(own.shape[1]),
-            )
-            own = np.where(some < c, own, False)
-            alone.append((own * np.linalg.solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
-        return together / (N * self.unit), np.stack(alone, axis=1) / (N * self.unit)
+        found[..., :c, c:], found[..., c:, :c] = -tilts, tilts.swapaxes(1, 2) / N
+        found[..., range(c, c + k), range(c, c + k)] = self.springs[len(self.load) - k :]
+        return found
 
     def step(self, *, single: bool) -> np.ndarray:
         """Take a step at all positions; by how much forces change at most [N], endless while sides change."""

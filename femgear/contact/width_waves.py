@@ -45,6 +45,7 @@ from femgear.contact.bodies import (
 from femgear.contact.local_compliance import depth_displacement, tip_corner
 from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import Material, stiffness, wave_stiffness
+from femgear.gears.pair import EACH
 
 _WAVES = 9
 """Wave numbers at which bodies are computed; between them their compliance is interpolated."""
@@ -163,12 +164,15 @@ def cosines(slices: int) -> np.ndarray:
 
 
 def slice_compliance(found: Candidates, rows: np.ndarray, waves: WidthWaves, slices: int) -> np.ndarray:
-    """Compliance between the slices of all windows beyond the plane one [m/N], (P, N, W, N, W)."""
+    """Compute the compliance between the slices of all windows beyond the plane one [m/N].
+
+    (I, P, N, W, N, W), images as of `Candidates`; ``rows`` are positions (P, 1), of helical teeth (P, N).
+    """
     from scipy.interpolate import CubicSpline
 
-    W, (P, each) = len(found.mesh), rows.shape
+    setup, W, (P, each) = found.setup, len(found.mesh), rows.shape
     if slices == 1:
-        return np.zeros((P, 1, W, 1, W))
+        return np.zeros((setup.images, P, 1, W, 1, W))
     wanted = np.pi / waves.bodies[0].face_width * np.arange(1, slices)
     # weights of the waves that were computed in those of the slices, which are cubics between them
     between = CubicSpline(np.log(waves.wave_number), np.eye(len(waves.wave_number)))(np.log(wanted))
@@ -177,19 +181,19 @@ def slice_compliance(found: Candidates, rows: np.ndarray, waves: WidthWaves, sli
         return _along_helix(found, rows, waves, wanted, between)
     known = np.array(
         [
-            body_compliance(found.setup, one, found.position[rows[:, 0]], found.mesh, found.pair[rows[:, 0]])
+            body_compliance(setup, one, found.position[rows[:, 0]], found.mesh, found.pair[rows[:, 0]])
             for one in waves.bodies
         ]
-    ).sum(axis=1)[:, :, :, 1, :, 1]
+    )[..., 1, :, 1]
     change = np.tensordot(between, known, 1)
     local = replace(waves, wave_number=wanted).local[:, None]
-    local = local / waves.bodies[0].of_kinds(found.setup.kind(found.mesh))
-    change[:, :, range(W), range(W)] += local[:, None]
-    return np.einsum("ms,mt,mpvw->psvtw", T, T, change, optimize=True)
+    local = local / waves.bodies[0].of_kinds(setup.kind(found.mesh))
+    change[:, 0][..., range(W), range(W)] += local[:, None]
+    return np.einsum("ms,mt,mipvw->ipsvtw", T, T, change, optimize=True)
 
 
 def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, between) -> np.ndarray:
-    """`slice_compliance` of helical teeth, whose slices are at positions of their own, (P, N, W, N, W).
+    """`slice_compliance` of helical teeth, whose slices are at positions of their own.
 
     ``between`` (N - 1, K) are the weights of the waves that were computed in those of ``wave_number``.
     """
@@ -200,32 +204,42 @@ def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, betwee
     )  # fmt: skip
     # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
     over = np.cos(np.pi / N * np.arange(1, N)[:, None] * np.arange(2 * N)) / N
-    across = np.zeros((P, N * W, N * W))
+    across = np.zeros((setup.images, P, N * W, N * W))
     for number, *on_body in windows_of_bodies(setup.gears, windows[0]):
         bodies = [one.gears[number] for one in waves.bodies]
         table = (between @ [one.regular.ravel() for one in bodies]).T @ over
-        _add_along(across, setup, bodies[0], table.T.copy(), windows, *on_body)
-    _add_beside(across, setup, waves, windows, wave_number, over)
+        sectors = across[:1] if number == EACH else across
+        _add_along(sectors, setup, bodies[0], table.T.copy(), windows, *on_body)
+    _add_beside(across[0], setup, waves, windows, wave_number, over)
     root = np.sqrt(waves.bodies[0].of_kinds(setup.kind(windows[0])))
-    return (across / (root[:, None] * root)).reshape(P, N, W, N, W)
+    return (across / (root[:, None] * root)).reshape(-1, P, N, W, N, W)
 
 
 def _add_along(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:
-    """Add what one body yields between its windows, by a table (2 N, ...) over distances of slices."""
+    """Add what one body yields between its windows and their images, (I, P, ...).
+
+    By a table (2 N, ...) over distances of slices.
+    """
     mesh, pair, position, piece = windows
     count, stations = body.regular.shape[:2]
     j, i = mesh[members], pair[:, members]
     index, weight = station_weights(setup.roll[gear, j, position[:, members], i, 1], body.roll)
     index, tooth = index + side[:, None] * len(body.roll), setup.tooth[gear, j, i]
-    one, two = np.triu_indices(len(members))
-    lag = (tooth[:, one] - tooth[:, two]) % count * stations
-    slices = piece[members[one]], piece[members[two]]
-    starts = [table.shape[1] * place for place in (np.abs(slices[0] - slices[1]), sum(slices) + 1)]
-    values, table = np.zeros(lag.shape), table.ravel()
-    for a, b in np.ndindex(4, 4):
-        place = (lag + index[:, one, a]) * stations + index[:, two, b]
-        values += weight[:, one, a] * weight[:, two, b] * sum(table[place + start] for start in starts)
-    _add_both(across, slice(None), members[one], members[two], values)
+    size, table = table.shape[1], table.ravel()
+    for image in range(len(across) // 2 + 1):
+        # what an image does to its original, the original does to the image on the other side
+        alone = 2 * image % len(across) == 0
+        one, two = np.triu_indices(len(members)) if alone else np.indices((len(members),) * 2).reshape(2, -1)
+        lag = (tooth[:, one] - tooth[:, two] - image * count // len(across)) % count * stations
+        slices = piece[members[one]], piece[members[two]]
+        starts = [size * place for place in (np.abs(slices[0] - slices[1]), sum(slices) + 1)]
+        values = np.zeros(lag.shape)
+        for a, b in np.ndindex(4, 4):
+            place = (lag + index[:, one, a]) * stations + index[:, two, b]
+            values += weight[:, one, a] * weight[:, two, b] * sum(table[place + start] for start in starts)
+        across[image][:, members[one], members[two]] += values
+        other = one != two if alone else one >= 0
+        across[-image][:, members[two[other]], members[one[other]]] += values[:, other]
 
 
 def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) -> None:
@@ -237,23 +251,15 @@ def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) ->
         members = np.flatnonzero(mesh == number)
         one, two = (members[rows] for rows in np.triu_indices(len(members)))
         p, same = np.nonzero(pair[:, one] == pair[:, two])
-        one, two, local = one[same], two[same], 0.0
+        one, two, local = one[same], two[same], np.zeros(len(p))
         shape = over[:, np.abs(piece[one] - piece[two])] + over[:, piece[one] + piece[two] + 1]
         for gear, body in enumerate(setup.gears.mates[setup.kind(number)]):
             rolls = (setup.roll[gear, number, position[p, w], pair[p, w], 1] for w in (one, two))
             arcs = [roll**2 / (2 * waves.bodies[0].gears[body].base_radius) for roll in rolls]
             local += (shape * _beside(np.abs(arcs[0] - arcs[1]), wave_number[:, None])).sum(axis=0)
-        _add_both(across, p, one, two, factor * local)
-
-
-def _add_both(matrices, number, one, two, values) -> None:
-    """Add values to symmetric matrices on both sides of their diagonals."""
-    matrices[number, one, two] += values
-    off = one != two
-    if isinstance(number, slice):
-        matrices[:, two[off], one[off]] += values[:, off]
-    else:
-        matrices[number[off], two[off], one[off]] += values[off]
+        across[p, one, two] += factor * local
+        off = one != two
+        across[p[off], two[off], one[off]] += factor * local[off]
 
 
 def _beside(distance, wave_number) -> np.ndarray:

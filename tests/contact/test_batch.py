@@ -18,9 +18,10 @@ from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, bearing_springs, moving_members
+from femgear.contact.width_waves import width_waves
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import FlankForm, Runout, no_deviations
-from femgear.gears.modifications import ProfileSlope
+from femgear.gears.modifications import FlankTwist, LeadCrowning, LeadSlope, ProfileSlope
 
 STEEL = Material(206e9, 0.3, 7850.0)
 SPRUNG = Supports(sun=5e7, carrier=2e8, planet=3e8)
@@ -196,13 +197,8 @@ def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
     assert len(counted) > 0 and sorted(steps.tolist()) == sorted([2 + count for count in counted] + rest)
 
 
-# three, four (two pairs) and five planets in the same state, on springs or free
-@pytest.mark.parametrize(
-    "seed, images, supports",
-    [(3, 3, SPRUNG), (6, 4, Supports(sun=0.0)), (7, 2, SPRUNG), (9, 5, Supports()), (4, 1, SPRUNG)],
-)
-def test_planets_in_the_same_state_are_solved_as_one(seed, images, supports, monkeypatch):
-    gears, bodies, torque = random_bodies(seed)
+def both_routes(gears, images, monkeypatch, *given, **options):
+    """A cycle from the planets of one sector, and from all of them."""
     sizes, together = [], cycle.solve_batch
 
     def noting(found, *others):
@@ -210,6 +206,36 @@ def test_planets_in_the_same_state_are_solved_as_one(seed, images, supports, mon
         return together(found, *others)
 
     monkeypatch.setattr(cycle, "solve_batch", noting)
+    one = walk_mesh_cycle(gears, *given, **options)
+    assert set(sizes) == {gears.n_planets // images}
+    sizes.clear()
+    with monkeypatch.context() as patch:
+        patch.setattr(cycle, "planet_symmetry", lambda *_: 1)
+        every = walk_mesh_cycle(gears, *given, **options)
+    assert set(sizes) == {gears.n_planets}
+    return one, every
+
+
+def check_equal(one, every, rounding):
+    """All arrays of two cycles agree to a share of their largest value."""
+    for name in (field.name for field in fields(MeshCycle)):
+        a, b = getattr(one, name), getattr(every, name)
+        if not isinstance(b, np.ndarray) or b.dtype.kind != "f":
+            assert np.array_equal(a, b), name
+        elif name != "residual":
+            # cells at a corner are a thousandth of a window wide: they show the rounding of separations
+            scale = 1e-9 if "pressure" in name else rounding
+            size = np.abs(every.deflection if name == "member_motion" else b).max(initial=0.0)
+            assert np.abs(a - b).max(initial=0.0) <= scale * size, name
+
+
+# three, four (two pairs) and five planets in the same state, on springs or free
+@pytest.mark.parametrize(
+    "seed, images, supports",
+    [(3, 3, SPRUNG), (6, 4, Supports(sun=0.0)), (7, 2, SPRUNG), (9, 5, Supports()), (4, 1, SPRUNG)],
+)
+def test_planets_in_the_same_state_are_solved_as_one(seed, images, supports, monkeypatch):
+    gears, bodies, torque = random_bodies(seed)
     # a modification is the same on all planets, and so is a pin that is off its place
     same = replace(
         no_deviations(gears),
@@ -217,25 +243,54 @@ def test_planets_in_the_same_state_are_solved_as_one(seed, images, supports, mon
         pin_errors=np.full((gears.n_planets, 2), 3e-6),
     )
     for sign, errors in ((1.0, None), (-1.0, same)):
-        options = dict(sun_torque=sign * torque, positions=6, deviations=errors, supports=supports)
         kept = CycleOptions(held_bodies=bodies, pressures=True)
-        one = walk_mesh_cycle(gears, bodies, options=kept, **options)
-        assert set(sizes) == {gears.n_planets // images}
-        sizes.clear()
-        with monkeypatch.context() as patch:
-            patch.setattr(cycle, "planet_symmetry", lambda *_: 1)
-            every = walk_mesh_cycle(gears, bodies, options=kept, **options)
-        assert set(sizes) == {gears.n_planets}
-        sizes.clear()
-        for name in (field.name for field in fields(MeshCycle)):
-            a, b = getattr(one, name), getattr(every, name)
-            if not isinstance(b, np.ndarray) or b.dtype.kind != "f":
-                assert np.array_equal(a, b), name
-            elif name != "residual":
-                # cells at a corner are a thousandth of a window wide: they show the rounding of separations
-                scale = 1e-9 if "pressure" in name else 1e-11
-                size = np.abs(every.deflection if name == "member_motion" else b).max(initial=0.0)
-                assert np.abs(a - b).max(initial=0.0) <= scale * size, name
+        given = dict(
+            sun_torque=sign * torque, positions=6, deviations=errors, supports=supports, options=kept
+        )
+        check_equal(*both_routes(gears, images, monkeypatch, bodies, **given), 1e-11)
+
+
+@pytest.mark.parametrize(
+    "seed, images, supports, overlap",
+    [
+        (3, 3, SPRUNG, None), (6, 4, Supports(sun=0.0), None), (7, 2, SPRUNG, None),
+        (3, 3, Supports(sun=0.0), 0.7), (7, 2, SPRUNG, 1.2),
+    ],
+)  # fmt: skip
+def test_planets_in_the_same_state_are_solved_as_one_over_the_width(
+    seed, images, supports, overlap, monkeypatch
+):
+    """With leads, errors that all planets have alike, tangents of other bodies; spur and helical teeth."""
+    (gears, bodies, torque), slices = random_bodies(seed), 7
+    N, width, material = gears.n_planets, bodies.face_width, bodies.material
+    sectors = make_sectors(gears, material, flank_elements=6, refine=0.5)
+    soft = replace(material, youngs_modulus=0.8 * material.youngs_modulus)
+    waves, softer_waves = (width_waves(sectors, one, slices) for one in (material, soft))
+    size = torque / (gears.sun.base_radius * N * 10e9 * width)
+    errors = replace(
+        no_deviations(gears),
+        sun=FlankForm((LeadSlope(size),)),
+        planet_sun_side=FlankForm((LeadCrowning(0.5 * size), FlankTwist(0.4 * size))),
+        pin_errors=np.full((N, 2), 0.3 * size),
+        planet_misalignment=np.full((N, 2), 0.3 * size / width),
+    )
+    softer = replace(bodies, ring=replace(bodies.ring, regular=1.2 * bodies.ring.regular))
+    ahead = None if overlap is None else overlap * ((np.arange(slices) + 0.5) / slices - 0.5)
+    for sign in (1.0, -1.0):
+        kept = CycleOptions(
+            waves=waves,
+            slices=slices,
+            ahead=ahead,
+            held_bodies=softer,
+            held_waves=softer_waves,
+            pressures=True,
+        )
+        given = dict(
+            sun_torque=sign * torque, positions=4, deviations=errors, supports=supports, options=kept
+        )
+        one, every = both_routes(gears, images, monkeypatch, bodies, **given)
+        check_equal(one, every, 1e-9)
+        assert one.held_compliance is not None and one.mesh_misalignment.any() and one.lead_offset.any()
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,26 @@ def test_slices_at_one_position_are_those_of_spur_teeth(gears, bodies, waves, le
     assert np.abs(found.stiffness / spur.stiffness - 1).max() < 5e-3
 
 
+def test_meshes_that_only_an_end_of_the_width_loads_are_coupled(gears, bodies, waves):
+    """A pin off its place by more than the teeth bend: without the lead its planet carries nothing."""
+    pins = np.array([[0.0, 5e-6], [0.0, 0.0], [0.0, 0.0]])
+    errors = replace(no_deviations(gears), pin_errors=pins)
+    options = {"sun_torque": TORQUE, "positions": [0.0, 0.4], "deviations": errors}
+    assert walk_mesh_cycle(gears, bodies, **options).open_planets.any()
+    options["deviations"] = replace(errors, sun=FlankForm((LeadSlope(8e-6), LeadCrowning(3e-6))))
+    spur, found = (
+        walk_mesh_cycle(
+            gears, bodies, **options,
+            options=CycleOptions(
+                waves=waves, slices=SLICES, ahead=ahead, held_bodies=bodies, held_waves=waves
+            ),
+        ).held_compliance
+        for ahead in (None, np.zeros(SLICES))
+    )  # fmt: skip
+    assert np.abs(spur).min() > 0.0
+    assert np.abs(found - spur).max() < 5e-3 * np.abs(spur).max()
+
+
 def test_a_whole_overlap_ratio_leaves_little_of_the_transmission_error(gears, bodies, waves):
     ripple = {one: np.ptp(walk(gears, bodies, waves, one).sun_arc) for one in (None, 0.5, 1.0, 2.0)}
     assert ripple[1.0] < 0.05 * ripple[None] and ripple[2.0] < 0.05 * ripple[None]

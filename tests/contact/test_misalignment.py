@@ -68,7 +68,7 @@ def test_tilts_follow_in_the_tangent():
     options = dict(stiffness=mesh, load=2e3, slices=SLICES, tilting=one_tilt(k))
     newton = spring_newton(3e-3 * PLACE, **options)
     force = newton.solve()[0][0, :, 0]
-    together, alone = newton.tangents(newton.smooth, newton.across * newton.unit)
+    together, alone = newton.tangents([(newton.smooth[None], newton.across[None] * newton.unit)])
     S = [(PLACE[force > 0] ** i).sum() for i in range(3)]
     expected = mesh / SLICES * (S[0] - mesh * S[1] ** 2 / (mesh * S[2] + SLICES * k))
     assert 0 < S[0] < SLICES

@@ -222,7 +222,7 @@ def test_the_mirror_image_over_the_width_is_that_of_the_mirrored_lead(gears, bod
 
 
 def _no_coupling(found, some, waves, count):
-    return np.zeros((len(some), count, len(found.mesh), count, len(found.mesh)))
+    return np.zeros((found.setup.images, len(some), count, len(found.mesh), count, len(found.mesh)))
 
 
 def test_coupling_raises_the_largest_load(gears, bodies, waves, monkeypatch):

@@ -460,7 +460,7 @@ def whole_sets() -> tuple[Row, ...]:
     ]
 
     def apart(found, some, waves, count):
-        return np.zeros((len(some), count, len(found.mesh), count, len(found.mesh)))
+        return np.zeros((found.setup.images, len(some), count, len(found.mesh), count, len(found.mesh)))
 
     for amount in (2, 4):
         lead = [LeadSlope(1e-6 * amount)]
