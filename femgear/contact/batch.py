@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -547,16 +548,26 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
     right[..., 1] = np.where(cells, beyond, 0.0)
     yields, moments = np.ones((len(force), P, W)), np.zeros((len(force), P, W, 3))
     touching, active = np.full((P, W, C), np.inf), beyond == 0.0
+    per, offset, pressed = (np.zeros(active.shape) for _ in range(3))
+    approach = np.zeros(len(active))
+    # solutions last until cells of their window change sides
+    changed = np.ones(len(active), bool)
     for k, one in enumerate(force):
+        some: Any = slice(None)
         for _ in range(_MOST_STEPS):
-            per, offset = np.moveaxis(_local_solution(local, active, right), -1, 0)
-            approach = (one + offset.sum(axis=1)) / per.sum(axis=1)
-            pressed = per * approach[:, None] - offset
-            gaps = beyond + (local @ pressed[..., None])[..., 0] - approach[:, None]
-            flips = np.where(active, pressed < 0.0, cells & (gaps < -ROUNDING * approach[:, None]))
-            if not flips.any():
+            again = np.flatnonzero(changed)
+            solved = _local_solution(local[again], active[again], right[again])
+            per[again], offset[again] = np.moveaxis(solved, -1, 0)
+            approach[some] = (one + offset[some].sum(axis=1)) / per[some].sum(axis=1)
+            pressed[some] = per[some] * approach[some, None] - offset[some]
+            gaps = beyond[some] + (local[some] @ pressed[some, :, None])[..., 0] - approach[some, None]
+            overlap = cells[some] & (gaps < -ROUNDING * approach[some, None])
+            flips = np.where(active[some], pressed[some] < 0.0, overlap)
+            changed[some] = flips.any(axis=1)
+            if not changed.any():
                 break
-            active ^= flips
+            active[some] ^= flips
+            some = np.flatnonzero(changed)
         yields[k][rows], moments[k][rows] = approach / one, (onto[rows] @ pressed[..., None])[..., 0] / one
         touching[rows] = np.where(active & np.isinf(touching[rows]), one, touching[rows])
     return PairLaws(
