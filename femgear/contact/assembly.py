@@ -604,8 +604,8 @@ def assemble_contact(
 
 def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> np.ndarray:
     """Regular compliance between the nodes of all windows, as `Candidates.images` has it."""
-    P, W = pair.shape
-    smooth = np.zeros((setup.images, P, W, 3, W, 3))
+    (P, W), nodes = pair.shape, setup.roll.shape[-1]
+    smooth = np.zeros((setup.images, P, W, nodes, W, nodes))
     for number, members, gear, side in windows_of_bodies(setup.gears, mesh):
         body = bodies.gears[number]
         if body is None:
@@ -703,7 +703,7 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
 def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):
     """Add the compliance of one body between its windows `members` (w,) and their images.
 
-    From roll lengths of their nodes (P, w, 3) [m], tooth numbers (P, w) and flanks (w,).
+    From roll lengths of their nodes (P, w, n) [m], tooth numbers (P, w) and flanks (w,).
     """
     count, stations = body.regular.shape[:2]
     index, weight = station_weights(roll, body.roll)
@@ -715,7 +715,8 @@ def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):
         lag = (tooth[:, one] - tooth[:, two] - image * count // len(smooth)) % count
         row = (lag[..., None, None] * stations + index[:, one]) * stations
         values = body.regular.reshape(-1)[row[..., None, None] + index[:, two][:, :, None, None]]
-        half = (weight[:, one][..., None, :] @ values.reshape(*row.shape, 12)).reshape(*row.shape[:3], 3, 4)
+        half = weight[:, one][..., None, :] @ values.reshape(*row.shape, -1)
+        half = half.reshape(*row.shape[:3], *weight.shape[2:])
         block = np.einsum("pwabq,pwbq->pwab", half, weight[:, two])
         sector[:, members[one], :, members[two]] += np.moveaxis(block, 1, 0)
         other = one != two if alone else one >= 0

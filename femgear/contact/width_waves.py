@@ -179,12 +179,9 @@ def slice_compliance(found: Candidates, rows: np.ndarray, waves: WidthWaves, sli
     T = cosines(slices)[1:]
     if each > 1:
         return _along_helix(found, rows, waves, wanted, between)
-    known = np.array(
-        [
-            body_compliance(setup, one, found.position[rows[:, 0]], found.mesh, found.pair[rows[:, 0]])
-            for one in waves.bodies
-        ]
-    )[..., 1, :, 1]
+    middle, place = replace(setup, roll=setup.roll[..., 1:2]), rows[:, 0]
+    windows = found.position[place], found.mesh, found.pair[place]
+    known = np.array([body_compliance(middle, one, *windows)[..., 0, :, 0] for one in waves.bodies])
     change = np.tensordot(between, known, 1)
     local = replace(waves, wave_number=wanted).local[:, None]
     local = local / waves.bodies[0].of_kinds(setup.kind(found.mesh))
