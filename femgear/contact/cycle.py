@@ -447,9 +447,7 @@ def _face_width(planetary_set: GearSet, options: CycleOptions) -> FaceWidth | No
     """What the contact over the face width takes of the options; None without slices."""
     if options.waves is None:
         return None
-    held = None
-    if options.held_bodies is not None and options.held_waves is not None:
-        held = options.held_bodies, options.held_waves
+    held = (options.held_bodies, options.held_waves) if options.held_bodies and options.held_waves else None
     tilting = tilting_members(planetary_set, options.width_supports, options.slices)
     return FaceWidth(options.waves, options.slices, tilting, held, options.ahead is not None)
 

@@ -87,9 +87,7 @@ def contact_over_width(
     S, rows = over.slices, len(found.position)
     P = rows // S if over.helical else rows
     lead, apart = _leads(found, deviations, S, P)
-    held = None
-    if over.held is not None:
-        held = found.images_of(over.held[0]), over.held[1]
+    held = None if over.held is None else (found.images_of(over.held[0]), over.held[1])
     laws = pair_laws(found, state, curves)
     sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
     force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
@@ -127,8 +125,7 @@ def _by_tilts(tilting: TiltingMembers | None, sliced: SliceState, tilts: np.ndar
     """
     force = sliced.of_meshes()
     if tilting is None:
-        turned = np.zeros(force.T.shape)
-        return tilts, turned, turned
+        return tilts, *np.zeros((2, *force.T.shape))
     turned = tilting.approach @ tilts
     twisted = turned - np.einsum("vswt,ptw->vsp", tilting.coupling, force)
     return tilting.angle[:, None] * tilts, turned, twisted

@@ -149,19 +149,17 @@ def solve_slices(
     for first in range(0, P, _TOGETHER):
         some = np.arange(first, min(first + _TOGETHER, P))
         rows = some[:, None] * each + np.arange(each)
-        across = slice_compliance(found, rows, waves, N)
-        bodies = [(found.images[:, rows], across)]
+        smooth, across = found.images[:, rows], slice_compliance(found, rows, waves, N)
+        bodies = [(smooth, across)]
         if held is not None:
             bodies.append((held[0][:, rows], slice_compliance(found, rows, held[1], N)))
-        newton = _SliceNewton(
-            laws, rows, load, across.sum(axis=0), separations[some], found.images[0][rows], tilting
-        )
+        newton = _SliceNewton(laws, rows, load, across.sum(axis=0), separations[some], smooth[0], tilting)
         before = newton.tangents(bodies) if each == 1 else []
         if tilting is not None:
             mesh, window = laws.mesh, np.arange(N)[:, None]
             coupling = tilting.coupling[mesh, window][:, :, mesh, window]
             newton.across = newton.across + coupling / newton.unit
-            bodies = [(smooth, change + coupling) for smooth, change in bodies]
+            bodies = [(one, change + coupling) for one, change in bodies]
         solved = newton.solve()
         after = newton.tangents(bodies)
         after = [b - a for a, b in zip(before, after, strict=True)] if before else after
