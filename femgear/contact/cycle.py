@@ -370,11 +370,11 @@ def walk_mesh_cycle(
     record = cycle_without_load(solved, position, periods=periods, contact=contact, options=options)
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
-        springs, images = bearing_springs(solved, supports, members), 1
-        width = _face_width(solved, options)
-        uneven = options.both_flanks or springs or options.planet_gaps is not None
-        if not uneven and (width is None or width.tilting is None):
-            images = math.gcd(planet_symmetry(solved, deviations), solved.gears[0].teeth)
+        springs, width = bearing_springs(solved, supports, members), _face_width(solved, options)
+        uneven = (
+            options.both_flanks or springs or options.planet_gaps is not None or (width and width.tilting)
+        )
+        images = 1 if uneven else math.gcd(planet_symmetry(solved, deviations), solved.gears[0].teeth)
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
         walk = _Walk(
             solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, width
