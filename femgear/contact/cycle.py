@@ -371,10 +371,8 @@ def walk_mesh_cycle(
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
         springs, width = bearing_springs(solved, supports, members), _face_width(solved, options)
-        uneven = (
-            options.both_flanks or springs or options.planet_gaps is not None or (width and width.tilting)
-        )
-        images = 1 if uneven else math.gcd(planet_symmetry(solved, deviations), solved.gears[0].teeth)
+        each = springs or options.both_flanks or options.planet_gaps is not None or (width and width.tilting)
+        images = 1 if each else math.gcd(planet_symmetry(solved, deviations), solved.gears[0].teeth)
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
         walk = _Walk(
             solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, width
