@@ -476,7 +476,7 @@ def whole_sets() -> tuple[Row, ...]:
 def refinement() -> tuple[Row, ...]:
     """Twice the slices, wave numbers and coarse elements."""
     rows = []
-    with patch.object(slices, "_WAVES", 18):
+    with patch("femgear.contact.width_waves._WAVES", 18):
         more = width_waves(coarse_sectors(), STEEL, SET_SLICES)
     fine = width_waves(make_sectors(reference_set(), STEEL, flank_elements=12, refine=1.0), STEEL, SET_SLICES)
     for text, lead in (("slope", LeadSlope(10e-6)), ("crowning", LeadCrowning(10e-6))):
