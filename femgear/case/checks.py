@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
-from femgear.case.quantities import SPEED
+from femgear.case.quantities import ANGLE, SPEED
 from femgear.case.sections import (
     LARGEST_DEVIATION,
     ROUNDING,
@@ -20,7 +20,7 @@ from femgear.case.sections import (
     GearErrors,
     check_published,
 )
-from femgear.errors import CaseError, GeometryError
+from femgear.errors import CaseError, Finding, GeometryError
 from femgear.gears.kinematics import unheld_members
 
 if TYPE_CHECKING:
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 LEAST_TORQUE = 1e-6
 """Smallest torque that is told from none [N m]."""
+VALIDATED_HELIX = math.radians(30.0)
+"""Largest helix angle at which teeth in three dimensions confirm the stiffness [rad]."""
 
 
 def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
@@ -56,6 +58,16 @@ def _check_operation(case: Case):
             key="ring.foundation_tangential", value="0 N/m^3", limit="above 0 N/m^3",
             remedy="give a tangential foundation, or hold another member",
         )  # fmt: skip
+
+
+def steep_helix(key: str, helix_angle: float) -> Iterator[Finding]:
+    """Warn of a helix angle [rad] at which nothing confirms the stiffness of the teeth."""
+    if abs(helix_angle) > VALIDATED_HELIX * (1.0 + 1e-9):
+        text = (
+            f"a helix angle of {ANGLE.show(helix_angle)}: the stiffness of helical teeth is validated up to "
+            f"{ANGLE.show(VALIDATED_HELIX)} alone (docs/validation.md, rows helix)"
+        )
+        yield Finding("W-HELIX", key, text)
 
 
 def check_speeds(case: Any) -> Iterator[CaseError]:

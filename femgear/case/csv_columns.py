@@ -1,7 +1,7 @@
 """CSV files that a case names: two columns, numbers with their units in the heading.
 
 `read_columns` reads any such file. `embed_points` puts the points of one in its place in the case, and
-`embed_profiles` those of all measured profiles: they are read once and kept inside the case.
+`embed_profiles` those of all measured profiles and leads: they are read once and kept inside the case.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import PurePath
 from typing import Any
 
@@ -26,10 +26,16 @@ _HEADING = re.compile(r"\s*(?P<name>[A-Za-z_ ]+?)[\s_]*[\[(](?P<unit>[^\])]+)[\]
 _LONGEST_TITLE = 200
 _COMMAS = "decimal commas need semicolons or tabs between the columns, or write decimal points"
 
-_PROFILE_ENTRIES = {"roll angle": "roll_angles", "diameter": "diameters", "deviation": "deviations"}
+_PROFILE_ENTRIES = {
+    "roll angle": "roll_angles", "diameter": "diameters", "place": "places", "deviation": "deviations",
+}  # fmt: skip
 _PROFILE_DIMENSIONS = {"roll angle": ANGLE, "diameter": LENGTH, "deviation": LENGTH}
-_PROFILE_UNITS = {"roll_angles": "rad", "diameters": "m", "deviations": "m"}
+_PROFILE_UNITS = {"roll_angles": "rad", "diameters": "m", "places": "m", "deviations": "m"}
 _PROFILE_HEADING = "the first line names two columns: roll angle [deg] or diameter [mm], and deviation [um]"
+_LEAD_DIMENSIONS = {"place": LENGTH, "deviation": LENGTH}
+_LEAD_HEADING = (
+    "the first line names two columns: place [mm], from the middle of the width, and deviation [um]"
+)
 
 
 @dataclass(frozen=True)
@@ -253,15 +259,15 @@ def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
 
 
 def embed_profiles(data: dict, name: str) -> dict[str, str]:
-    """Put the points of every ``file`` of a measured profile in its place; see `embed_points`."""
+    """Put the points of every ``file`` of a measured profile or lead in its place; see `embed_points`."""
 
-    def plain(table: dict) -> bool:
-        return table.get("kind") == "measured profile" and "deviations" not in table
+    def plain(table: dict, kind: str) -> bool:
+        return table.get("kind") == kind and "deviations" not in table
 
-    found = {}
-    for gear in ("sun", "planet", "ring", "gear_1", "gear_2"):
-        entry = f"{gear}.modifications"
-        found |= embed_points(data, entry, name, read=read_profile, units=_PROFILE_UNITS, plain=plain)
+    found, kinds = {}, (("measured profile", read_profile), ("measured lead", read_lead))
+    for gear, (kind, read) in product(("sun", "planet", "ring", "gear_1", "gear_2"), kinds):
+        options = {"read": read, "units": _PROFILE_UNITS, "plain": partial(plain, kind=kind)}
+        found |= embed_points(data, f"{gear}.modifications", name, **options)
     return found
 
 
@@ -272,10 +278,20 @@ def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:
     values are ``"roll_angles"`` [rad] or ``"diameters"`` [m], ascending or descending, and ``"deviations"``
     [m], positive where there is more material.
     """
-    found = read_columns(path, _PROFILE_DIMENSIONS, least=2, most=MOST_POINTS, remedy=_PROFILE_HEADING)
+    return _read_deviations(path, _PROFILE_DIMENSIONS, _PROFILE_HEADING)
+
+
+def read_lead(path: str | os.PathLike) -> dict[str, list[float]]:
+    """Read the columns of a measured lead, ``place [mm]`` and ``deviation [um]``, as `read_profile`."""
+    return _read_deviations(path, _LEAD_DIMENSIONS, _LEAD_HEADING)
+
+
+def _read_deviations(path, dimensions: Mapping[str, Dimension], heading: str) -> dict[str, list[float]]:
+    """Read deviations over places of one kind, and refuse places that neither ascend nor descend."""
+    found = read_columns(path, dimensions, least=2, most=MOST_POINTS, remedy=heading)
     if "deviation" not in found.values:
         words = f"the columns are {' and '.join(found.values)}"
-        raise found.problem(words, found.heading, limit="one of them deviations", remedy=_PROFILE_HEADING)
+        raise found.problem(words, found.heading, limit="one of them deviations", remedy=heading)
     (places,) = (values for title, values in found.values.items() if title != "deviation")
     rising = places[1] > places[0]
     for (before, after), line in zip(pairwise(places), found.lines[1:], strict=True):

@@ -317,9 +317,11 @@ def flank_form(case: Any, gear: Gear, side: str = "both") -> FlankForm:
             found.append(_modification(section, gear))
             check_form(FlankForm((found[-1],)), gear)
             if isinstance(found[-1], MeasuredProfile):
-                _check_reach(case, found[-1], gear, f"{gear.name}.modifications[{i}]")
+                _check_reach(found[-1], gear, f"{gear.name}.modifications[{i}]")
         except GeometryError as error:
             error.key = f"{gear.name}.modifications[{i}]"
+            if source := case.profile_files.get(error.key):
+                error.message += f" (points of {source})"
             error.file = case.location(error.key)
             raise
     return FlankForm(tuple(found))
@@ -365,15 +367,13 @@ def _modification(section: ModificationSection, gear: Gear) -> Modification:
             return ProfileCrowning(amount, start, end)
 
 
-def _check_reach(case: Case, profile: MeasuredProfile, gear: Gear, key: str) -> None:
-    """Refuse a measured profile that lies beside the flank, with its file and both ranges."""
+def _check_reach(profile: MeasuredProfile, gear: Gear, key: str) -> None:
+    """Refuse a measured profile that lies beside the flank, with both ranges."""
     low, high = sorted((gear.form_roll, gear.tip_roll))
     if profile.roll[-1] >= low and profile.roll[0] <= high:
         return
-    source = case.profile_files.get(key)
-    named = f"the measured profile {source}" if source else "the measured profile"
     raise GeometryError(
-        f"{gear.name}: no part of {named} lies on the flank", code="E-MODIFICATION", key=key,
+        f"{gear.name}: no part of the measured profile lies on the flank", code="E-MODIFICATION", key=key,
         value=_range(gear, *profile.roll[:: len(profile.roll) - 1]),
         limit=f"points within {_range(gear, low, high)}",
         remedy="check the unit of its first column and that it belongs to this gear",

@@ -63,6 +63,8 @@ PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(4
 Diameter = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 RollAngle = Annotated[float, Quantity(ANGLE, 0.0, 4 * math.pi)]
 RollLength = Annotated[float, Quantity(LENGTH, 0.0, 10.0)]
+Place = Annotated[float, Quantity(LENGTH, -2.5, 2.5)]
+"""Over the face width, from its middle."""
 Points, Pitches = (Values(max_length=most) for most in (MOST_POINTS, 5000))
 Member = Literal["sun", "ring", "carrier"]
 Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
@@ -117,7 +119,7 @@ class ModificationSection(Section):
     file: Annotated[str, Field(max_length=1000)] | None = None
     roll_angles: Annotated[tuple[RollAngle, ...], Points] | None = None
     diameters: Annotated[tuple[Diameter, ...], Points] | None = None
-    places: Annotated[tuple[Deviation, ...], Points] | None = None
+    places: Annotated[tuple[Place, ...], Points] | None = None
     deviations: Annotated[tuple[Deviation, ...], Points] | None = None
 
     @model_validator(mode="after")
@@ -167,7 +169,7 @@ def _check_points(section: ModificationSection) -> None:
     wrong = len(columns) != 1 or section.deviations is None or section.file is not None
     if lead and (wrong or columns != ["places"]):
         raise CaseError(
-            "a measured lead is deviations over places", code="E-MODIFICATION",
+            "a measured lead is a file, or deviations over places", code="E-MODIFICATION",
             remedy='places = ["-9 mm", "9 mm"] from the middle of the width, deviations = ["0 um", "3 um"]',
         )  # fmt: skip
     if wrong or (columns == ["places"]) != lead:

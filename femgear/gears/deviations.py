@@ -472,7 +472,7 @@ def check_deviations(deviations: SetDeviations, planetary_set: GearSet) -> tuple
     -------
     tuple of GeometryWarning
         W-WEDGING: the deviations may use up the play, so that both flanks carry. W-PROFILE: a measured
-        profile covers less than half of its flank.
+        profile covers less than half of its flank, a measured lead less than 90 % of the width.
 
     Raises
     ------
@@ -540,10 +540,11 @@ def _wedging(d: SetDeviations, s: GearSet):
     if least < -1e-12:
         nominal = min(kind.backlash for kind in s.kinds)
         where = "in one mesh" if single <= whole else "between different planets"
+        which = "pin errors and other deviations" if len(s.kinds) > 1 else "the deviations"
         yield GeometryWarning(
             "W-WEDGING",
             "set.backlash",
-            f"pin errors and other deviations may exceed the backlash by {-least * 1e6:.3f} um {where} "
+            f"{which} may exceed the backlash by {-least * 1e6:.3f} um {where} "
             f"(ideal gears have {nominal * 1e6:.3f} um): loaded and back flanks may touch at once",
             "play of 0 um or more",
         )

@@ -21,6 +21,8 @@ LARGEST_DEVIATION = 0.2
 """Largest plausible amount of any modification or error, in modules."""
 LEAST_COVERAGE = 0.5
 """Part of a flank that a measured profile should cover; beyond its ends it is constant."""
+LEAST_OF_WIDTH, OVER_ENDS = 0.9, 1.01
+"""Part of the width that a measured lead should cover, and over which it may at most reach."""
 
 
 @dataclass(frozen=True)
@@ -262,7 +264,7 @@ def roll_at(
 
 
 def check_form(form: FlankForm, gear: Gear) -> None:
-    """Refuse (E-MODIFICATION) laws that start or end outside the involute or run the wrong way."""
+    """Refuse (E-MODIFICATION) laws that start or end beside the flank or run the wrong way."""
     for number, modification in enumerate(form.modifications):
         laws = (TipRelief, RootRelief, ProfileSlope, ProfileCrowning)
         problem = _problem(modification, gear) if isinstance(modification, laws) else None
@@ -272,6 +274,16 @@ def check_form(form: FlankForm, gear: Gear) -> None:
                 key=f"{gear.name}.modifications[{number}]", value=f"{modification.length * 1e3:.4g} mm",
                 limit=f"at most half the face width, {gear.face_width * 500:.4g} mm",
                 remedy="a crowning takes off more than that over the whole width",
+            )  # fmt: skip
+        half = 0.5 * gear.face_width
+        places = modification.place if isinstance(modification, MeasuredLead) else (0.0,)
+        furthest = max(places, key=abs)
+        if abs(furthest) > OVER_ENDS * half:
+            raise GeometryError(
+                f"{gear.name}: places of a measured lead lie beside the face width", code="E-MODIFICATION",
+                key=f"{gear.name}.modifications[{number}]", value=f"{furthest * 1e3:.6g} mm",
+                limit=f"-{half * 1e3:.6g} to {half * 1e3:.6g} mm, half the face width to either side",
+                remedy="count places from the middle of the width, not from an end of it",
             )  # fmt: skip
         if problem is not None:
             message, value, limit = problem
@@ -311,25 +323,31 @@ def check_flank(flank: str, form: FlankForm, gear: Gear) -> Iterator[GeometryWar
     """Check the modifications of a named flank together, and warn of short profiles.
 
     E-MODIFICATION: together they exceed `LARGEST_DEVIATION` modules; W-PROFILE: a measured profile covers
-    less than `LEAST_COVERAGE` of its flank.
+    less than `LEAST_COVERAGE` of its flank, a measured lead less than `LEAST_OF_WIDTH` of the width.
     """
     _check_sum(flank, form, gear)
-    low, high = sorted((gear.form_roll, gear.tip_roll))
-    for profile in form.modifications:
-        if not isinstance(profile, MeasuredProfile):
+    for one in form.modifications:
+        if isinstance(one, MeasuredProfile):
+            (low, high), least = sorted((gear.form_roll, gear.tip_roll)), LEAST_COVERAGE
+            points, shown = one.roll, math.degrees(1.0 / gear.base_radius)
+            words = "profile over roll angles {:.4g} to {:.4g} deg covers {:.0f} % of the flank,"
+            words += " {:.4g} to {:.4g} deg"
+        elif isinstance(one, MeasuredLead):
+            low, high, least = -0.5 * gear.face_width, 0.5 * gear.face_width, LEAST_OF_WIDTH
+            points, shown = one.place, 1e3
+            words = "lead over places {:.4g} to {:.4g} mm covers {:.0f} % of the width, {:.4g} to {:.4g} mm"
+        else:
             continue
-        start, end = profile.roll[0], profile.roll[-1]
-        covered = max(min(end, high) - max(start, low), 0.0) / (high - low)
-        if covered < LEAST_COVERAGE:
-            angles = [math.degrees(roll / gear.base_radius) for roll in (start, end, low, high)]
+        ends = points[0], points[-1]
+        covered = max(min(ends[1], high) - max(ends[0], low), 0.0) / (high - low)
+        if covered < least:
+            first, last, *whole = (shown * end for end in (*ends, low, high))
+            text = words.format(first, last, 100 * covered, *whole)
             yield GeometryWarning(
                 "W-PROFILE",
                 f"{gear.name}.modifications",
-                "{}: a measured profile over roll angles {:.4g} to {:.4g} deg covers {:.0f} % of the flank, "
-                "{:.4g} to {:.4g} deg; beyond its ends it is constant".format(
-                    flank, *angles[:2], 100 * covered, *angles[2:]
-                ),
-                f"{100 * LEAST_COVERAGE:.0f} % or more",
+                f"{flank}: a measured {text}; beyond its ends it is constant",
+                f"{100 * least:.0f} % or more",
             )
 
 

@@ -10,7 +10,7 @@ import pytest
 from femgear.case.csv_columns import read_profile
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError, GeometryError
-from femgear.gears.modifications import MeasuredProfile
+from femgear.gears.modifications import MeasuredLead, MeasuredProfile
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 from femgear.trains.static.results import set_warnings
 
@@ -166,6 +166,19 @@ def test_a_table_is_read_without_a_case(tmp_path):
         "diameters": pytest.approx([0.04, 0.044]),
         "deviations": pytest.approx([1e-6, 2e-6]),
     }
+
+
+def test_a_measured_lead_may_be_a_file(folder):
+    """As a measured profile; places beyond the width of 25 mm are refused with the file."""
+    extra = MEASURED.replace("profile", "lead")
+    path = folder("place [mm]; deviation [um]\n12,5; -2,5\n-12,5; 4\n", extra)
+    (lead,) = set_deviations(read_case(path)).sun.modifications
+    assert lead == MeasuredLead((-12.5e-3, 12.5e-3), (-4e-6, 2.5e-6))
+    with pytest.raises(GeometryError, match=r"data/left\.csv") as info:
+        set_deviations(read_case(folder("place [mm], deviation [um]\n0, 1\n25, 2\n", extra)))
+    assert info.value.value == "25 mm" and "-12.5 to 12.5 mm" in info.value.limit
+    with pytest.raises(CaseError, match="no known name"):
+        read_case(folder("diameter [mm], deviation [um]\n40, 1\n44, 2\n", extra))
 
 
 def test_profiles_too_many_for_one_case_are_refused(folder):

@@ -25,6 +25,7 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.kinematics import mesh_normals, orientations
 from femgear.gears.modifications import FlankForm, ProfileSlope, TipRelief
+from femgear.gears.pair import GearPair
 
 
 def test_profiles_of_both_flanks_add_up():
@@ -291,6 +292,14 @@ def test_play_left_and_wedging():  # bad input 50
     assert "in one mesh" in str(check_deviations(deep, PLAY)[0])
     thin = replace(deep, sun_thickness=50 * UM)
     assert check_deviations(thin, PLAY) == ()
+
+
+def test_a_pair_has_no_pins_that_use_up_its_play():
+    pair = GearPair(PLAY.sun, PLAY.planet, PLAY.centre_distance)
+    pitch = np.zeros(PLAY.sun.teeth)
+    pitch[0] = 1.01 * pair.backlash
+    (warning,) = check_deviations(replace(no_deviations(pair), sun_pitch=pitch), pair)
+    assert warning.code == "W-WEDGING" and "pin" not in str(warning)
 
 
 def test_pitch_and_material_use_up_play():

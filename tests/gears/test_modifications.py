@@ -12,11 +12,13 @@ from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import (
     FlankForm,
+    MeasuredLead,
     MeasuredProfile,
     ProfileCrowning,
     ProfileSlope,
     RootRelief,
     TipRelief,
+    check_flank,
     check_form,
     form_deviation,
     roll_at,
@@ -126,6 +128,8 @@ def test_places_on_the_flank():
         (TipRelief(1e-5, place(SUN, 1.0)), "coincide"),
         (TipRelief(1e-5, place(SUN, 0.8), place(SUN, 0.5)), "exchanged"),
         (RootRelief(1e-5, place(SUN, 0.3), place(SUN, 0.5)), "exchanged"),
+        (MeasuredLead((-0.6 * SUN.face_width, 0.3 * SUN.face_width), (0.0, 1e-6)), "beside the face width"),
+        (MeasuredLead((0.0, SUN.face_width), (0.0, 1e-6)), "beside the face width"),
     ],
 )
 def test_refusals(modification, text):
@@ -133,6 +137,18 @@ def test_refusals(modification, text):
         check_form(FlankForm((ProfileSlope(1e-6), modification)), SUN)
     assert info.value.code == "E-MODIFICATION" and info.value.key == "sun.modifications[1]"
     assert info.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("ends", "share"), [((-0.504, 0.504), None), ((-0.46, 0.45), None), ((0.0, 0.5), 50), ((-0.44, 0.44), 88)]
+)
+def test_a_measured_lead_covers_the_width(ends, share):
+    """Of a width b its places lie within b/2 of the middle; much of it beside them is a warning."""
+    form = FlankForm((MeasuredLead(tuple(SUN.face_width * end for end in ends), (0.0, 1e-6)),))
+    check_form(form, SUN)
+    found = [str(one) for one in check_flank("sun", form, SUN)]
+    assert len(found) == (share is not None)
+    assert all(f"covers {share} % of the width" in one and one.startswith("[W-PROFILE]") for one in found)
 
 
 def test_good_forms_pass():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 
+from femgear.case.checks import steep_helix
 from femgear.case.quantities import ANGLE, STIFFNESS, TORSION, Count, Quantity, Section
 from femgear.case.sections import LARGEST_HELIX, Inertia, Mass, MeshStiffnessSection, RigidCase
 from femgear.case.text import CaseFile
@@ -63,8 +64,8 @@ class HelicalSection(Section):
         return self.helix_angle if self.hand == "right" else -self.helix_angle
 
 
-def helical_notices(data: dict) -> Iterator[Finding]:
-    """List what a helical case gives without effect, by the tables of its checked file."""
+def helical_notices(data: dict, helix_angle: float) -> Iterator[Finding]:
+    """List what deserves a look in a helical case, by the tables of its checked file and its helix [rad]."""
     unused = entries_without_effect(data)
     static = data.get("static", {})
     without = ("back_flanks",) if static.get("slices", 0) > 1 else ("stresses", "back_flanks")
@@ -92,6 +93,7 @@ def helical_notices(data: dict) -> Iterator[Finding]:
                 "excites, and modes are all that is computed"
             )
     else:
+        yield from steep_helix("helical.helix_angle", helix_angle)
         yield from _slow_notice(data)
 
 
@@ -153,4 +155,6 @@ def check_helical(case: HelicalCase) -> Iterator[CaseError]:
         )
 
 
-FILE = CaseFile(HelicalCase, check_helical, lambda tables, case: helical_notices(tables))
+FILE = CaseFile(
+    HelicalCase, check_helical, lambda tables, case: helical_notices(tables, case.helical.helix_angle)
+)

@@ -48,7 +48,7 @@ from femgear.report.style import (
 from femgear.storage.files import write_text
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.results import SIDES, StaticResult
-from femgear.trains.static.stages import static_supports
+from femgear.trains.static.stages import over_width, static_supports
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -641,7 +641,7 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     if static is None or not static.cycle.force.any():
         return []
 
-    gears, cycle = _left_flanks_loaded(static, case)
+    gears, cycle = _left_flanks_loaded(static, case, drawn.cache)
     sectors = picture_sectors(drawn, gears)
     of_kind = {sector.gear.name: sector for sector in sectors.gears}
     bodies, deformed = [], deformed_set(gears, sectors, cycle)
@@ -679,11 +679,12 @@ def _mesh_views(gears: GearSet) -> list[View]:
     return views
 
 
-def _left_flanks_loaded(static: StaticResult, case: Case) -> tuple[Any, MeshCycle]:
+def _left_flanks_loaded(static: StaticResult, case: Case, cache: Path | None = None) -> tuple[Any, MeshCycle]:
     """The set and its static state at position zero; of a negative torque those of the mirror image."""
     if static.sun_torque >= 0:
         return static.planetary_set, static.cycle
-    gears, _, deviations = loaded_image(static.planetary_set, static.sun_torque, set_deviations(case))
+    gears, order, deviations = loaded_image(static.planetary_set, static.sun_torque, set_deviations(case))
+    width = over_width(case, static.planetary_set, cache=cache)
     cycle = walk_mesh_cycle(
         gears,
         static.bodies,
@@ -692,7 +693,7 @@ def _left_flanks_loaded(static: StaticResult, case: Case) -> tuple[Any, MeshCycl
         contact=case.static.contact,
         deviations=deviations,
         supports=static_supports(case),
-        options=CycleOptions(both_flanks=case.static.back_flanks),
+        options=CycleOptions(both_flanks=case.static.back_flanks, **width).mirrored(order),
     )
     return gears, cycle
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.case.checks import steep_helix
 from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
@@ -462,7 +463,7 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
     if "face_load_factor" in data and data["face_load_factor"].values.max() > 1.02:
         count = data.sizes["slice"]
         if count < SLICES:
-            text = f"K_Hbeta is the mean over a {count}th of the width: take {SLICES} slices or more"
+            text = f"K_Hbeta is the mean over a {count}th of the width: {_more_slices(data, module)}"
             yield Finding("W-FACE-LOAD", "static.slices", text)
     if "slice_load" in data:
         yield from _lifted(data)
@@ -480,6 +481,18 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
     if ((back > 0) & ~(force > 0)).any():
         text = "some meshes carry on their back flanks alone: planets work against one another"
         yield Finding("W-BACK", "", text)
+
+
+def _more_slices(data: xr.Dataset, module: float) -> str:
+    """Advise as many slices as are thicker than a quarter of the module [m] and than contacts are wide."""
+    width, load, pressure = data.attrs["face_width"], data.slice_load.values, data.slice_pressure.values
+    # width 4 F' / (pi p) of a line contact under F' per length (Johnson, Contact Mechanics, 4.3)
+    contact = 4.0 / (np.pi * width) * np.divide(load, pressure, out=np.zeros(load.shape), where=pressure > 0)
+    # finer slices carry higher peaks, and pressures at the ends of flanks are not known
+    most = int(width / max(1.2 * float(contact.max(initial=0.0)), 0.25 * module))
+    if most <= data.sizes["slice"]:
+        return "more would be thinner than contacts are wide, or than a quarter of the module"
+    return f"take {SLICES} slices or more" if most >= SLICES else f"take {most} slices, about as many as fit"
 
 
 def _lifted(data: xr.Dataset) -> Iterator[Finding]:
@@ -535,7 +548,9 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
         "p max [MPa]": lambda one: f"{p.max() / 1e6:.1f}" if (p := one.max_pressure.values).any() else "-",
     }
     if "face_load_factor" in data:
-        columns["K_Hbeta"] = lambda one: f"{float(one.face_load_factor):.3f}"
+        columns["K_Hbeta"] = lambda one: (
+            f"{float(one.face_load_factor):.3f}" if one.mesh_force.values.any() else "-"
+        )
         columns["misaligned [um]"] = lambda one: f"{float(one.mesh_misalignment.mean()) * 1e6:+.2f}"
     contact = f"contact: {data.attrs.get('contact', 'unknown')}"
     sharing = (
@@ -661,6 +676,7 @@ def set_warnings(case: Case) -> Iterator[Finding]:
 def load_warnings(case: Any) -> Iterator[Finding]:
     """List what deserves a look in the deviations and the torque of a case."""
     yield from check_deviations(set_deviations(case), planetary_set(case))
+    yield from steep_helix("set.helix_angle", case.set.helix_angle)
     if case.operation.torque <= 0:
         nothing = "without torque no tooth touches; only static results exist"
         text = "a negative torque loads the other flanks" if case.operation.torque < 0 else nothing

@@ -41,6 +41,7 @@ from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.static.results import (
+    SLICES,
     NominalStresses,
     StaticResult,
     StressResult,
@@ -164,15 +165,18 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
     of a module.
     """
     static, count, first = case.static, case.static.slices, gears.gears[0]
-    where, remedy = {"code": "E-SLICES", "file": case.location("static.slices")}, "leave static.slices out"
-    overlap = _overlap(case, gears)
+    where, overlap = {"code": "E-SLICES", "file": case.location("static.slices")}, _overlap(case, gears)
+    least, most = math.ceil(_PER_OVERLAP * abs(overlap)) + 1, int(4 * first.face_width / first.module)
+    needed, other = f"give static.slices = {max(min(SLICES, most), least)}", ""
+    if not overlap:
+        other = ", or leave static.slices out"
     if case.set.helix_angle and count < max(2, _PER_OVERLAP * abs(overlap)):
         raise CaseError(
             f"helical teeth with an overlap ratio of {abs(overlap):.3g} need slices over the width",
-            key="static.slices", value=count, limit=f"at least {math.ceil(_PER_OVERLAP * abs(overlap)) + 1}",
-            remedy="give static.slices = 25", **where,
+            key="static.slices", value=count, limit=f"at least {least}", remedy=needed,
+            **where,
         )  # fmt: skip
-    _check_width_entries(case, helical=bool(overlap))
+    _check_width_entries(case, needed, helical=bool(overlap))
     if count < 2:
         for gear in case.gear_names:
             for i, one in enumerate(getattr(case, gear).modifications):
@@ -180,7 +184,7 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
                     key = f"{gear}.modifications[{i}]"
                     raise CaseError(
                         f"a {one.kind} needs slices over the width", code="E-SLICES", key=key,
-                        file=case.location(key), remedy="give static.slices = 25",
+                        file=case.location(key), remedy=needed,
                     )  # fmt: skip
         return
     try:
@@ -189,17 +193,19 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
         error.file = case.location(error.key or "")
         raise
     if static.back_flanks:
+        remedy = f"leave static.back_flanks out{other}"
         raise CaseError("slices have no back flanks", key="static.back_flanks", remedy=remedy, **where)
     if static.members == "elastic" and case.planet.bearing_clearance:
+        remedy = f"leave planet.bearing_clearance out{other}"
         raise CaseError("slices know no clearance", key="planet.bearing_clearance", remedy=remedy, **where)
     if first.face_width < 0.25 * count * first.module:
         raise CaseError(
             "slices are thinner than a quarter of the module", key="static.slices", value=count,
-            limit=f"at most {int(4 * first.face_width / first.module)}", remedy=remedy, **where,
+            limit=f"at most {most}", remedy=f"use at most {most} slices{other}", **where,
         )  # fmt: skip
 
 
-def _check_width_entries(case: Case, *, helical: bool) -> None:
+def _check_width_entries(case: Case, needed: str, *, helical: bool) -> None:
     """Refuse tilts and twists without slices, and those of helical teeth, which axial motions press too."""
     if case.static.slices > 1 and not helical:
         return
@@ -209,7 +215,7 @@ def _check_width_entries(case: Case, *, helical: bool) -> None:
             raise CaseError(
                 "tilts and twists over the face width are those of spur teeth in slices", code="E-SLICES",
                 key=key, file=case.location(key),
-                remedy="leave them out, or take a lead slope" if helical else "give static.slices = 25",
+                remedy="leave them out, or take a lead slope" if helical else needed,
             )  # fmt: skip
 
 

@@ -64,6 +64,13 @@ def test_elastic_set_with_a_helix(tmp_path):
     assert data.attrs["overlap_ratio"] == pytest.approx(overlap, rel=1e-12)
 
 
+@pytest.mark.parametrize(("angle", "steep"), [(30, False), (31, True)])
+def test_steep_helices_of_rigid_sets_are_told(angle, steep):
+    case = femgear.read_case(ROOT / "cases" / "helical_30_20_70.toml")
+    case = femgear.with_values(case, {"helical.helix_angle": f"{angle} deg", "helical.mesh_stiffness": None})
+    assert [one.key for one in case.notices if one.code == "W-HELIX"] == ["helical.helix_angle"] * steep
+
+
 def test_rigid_set_takes_the_meshes_of_the_contact(tmp_path):
     """The quick estimate has another section factor, and slices that do not draw one another along."""
     text = (ROOT / "cases" / "helical_30_20_70.toml").read_text(encoding="utf-8")

@@ -1,5 +1,6 @@
 """Pairs in slices over the width: against the plane, against a set, hands, leads, and what is refused."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +16,10 @@ from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadSlope
 from femgear.gears.pair import GearPair
 from femgear.trains.pair.stages import iso_stiffness
+from femgear.trains.reading import with_values
 from femgear.trains.registry import check_case
 from femgear.trains.static.figures import contact_pattern
+from femgear.trains.static.results import load_warnings
 from femgear.trains.static.stages import solve_static
 
 SLICES = 12
@@ -124,6 +127,9 @@ def test_a_slope_loads_one_end_more_than_linear_teeth_would(kind):
         ({"set.helix_angle": "20 deg"}, "E-SLICES", "static.slices", "helical teeth with an overlap ratio"),
         ({"set.helix_angle": "-40 deg", **SLICED, "static.slices": 6}, "E-SLICES", "static.slices", "1.36"),
         ({"static.slices": 30}, "E-SLICES", "static.slices", "thinner than a quarter"),
+        ({"static.slices": 30}, "E-SLICES", "static.slices", "use at most 25 slices"),
+        ({"set.face_width": "15 mm"}, "E-SLICES", "static.slices", "give static.slices = 18"),
+        ({"set.face_width": "150 mm"}, "E-SLICES", "static.slices", "give static.slices = 34"),
         ({**SLICED, "static.back_flanks": True}, "E-SLICES", "static.back_flanks", "no back flanks"),
         ({"set.helix_angle": "35 deg", **SLICED, "set.centre_distance": "91.5 mm"}, "E-CENTRE-DISTANCE",
          "set.centre_distance", "transverse section"),
@@ -136,6 +142,26 @@ def test_refusals_name_the_entries_of_the_file(changes, code, key, words):
         check_case(helical({}, 20, **{"static.slices": 0, **changes}))
     problems = getattr(found.value, "problems", ()) or (found.value,)
     assert any(one.code == code and one.key == key and words in str(one) for one in problems)
+    assert "leave static.slices out" not in str(found.value)
+
+
+@pytest.mark.parametrize(("angle", "steep"), [("30 deg", False), ("-31 deg", True)])
+def test_helices_beyond_those_validated_are_told(angle, steep):
+    found = [
+        one for one in load_warnings(helical({}, 20, **{"set.helix_angle": angle})) if "HELIX" in one.code
+    ]
+    assert [(one.code, one.key) for one in found] == [("W-HELIX", "set.helix_angle")] * steep
+
+
+def test_the_slices_that_a_warning_advises_can_be_taken():
+    """Under a load that makes contacts a sixteenth of the width wide."""
+    slope = [{"kind": "lead slope", "amount": "40 um"}]
+    coarse = {"operation.torque": "3000 N m", "static.positions": 4, "static.flank_elements": 8}
+    case = pair_case({**coarse, "gear_1.modifications": slope, "static.slices": 8})
+    advice = re.search(r"8th of the width: take (\d+) slices, about", solve_static(case).dataset().warnings)
+    assert advice and 8 < int(advice[1]) < 25
+    case = with_values(case, {"static.slices": int(advice[1])})
+    assert "more would be thinner" in solve_static(case).dataset().warnings
 
 
 def test_stiffness_of_the_standard_knows_material_and_small_loads():

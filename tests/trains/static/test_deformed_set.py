@@ -10,17 +10,24 @@ from femgear.trains.reading import read_case, with_values
 from femgear.trains.static.figures import _left_flanks_loaded
 from femgear.trains.static.stages import solve_static
 
+SLICED = {"static.slices": 8, "sun.modifications": [{"kind": "lead slope", "amount": "12 um"}]}
+HELICAL = {"set.helix_angle": "8 deg", "set.centre_distance": None, "sun.profile_shift": 0.0}
 CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 
 
-@pytest.mark.parametrize("members", ["fixed", "elastic"])
-def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members):
+@pytest.mark.parametrize(
+    ("members", "more"),
+    [("fixed", {}), ("elastic", {}), ("fixed", SLICED), ("fixed", {**SLICED, **HELICAL})],
+    ids=["fixed", "elastic", "slices", "helical"],
+)
+def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members, more):
     changes = {
         "operation.torque": "-60 N m",
         "set.pin_errors": [{"planet": 2, "tangential": "5 um"}],
         "static.members": members,
         "static.positions": 8,
         "static.flank_elements": 6,
+        **more,
     }
     case = with_values(read_case(CASE), changes)
     static = solve_static(case)
@@ -32,4 +39,6 @@ def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members):
     seen = np.concatenate([force[order], force[3 + order]])
     # the cells of a walk fit the largest load of all its positions
     np.testing.assert_allclose(cycle.force[:, 0], seen, rtol=1e-3)
+    image, loads = (one.tooth_load[..., at].max(axis=1) for one, at in ((cycle, 0), (static.cycle, start)))
+    np.testing.assert_allclose(image, loads[[*order, *(3 + order)]], rtol=1e-3)
     assert gears.planet_angles == mirrored_set(static.planetary_set)[0].planet_angles

@@ -46,7 +46,9 @@ def test_static_results_hold_the_load_over_the_width(misaligned):
     assert factor[:3] == pytest.approx(factor[0], rel=1e-6) and factor[0] > 1.5
     block = describe_static(data, 1.5e-3)
     assert block.rows[0][block.header.index("K_Hbeta")] == f"{factor[0]:.3f}"
-    assert "W-FACE-LOAD" in data.attrs["warnings"]
+    assert "W-FACE-LOAD" in data.attrs["warnings"] and "take 25 slices or more" in data.attrs["warnings"]
+    idle = describe_static(data.assign(mesh_force=data.mesh_force * (data.mesh != "sun-planet 1")), 1.5e-3)
+    assert [row[block.header.index("K_Hbeta")] == "-" for row in idle.rows] == [True] + 5 * [False]
     check_documented(data, "## static.nc", others=HELIX_VARIABLES)
 
 
