@@ -46,7 +46,7 @@ def main(
     below
         Frequency with its unit; modes that are lower at rest are followed.
     """
-    from femgear.case.gear_set import planetary_set
+    from femgear.case.gear_set import need_set, planetary_set
     from femgear.case.quantities import FREQUENCY, SPEED, to_si
     from femgear.report.style import save_figure
     from femgear.trains.elastic.checks import check_rim_speed
@@ -61,6 +61,7 @@ def main(
             limit="3 speeds or more, above 0, modes above 0 Hz",
         )  # fmt: skip
     data = read_case(case)
+    need_set(data)
     planetary_set(data)  # refuse before the folder is touched
     folder = ready_folder(output, FILES)
     with Progress() as progress:

@@ -48,10 +48,12 @@ def main(
     harmonic
         Harmonic of the mesh frequency, 1 upwards.
     """
-    from femgear.case.gear_set import planetary_set
+    from femgear.case.gear_set import need_set, planetary_set
     from femgear.trains.reading import read_case, with_value
 
-    data = with_value(read_case(case), "operation.speeds", [speed])
+    data = read_case(case)
+    need_set(data)
+    data = with_value(data, "operation.speeds", [speed])
     # refuse before the folder is touched, and what only the response tells after it
     _check_harmonic(harmonic, data.response_harmonics)
     planetary_set(data)

@@ -62,7 +62,7 @@ def main(
         ("--positions", positions, 3 <= positions <= 512, "3 to 512"),
     ):
         if not good:
-            raise CaseError("not usable", code="E-RANGE", key=key, value=value, limit=limit)
+            raise CaseError("out of range", code="E-RANGE", key=key, value=value, limit=limit)
     data = data if data.static.slices > 1 else with_values(data, {"static.slices": slices})
     folder, torque, slopes = (
         ready_folder(output, FILES),

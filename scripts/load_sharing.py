@@ -43,13 +43,14 @@ def main(
     planet
         Number of the planet that has the gap, 1 upwards.
     """
-    from femgear.case.gear_set import planetary_set
+    from femgear.case.gear_set import need_set, planetary_set
     from femgear.case.quantities import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.study.relief import sun_torque
     from femgear.trains.reading import read_case
 
     data = read_case(case)
+    need_set(data)
     gears = planetary_set(data)
     gaps = [_checked(to_si(text, LENGTH), text) for text in gap]
     if not 1 <= planet <= gears.n_planets:

@@ -118,6 +118,7 @@ def main(
     output
         Folder of the results.
     """
+    from femgear.case.gear_set import need_set
     from femgear.storage.files import resumable
     from femgear.study.front import check_second
     from femgear.study.objectives import named_quantity
@@ -125,6 +126,7 @@ def main(
     from femgear.trains.reading import read_case, with_value
 
     data = read_case(case)
+    need_set(data)
     data = data if task.torque is None else with_value(data, "operation.torque", task.torque)
     _check_request(data, extent)
     data, problem = _problem(data, task, extent)

@@ -63,7 +63,7 @@ def main(
     position
         In mesh periods, 0 to 1, rounded to a sixteenth.
     """
-    from femgear.case.gear_set import planetary_set
+    from femgear.case.gear_set import need_set, planetary_set
     from femgear.case.quantities import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
@@ -72,6 +72,7 @@ def main(
     from femgear.trains.reading import read_case
 
     data = read_case(case)
+    need_set(data)
     gears = planetary_set(data)
     torque = sun_torque(data, gears)
     given = {"--radial": radial, "--tangential": tangential}

@@ -126,7 +126,7 @@ def relief_tables(gears, *, amount: float, length: float, power: float, back: bo
 def _check_counts(points: int, positions: int) -> None:
     for key, value, low, high in (("--points", points, 3, 100), ("--positions", positions, 4, 2048)):
         if not low <= value <= high:
-            raise CaseError("not usable", code="E-RANGE", key=key, value=value, limit=f"{low} to {high}")
+            raise CaseError("out of range", code="E-RANGE", key=key, value=value, limit=f"{low} to {high}")
 
 
 def _checked(amount: float, text: str, module: float) -> float:

@@ -156,7 +156,7 @@ def test_helices_beyond_those_validated_are_told(angle, steep):
 def test_the_slices_that_a_warning_advises_can_be_taken():
     """Under a load that makes contacts a sixteenth of the width wide."""
     slope = [{"kind": "lead slope", "amount": "40 um"}]
-    coarse = {"operation.torque": "3000 N m", "static.positions": 4, "static.flank_elements": 8}
+    coarse = {"operation.torque": "3000 N m", "static.positions": 8, "static.flank_elements": 8}
     case = pair_case({**coarse, "gear_1.modifications": slope, "static.slices": 8})
     advice = re.search(r"8th of the width: take (\d+) slices, about", solve_static(case).dataset().warnings)
     assert advice and 8 < int(advice[1]) < 25
