@@ -35,6 +35,11 @@ SET_SCRIPTS = (
     "multistage.py",
 )
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
+PAIR = ROOT / "cases" / "spur_pair.toml"
+OF_SETS = (
+    "load_sharing", "pin_error_load_sharing", "housing_modulation", "optimise", "gyroscopic", "lead_design",
+    "tip_relief_design",
+)  # fmt: skip
 
 
 def table(path):
@@ -118,6 +123,7 @@ def test_help(name, tmp_path):
         ("planet_phasing.py", ["--angle", "0", "--angle", "100"], 2, "100.800000"),
         ("planet_phasing.py", ["--distance", "50"], 2, "0 to 30"),
         ("planet_phasing.py", ["--convention", "other"], 2, "--convention"),
+        *((f"{name}.py", [PAIR], 2, "E-MODEL") for name in OF_SETS),
     ],
 )
 def test_bad_input_ends_in_a_message(name, arguments, code, message, tmp_path):
