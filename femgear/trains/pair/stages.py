@@ -160,6 +160,8 @@ def _warnings(case: PairCase) -> Iterator[Finding]:
     """List what is allowed but deserves a look."""
     yield from (*check_meshes(planetary_set(case)), *case.notices)
     yield from load_warnings(case)
+    if case.operation.speeds and (why := _no_modes(case)):
+        yield Finding("W-UNUSED", "operation.speeds", f"no effect, static results are all: {why}")
 
 
 def _no_modes(case: PairCase) -> str:
@@ -250,11 +252,12 @@ def _with_play(
     if not found.converged:
         found = solve_harmonic_balance(problem, 2.0 * np.pi * frequency, **options)
     if not found.converged:
-        key = "operation.speeds"
+        damped = case.dynamics.damping_ratio > 0.0
+        key = "operation.speeds" if damped else "dynamics.damping_ratio"
         raise ConvergenceError(
             f"no motion with contact loss at a mesh frequency of {frequency:.6g} Hz; {found.message}",
             code="E-CONVERGENCE", key=key, value=f"relative residual {found.residual:.2e}",
-            remedy="raise the damping, or leave the speed out", file=case.location(key),
+            file=case.location(key), remedy="raise dynamics.damping_ratio, or leave the speed out",
         )  # fmt: skip
     return found
 

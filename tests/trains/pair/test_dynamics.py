@@ -5,13 +5,15 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.io import wavfile
 
 from femgear import cli, open_results
-from femgear.errors import CaseError
+from femgear.errors import CaseError, ConvergenceError
 from femgear.report.charts import chart
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -310,3 +312,13 @@ def test_flanks_that_part_without_backlash_are_told_to_have_no_back(play, said):
     data = solve_pair_dynamics(case, solve_pair_modes(case, solve_static(case))).dataset()
     (found,) = [one for one in dynamics_warnings(data) if one.code == "W-SEPARATION"]
     assert ("no back flanks" in found.text) == said
+
+
+@pytest.mark.parametrize(("ratio", "key"), [(0.0, "dynamics.damping_ratio"), (0.01, "operation.speeds")])
+def test_a_motion_that_is_not_found_names_what_to_change(monkeypatch, ratio, key):
+    failed = SimpleNamespace(converged=False, message="", residual=1.0)
+    monkeypatch.setattr(stages, "solve_harmonic_balance", lambda *_, **__: failed)
+    problem: Any = None
+    with pytest.raises(ConvergenceError) as found:
+        stages._with_play(problem, 100.0, np.zeros((1, 2)), pair_case(**{"dynamics.damping_ratio": ratio}))
+    assert found.value.key == key

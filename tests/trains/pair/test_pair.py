@@ -13,6 +13,7 @@ from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import FemgearError
 from femgear.fe.elasticity import Material
 from femgear.gears.pair import GearPair
+from femgear.trains.pair.stages import PAIR
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import check_case
 from femgear.trains.static.stages import solve_static, solve_stress
@@ -145,3 +146,18 @@ def test_refusals_name_the_entries_of_the_file(changes, code, key):
 def test_without_torque_nothing_touches():
     data = solve_static(pair_case({"operation.torque": "0 N m"})).dataset()
     assert not data.mesh_force.values.any() and data.sizes["mesh"] == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"operation.torque": "0 N m"}, "without torque"),
+        ({"gear_1.errors": {"runout_amplitude": "9 um"}}, "mesh periods"),
+        ({}, None),
+    ],
+)
+def test_speeds_without_effect_are_told(changes, why):
+    found = PAIR.warnings(pair_case({**changes, "operation.speeds": ["100 rpm"]}))
+    found = [one for one in found if one.key == "operation.speeds"]
+    assert [one.code for one in found] == ["W-UNUSED"] * (why is not None)
+    assert all(why in one.text for one in found)
