@@ -167,14 +167,15 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
     static, count, first = case.static, case.static.slices, gears.gears[0]
     where, overlap = {"code": "E-SLICES", "file": case.location("static.slices")}, _overlap(case, gears)
     least, most = math.ceil(_PER_OVERLAP * abs(overlap)) + 1, int(4 * first.face_width / first.module)
-    needed, other = f"give static.slices = {max(min(SLICES, most), least)}", ""
-    if not overlap:
-        other = ", or leave static.slices out"
+    needed, other = (
+        max(min(SLICES, most), least),
+        "" if case.set.helix_angle else ", or leave static.slices out",
+    )
     if case.set.helix_angle and count < max(2, _PER_OVERLAP * abs(overlap)):
         raise CaseError(
             f"helical teeth with an overlap ratio of {abs(overlap):.3g} need slices over the width",
-            key="static.slices", value=count, limit=f"at least {least}", remedy=needed,
-            **where,
+            key="static.slices", value=count, limit=f"at least {least}",
+            remedy=f"give static.slices = {needed}", **where,
         )  # fmt: skip
     _check_width_entries(case, needed, helical=bool(overlap))
     if count < 2:
@@ -184,7 +185,7 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
                     key = f"{gear}.modifications[{i}]"
                     raise CaseError(
                         f"a {one.kind} needs slices over the width", code="E-SLICES", key=key,
-                        file=case.location(key), remedy=needed,
+                        file=case.location(key), remedy=f"give static.slices = {needed}",
                     )  # fmt: skip
         return
     try:
@@ -205,7 +206,7 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
         )  # fmt: skip
 
 
-def _check_width_entries(case: Case, needed: str, *, helical: bool) -> None:
+def _check_width_entries(case: Case, needed: int, *, helical: bool) -> None:
     """Refuse tilts and twists without slices, and those of helical teeth, which axial motions press too."""
     if case.static.slices > 1 and not helical:
         return
@@ -215,7 +216,8 @@ def _check_width_entries(case: Case, needed: str, *, helical: bool) -> None:
             raise CaseError(
                 "tilts and twists over the face width are those of spur teeth in slices", code="E-SLICES",
                 key=key, file=case.location(key),
-                remedy="leave them out, or take a lead slope" if helical else needed,
+                remedy="leave them out, or take a lead slope"
+                if helical else f"give static.slices = {needed}",
             )  # fmt: skip
 
 
