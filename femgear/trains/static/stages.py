@@ -167,10 +167,8 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
     static, count, first = case.static, case.static.slices, gears.gears[0]
     where, overlap = {"code": "E-SLICES", "file": case.location("static.slices")}, _overlap(case, gears)
     least, most = math.ceil(_PER_OVERLAP * abs(overlap)) + 1, int(4 * first.face_width / first.module)
-    needed, other = (
-        max(min(SLICES, most), least),
-        "" if case.set.helix_angle else ", or leave static.slices out",
-    )
+    needed, other = max(min(SLICES, most), least), ", or leave static.slices out"
+    other = "" if case.set.helix_angle else other
     if case.set.helix_angle and count < max(2, _PER_OVERLAP * abs(overlap)):
         raise CaseError(
             f"helical teeth with an overlap ratio of {abs(overlap):.3g} need slices over the width",
