@@ -35,6 +35,7 @@ from femgear.fe.compliance import condense_sector, symmetric_factor, tooth_compl
 from femgear.fe.elasticity import Material, basis, plane_modulus, wave_stiffness
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope
+from femgear.trains.reading import with_values
 from validation.cases import reference_case
 from validation.mapped import boundary_nodes, mapped_grid
 from validation.reference.twisted import (
@@ -55,7 +56,7 @@ SLICES, SET_SLICES, POSITIONS = 13, 25, 8
 # of the polynomials over the width, in three dimensions
 ORDER = 10
 # of the sun-like bodies: load per width [N/m], misalignment [m]
-LINE_LOAD, SLOPE = 100e3, 6e-6
+LINE_LOAD, SLOPE, NARROW = 100e3, 6e-6, 0.010
 # c' of the springs [N/m^2] and their width [m]
 SPRING, WIDTH = 11.084e9, 0.025
 EXPECTED = "0.1 to 1.3 % were expected"
@@ -69,9 +70,9 @@ ENDS = (
 
 
 @cache
-def reference_set():
-    """The gears of the reference set."""
-    return planetary_set(reference_case())
+def reference_set(width: float = WIDTH):
+    """The gears of the reference set, with a face width [m]."""
+    return planetary_set(with_values(reference_case(), {"set.face_width": f"{width!r} m"}))
 
 
 def spring_loads(separation: np.ndarray, per_width: float) -> np.ndarray:
@@ -256,7 +257,7 @@ def _waves_of_solid(grid, twist) -> tuple[Row, ...]:
 
 
 @cache
-def solid_sun(*, mirrors: bool):
+def solid_sun(*, mirrors: bool, width: float = WIDTH):
     """Compliance of the sun to means of slices at the pitch point, in three dimensions, coarse.
 
     And the tangential stress along the root of that tooth at mid-slice under their forces, (m, N, N) [Pa/N].
@@ -269,17 +270,17 @@ def solid_sun(*, mirrors: bool):
     axial = np.zeros(root.shape)
     axial[3 * along.nodes + 2, np.arange(len(along.nodes))] = 1.0
     columns, m = np.hstack([seen, root, axial]), len(along.nodes)
-    axial, section = axial_matrices(WIDTH, 1, ORDER), section_matrices(grid, STEEL, 0.0)
+    axial, section = axial_matrices(width, 1, ORDER), section_matrices(grid, STEEL, 0.0)
     found = solid_compliance(grid, section, axial, gears.sun.teeth, loads, columns, mirrors=mirrors)[0]
     s, w = legendre.leggauss(ORDER)
-    places = WIDTH / SLICES * (np.arange(SLICES) + 0.5) - 0.5 * WIDTH
-    z = (places[:, None] + WIDTH / SLICES * 0.5 * s).ravel()
-    mean = np.einsum("nsp,s->np", axial_shapes(WIDTH, 1, ORDER, z).reshape(SLICES, ORDER, -1), 0.5 * w)
+    places = width / SLICES * (np.arange(SLICES) + 0.5) - 0.5 * width
+    z = (places[:, None] + width / SLICES * 0.5 * s).ravel()
+    mean = np.einsum("nsp,s->np", axial_shapes(width, 1, ORDER, z).reshape(SLICES, ORDER, -1), 0.5 * w)
     found = found.reshape(2 * m + 1, ORDER + 1, ORDER + 1) @ mean.T
     # slopes along the axis are of the same polynomials
     lateral = plane_modulus(STEEL, "plane strain") * STEEL.poisson_ratio
     extended = lateral * np.linalg.solve(axial[1], axial[2]) @ found[1 + m :]
-    return mean @ found[0], axial_shapes(WIDTH, 1, ORDER, places) @ (found[1 : 1 + m] + extended)
+    return mean @ found[0], axial_shapes(width, 1, ORDER, places) @ (found[1 : 1 + m] + extended)
 
 
 def _pitch_roll() -> float:
@@ -305,9 +306,10 @@ class SunLikePair:
     across: dict[str, np.ndarray]
     waves: np.ndarray
 
-    def face_load_factor(self, across: np.ndarray) -> float:
-        """Largest load of a slice over the mean, all of them in contact, under a misalignment."""
-        N, apart = len(across), SLOPE * ((np.arange(len(across)) + 0.5) / len(across) - 0.5)
+    def face_load_factor(self, across: np.ndarray, *, crowned: bool = False) -> float:
+        """Largest load of a slice over the mean, all in contact, under a misalignment or a crowning."""
+        N, place = len(across), (np.arange(len(across)) + 0.5) / len(across) - 0.5
+        apart = SLOPE * (2.0 * place**2 if crowned else place)
         whole = np.ones((N + 1, N + 1)) - np.diag(np.append(np.zeros(N), 1.0))
         whole[:N, :N] = across + self.plane * np.eye(N)
         load = np.linalg.solve(whole, np.append(-apart, LINE_LOAD * N))[:N]
@@ -316,8 +318,8 @@ class SunLikePair:
 
 
 @cache
-def sun_like_pair() -> SunLikePair:
-    """Compute the pair from the whole sun, coarse over the section where it is solid."""
+def sun_like_pair(width: float = WIDTH) -> SunLikePair:
+    """Compute the pair of a face width [m] from the whole sun, coarse over the section where it is solid."""
     gears, coarse = reference_set(), coarse_sectors()
     gear, grid = gears.sun, coarse.sun.grid
     stations, _, loads, seen = observed_flanks(grid, gear)
@@ -325,18 +327,19 @@ def sun_like_pair() -> SunLikePair:
     loads, seen = (_at_roll(one, stations.roll, roll) for one in (loads, seen))
     whole = {"count": gear.teeth, "rim": "rim"}
     solid = [_solid_columns(one) for one in (loads, seen)]
-    mirror, free = (WIDTH / SLICES * solid_sun(mirrors=one)[0] for one in (True, False))
+    mirror, free = (width / SLICES * solid_sun(mirrors=one, width=width)[0] for one in (True, False))
     parts, T, compared = wave_stiffness(grid, STEEL), cosines(SLICES), []
     for m in range(1, 5):
-        K = (parts[0] + (k := m * np.pi / WIDTH) * parts[1] + k**2 * parts[2]).tocsc()
+        K = (parts[0] + (k := m * np.pi / width) * parts[1] + k**2 * parts[2]).tocsc()
         sector = condense_sector(grid, K, **whole, loads=solid[0], observations=solid[1])
         # loads and displacements are means of slices
         seen_wave = tooth_compliance(sector.supported())[0, 0, 0] * np.sinc(m / (2 * SLICES)) ** 2
         compared.append((seen_wave, T[m] @ mirror @ T[m]))
-    waves, k = width_waves(coarse, STEEL, SLICES), np.pi / WIDTH * np.arange(1, SLICES)
-    known = [_regular(one.sun, roll, WIDTH) for one in waves.bodies]
+    coarse = make_sectors(reference_set(width), STEEL, flank_elements=6, refine=0.5)
+    waves, k = width_waves(coarse, STEEL, SLICES), np.pi / width * np.arange(1, SLICES)
+    known = [_regular(one.sun, roll, width) for one in waves.bodies]
     change = 2 * CubicSpline(np.log(waves.wave_number), known)(np.log(k))
-    change = np.append(0.0, change + WIDTH * replace(waves, wave_number=k).local)
+    change = np.append(0.0, change + width * replace(waves, wave_number=k).local)
     waves_of_width = T.T @ (change[:, None] * T)
     across = {"mirror": waves_of_width, "free": waves_of_width + 2 * (free - mirror)}
     fine = make_bodies(make_sectors(gears, STEEL, flank_elements=12), STEEL).sun
@@ -363,7 +366,7 @@ def _regular(flank, roll, width) -> float:
 
 def ends_of_teeth() -> tuple[Row, ...]:
     """Face load factors of the sun-like pair: slices alone, mirror planes and free ends."""
-    pair = sun_like_pair()
+    pair, narrow = sun_like_pair(), sun_like_pair(NARROW)
     alone = pair.face_load_factor(np.zeros((SLICES, SLICES)))
     mirror, free = (pair.face_load_factor(pair.across[name]) for name in ("mirror", "free"))
     name = f"two sun-like bodies, {SLICES} slices, 6 um at 100 N/mm: K_Hbeta"
@@ -380,6 +383,18 @@ def ends_of_teeth() -> tuple[Row, ...]:
         within("ends", trial, text, 0.7, apart, 0.6, relative=False, note=EXPECTED, explanation=ENDS),
         information("ends", trial, f"{name} less 1, mirror planes over no coupling", 1.107, ratios[0]),
         information("ends", trial, f"{name} less 1, free ends over mirror planes", 1.013, ratios[1]),
+        *(
+            information(
+                "ends",
+                SOLID,
+                f"teeth of {1e3 * NARROW:g} mm, {words}: K_Hbeta",
+                *(
+                    narrow.face_load_factor(narrow.across[ends], crowned=crowned)
+                    for ends in ("free", "mirror")
+                ),
+            )
+            for words, crowned in (("slope 6 um", False), ("crowning 3 um", True))
+        ),
     )
 
 

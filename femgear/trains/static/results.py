@@ -88,8 +88,13 @@ SLICE_VARIABLES = {
 """Further ones of contact in slices over the width."""
 HELIX_VARIABLES = {
     "axial_force": ("mesh position", "N", "axial force of gear 1 on gear 2, positive towards +z"),
+    "planet_couple": ("planet position", "N m", "couple of the axial forces that tilts a planet"),
 }
 """Further ones of helical teeth; all others are those of the transverse section."""
+_ENDS = 0.2, 5.0
+"""By how much free ends soften a mesh, times face width over normal module: of spur teeth, and what helical
+ones add over the square of tan beta. From solid pairs of 0, 10 and 20 degrees, rows *finite* of
+docs/validation.md."""
 _ATTRIBUTES = {
     "ste": "deflection",
     "ste_overall": "overall_deflection",
@@ -193,7 +198,11 @@ class StaticResult:
             # a right-handed gear that turns another counter-clockwise pushes it towards -z
             sense = -math.copysign(math.tan(self.base_helix_angle), self.base_helix_angle * self.sun_torque)
             values["axial_force"] = sense * cycle.force
-            variables = variables | HELIX_VARIABLES
+            if len(kinds) > 1:
+                values["planet_couple"] = self._planet_couple()
+            variables = variables | {
+                name: HELIX_VARIABLES[name] for name in HELIX_VARIABLES if name in values
+            }
         teeth, planets = cycle.tooth_load.shape[1], np.arange(1, gears.n_planets + 1)
         found = dataset(
             declared(variables, values),
@@ -217,6 +226,7 @@ class StaticResult:
                 "centre_distance": gears.centre_distance,
                 "face_width": width,
                 "overlap_ratio": abs(self.overlap_ratio),
+                "free_ends": self._free_ends(),
                 "teeth": np.array([gear.teeth for gear in gears.gears]),
                 "sun_torque": self.sun_torque,
                 "contact": cycle.contact,
@@ -229,6 +239,22 @@ class StaticResult:
         )
         found.attrs["warnings"] = " ".join(map(str, static_warnings(found, gears.gears[0].module)))
         return found
+
+    def _planet_couple(self) -> np.ndarray:
+        """Couple (N, P) [N m] of the axial forces of sun and ring on every planet, at the working circles."""
+        force = self.cycle.force.reshape(len(self.planetary_set.kinds), -1, len(self.cycle.position))
+        radius = self.planetary_set.gears[1].base_radius
+        arms = [radius / math.cos(pair.working_pressure_angle) for pair in self.planetary_set.kinds]
+        return math.tan(abs(self.base_helix_angle)) * np.einsum("k,knp->np", arms, force)
+
+    def _free_ends(self) -> float:
+        """Estimate by what share free ends make helical meshes softer than mirror planes do, zero of spur."""
+        if not self.overlap_ratio:
+            return 0.0
+        gear = self.planetary_set.gears[0]
+        slope = math.tan(self.base_helix_angle) / math.cos(gear.pressure_angle)
+        normal_module = gear.module * math.cos(math.atan(slope))
+        return (_ENDS[0] + _ENDS[1] * slope**2) * normal_module / gear.face_width
 
     def _over_width(self, width: float) -> dict[str, Any]:
         """Coordinate of the slices, where there are any."""
@@ -467,6 +493,7 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
             yield Finding("W-FACE-LOAD", "static.slices", text)
     if "slice_load" in data:
         yield from _lifted(data)
+        yield from _helical(data)
     unloaded = (force + back)[: data.sizes["planet"]] <= 0.0
     if unloaded.any() and force.any():
         planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
@@ -493,6 +520,27 @@ def _more_slices(data: xr.Dataset, module: float) -> str:
     if most <= data.sizes["slice"]:
         return "more would be thinner than contacts are wide, or than a quarter of the module"
     return f"take {SLICES} slices or more" if most >= SLICES else f"take {most} slices, about as many as fit"
+
+
+def _helical(data: xr.Dataset) -> Iterator[Finding]:
+    """Tell what slices of helical teeth leave out: ends that are free, and tilts of planets under thrust."""
+    if (softer := data.attrs.get("free_ends", 0.0)) > 0.05:
+        text = f"free ends make meshes softer by about {100 * softer:.0f} %: here they are mirror planes"
+        remedy = "take mesh stiffness and transmission error with that margin"
+        yield Finding("W-ENDS", "set.helix_angle", text, remedy=remedy)
+    if "planet_couple" not in data or not data["mesh_force"].values.any():
+        return
+    couple, width = data["planet_couple"].values, data.attrs["face_width"]
+    total = data["mesh_force"].values.reshape(2, *couple.shape).sum(axis=0)
+    offset = couple.sum() / total.sum()
+    if offset > 0.05 * width:
+        text = (
+            f"axial forces tilt every planet with up to {couple.max():.3g} N m, as loads "
+            f"{offset * 1e3:.2g} mm off the middle of the width would: bearings are taken to hold planets "
+            "upright, and K_Hbeta is that of upright planets"
+        )
+        remedy = "give the tilt that bearings allow as a lead slope of the planets"
+        yield Finding("W-THRUST", "set.helix_angle", text, remedy=remedy)
 
 
 def _lifted(data: xr.Dataset) -> Iterator[Finding]:
