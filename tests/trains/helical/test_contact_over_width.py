@@ -62,6 +62,13 @@ def test_elastic_set_with_a_helix(tmp_path):
     assert ratio == pytest.approx(expected, rel=1e-9)
     assert data["axial_force"].values == pytest.approx(-np.tan(base) * found.cycle.force, rel=1e-12)
     assert data.attrs["overlap_ratio"] == pytest.approx(overlap, rel=1e-12)
+    # sun and ring push a planet to opposite sides on opposite arms, at the working circles
+    gears, axial = found.planetary_set, np.abs(data["axial_force"].values)
+    sun, planet, ring = (gear.teeth for gear in gears.gears)
+    arms = gears.centre_distance * planet / np.array([sun + planet, ring - planet])
+    couple = arms[0] * axial[: gears.n_planets] + arms[1] * axial[gears.n_planets :]
+    assert data["planet_couple"].values == pytest.approx(couple, rel=1e-12)
+    assert "W-THRUST" in [one.code for one in found.warnings]
 
 
 @pytest.mark.parametrize(("angle", "steep"), [(30, False), (31, True)])

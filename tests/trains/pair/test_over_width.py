@@ -60,6 +60,10 @@ def test_the_other_hand_mirrors_the_width(kind):
     assert left.axial_force.values == pytest.approx(-right.axial_force.values, rel=1e-9)
     overlap = 20.0 * np.sin(np.radians(20.0)) / (np.pi * 3.0)
     assert right.attrs["overlap_ratio"] == pytest.approx(overlap, rel=1e-12)
+    assert "planet_couple" not in right
+    # solid pairs of 0, 10 and 20 degrees; of 20 degrees and 27.6 mm it is 9.4 %
+    assert right.attrs["free_ends"] == pytest.approx(0.094 * 27.6 / 20.0, rel=0.01)
+    assert "[W-ENDS]" in right.attrs["warnings"]
     assert len(contact_pattern(right).axes) == 2  # the mesh and its colours
 
 
