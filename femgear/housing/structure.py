@@ -1,0 +1,330 @@
+"""The housing that stands still: a linear structure, fixed in space, that the planets' meshes run around in.
+
+`FixedStructure` is all that the two-way solution (`femgear.solvers.periodic.two_way`) knows of a casing, and
+what every source of one is converted to: natural frequencies, damping, mode shapes along the path of the
+meshes and at the sensors, and the static compliance of the modes left out. It comes from the cyclic modes of
+a ring on springs (`supported_ring`) or from arrays (`from_arrays`, `read_arrays`).
+
+At the housing angle phi the path has the displacement ``w_m(phi) = sum_n P[m, n] exp(i n phi)`` of mode m,
+n = -n_max .. n_max: the component, on the pitch circle, along the line of action of the planet-ring mesh,
+positive where the ring gives way to the planet. A mesh force f >= 0 at phi does the modal force w_m(phi) f.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.housing.sensor import ReadOnlyArrays
+
+if TYPE_CHECKING:
+    from femgear.fe.reduction import CyclicModes
+
+_ROUNDING = 1e-9
+"""Part of an array by which it may miss a symmetry."""
+_FREE = 1e-12
+"""Square of a natural frequency over the largest one below which nothing holds the motion."""
+_CONDITION = 1e3
+"""Of the Fourier matrix of points around the ring, beyond which they leave gaps."""
+
+
+@dataclass(frozen=True)
+class FixedStructure(ReadOnlyArrays):
+    """Linear structure, fixed in space, under loads that run around its ring.
+
+    Parameters
+    ----------
+    natural_frequency : (m,) array
+        Undamped, of mass-normalised modes [rad/s]; above zero, for something must hold the ring.
+    damping_ratio : (m,) array
+        0 <= zeta < 1.
+    ring_shape : (m, 2 n_max + 1) complex array
+        Circumferential coefficients P of the displacement on the path of the meshes [kg^-1/2], see the head
+        of this module; ``P[m, -n]`` is the conjugate of ``P[m, n]``.
+    sensor_shape : (m, n_sensors) array
+        Displacement of the modes at the sensors, each in its own direction [kg^-1/2].
+    residual : (2 n_max + 1, 2 n_max + 1) complex array
+        Static compliance of what the modes leave out [m/N], ``sum_m P[m, n] conj(P[m, n'])/omega_m^2`` over
+        the missing modes m: Hermitian.
+    sensor_residual : (n_sensors, 2 n_max + 1) complex array
+        The same from the path to the sensors [m/N], ``sum_m phi_m conj(P[m, n'])/omega_m^2``.
+
+    Raises
+    ------
+    CaseError
+        ``E-SHAPE``: arrays that do not fit each other or are not finite. ``E-MECHANISM``: a motion that
+        nothing holds. ``E-DAMPING``. ``E-SYMMETRY``: coefficients that belong to no real displacement.
+    """
+
+    natural_frequency: np.ndarray
+    damping_ratio: np.ndarray
+    ring_shape: np.ndarray
+    sensor_shape: np.ndarray
+    residual: np.ndarray
+    sensor_residual: np.ndarray
+
+    def __post_init__(self):
+        super().__post_init__()
+        m, width, sensors = (
+            len(self.natural_frequency),
+            self.ring_shape.shape[-1],
+            self.sensor_shape.shape[-1],
+        )
+        shapes = {
+            "natural_frequency": (m,), "damping_ratio": (m,), "ring_shape": (m, width),
+            "sensor_shape": (m, sensors), "residual": (width, width), "sensor_residual": (sensors, width),
+        }  # fmt: skip
+        for name, shape in shapes.items():
+            array = getattr(self, name)
+            if array.shape != shape or not np.isfinite(array).all() or width % 2 == 0:
+                raise CaseError(
+                    f"{name} of shape {array.shape} does not fit a structure of {m} modes, {width} "
+                    f"circumferential coefficients and {sensors} sensors, or is not finite", code="E-SHAPE",
+                    key=name, limit=f"finite numbers of shape {shape}, coefficients n = -n_max .. n_max",
+                )  # fmt: skip
+        if not (self.natural_frequency > 0).all():
+            raise CaseError(
+                "a mode of the structure is free, has a negative stiffness, or is no number",
+                code="E-MECHANISM", key="natural_frequency", value=float(self.natural_frequency.min()),
+                limit="above 0 rad/s", remedy="hold the structure: supports, bolts, a foundation",
+            )  # fmt: skip
+        if not ((self.damping_ratio >= 0) & (self.damping_ratio < 1)).all():
+            raise CaseError(
+                "damping ratios of the structure", code="E-DAMPING", key="damping_ratio",
+                value=self.damping_ratio.tolist(), limit="0 or more, below 1",
+            )  # fmt: skip
+        pairs = {
+            "ring_shape": (self.ring_shape, np.conj(self.ring_shape[:, ::-1])),
+            "residual": (self.residual, np.conj(self.residual.T)),
+            "residual of -n": (self.residual, np.conj(self.residual[::-1, ::-1])),
+            "sensor_residual": (self.sensor_residual, np.conj(self.sensor_residual[:, ::-1])),
+        }
+        for name, (one, other) in pairs.items():
+            if np.abs(one - other).max(initial=0.0) > _ROUNDING * np.abs(one).max(initial=0.0):
+                raise CaseError(
+                    f"the coefficients {name} are those of no real displacement", code="E-SYMMETRY",
+                    key=name.split()[0], limit="coefficient -n is the conjugate of n, compliances Hermitian",
+                )  # fmt: skip
+
+    @property
+    def max_diameter(self) -> int:
+        """Largest nodal diameter n_max of the path."""
+        return self.ring_shape.shape[1] // 2
+
+
+_ARRAYS = ("natural_frequency", "damping_ratio", "ring_angle", "ring_shape", "sensor_shape")
+
+
+def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> FixedStructure:
+    """Make a structure of mode shapes at points of the pitch circle and at sensors.
+
+    Parameters
+    ----------
+    arrays : mapping of str to array
+        ``natural_frequency`` (m,) [rad/s] of mass-normalised modes; ``damping_ratio`` () or (m,);
+        ``ring_angle`` (p,), housing angles of the points [rad], all around in any order, at least four a
+        nodal diameter; ``ring_shape`` (m, p, 2), displacement there outwards and counter-clockwise
+        [kg^-1/2]; ``sensor_shape`` (m, n_sensors) [kg^-1/2]. Where modes are missing, their static compliance
+        [m/N]: ``ring_compliance`` (p, p) between the points in that direction, ``sensor_compliance``
+        (n_sensors, p) from the points to the sensors.
+    direction : (radial, tangential)
+        Of the force on the ring along the line of action, a unit vector.
+    max_diameter : int
+        Largest nodal diameter kept.
+
+    Raises
+    ------
+    CaseError
+        As `FixedStructure`; ``E-KEY-MISSING``: arrays that are missing; ``E-COUNT``: too few points;
+        ``E-RANGE``: points that leave gaps, a direction that is no unit vector.
+    """
+    missing = [name for name in _ARRAYS if name not in arrays]
+    if missing:
+        raise CaseError(
+            f"the structure lacks {', '.join(missing)}", code="E-KEY-MISSING", key=missing[0],
+            limit=f"the arrays {', '.join(_ARRAYS)}",
+        )  # fmt: skip
+    values = {name: np.asarray(arrays[name], float) for name in arrays}
+    angle, shape, sensors = (values[name] for name in ("ring_angle", "ring_shape", "sensor_shape"))
+    points, least = angle.size, max(4 * max_diameter, 1)
+    if points < least:
+        raise CaseError(
+            f"{points} points of the ring do not resolve {max_diameter} nodal diameters", code="E-COUNT",
+            key="ring_angle", limit=f"{least} or more", remedy="give more points, or keep fewer diameters",
+        )  # fmt: skip
+    between = values.get("ring_compliance", np.zeros((points, points)))
+    away = values.get("sensor_compliance", np.zeros((sensors.shape[-1], points)))
+    fits = shape.shape[1:] == (points, 2) and between.shape == (points, points)
+    if angle.ndim != 1 or not fits or away.shape[-1] != points:
+        raise CaseError(
+            f"shapes {shape.shape} and compliances {between.shape}, {away.shape} at {points} points",
+            code="E-SHAPE", key="ring_shape", limit=f"(modes, {points}, 2), ({points}, {points})",
+        )  # fmt: skip
+    waves = np.exp(1j * np.outer(angle, np.arange(-max_diameter, max_diameter + 1)))
+    if not np.linalg.cond(waves) < _CONDITION or abs(np.linalg.norm(direction) - 1.0) > _ROUNDING:
+        raise CaseError(
+            "the points leave gaps around the ring, or the direction of the force is no unit vector",
+            code="E-RANGE", key="ring_angle", value=f"direction {np.asarray(direction).tolist()}",
+            limit="points all around, a direction of length 1",
+            remedy="give equally spaced points; sine and cosine of the working pressure angle",
+        )  # fmt: skip
+    fit = np.linalg.pinv(waves)
+    return FixedStructure(
+        natural_frequency=values["natural_frequency"],
+        damping_ratio=np.broadcast_to(values["damping_ratio"], shape.shape[:1]),
+        ring_shape=shape @ np.asarray(direction, float) @ fit.T,
+        sensor_shape=sensors,
+        residual=fit @ (0.5 * (between + between.T)) @ fit.conj().T,
+        sensor_residual=away @ fit.conj().T,
+    )
+
+
+def read_arrays(path: Path, *, direction, max_diameter: int) -> FixedStructure:
+    """Read a structure from a file .npz that holds the arrays of `from_arrays` under their names.
+
+    CaseError: as there; E-FILE: no such file.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = dict(stored.items())
+    except (OSError, ValueError, AttributeError) as error:
+        message = f"the arrays of a structure cannot be read: {error}"
+        raise CaseError(message, code="E-FILE", file=str(path), limit="a file .npz of numbers") from error
+    return from_arrays(arrays, direction=direction, max_diameter=max_diameter)
+
+
+@dataclass(frozen=True)
+class Support:
+    """A bolt, foot or lug of the outer surface: springs to the ground and a mass that moves along.
+
+    Parameters
+    ----------
+    angle : float
+        Of its middle on the housing [rad].
+    radial_stiffness, tangential_stiffness : float
+        [N/m].
+    mass : float
+        [kg].
+    width : float
+        Angle over which stiffness and mass are spread evenly [rad]; 0 for a point.
+    """
+
+    angle: float
+    radial_stiffness: float
+    tangential_stiffness: float
+    mass: float = 0.0
+    width: float = 0.0
+
+    def __post_init__(self):
+        values = self.radial_stiffness, self.tangential_stiffness, self.mass, self.width
+        if not (np.isfinite([self.angle, *values]).all() and min(values) >= 0 and self.width <= 2 * np.pi):
+            raise CaseError(
+                f"a support with stiffness, mass and width {values}", code="E-SUPPORT", value=self.angle,
+                limit="finite numbers, not negative, a width of one turn at most",
+            )  # fmt: skip
+
+
+def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
+    """Compute the circumferential coefficients of a functional of cyclic modes, per ring coordinate.
+
+    Parameters
+    ----------
+    ring : CyclicModes
+    values : (m,) complex array
+        What the functional takes from every mode, a column of ``ring.load`` or ``ring.output``.
+    max_diameter : int
+        Largest nodal diameter of the result; waves of others are left out.
+
+    Returns
+    -------
+    (n_coordinates, 2 max_diameter + 1) complex array
+        ``V`` of the value ``sum_n V[i, n] exp(i n phi)`` at the angle phi for the unit coordinate i: cosine
+        and, of paired modes, sine of every mode in turn.
+    """
+    mode = np.repeat(np.arange(len(ring.paired)), np.where(ring.paired, 2, 1))
+    sine = np.append(False, mode[1:] == mode[:-1])
+    n, single = ring.nodal_diameter[mode], ~ring.paired[mode]
+    value = np.where(sine, -1j, 1.0) * np.where(single, 1.0, 0.5) * (ring.norm * values)[mode]
+    columns, row = np.zeros((len(mode), 2 * max_diameter + 1), complex), np.arange(len(mode))
+    inside = n <= max_diameter
+    np.add.at(columns, (row[inside], max_diameter + n[inside]), value[inside])
+    mirrored = inside & ~single
+    np.add.at(columns, (row[mirrored], max_diameter - n[mirrored]), np.conj(value[mirrored]))
+    return columns
+
+
+def supported_ring(
+    ring: CyclicModes, supports: Sequence[Support], *, max_diameter: int, max_frequency: float,
+    damping_ratio: float, sensor_angles: Sequence[float] = (0.0,),
+) -> FixedStructure:  # fmt: skip
+    """Make a structure of a ring on supports: a Ritz approximation in the cyclic modes of the ring.
+
+    Mass-normalised coordinates of the ring have the stiffness ``diag(omega^2) + sum k V G V^H`` and the mass
+    ``1 + sum m V G V^H`` with V of `circumferential` at the outer surface, and for a support of the width b
+    at the angle phi_s ``G[n, n'] = exp(i (n - n') phi_s) sin((n - n') b/2)/((n - n') b/2)``, the mean over
+    it. Supports couple nodal diameters (X. Wu and R. G. Parker, J. Sound Vib. 295, 2006, 194-213).
+
+    Parameters
+    ----------
+    ring : CyclicModes
+        One load, the displacement into the ring on the path of the meshes; outputs radial and tangential
+        displacement of the outer surface. On its foundation, or free where the supports hold it.
+    supports : sequence of Support
+        None leaves the ring as it is.
+    max_diameter : int
+        Largest nodal diameter of the path. Supports couple those of all modes.
+    max_frequency : float
+        Modes beyond are represented by their static part [Hz].
+    damping_ratio : float
+        Of all modes.
+    sensor_angles : sequence of float
+        Places of the sensors, which feel the radial displacement of the outer surface [rad].
+
+    Raises
+    ------
+    CaseError
+        As `FixedStructure`: supports that do not hold the ring (E-MECHANISM).
+    """
+    top = max(int(ring.nodal_diameter.max()), max_diameter)
+    path, radial, tangential = (
+        circumferential(ring, one, top) for one in (ring.load[:, 0], ring.output[:, 0], ring.output[:, 1])
+    )
+    omega = 2 * np.pi * np.repeat(ring.frequency, np.where(ring.paired, 2, 1))
+    K, M, n = np.diag(omega**2), np.eye(len(omega)), np.arange(-top, top + 1)
+    for one in supports:
+        apart = n[:, None] - n
+        mean = np.exp(1j * apart * one.angle) * np.sinc(apart * one.width / (2 * np.pi))
+        for stiffness, field in ((one.radial_stiffness, radial), (one.tangential_stiffness, tangential)):
+            both = np.real(field @ mean @ field.conj().T)
+            K, M = K + stiffness * both, M + one.mass * both
+    try:
+        square, shape = eigh(K, M)
+    except np.linalg.LinAlgError as error:
+        message = f"the modes of the ring on its supports cannot be computed: {error}"
+        raise ConvergenceError(message, code="E-MASS") from error
+    square = np.where(square < _FREE * square[-1], 0.0, square)
+    if not square[0] > 0:
+        raise CaseError(
+            f"the supports leave {int((square == 0).sum())} motions of the ring free", code="E-MECHANISM",
+            key="housing.support", limit="radial and tangential stiffness that hold x, y and rotation",
+            remedy="give the supports a tangential stiffness, or the ring a foundation",
+        )  # fmt: skip
+    middle = slice(top - max_diameter, top + max_diameter + 1)
+    heard = np.real(radial @ np.exp(1j * np.outer(n, sensor_angles)))
+    waves, sensors = shape.T @ path[:, middle], shape.T @ heard
+    kept = square <= (2 * np.pi * max_frequency) ** 2
+    left = waves[~kept] / square[~kept, None]
+    return FixedStructure(
+        natural_frequency=np.sqrt(square[kept]),
+        damping_ratio=np.full(int(kept.sum()), damping_ratio),
+        ring_shape=waves[kept],
+        sensor_shape=sensors[kept],
+        residual=waves[~kept].T @ left.conj(),
+        sensor_residual=sensors[~kept].T @ left.conj(),
+    )

@@ -1,0 +1,463 @@
+"""Two-way response of a planetary set and a housing that stands still, in orders of the carrier.
+
+Gears and carrier do not change with time in the frame of the carrier, ring and casing do not in space. Mesh j
+stands at the housing angle ``phi_j + s theta``, ``theta = |Omega_c| t``, s the sense of the carrier, and
+everything repeats after a turn. With ``x(t) = sum_L x[L] exp(i L theta)``, modes m of the structure, their
+receptances H_m and circumferential coefficients P (`femgear.housing.structure.FixedStructure`)
+
+    q_m[K] = H_m(K Omega) sum_j sum_n conj(P[m, n]) exp(-i n phi_j) f_j[K + s n]
+    u_j[L] = sum_m sum_n P[m, n] exp(i n phi_j) q_m[L - s n]                   (what the ring gives way)
+    d_j[L] = d_load delta_L0 - sum_k T_jk(L Omega) (f - k0 d)_k[L]             (gears against a rigid ring)
+    f_j    = F_j + k_j (d_j - u_j - ste_j),
+
+a harmonic transfer function (N. M. Wereley, Analysis and Control of Linear Periodically Time Varying Systems,
+PhD thesis, MIT, 1991). k, F and ste have orders that are multiples of z_ring: the gears couple L with L + p
+z_ring alone, the structure the side bands of one mesh harmonic. Orders are ``h z_ring + r``, |h| <= H,
+|r| <= 2 n_max. A set that is the same after a turn by ``2 pi/N`` repeats itself in time, ``f_j(theta) =
+f_i(theta + s (phi_j - phi_i))``: one of N planets is solved for, and q_m[K] vanishes unless N divides K, on
+any structure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError, checked_count
+from femgear.housing.sensor import ReadOnlyArrays
+from femgear.housing.structure import FixedStructure
+from femgear.solvers.periodic.spectral import compliance
+from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
+
+_EQUAL = 1e-9
+"""Part of the largest harmonic by which meshes that repeat one another may differ."""
+_MEMORY = 2e8
+"""Size of the speeds that are solved together [bytes]."""
+_BYTES = 130
+"""Of one unknown order times one, while a speed is solved."""
+_RESIDUAL = 1e-8
+"""Residual from which a solution is refused."""
+
+
+@dataclass(frozen=True)
+class TwoWayResponse(ReadOnlyArrays):
+    """Forces of the meshes over carrier orders: ``Re sum_k force[k] exp(i order[k] |carrier_speed| t)``.
+
+    Parameters
+    ----------
+    carrier_speed : (n_speeds,) array
+        [rad/s], counter-clockwise positive.
+    order : (n_orders,) int array
+        From 0 upwards.
+    force : (n_speeds, 2 G, n_orders) complex array
+        Of the sun-planet, then the planet-ring meshes of the G planets that the others repeat [N].
+    mesh_angle : (G,) array
+        Housing angles of those planet-ring meshes at time zero [rad].
+    residual : (n_speeds,) array
+        Of the planet-ring forces in their equations, over their norm.
+    tail : (n_speeds,) array
+        Share of the fluctuating planet-ring forces beyond n_max side bands (root of energies), a measure of
+        truncation.
+    harmonics, z_ring, symmetry : int
+        Mesh harmonics H, teeth of the ring, and N: turns by ``2 pi/N`` map the set on itself.
+    """
+
+    carrier_speed: np.ndarray
+    order: np.ndarray
+    force: np.ndarray
+    mesh_angle: np.ndarray
+    residual: np.ndarray
+    tail: np.ndarray
+    harmonics: int
+    z_ring: int
+    symmetry: int
+
+
+@dataclass(frozen=True)
+class MeshPaths:
+    """How the planet-ring meshes run around in the structure.
+
+    Parameters
+    ----------
+    z_ring : int
+        Teeth of the ring, more than ``6 n_max``: side bands of neighbouring mesh harmonics stay apart.
+    planet_angles : tuple of float
+        In the frame of the carrier, which is the housing's at time zero [rad].
+    load_angle : float
+        From a planet to the place of its force on the ring [rad].
+    symmetry : int
+        Turns by ``2 pi/symmetry`` map every planet on one like it; 1 solves for all of them.
+    """
+
+    z_ring: int
+    planet_angles: tuple[float, ...]
+    load_angle: float = 0.0
+    symmetry: int = 1
+
+
+def solve_two_way(
+    gears: Modes,
+    excitation: MeshExcitation,
+    structure: FixedStructure,
+    paths: MeshPaths,
+    carrier_speed,
+    *,
+    excitation_harmonics: int = 6,
+    response_harmonics: int = 6,
+) -> TwoWayResponse:
+    """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
+
+    Parameters
+    ----------
+    gears : Modes
+        Of gears and carrier with mean mesh stiffnesses against a rigid ring: N sun-planet, then N planet-ring
+        meshes.
+    excitation : MeshExcitation
+        Of the 2N meshes, over one mesh period; their stiffness without what the structure is elastic.
+    structure : FixedStructure
+    paths : MeshPaths
+    carrier_speed : (n_speeds,) array
+        [rad/s], counter-clockwise positive, all of one direction.
+    excitation_harmonics, response_harmonics : int
+        Mesh harmonics kept in the data, and in the response.
+
+    Raises
+    ------
+    CaseError
+        ``E-RANGE``, ``E-SPEED``, ``E-SHAPE``, ``E-HARMONICS``, ``E-PERIODS``, ``E-TEETH``; ``E-SYMMETRY``:
+        planets that do not repeat one another.
+    ConvergenceError
+        Equations that are singular (E-RESONANCE).
+    """
+    kept, angles = (excitation_harmonics, response_harmonics), np.asarray(paths.planet_angles, float)
+    speeds = _checked(gears, excitation, carrier_speed, paths, structure.max_diameter, *kept)
+    groups = planet_groups(angles, paths.symmetry)
+    orders = _Orders(paths.z_ring, kept[1], structure.max_diameter, paths.symmetry, int(np.sign(speeds[0])))
+    one_sided = mesh_harmonics(excitation, kept[0])
+    _check_repeated(one_sided, orders, *groups)
+    known, place = _Gears.build(gears, one_sided, orders, *groups), angles[groups[0]] + paths.load_angle
+    count, n_orders = len(place), len(orders.positive)
+    step = max(int(_MEMORY / (_BYTES * (count * n_orders) ** 2)), 1)
+    force = np.empty((len(speeds), 2 * count, n_orders), complex)
+    residual, tail = np.empty((2, len(speeds)))
+    for first in range(0, len(speeds), step):
+        some = slice(first, first + step)
+        found = _solve(known, structure, place, orders, np.abs(speeds[some]))
+        force[some], residual[some], tail[some] = found
+    if not (residual < _RESIDUAL).all():
+        worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
+        raise ConvergenceError(
+            f"residual {residual[worst]:.3e} of the two-way equations at {speeds[worst]:.6g} rad/s",
+            code="E-RESONANCE", limit=f"{_RESIDUAL:g}", remedy="give gears and structure some damping",
+        )  # fmt: skip
+    return TwoWayResponse(
+        speeds, orders.positive, force, place, residual, tail, kept[1], paths.z_ring, paths.symmetry
+    )
+
+
+def structure_lines(
+    structure: FixedStructure, response: TwoWayResponse, sensors=slice(None)
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the lines of sensors on the structure under forces that run around in it.
+
+    Carrier orders (n_orders,) from 0, multiples of the symmetry, and displacements
+    (n_speeds, n_sensors, n_orders) [m] of ``u(t) = Re sum_k u[k] exp(i order[k] |carrier_speed| t)``, of some
+    of the sensors where they are chosen. The sensors stand still: nothing is modulated after that.
+    """
+    s = int(np.sign(response.carrier_speed[0]))
+    orders = _Orders(response.z_ring, response.harmonics, structure.max_diameter, response.symmetry, s)
+    speed, G = np.abs(response.carrier_speed), len(response.mesh_angle)
+    ring = _mirrored(response.force[:, G:] * np.where(response.order == 0, 1.0, 0.5))
+    ring = ring.reshape(len(speed), G, len(orders.h), -1)
+    parts, found = list[np.ndarray](), list[int]()
+    for h in range(orders.harmonics + 1):
+        for r, (into, of) in orders.scatter(h):
+            K = h * response.z_ring + r
+            if K < 0:
+                continue
+            load = np.zeros((len(speed), 2 * orders.n_max + 1), complex)
+            wave = np.exp(-1j * np.outer(orders.n[of], response.mesh_angle))
+            load[:, of] = response.symmetry * np.einsum(
+                "ng,sgn->sn", wave, ring[:, :, h + orders.harmonics, into]
+            )
+            modal = _receptance(structure, speed, np.array([K]))[:, 0] * (
+                load @ structure.ring_shape.conj().T
+            )
+            moved = modal @ structure.sensor_shape[:, sensors] + load @ structure.sensor_residual[sensors].T
+            parts.append((moved if K == 0 else 2 * moved)[..., None])
+            found.append(K)
+    lines, order = np.concatenate(parts, axis=-1), np.array(found)
+    return order, np.where(order == 0, lines.real, lines)
+
+
+def _checked(gears, excitation, carrier_speed, paths, n_max, excited, harmonics) -> np.ndarray:
+    """Speeds (n_speeds,) [rad/s] of data that belong together."""
+    checked_count(excited, "excitation harmonics", code="E-HARMONICS")
+    checked_count(harmonics, "response harmonics", code="E-HARMONICS", least=excited)
+    z_ring = checked_count(paths.z_ring, "ring teeth", code="E-TEETH")
+    if z_ring <= 6 * n_max:
+        raise CaseError(
+            f"side bands of {n_max} nodal diameters overlap between the harmonics of {z_ring} teeth",
+            code="E-RANGE", key="max_diameter", value=n_max, limit=f"up to {(z_ring - 1) // 6}",
+            remedy="keep fewer nodal diameters of the structure",
+        )  # fmt: skip
+    if excitation.periods != 1:
+        raise CaseError(
+            f"the excitation spans {excitation.periods} mesh periods", code="E-PERIODS", limit="one",
+            remedy="leave out errors that turn with a member",
+        )  # fmt: skip
+    meshes = len(gears.mesh_stiffness), len(excitation.stiffness)
+    if {*meshes} != {2 * len(paths.planet_angles)}:
+        raise CaseError(
+            f"modes of {meshes[0]} meshes, excitation of {meshes[1]}, {len(paths.planet_angles)} planets",
+            code="E-SHAPE", limit="two meshes a planet",
+        )  # fmt: skip
+    speeds = np.atleast_1d(np.asarray(carrier_speed, float))
+    sense = np.unique(np.sign(speeds))
+    if speeds.ndim != 1 or len(sense) != 1 or sense[0] == 0 or not np.isfinite(speeds).all():
+        raise CaseError(
+            "speeds of the carrier must be one list, of one direction", code="E-SPEED", key="carrier_speed",
+            value=carrier_speed, limit="finite, none zero",
+        )  # fmt: skip
+    return speeds
+
+
+def planet_groups(planet_angles, symmetry: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the planets that others repeat after turns by ``2 pi/symmetry``.
+
+    Leaders (G,), group (N,) of every planet, and its turns (N,) from its leader. CaseError: turns that do not
+    map the angles [rad] on one another (E-SYMMETRY).
+    """
+    angles = np.asarray(planet_angles, float)
+    checked_count(symmetry, "symmetry", code="E-SYMMETRY")
+    apart = (angles[:, None] - angles) * symmetry / (2 * np.pi)
+    turns = np.rint(apart)
+    alike = np.abs(apart - turns) < 1e-6
+    leader = alike.argmax(axis=1)
+    leaders, group = np.unique(leader, return_inverse=True)
+    turn = turns[np.arange(len(angles)), leader].astype(int) % symmetry
+    if sorted(zip(group, turn)) != [(g, t) for g in range(len(leaders)) for t in range(symmetry)]:
+        raise CaseError(
+            f"turns by 360/{symmetry} deg do not map the planets on one another", code="E-SYMMETRY",
+            key="symmetry", value=np.degrees(angles).tolist(), limit="planets at angles that repeat",
+            remedy="take symmetry 1, which solves for every planet",
+        )  # fmt: skip
+    return leaders, group, turn
+
+
+@dataclass(frozen=True)
+class _Orders:
+    """Carrier orders ``h z_ring + r`` and how the structure connects them, with the sense of the carrier."""
+
+    z_ring: int
+    harmonics: int
+    n_max: int
+    symmetry: int
+    sense: int
+
+    @property
+    def h(self) -> np.ndarray:
+        """Mesh harmonics, both signs."""
+        return np.arange(-self.harmonics, self.harmonics + 1)
+
+    @property
+    def r(self) -> np.ndarray:
+        """Side bands."""
+        return np.arange(-2 * self.n_max, 2 * self.n_max + 1)
+
+    @property
+    def n(self) -> np.ndarray:
+        """Circumferential orders."""
+        return np.arange(-self.n_max, self.n_max + 1)
+
+    @property
+    def every(self) -> np.ndarray:
+        """All orders (2 H + 1, R), ascending; the one at the same place from the end is the negative."""
+        return self.h[:, None] * self.z_ring + self.r
+
+    @property
+    def positive(self) -> np.ndarray:
+        """Orders from 0 upwards."""
+        return self.every.ravel()[self.every.size // 2 :]
+
+    def scatter(self, h: int):
+        """Side bands r_K of the structure's orders near a harmonic; which r and n stand for ``r_K + s n``."""
+        for r in range(-3 * self.n_max, 3 * self.n_max + 1):
+            if (h * self.z_ring + r) % self.symmetry == 0:
+                place = r + self.sense * self.n + 2 * self.n_max
+                of = np.flatnonzero((place >= 0) & (place <= 4 * self.n_max))
+                yield r, (place[of], of)
+
+
+@dataclass(frozen=True)
+class _Gears:
+    """Gears and excitation of the leading meshes, 2 G of them, at two-sided harmonics."""
+
+    modes: Modes
+    rows: np.ndarray  # (2 G, n_modes) deflections of the leaders
+    folded: np.ndarray  # (N, 2 G, n_modes) of all that repeat them, by the residue of the order modulo N
+    residual: np.ndarray  # (N, 2 G, 2 G) [m/N]
+    load: np.ndarray  # (2 G,) deflection by the constant load [m]
+    mean: np.ndarray  # (2 G,) stiffness that the modes contain [N/m]
+    product: np.ndarray  # (2 G, 2 H + 1, 2 H + 1) convolution with the stiffness [N/m]
+    forcing: np.ndarray  # (2 G, 2 H + 1) F - k ste [N]
+
+    @classmethod
+    def build(cls, modes: Modes, one_sided, orders: _Orders, leaders, group, turn) -> _Gears:
+        """From harmonics (2N, count + 1) of stiffness, deflection and force of all meshes."""
+        N, H, meshes = orders.symmetry, orders.harmonics, np.concatenate([leaders, len(group) + leaders])
+        owner = np.concatenate([group, len(leaders) + group])
+        phase = np.exp(2j * np.pi * (orders.sense * np.outer(np.arange(N), turn) % N) / N)
+        member = (owner == np.arange(len(meshes))[:, None]) * np.tile(phase, 2)[:, None]
+        stiffness, deflection, force = (_two_sided(values[meshes]) for values in one_sided)
+        count = stiffness.shape[1] // 2
+        apart = np.subtract.outer(orders.h, orders.h)
+        inside = np.abs(apart) <= count
+        product = np.where(inside, stiffness[:, np.where(inside, apart, 0) + count], 0.0)
+        wide = ((0, 0), (H - count, H - count))
+        forcing = np.pad(force, wide) - np.einsum("mhk,mk->mh", product, np.pad(deflection, wide))
+        return cls(
+            modes, modes.mesh_deflection[meshes], member @ modes.mesh_deflection,
+            np.swapaxes(member @ modes.residual[:, meshes], 1, 2), modes.load_deflection[meshes],
+            modes.mesh_stiffness[meshes], product, forcing,
+        )  # fmt: skip
+
+    def seen(self, orders: _Orders, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces ``f = a + Y u`` of the meshes over what the ring gives way, harmonics of one side band.
+
+        ``a`` (S, 2 G, 2 H + 1), which has no side bands, and ``Y`` (S, R, 2 G, 2 H + 1, G, 2 H + 1).
+        """
+        (S, R), (n, size), G = (len(speed), len(orders.r)), self.forcing.shape, len(self.rows) // 2
+        T = np.empty((S, R, size, n, n), complex)
+        for c in range(orders.symmetry):
+            h, r = np.nonzero(orders.every % orders.symmetry == c)
+            pairs = (self.rows[:, None] * self.folded[c]).reshape(n * n, -1)
+            modal = compliance(self.modes, speed[:, None] * orders.every[h, r])
+            T[:, r, h] = (modal @ pairs.T).reshape(S, -1, n, n) + self.residual[c]
+        # unknowns (mesh, harmonic): d + T (k - mean) d = d_load - T F' + T k u
+        fluctuating = self.product - self.mean[:, None, None] * np.eye(size)
+        whole = (S, R, n * size)
+        left = np.einsum("srhij,jhk->srihjk", T, fluctuating).reshape(*whole, n * size)
+        left += np.eye(n * size)
+        moved = np.einsum("srhij,jhk->srihjk", T[..., G:], self.product[G:]).reshape(*whole, G * size)
+        still = -np.einsum("shij,jh->sih", T[:, R // 2], self.forcing)
+        still[:, :, size // 2] += self.load
+        middle = np.zeros((S, R, n * size, 1), complex)
+        middle[:, R // 2, :, 0] = still.reshape(S, -1)
+        d = np.linalg.solve(left, np.concatenate([moved, middle], axis=-1)).reshape(S, R, n, size, -1)
+        force = np.einsum("jhk,srjkc->srjhc", self.product, d)
+        Y = force[..., :-1].reshape(S, R, n, size, G, size)
+        for g in range(G):
+            Y[:, :, G + g, :, g] -= self.product[G + g]
+        return self.forcing + force[:, R // 2, :, :, -1], Y
+
+
+def _two_sided(one_sided: np.ndarray) -> np.ndarray:
+    """Coefficients -H .. H of exp(i h omega t) of harmonics (..., H + 1) of Re sum X exp(i h omega t)."""
+    half = 0.5 * one_sided[..., 1:]
+    return np.concatenate([half[..., ::-1].conj(), one_sided[..., :1].real, half], axis=-1)
+
+
+def _check_repeated(one_sided, orders: _Orders, leaders, group, turn) -> None:
+    """Refuse planets whose meshes do not repeat those of their leaders (E-SYMMETRY)."""
+    N, harmonic = orders.symmetry, np.arange(one_sided[0].shape[1])
+    # whole turns have no rounding
+    whole = turn[:, None] * harmonic * (orders.sense * orders.z_ring % N)
+    shift = np.exp(2j * np.pi * (whole % N) / N)
+    for name, values in zip(("stiffness", "deflection", "force"), one_sided):
+        apart = [half - shift * half[leaders][group] for half in np.split(values, 2)]
+        if np.abs(apart).max() > _EQUAL * np.abs(values).max():
+            raise CaseError(
+                f"the {name} of meshes of equal planets differs by "
+                f"{np.abs(apart).max() / np.abs(values).max():.2e} of its largest harmonic",
+                code="E-SYMMETRY", key="symmetry", value=N, limit=f"{_EQUAL:g}",
+                remedy="take symmetry 1, which solves for every planet",
+            )  # fmt: skip
+
+
+def _receptance(structure: FixedStructure, speed: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Modal receptances (S, n_orders, m) [s^2] at whole orders of speeds (S,) [rad/s]."""
+    natural, omega = structure.natural_frequency, np.multiply.outer(speed, order)[..., None]
+    return 1.0 / (natural**2 - omega**2 + 2j * structure.damping_ratio * natural * omega)
+
+
+def _ring(structure: FixedStructure, orders: _Orders, place: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """What the ring gives way at the leaders per force, harmonics 0 .. H: (S, H + 1, G, R, G, R) [m/N]."""
+    P, n, R, G = structure.ring_shape, orders.n, len(orders.r), len(place)
+    pairs = (P[:, :, None] * P[:, None].conj()).reshape(len(P), -1)
+    wave = np.exp(1j * np.outer(place, n))
+    found = np.zeros((len(speed), orders.harmonics + 1, G, R, G, R), complex)
+    for h in range(orders.harmonics + 1):
+        places = list(orders.scatter(h))
+        order = h * orders.z_ring + np.array([r for r, _ in places])
+        every = (_receptance(structure, speed, order) @ pairs).reshape(len(speed), len(order), len(n), len(n))
+        every = orders.symmetry * (every + structure.residual)
+        for one, (_, (r, of)) in zip(np.moveaxis(every, 1, 0), places):
+            # places rise or fall by one
+            to, part = slice(r.min(), r.max() + 1), of[np.argsort(r)]
+            block = one[:, part[:, None], part]
+            for g in range(G):
+                for k in range(G):
+                    turned = wave[g, part, None] * wave[k, part].conj()
+                    found[:, h, g, to, k, to] += turned * block
+    return found
+
+
+def _solve(gears: _Gears, structure: FixedStructure, place, orders: _Orders, speed: np.ndarray):
+    """Forces (S, 2 G, n_orders), residuals (S,) and tails (S,) at some speeds [rad/s]."""
+    a, Y = gears.seen(orders, speed)
+    half = _ring(structure, orders, place, speed)
+    # of negative harmonics: both side bands change their sign
+    R = np.concatenate([half[:, :0:-1, :, ::-1, :, ::-1].conj(), half], axis=1)
+    (S, G, bands), size, H = (len(speed), len(place), len(orders.r)), len(orders.h), orders.harmonics
+    middle = size * bands // 2
+    source = np.zeros((S, G, size, bands), complex)
+    source[..., bands // 2] = a[:, G:]
+    source = source.reshape(S, G, -1)[..., middle:]
+    left = np.zeros((S, G, H + 1, bands, G, size, bands), complex)
+    for g in range(G):
+        for b in range(G):
+            seen = np.moveaxis(Y[:, :, G + g, H:, b], 1, 2)
+            for k in range(G):
+                left[:, g, :, :, k] -= seen[..., None] * np.moveaxis(R[:, :, b, :, k], 1, 2)[:, None]
+    left = left.reshape(S, G, (H + 1) * bands, G, size * bands)[:, :, bands // 2 :]
+    row = np.arange(middle + 1)
+    for g in range(G):
+        left[:, g, row, g, middle + row] += 1.0
+    ring = _solve_real(left, source)
+    two_sided = _mirrored(ring).reshape(S, G, size, bands)
+    moved = np.einsum("shgrkt,skht->sghr", R, two_sided, optimize=True)
+    every = np.einsum("srmhgk,sgkr->smhr", Y, moved, optimize=True)
+    every[..., bands // 2] += a
+    force = every.reshape(S, 2 * G, -1)[..., middle:] * np.where(np.arange(middle + 1) == 0, 1, 2)
+    norm = np.linalg.norm(two_sided.reshape(S, -1), axis=1)
+    residual = np.linalg.norm((every[:, G:] - two_sided).reshape(S, -1), axis=1) / norm
+    energy = (np.abs(force[:, G:]) ** 2).sum(axis=1)[:, 1:]
+    beyond = np.abs((orders.positive[1:] + orders.z_ring // 2) % orders.z_ring - orders.z_ring // 2)
+    total = np.maximum(energy.sum(axis=1), np.finfo(float).tiny)
+    return force, residual, np.sqrt(energy[:, beyond > orders.n_max].sum(axis=1) / total)
+
+
+def _mirrored(half: np.ndarray) -> np.ndarray:
+    """Two-sided coefficients of real signals, of those from 0 upwards (..., n)."""
+    return np.concatenate([half[..., :0:-1].conj(), half], axis=-1)
+
+
+def _solve_real(left: np.ndarray, source: np.ndarray) -> np.ndarray:
+    """Solve for real signals: coefficients (S, G, n) from 0 upwards, left (S, G, n, G, 2 n - 1) two-sided.
+
+    Coefficients of negative orders are the conjugates, so that real and imaginary parts are the unknowns.
+    """
+    S, G, n = source.shape
+    plus, minus = left[..., n - 1 :], left[..., n - 1 :: -1]
+    same, other = plus + minus, plus[..., 1:] - minus[..., 1:]
+    same[..., 0] = plus[..., 0]
+    matrix = np.empty((S, G, 2 * n - 1, G, 2 * n - 1))
+    matrix[:, :, :n, :, :n], matrix[:, :, :n, :, n:] = same.real, -other.imag
+    matrix[:, :, n:, :, :n], matrix[:, :, n:, :, n:] = same[:, :, 1:].imag, other[:, :, 1:].real
+    right = np.concatenate([source.real, source[..., 1:].imag], axis=-1)
+    unknowns = G * (2 * n - 1)
+    found = np.linalg.solve(matrix.reshape(S, unknowns, unknowns), right.reshape(S, unknowns, 1))
+    found = found.reshape(S, G, -1)
+    return found[..., :n] + 1j * np.pad(found[..., n:], ((0, 0), (0, 0), (1, 0)))

@@ -1,0 +1,403 @@
+"""A ring on springs, and a small set that runs around in it: both ways, against routes that share no code.
+
+The ring is thin and inextensional, the gears are a sun in two springs with rigid planets on fixed pins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from femgear.fe.reduction import CyclicModes
+from femgear.housing.sensor import component_lines
+from femgear.housing.structure import FixedStructure, Support, circumferential, supported_ring
+from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.periodic.spectral import HarmonicProblem, solve_direct, solve_spectral
+from femgear.solvers.periodic.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
+from femgear.system.fourier import Product, harmonics_of, pad
+from femgear.system.system import MechanicalSystem, MeshExcitation
+from validation.rows import Row, at_most, counted, printed, within
+
+E, RHO, R, WIDTH, HEIGHT = 206e9, 7850.0, 0.1, 0.025, 0.01
+AREA, INERTIA = WIDTH * HEIGHT, WIDTH * HEIGHT**3 / 12
+PRESSURE = np.radians(20.0)
+SPRING = 1e6
+WU = "Wu and Parker 2006"
+EQUAL = tuple(2 * np.pi * np.arange(3) / 3)
+FEET = tuple(Support(a, 4e7, 2e7, 0.05) for a in np.radians([20.0, 100.0, 195.0, 310.0]))
+PAIR = MeshPaths(97, tuple(2 * np.pi * np.array([0.0, 0.24, 0.5, 0.74])))
+
+
+def thin_ring(
+    highest: int, direction=(np.sin(PRESSURE), -np.cos(PRESSURE)), *, foundation=0.0, lowest=0
+) -> CyclicModes:
+    """Closed-form modes of the thin ring, on a radial foundation [N/m^3]: w = cos n phi, v = -sin(n phi)/n.
+
+    ``w^2 = EI/(rho A R^4) n^2 (n^2 - 1)^2/(n^2 + 1)`` (W. Soedel, Vibrations of Shells and Plates, 5.3).
+    """
+    n = np.arange(lowest, highest + 1)
+    mass = RHO * AREA * np.pi * R * np.where(n == 0, 2.0, 1.0 + 1.0 / np.maximum(n, 1) ** 2)
+    stiffness = np.pi * (E * INERTIA / R**3 * (n**2 - 1.0) ** 2 + foundation * WIDTH * R)
+    # the rotation has no radial displacement: the same foundation, tangential, holds it
+    stiffness = np.where(n == 0, 2 * np.pi * foundation * WIDTH * R, stiffness)
+    norm = np.sqrt(np.where(n == 0, 1.0, 2.0) / 97)
+    radial = np.where(n == 0, 0.0, 1.0) / np.sqrt(mass) / norm + 0j
+    tangential = np.where(n == 0, 1.0, 1j / np.maximum(n, 1)) / np.sqrt(mass) / norm
+    load = direction[0] * radial + direction[1] * tangential
+    return CyclicModes(
+        97, n, np.sqrt(stiffness / mass) / (2 * np.pi), load[:, None], np.stack([radial, tangential], axis=1),
+        np.zeros((0, len(n))), np.zeros((0, 0)),
+    )  # fmt: skip
+
+
+def springs(count: int, stiffness: float = SPRING, highest: int = 40) -> np.ndarray:
+    """Natural frequencies [Hz] of the ring on radial springs, which its rotation does not feel."""
+    held = [Support(2 * np.pi * i / count, stiffness, 0.0) for i in range(count)]
+    known = {"max_diameter": 0, "max_frequency": 1e6, "damping_ratio": 0.0}
+    return supported_ring(thin_ring(highest, lowest=1), held, **known).natural_frequency / (2 * np.pi)
+
+
+_TABLE = {
+    3: ("671.777", "671.777", "1786.239", "1816.949", "3433.436", "3433.436", "5544.262", "5544.262"),
+    4: ("631.531", "727.960", "1806.998", "1806.998", "3424.957", "3447.440"),
+}
+
+
+def splitting() -> tuple[Row, ...]:
+    """Pairs of modes of the ring on N equal springs split where 2n/N is whole."""
+    rows = list[Row]()
+    for count, table in _TABLE.items():
+        # two rigid motions come first
+        found = springs(count)[2:]
+        for i, reference in enumerate(table):
+            words = f"{count} springs, n = {2 + i // 2}, {'second' if i % 2 else 'first'} natural frequency, Hz"
+            rows.append(printed("splitting", WU, words, reference, found[i]))
+        weak = (2 * np.pi * springs(count, 1e2)[2 : 2 + len(table)]) ** 2
+        error = 0.0
+        for n in range(2, 2 + len(table) // 2):
+            free = (2 * np.pi * thin_ring(n).frequency[n]) ** 2
+            change = count * 1e2 / (RHO * AREA * np.pi * R * (1 + 1 / n**2))
+            expected = [0.0, change] if 2 * n % count == 0 else [change / 2] * 2
+            error = max(error, np.abs(weak[2 * n - 4 : 2 * n - 2] - free - expected).max() / change)
+        words = f"{count} springs of 100 N/m: change of omega^2 against first order, over the largest"
+        rows.append(at_most("splitting", WU, words, 1e-3, error))
+    return tuple(rows)
+
+
+def gears(angles) -> MechanicalSystem:
+    """Sun (x, y, rotation as a length) in springs and planets that roll on fixed pins."""
+    N = len(angles)
+    M, K = np.diag([1.0, 1.0, 0.5] + [0.3] * N), np.diag([2e6, 2e6, 1e6] + [1e4] * N)
+    W, load = np.zeros((3 + N, 2 * N)), np.zeros(3 + N)
+    for j, angle in enumerate(angles):
+        W[:3, j] = np.cos(angle + 0.4), np.sin(angle + 0.4), 1.0
+        W[3 + j, j], W[3 + j, N + j] = -1.0, 1.0
+    load[2] = 300.0
+    return MechanicalSystem(M, np.zeros_like(K), K, W, load, tuple(f"q{i}" for i in range(len(K))))
+
+
+def excitation(paths: MeshPaths, sense: int = 1, depth: float = 0.15) -> MeshExcitation:
+    """Two harmonics of stiffness, deflection and force; planets in the phases of their angles."""
+    tau = 2 * np.pi * np.arange(64) / 64
+
+    def wave(lag):
+        phase = tau + paths.z_ring * sense * np.array(paths.planet_angles)[:, None]
+        return np.cos(phase + lag) + 0.4 * np.sin(2 * phase)
+
+    stiffness = 5e6 * np.concatenate([1 + depth * wave(0.0), 1.3 + depth * wave(0.7)])
+    deflection = 1e-5 * np.concatenate([1 + 0.3 * wave(0.2), 2 + 0.4 * wave(0.1)])
+    force = 100 + 10 * np.concatenate([wave(0.5), wave(0.5)])
+    return MeshExcitation(stiffness, deflection, force, np.zeros(len(force)))
+
+
+def feet(max_diameter: int, highest: int = 20) -> FixedStructure:
+    """The ring on four irregular feet; the modes above 6 kHz are static."""
+    place = 0.3, 2.0
+    return supported_ring(
+        thin_ring(highest), FEET, max_diameter=max_diameter, max_frequency=6e3, damping_ratio=0.03,
+        sensor_angles=place,
+    )  # fmt: skip
+
+
+def solved(paths: MeshPaths, structure, speeds, *, depth=0.15, harmonics=6, ratio=0.04) -> TwoWayResponse:
+    """The set in a structure by the two-way solution."""
+    drive = excitation(paths, int(np.sign(speeds[0])), depth)
+    modes = solve_modes(gears(paths.planet_angles), drive.stiffness.mean(axis=1), damping_ratio=ratio)
+    kept = {"excitation_harmonics": 2, "response_harmonics": harmonics}
+    return solve_two_way(modes, drive, structure, paths, speeds, **kept)
+
+
+def order_rules() -> tuple[Row, ...]:
+    """Every planet solved for: what orders remain, and what one planet alone gives."""
+    structure, rows, speeds = feet(8), list[Row](), np.array([-40.0])
+    every, one = (MeshPaths(97, EQUAL, 0.1, symmetry) for symmetry in (1, 3))
+    for paths, step, words in ((every, 3, "equal spacing, N = 3"), (PAIR, 2, "(0, 24, 50, 74)/100 turn")):
+        order, lines = structure_lines(structure, solved(paths, structure, speeds))
+        size = np.abs(order**2 * lines)
+        leak = size[..., order % step != 0].max() / size.max()
+        words = f"{words}: largest acceleration off the multiples of {step} over the largest"
+        rows.append(at_most("order rules", "symmetry", words, 1e-10, leak))
+    full, single = (structure_lines(structure, solved(p, structure, speeds)) for p in (every, one))
+    apart = np.abs(full[1][..., full[0] % 3 == 0] - single[1]).max() / np.abs(single[1]).max()
+    rows.append(at_most("order rules", "all planets", "one planet against three: sensor lines", 1e-10, apart))
+    return tuple(rows)
+
+
+def _foundation(max_diameter: int, damping: float) -> tuple[CyclicModes, FixedStructure]:
+    """The ring on a foundation all around, and the structure that it is."""
+    ring = thin_ring(max_diameter, foundation=2e10)
+    known = {"max_diameter": max_diameter, "max_frequency": 1e6, "damping_ratio": damping}
+    return ring, supported_ring(ring, (), sensor_angles=(0.3,), **known)
+
+
+def axisymmetric() -> tuple[Row, ...]:
+    """A foundation all around: what the carrier frame knows already.
+
+    The present dynamics leave the convective terms of the ring out, which are n/z_ring of the frequency: they
+    vanish for 1e13 teeth. With few teeth the wave n has its receptance at the order h z_ring - n.
+    """
+    ring, structure = _foundation(5, 0.0)
+    teeth = 10**13
+    paths = MeshPaths(teeth, EQUAL, 0.1)
+    # angles whose mesh phases are zero to rounding
+    drive = excitation(replace(paths, z_ring=0))
+    speed = np.array([700.0])
+    system = gears(EQUAL)
+    waves = circumferential(ring, ring.load[:, 0], 5)
+    at = np.real(waves @ np.exp(1j * np.outer(np.arange(-5, 6), np.array(EQUAL) + 0.1)))
+    n, size = len(system.K), len(at)
+    natural = 2 * np.pi * np.repeat(ring.frequency, np.where(ring.paired, 2, 1))
+    M, K = np.eye(n + size), np.diag(np.append(np.zeros(n), natural**2))
+    M[:n, :n], K[:n, :n] = system.M, system.K
+    W = np.vstack([system.W, np.hstack([np.zeros((size, 3)), -at])])
+    whole = MechanicalSystem(M, 0 * K, K, W, np.append(system.load, np.zeros(size)), ("",) * len(K))
+    modes = solve_modes(whole, drive.stiffness.mean(axis=1), damping_ratio=0.0)
+    kept = {"excitation_harmonics": 2, "response_harmonics": 6}
+    present = solve_spectral(modes, drive, speed / (2 * np.pi), tolerance=1e-12, method="direct", **kept)
+    rigid = solve_modes(system, drive.stiffness.mean(axis=1), damping_ratio=0.0)
+    two_way = solve_two_way(rigid, drive, structure, paths, speed / teeth, **kept)
+    middle = two_way.force[..., np.isin(two_way.order, np.arange(7) * teeth)]
+    apart = np.abs(middle - present.force).max() / np.abs(present.force[..., 1:]).max()
+    words = "against the dynamics of the set on its foundation, 1e13 teeth"
+    rows = [at_most("axisymmetric", "solve_spectral", f"mesh forces {words}", 1e-10, apart)]
+    coordinates = modes.shape[n:] @ present.modal[0]
+    field = np.swapaxes(coordinates, 0, 1) @ circumferential(ring, ring.output[:, 0], 5)
+    lines = component_lines(field, teeth, float(speed[0] / teeth), 0.3)
+    order, heard = structure_lines(structure, two_way)
+    same = np.isin(order, lines.order)
+    expected = np.zeros(len(order), complex)
+    expected[same] = lines.displacement[np.isin(lines.order, order)]
+    apart = np.abs(heard[0, 0] - expected).max() / np.abs(expected[1:]).max()
+    rows.append(at_most("axisymmetric", "component_lines", f"sensor lines {words}", 1e-10, apart))
+    return (*rows, *_convective())
+
+
+def _convective() -> tuple[Row, ...]:
+    structure, paths, speed, ratio = _foundation(5, 0.03)[1], MeshPaths(37, EQUAL, 0.1), 20.0, 0.04
+    found = solved(paths, structure, np.array([-speed]), harmonics=8, ratio=ratio)
+    drive, system = excitation(paths, -1), gears(EQUAL)
+    mean = drive.stiffness.mean(axis=1)
+    damping, between = modal_damping(system, mean, ratio), np.subtract.outer(EQUAL, EQUAL)
+    receptance, own = np.empty((6, 6, 1, 9), complex), structure.natural_frequency
+    for h in range(9):
+        w = h * 37 * speed
+        free = system.W.T @ np.linalg.solve(system.K + 1j * w * damping - w**2 * system.M, system.W)
+        for n in range(-5, 6):
+            # the carrier turns backwards
+            wave = (h * 37 + n) * speed
+            modal = 1 / (own**2 - wave**2 + 2j * 0.03 * own * wave)
+            free[3:, 3:] += modal @ np.abs(structure.ring_shape[:, n + 5]) ** 2 * np.exp(1j * n * between)
+        receptance[:, :, 0, h] = np.linalg.solve(np.eye(6) + free * mean, free)
+    k, s, F = (
+        pad(harmonics_of(one, 2), 8)[:, None] for one in (drive.stiffness, drive.deflection, drive.force)
+    )
+    forcing = F - Product(k)(s)
+    source = -np.einsum("ijsh,jsh->ish", receptance, forcing)
+    rigid = system.W.T @ np.linalg.solve(system.K, system.load)
+    source[:, 0, 0] += rigid - receptance[:, :, 0, 0].real @ (mean * rigid)
+    fluctuating = np.array(k)
+    fluctuating[..., 0] -= mean[:, None]
+    force = forcing + Product(k)(solve_direct(HarmonicProblem(receptance, Product(fluctuating), source)))
+    middle = found.force[0][:, np.isin(found.order, np.arange(9) * 37)]
+    apart = np.abs(middle - force[:, 0]).max() / np.abs(force[..., 1:]).max()
+    words = "mesh forces against the carrier frame with convective terms, 37 teeth"
+    return (at_most("axisymmetric", "solve_direct", words, 1e-10, apart),)
+
+
+def _moving(structure: FixedStructure, angles) -> np.ndarray:
+    """Displacement of the modes on the path at angles (...), (..., m)."""
+    n = np.arange(-structure.max_diameter, structure.max_diameter + 1)
+    return np.real(np.exp(1j * np.multiply.outer(angles, n)) @ structure.ring_shape.T)
+
+
+def _sampled(found: TwoWayResponse, theta) -> np.ndarray:
+    return np.real(found.force[0] @ np.exp(1j * np.outer(found.order, theta)))
+
+
+def _short(structure: FixedStructure, count: int, kept: int) -> FixedStructure:
+    """The first modes alone, no residual, waves up to ``kept`` nodal diameters."""
+    n_max = structure.max_diameter
+    inside = np.abs(np.arange(-n_max, n_max + 1)) <= kept
+    return FixedStructure(
+        structure.natural_frequency[:count], structure.damping_ratio[:count],
+        structure.ring_shape[:count] * inside, structure.sensor_shape[:count],
+        0 * structure.residual, 0 * structure.sensor_residual,
+    )  # fmt: skip
+
+
+def in_time() -> tuple[Row, ...]:
+    """Three rigid planets and four modes, ten degrees of freedom, integrated over a turn of the carrier."""
+    paths, speed, structure = MeshPaths(37, EQUAL, 0.1, 3), 8.0, _short(feet(6), 4, 2)
+    found = solved(paths, structure, np.array([speed]), harmonics=8)
+    drive, system = excitation(paths), gears(EQUAL)
+    damping = modal_damping(system, drive.stiffness.mean(axis=1), 0.04)
+    own, n, series = structure.natural_frequency, len(system.K), [
+        harmonics_of(one, 2) for one in (drive.stiffness, drive.deflection, drive.force)
+    ]
+
+    def forces(theta, state):
+        """Mesh forces, and the modes' displacement at the meshes, of states (20, ...)."""
+        wave = np.exp(1j * 37 * theta * np.arange(3))
+        k, s, F = (np.real(one @ wave)[:, None] for one in series)
+        path = _moving(structure, np.array(EQUAL) + 0.1 + theta)
+        d = system.W.T @ state[:n]
+        d[3:] -= path @ state[n : n + 4]
+        return k * d, F - k * s, path
+
+    def rate(time, flat, constant):
+        state = flat.reshape(20, -1)
+        linear, source, path = forces(speed * time, state)
+        force = linear + source * constant
+        x, q, v, r = np.split(state, [n, n + 4, 2 * n + 4])
+        load = system.load[:, None] * constant - system.K @ x - damping @ v - system.W @ force
+        modal = path.T @ force[3:] - (own**2)[:, None] * q - (0.06 * own)[:, None] * r
+        return np.concatenate([v, r, np.linalg.solve(system.M, load), modal]).ravel()
+
+    # the periodic motion by the monodromy matrix: columns of unit starts without load, then the loaded one
+    start, constant = np.eye(20, 21), np.append(np.zeros(20), 1.0)
+    turn, precise = 2 * np.pi / speed, {"method": "DOP853", "rtol": 1e-9, "atol": 1e-12}
+    end = solve_ivp(rate, (0, turn), start.ravel(), args=(constant,), **precise).y[:, -1].reshape(20, 21)
+    first = np.linalg.solve(np.eye(20) - end[:, :20], end[:, 20])
+    times = np.linspace(0, turn, 200, endpoint=False)
+    motion = solve_ivp(rate, (0, turn), first, args=(np.ones(1),), t_eval=times, **precise).y
+    exact = np.empty((6, len(times)))
+    for i, time in enumerate(times):
+        linear, source, _ = forces(speed * time, motion[:, i : i + 1])
+        exact[:, i] = (linear + source)[:, 0]
+    ours = _sampled(found, speed * times)
+    apart = np.abs(ours - exact[[0, 3]]).max() / np.ptp(exact)
+    order, lines = structure_lines(structure, found)
+    heard = np.real(lines[0] @ np.exp(1j * np.outer(order, speed * times)))
+    expected = structure.sensor_shape.T @ motion[n : n + 4]
+    moved = np.abs(heard - expected).max() / np.ptp(expected)
+    return (
+        at_most("in time", "DOP853", "ten degrees of freedom: mesh forces over their range", 1e-5, apart),
+        at_most("in time", "DOP853", "ten degrees of freedom: sensors over their range", 1e-5, moved),
+    )
+
+
+def by_samples() -> tuple[Row, ...]:
+    """Forces at samples of a turn, products in time, receptances by FFT, and GMRES, for all planets."""
+    paths, speed, structure = MeshPaths(97, EQUAL, 0.1, 3), 2 * np.pi, feet(14)
+    found = solved(paths, structure, np.array([speed]))
+    drive, system, count = excitation(paths), gears(EQUAL), 2048
+    mean, theta, order = drive.stiffness.mean(axis=1), 2 * np.pi * np.arange(count) / count, np.arange(1025)
+    damping, w, own = modal_damping(system, mean, 0.04), speed * order, structure.natural_frequency
+    dynamic = system.K + np.multiply.outer(1j * w, damping) - np.multiply.outer(w**2, system.M)
+    gear = system.W.T @ np.linalg.solve(dynamic, system.W)
+    modal = 1 / (own**2 - w[:, None] ** 2 + 0.06j * own * w[:, None])
+    angles = np.add.outer(theta, np.array(EQUAL) + 0.1)
+    path, wave = _moving(structure, angles), np.exp(1j * np.multiply.outer(angles, np.arange(-14, 15)))
+    k, s, F = (
+        np.real(harmonics_of(one, 2) @ np.exp(1j * 97 * np.outer(np.arange(3), theta)))
+        for one in (drive.stiffness, drive.deflection, drive.force)
+    )
+
+    def deflection(force):
+        """Of the meshes under forces (6, n_times)."""
+        moved = np.fft.irfft(np.einsum("lij,jl->il", gear, np.fft.rfft(force)), count)
+        q = np.fft.irfft(np.fft.rfft(np.einsum("tjm,jt->mt", path, force[3:])) * modal.T, count)
+        static = np.real(np.einsum("tjn,nk,tik,it->jt", wave, structure.residual, wave.conj(), force[3:], optimize=True))
+        moved[3:] += np.einsum("tjm,mt->jt", path, q) + static
+        return moved
+
+    start = (system.W.T @ np.linalg.solve(system.K, system.load))[:, None]
+    right, products = (F + k * (start - s)).ravel(), [0]
+
+    def product(flat):
+        products[0] += 1
+        force = flat.reshape(6, count)
+        return (force + k * deflection(force)).ravel()
+
+    # the gears alone, with mean stiffness, precondition
+    inverse = np.linalg.inv(np.eye(6) + mean[:, None] * gear)
+
+    def nearly(flat):
+        return np.fft.irfft(np.einsum("lij,jl->il", inverse, np.fft.rfft(flat.reshape(6, count))), count).ravel()
+
+    shape = (6 * count, 6 * count)
+    force, failed = gmres(
+        LinearOperator(shape, product, dtype=float), right, rtol=1e-8, restart=200, maxiter=10,
+        M=LinearOperator(shape, nearly, dtype=float),
+    )  # fmt: skip
+    exact = force.reshape(6, count)[[0, 3]]
+    apart = np.abs(_sampled(found, theta) - exact).max() / np.ptp(exact)
+    words = "four feet, 14 nodal diameters, 60 rpm of the carrier: mesh forces over their range"
+    return (
+        counted("by samples", "GMRES", "GMRES converged", 1, int(failed == 0)),
+        at_most("by samples", "GMRES", words, 1e-4, apart, note=f"{products[0]} products"),
+    )
+
+
+def _green(angle, w: float) -> np.ndarray:
+    """Radial displacement of the free thin ring per radial force at an angle and a frequency [rad/s].
+
+    ``sum_n g(n) exp(i n phi)`` over all whole n of the rational g, by the residues at its six poles.
+    """
+    bending, inertia = E * INERTIA / R**3, RHO * AREA * R * w**2
+    poles = np.sqrt(np.roots([bending, -2 * bending, bending - inertia, -inertia]) + 0j)
+    z = np.concatenate([poles, -poles])
+    slope = 2 * z * (bending * (3 * z**4 - 4 * z**2 + 1) - inertia)
+    angle = np.mod(angle, 2 * np.pi)[..., None]
+    # the larger exponential is divided out
+    kernel = np.where(
+        z.imag >= 0,
+        np.exp(1j * z * angle) / np.expm1(2j * np.pi * np.where(z.imag >= 0, z, 1j)),
+        np.exp(1j * z * (angle - 2 * np.pi)) / -np.expm1(-2j * np.pi * np.where(z.imag < 0, z, -1j)),
+    )
+    return -np.sum(1j * z**2 / slope * kernel, axis=-1)
+
+
+def green() -> tuple[Row, ...]:
+    """A constant force runs around the ring on four radial springs: Ritz against the exact ring."""
+    speed, top, sensor, places = 500.0, 200, 0.7, np.array([0.3, 1.9, 3.3, 5.0])
+    held = [Support(angle, SPRING, 0.0) for angle in places]
+    structure = supported_ring(
+        thin_ring(top, (1.0, 0.0), lowest=1), held, max_diameter=top, max_frequency=1e5, damping_ratio=0.0,
+        sensor_angles=(sensor,),
+    )  # fmt: skip
+    constant = np.zeros((1, 2, 2 * top + 1), complex)
+    constant[..., 0] = 1.0
+    order = np.arange(2 * top + 1)
+    load = TwoWayResponse(
+        np.array([speed]), order, constant, np.zeros(1), np.zeros(1), np.zeros(1), 0, 6 * top + 1, 1
+    )
+    heard_order, heard = structure_lines(structure, load)
+    n = np.arange(1, top + 1)
+    exact = np.empty(top, complex)
+    for K in n:
+        w = K * speed
+        bending, inertia = E * INERTIA / R**3 * (K**2 - 1.0) ** 2, RHO * AREA * R * (1 + 1 / K**2) * w**2
+        # the force is heard at the order K by its wave -K
+        free = 1 / (2 * np.pi * (bending - inertia)) * np.exp(-1j * K * np.append(places, sensor))
+        away = _green(np.subtract.outer(np.append(places, sensor), places), w)
+        at = np.linalg.solve(np.eye(4) + SPRING * away[:4], free[:4])
+        exact[K - 1] = 2 * (free[4] - SPRING * away[4] @ at)
+    lines = heard[0, 0, np.isin(heard_order, n)]
+    apart = np.abs(lines - exact).max() / np.abs(exact).max()
+    words = "four radial springs, force at 500 rad/s: lines of a sensor over the largest"
+    return (at_most("moving force", "Green's function", words, 1e-6, apart),)
