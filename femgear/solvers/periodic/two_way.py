@@ -32,7 +32,7 @@ from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
 
 _EQUAL = 1e-9
 """Part of the largest harmonic by which meshes that repeat one another may differ."""
-_MEMORY = 2e8
+_MEMORY = 6e7
 """Size of the speeds that are solved together [bytes]."""
 _BYTES = 130
 """Of one unknown order times one, while a speed is solved."""
