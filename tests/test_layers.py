@@ -13,8 +13,9 @@ PACKAGE = Path(__file__).parents[1] / "femgear"
 LAYERS = (
     ("errors",),
     ("gears", "fe"),
-    ("contact", "system", "housing"),
+    ("contact", "system"),
     ("solvers",),
+    ("housing",),
     ("case",),
     ("storage",),
     ("report", "exchange"),

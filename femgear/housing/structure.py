@@ -1,6 +1,6 @@
 """The housing that stands still: a linear structure, fixed in space, that the planets' meshes run around in.
 
-`FixedStructure` is all that the two-way solution (`femgear.solvers.periodic.two_way`) knows of a casing, and
+`FixedStructure` is all that the two-way solution (`femgear.housing.two_way`) knows of a casing, and
 what every source of one is converted to: natural frequencies, damping, mode shapes along the path of the
 meshes and at the sensors, and the static compliance of the modes left out. It comes from the cyclic modes of
 a ring on springs (`supported_ring`) or from arrays (`from_arrays`, `read_arrays`).

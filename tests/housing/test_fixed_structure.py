@@ -9,8 +9,8 @@ from validation.fixed_housing import DIRECTION, EQUAL, FEET, PAIR, WIDTH, R, fee
 
 from femgear.errors import CaseError
 from femgear.housing.structure import FixedStructure, Support, from_arrays, read_arrays, supported_ring
+from femgear.housing.two_way import MeshPaths, planet_groups, solve_two_way
 from femgear.solvers.linear.modal import solve_modes
-from femgear.solvers.periodic.two_way import MeshPaths, planet_groups, solve_two_way
 
 KNOWN = {"max_diameter": 4, "max_frequency": 6e3, "damping_ratio": 0.03}
 

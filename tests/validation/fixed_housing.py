@@ -14,9 +14,9 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from femgear.fe.reduction import CyclicModes
 from femgear.housing.sensor import component_lines
 from femgear.housing.structure import FixedStructure, Support, circumferential, supported_ring
+from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.periodic.spectral import HarmonicProblem, solve_direct, solve_spectral
-from femgear.solvers.periodic.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
 from femgear.system.fourier import Product, harmonics_of, pad
 from femgear.system.system import MechanicalSystem, MeshExcitation
 from validation.rows import Row, at_most, counted, printed

@@ -188,7 +188,7 @@ def structure_lines(
             parts.append((moved if K == 0 else 2 * moved)[..., None])
             found.append(K)
     lines, order = np.concatenate(parts, axis=-1), np.array(found)
-    return order, np.where(order == 0, lines.real, lines)
+    return order, np.where(order == 0, np.real(lines), lines)
 
 
 def _checked(gears, excitation, carrier_speed, paths, n_max, excited, harmonics) -> np.ndarray:
@@ -356,7 +356,7 @@ class _Gears:
 def _two_sided(one_sided: np.ndarray) -> np.ndarray:
     """Coefficients -H .. H of exp(i h omega t) of harmonics (..., H + 1) of Re sum X exp(i h omega t)."""
     half = 0.5 * one_sided[..., 1:]
-    return np.concatenate([half[..., ::-1].conj(), one_sided[..., :1].real, half], axis=-1)
+    return np.concatenate([half[..., ::-1].conj(), np.real(one_sided[..., :1]), half], axis=-1)
 
 
 def _check_repeated(one_sided, orders: _Orders, leaders, group, turn) -> None:
@@ -454,9 +454,9 @@ def _solve_real(left: np.ndarray, source: np.ndarray) -> np.ndarray:
     same, other = plus + minus, plus[..., 1:] - minus[..., 1:]
     same[..., 0] = plus[..., 0]
     matrix = np.empty((S, G, 2 * n - 1, G, 2 * n - 1))
-    matrix[:, :, :n, :, :n], matrix[:, :, :n, :, n:] = same.real, -other.imag
-    matrix[:, :, n:, :, :n], matrix[:, :, n:, :, n:] = same[:, :, 1:].imag, other[:, :, 1:].real
-    right = np.concatenate([source.real, source[..., 1:].imag], axis=-1)
+    matrix[:, :, :n, :, :n], matrix[:, :, :n, :, n:] = np.real(same), -np.imag(other)
+    matrix[:, :, n:, :, :n], matrix[:, :, n:, :, n:] = np.imag(same[:, :, 1:]), np.real(other[:, :, 1:])
+    right = np.concatenate([np.real(source), np.imag(source[..., 1:])], axis=-1)
     unknowns = G * (2 * n - 1)
     found = np.linalg.solve(matrix.reshape(S, unknowns, unknowns), right.reshape(S, unknowns, 1))
     found = found.reshape(S, G, -1)
