@@ -491,8 +491,24 @@ class MicrophoneSection(Section):
     angle: Angle | None = None
 
 
+class SupportSection(Section):
+    """A bolt, foot or lug at the outer surface of the ring: springs to the ground, a mass that moves along.
+
+    Stiffness and mass are spread evenly over the ``width`` along the circumference.
+    """
+
+    angle: Angle
+    radial_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)]
+    tangential_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)]
+    mass: Annotated[float, Quantity(MASS, 0.0, 1e6)] = 0.0
+    width: Annotated[float, Quantity(LENGTH, 0.0, 60.0)] = 0.0
+
+
 class HousingSection(Section):
     """The fixed sensor, how the ring's field is carried to it, and the microphone.
+
+    With supports the ring is a structure that stands still and has no symmetry; forces and motions of its
+    ``nodal_diameters`` act both ways.
 
     ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
     interpolation between ``points`` points of the paper on carrier modulation, with its images.
@@ -503,6 +519,8 @@ class HousingSection(Section):
     sensor_angle: Angle = 0.0
     microphone: MicrophoneSection = MicrophoneSection()
     published: Annotated[tuple[PublishedLines, ...], Field(max_length=100)] = ()
+    support: Annotated[tuple[SupportSection, ...], Field(max_length=200)] = ()
+    nodal_diameters: Annotated[int, Count(2, 26)] | None = None
 
 
 class Case(Section, ReadCase):

@@ -70,7 +70,8 @@ class SensorLines(ReadOnlyArrays):
     z_ring : int
         Teeth of the ring, the order of the mesh frequency.
     method : str
-        ``"exact"`` or ``"linear, P points"``.
+        ``"exact"``, ``"linear, P points"`` or ``"supports"``, of a structure that stands still: only the
+        first have one nodal diameter a line.
     """
 
     order: np.ndarray
@@ -208,7 +209,9 @@ def stored_lines(housing: Any, *, form: str | None = None) -> SensorLines:
     exact = housing["lines_real"].values + 1j * housing["lines_imag"].values
     end = np.flatnonzero(exact.any(axis=tuple(range(exact.ndim - 1)))).max(initial=1) + 1
     place = float(known["sensor_angle"]), int(known["ring_teeth"])
-    lines = SensorLines(order[:end], exact[..., :end], housing["carrier_speed"].values, *place, "exact")
+    lines = SensorLines(
+        order[:end], exact[..., :end], housing["carrier_speed"].values, *place, known.get("method", "exact")
+    )
     return lines_in_form(lines, form or known["form"], int(known["points"]), round(order[-1] / place[1]))
 
 

@@ -224,6 +224,23 @@ def sound_power(lines: SensorLines, cylinder: Cylinder, *, equivalent: bool = Fa
     return power * radiation_efficiency(n, ka, cylinder.length / cylinder.radius)
 
 
+def surface_sound(
+    waves, n, frequency, cylinder: Cylinder, microphone: Microphone
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute the sound of a surface of which every line has waves of many nodal diameters.
+
+    Of radial velocities (..., n_orders, n_waves) [m/s] of exp(i n phi), n (n_waves,), at frequencies
+    (..., n_orders) [Hz]: lines of the pressure at the microphone [Pa], power, and that of the radiation
+    efficiency one [W], all (..., n_orders). Waves of different n radiate independently.
+    """
+    waves, frequency = np.asarray(waves), np.asarray(frequency, float)[..., None]
+    heard = pressure_transfer(n, frequency, cylinder, microphone.distance) * np.exp(1j * n * microphone.angle)
+    around, speed = 2 * np.pi * cylinder.radius, cylinder.sound_speed
+    power = 0.5 * cylinder.density * speed * around * cylinder.length * np.abs(waves) ** 2
+    efficiency = radiation_efficiency(n, around / speed * frequency, cylinder.length / cylinder.radius)
+    return (heard * waves).sum(axis=-1), (efficiency * power).sum(axis=-1), power.sum(axis=-1)
+
+
 def _velocity(lines: SensorLines) -> np.ndarray:
     """Radial velocity of the surface at the sensor [m/s], complex, (..., n_orders)."""
     return 1j * lines.order * lines.base_speed[..., None] * lines.displacement
@@ -274,6 +291,9 @@ def _decibels(power: np.ndarray, reference: float) -> np.ndarray:
 def stored_sound(housing: Any) -> tuple[SensorLines, np.ndarray]:
     """Read the exact lines of the sensor from housing.nc, and compute those of the microphone [Pa]."""
     lines = stored_lines(housing, form="exact")
+    if "pressure_real" in housing:
+        pressure = housing["pressure_real"].values + 1j * housing["pressure_imag"].values
+        return lines, pressure[..., : len(lines.order)]
     return lines, microphone_lines(lines, housing.attrs)
 
 

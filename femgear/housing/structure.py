@@ -13,7 +13,7 @@ positive where the ring gives way to the planet. A mesh force f >= 0 at phi does
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -116,6 +116,12 @@ class FixedStructure(ReadOnlyArrays):
     def max_diameter(self) -> int:
         """Largest nodal diameter n_max of the path."""
         return self.ring_shape.shape[1] // 2
+
+    def combined(self, weights) -> FixedStructure:
+        """Replace the sensors by k weighted sums of them, ``weights`` (n_sensors, k)."""
+        weights = np.asarray(weights, float)
+        shape, residual = self.sensor_shape @ weights, weights.T @ self.sensor_residual
+        return replace(self, sensor_shape=shape, sensor_residual=residual)
 
 
 _ARRAYS = ("natural_frequency", "damping_ratio", "ring_angle", "ring_shape", "sensor_shape")
@@ -261,7 +267,7 @@ def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
 
 def supported_ring(
     ring: CyclicModes, supports: Sequence[Support], *, max_diameter: int, max_frequency: float,
-    damping_ratio: float, sensor_angles: Sequence[float] = (0.0,),
+    damping_ratio: float, sensor_angles: Any = (0.0,),
 ) -> FixedStructure:  # fmt: skip
     """Make a structure of a ring on supports: a Ritz approximation in the cyclic modes of the ring.
 
@@ -283,7 +289,7 @@ def supported_ring(
         Modes beyond are represented by their static part [Hz].
     damping_ratio : float
         Of all modes.
-    sensor_angles : sequence of float
+    sensor_angles : (n_sensors,) array
         Places of the sensors, which feel the radial displacement of the outer surface [rad].
 
     Raises

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 HIGHEST_RESPONSE = 200e3
 """The wavelength of shear in steel there is 16 mm: shorter waves are no matter of plane gear bodies [Hz]."""
+_DIAMETERS = 14
+"""Nodal diameters of a ring on supports."""
 _CHECKED = 12
 """Speeds at which the level is computed again, at most."""
 NOTICEABLE = 1.0
@@ -65,9 +67,45 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             remedy="give a torque, or run with --only static",
         )
     check_one_period(case, gears, "modes, dynamics and housing take")
+    _check_housing_supports(case)
     fastest_mesh_frequency(case, gears)
     if case.runup.count:
         runup_ends(case)
+
+
+def fixed_diameters(case: Case) -> int:
+    """Choose the nodal diameters in which a ring on supports and the meshes act both ways."""
+    return case.housing.nodal_diameters or min(_DIAMETERS, _apart(case), max_nodal_diameter(case))
+
+
+def _apart(case: Case) -> int:
+    """Nodal diameters of a structure up to which side bands of neighbouring mesh harmonics stay apart."""
+    return (case.ring.teeth - 1) // 6
+
+
+def _check_housing_supports(case: Case) -> None:
+    """Refuse supports of the ring that cannot be: twice at one angle, wider than the ring, linear form."""
+    section, around = case.housing, 2 * math.pi * case.ring.outer_radius
+    angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in section.support]
+    for i, one in enumerate(section.support):
+        key = f"housing.support[{i}]"
+        if angles[i] in angles[:i]:
+            message, remedy = "two supports stand at this angle", "make one of them, with the sum of both"
+            raise CaseError(message, code="E-DUPLICATE", key=f"{key}.angle", value=one.angle, remedy=remedy)
+        if one.width > around:
+            message, limit = "the support is wider than the ring", f"{around:.6g} m, its circumference"
+            raise CaseError(message, code="E-RANGE", key=f"{key}.width", value=one.width, limit=limit)
+    if section.support and section.form == "linear":
+        raise CaseError(
+            "the linear form interpolates a field that turns with the carrier; a ring on supports has none",
+            code="E-CHOICE", key="housing.form", value="linear", limit='"exact" with housing.support',
+        )  # fmt: skip
+    most = min(_apart(case), max_nodal_diameter(case))
+    if (section.nodal_diameters or 0) > most:
+        raise CaseError(
+            "side bands of neighbouring mesh harmonics would overlap", code="E-RANGE",
+            key="housing.nodal_diameters", value=section.nodal_diameters, limit=f"2 to {most}",
+        )  # fmt: skip
 
 
 def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
@@ -142,6 +180,8 @@ def case_warnings(case: Case) -> Iterator[Finding]:
             "without damping resonances have no limit, and levels depend on how near a line lies to one",
             remedy="0.02 to 0.05 is usual",
         )
+    if case.housing.support and case.runup.count:
+        yield Finding("W-SUPPORT", "housing.support", "the run-up takes the ring without its supports")
     yield from _wound_up(case)
     if case.planet.bearing_clearance and case.operation.fixed == "ring":
         yield Finding(

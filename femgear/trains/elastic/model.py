@@ -22,6 +22,7 @@ from femgear.fe.compliance import cyclic_harmonics, static_cut_shapes
 from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis, smooth_cut_shapes
 from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import mesh_normals, torques
+from femgear.housing.structure import circumferential
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 if TYPE_CHECKING:
@@ -119,6 +120,18 @@ def elastic_set(
         ring_mode=ring_mode,
         planet_angles=np.asarray(planetary_set.planet_angles),
     )
+
+
+def gears_alone(model: ElasticSet, flexibility) -> MechanicalSystem:
+    """Take gears and carrier out of a set, against a ring that is rigid.
+
+    ``flexibility`` (2N, 2N) as for `elastic_set`, without what another model of the ring holds [m/N].
+    """
+    system, own = model.system, slice(model.ring_slice.start)
+    return replace(
+        system, M=system.M[own, own], C=system.C[own, own], K=system.K[own, own], dofs=system.dofs[own],
+        W=model.rigid_directions[own], load=system.load[own], flexibility=flexibility,
+    )  # fmt: skip
 
 
 def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.ndarray:
@@ -292,9 +305,7 @@ def mesh_excitation(
     )
 
 
-def ring_field(
-    model: ElasticSet, ring: CyclicModes, coordinates, output: int, max_diameter: int
-) -> np.ndarray:
+def ring_field(ring: CyclicModes, coordinates, output: int, max_diameter: int) -> np.ndarray:
     """Compute circumferential components of a ring output from harmonics of the ring's coordinates.
 
     ``u(phi, t) = Re sum_h sum_n U[h, n] e^{i n phi} e^{i h omega t}``.
@@ -313,18 +324,7 @@ def ring_field(
     (..., 2 max_diameter + 1) complex array
         Components n = -max_diameter .. max_diameter, in the unit of the output [m].
     """
-    mode, n = model.ring_mode, model.ring_diameter
-    value = (ring.norm * ring.output[:, output])[mode]
-    single = ~ring.paired[mode]
-    turn = np.where(model.ring_phase == 1, -1j, 1.0)
-    half = np.where(single, 1.0, 0.5)
-    columns = np.zeros((len(mode), 2 * max_diameter + 1), complex)
-    row = np.arange(len(mode))
-    inside = n <= max_diameter
-    np.add.at(columns, (row[inside], max_diameter + n[inside]), (half * turn * value)[inside])
-    mirrored = inside & ~single
-    np.add.at(columns, (row[mirrored], max_diameter - n[mirrored]), (half * np.conj(turn * value))[mirrored])
-    return np.asarray(coordinates) @ columns
+    return np.asarray(coordinates) @ circumferential(ring, ring.output[:, output], max_diameter)
 
 
 @dataclass(frozen=True)

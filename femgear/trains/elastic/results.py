@@ -64,6 +64,8 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
+    from femgear.housing.structure import FixedStructure
+    from femgear.housing.two_way import TwoWayResponse
     from femgear.solvers.stability.parametric import Stability
     from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
@@ -76,6 +78,11 @@ _FIRST, _STRONGEST = 6, 4
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
+_SUPPORTED = (
+    ("one_way_level", "m/s^2", "level by the mesh forces of the ring without its supports"),
+    ("two_way_residual", "1", "residual of the two-way equations"),
+    ("order_tail", "1", "share of the mesh forces in the outer half of the side bands"),
+)
 _DIRECTIONS = {RADIAL: "radial", TANGENTIAL: "tangential"}
 
 
@@ -127,7 +134,7 @@ class ModesResult:
         }
         motions = modes.shape[model.ring_slice].T
         for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
-            field = ring_field(model, self.ring.modes, motions, output, n_max)
+            field = ring_field(self.ring.modes, motions, output, n_max)
             words = f"outer {_DIRECTIONS[output]} displacement, component exp(i n phi)"
             for part in ("real", "imag"):
                 variables[f"{name}_{part}"] = ("mode circumferential", getattr(field, part), "kg^-1/2", words)
@@ -154,7 +161,9 @@ class DynamicsResult:
 
     ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial``
     (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its outer surface, as
-    ``ring_tangential`` (H + 1, 2 n_max + 1) at the last speed; ``symmetry`` is that of `ModesResult`,
+    ``ring_tangential`` (H + 1, 2 n_max + 1) at the last speed; of a ring on supports ``fixed`` are
+    its structure, whose sensors stand at equal distances around its outer surface, and the forces in it, all
+    else is the ring without supports; ``symmetry`` is that of `ModesResult`,
     ``harmonics`` their number at the speed of the case that has the most. The excitation ends at
     ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
     changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at. ``warnings``
@@ -176,6 +185,7 @@ class DynamicsResult:
     compared_to: float
     warnings: tuple[Finding, ...]
     entries: Entries
+    fixed: tuple[FixedStructure, TwoWayResponse] | None = None
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
@@ -213,7 +223,11 @@ class HousingResult:
 
     ``exact`` are the lines of the components, ``lines`` those of the case's ``form``, "exact" or "linear"
     (interpolated over ``points`` points of the ring). The excitation ends at ``excitation_limit`` (speeds,)
-    [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`.
+    [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`. Of a ring on supports ``pressure``
+    (speeds, n_orders) [Pa] are the lines of the microphone, ``power`` and ``equivalent_power`` [W] those that
+    all of the surface radiates, ``one_way_level`` (speeds,) [m/s^2] the level by the forces of the ring
+    without supports, ``two_way_residual`` and ``order_tail`` (speeds,)
+    are those of `TwoWayResponse`.
     """
 
     input_speed: np.ndarray
@@ -225,6 +239,12 @@ class HousingResult:
     excitation_limit: np.ndarray
     cylinder: Cylinder
     microphone: Microphone
+    pressure: np.ndarray | None = None
+    power: np.ndarray | None = None
+    equivalent_power: np.ndarray | None = None
+    one_way_level: np.ndarray | None = None
+    two_way_residual: np.ndarray | None = None
+    order_tail: np.ndarray | None = None
 
     @cached_property
     def lines(self) -> SensorLines:
@@ -242,23 +262,36 @@ class HousingResult:
             )
         lines = ("lines", "speed order", values, "m", words)
         cylinder, frequency = self.cylinder, exact.frequency
-        pressure = sound_pressure(exact, cylinder, self.microphone)
-        radiated, equivalent = (sound_power(exact, cylinder, equivalent=one) for one in (False, True))
+        pressure, radiated, equivalent = self.pressure, self.power, self.equivalent_power
+        stored: list[Any] = [lines]
+        if pressure is None:
+            pressure = sound_pressure(exact, cylinder, self.microphone)
+            radiated, equivalent = (sound_power(exact, cylinder, equivalent=one) for one in (False, True))
+        else:
+            stored.append(("pressure", "speed order", pressure, "Pa", "sound pressure at the microphone"))
         heard, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
-        variables = complex_entries((lines,), single=True) | {
-            "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
-            "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
-            "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
-            "pressure_level": ("speed", pressure_level(pressure, frequency), "dB", f"A-weighted {heard}"),
-            "power_level": ("speed", power_level(radiated, frequency), "dB", f"A-weighted {power}"),
-            "equivalent_power_level": ("speed", power_level(equivalent, frequency), "dB", _EQUIVALENT),
-        }
+        supported = {
+            name: ("speed", getattr(self, name), unit, words)
+            for name, unit, words in _SUPPORTED if getattr(self, name) is not None
+        }  # fmt: skip
+        variables = (
+            complex_entries(tuple(stored), single=True)
+            | supported
+            | {
+                "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
+                "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
+                "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
+                "pressure_level": ("speed", pressure_level(pressure, frequency), "dB", f"A-weighted {heard}"),
+                "power_level": ("speed", power_level(radiated, frequency), "dB", f"A-weighted {power}"),
+                "equivalent_power_level": ("speed", power_level(equivalent, frequency), "dB", _EQUIVALENT),
+            }
+        )
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return dataset(
             variables, coords=coordinates(speed=self.input_speed / RPM) | order,
             attrs={
                 "title": "what a sensor fixed on the housing hears", "sensor_angle": exact.sensor_angle,
-                "form": self.form, "points": self.points, "ring_teeth": exact.z_ring,
+                "form": self.form, "points": self.points, "method": exact.method, "ring_teeth": exact.z_ring,
                 "symmetry": self.symmetry, "rounding": rounding,
                 "microphone_distance": self.microphone.distance,
                 "microphone_angle": self.microphone.angle,
@@ -425,6 +458,9 @@ def describe_housing(data: xr.Dataset) -> Block:
         "microphone: {microphone_distance:g} m from the ring, which radiates over its face width in a rigid "
         "cylinder into air of {air_density:g} kg/m^3 and {sound_speed:g} m/s"
     ).format(**data.attrs)
+    if "one_way_level" in data:
+        columns["one way [m/s^2]"] = lambda one: f"{float(one.one_way_level):.4g}"
+        heard += "; one way: by the mesh forces of the ring without its supports"
     speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
     return tabulate("Housing", speeds, columns, (note, heard))
 

@@ -43,7 +43,9 @@ from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
-from femgear.housing.sound import Cylinder, Microphone
+from femgear.housing.sound import Cylinder, Microphone, surface_sound
+from femgear.housing.structure import FixedStructure, Support, supported_ring
+from femgear.housing.two_way import MeshPaths, TwoWayResponse, planet_groups, solve_two_way, structure_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
@@ -57,7 +59,7 @@ from femgear.solvers.linear.resonances import (
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
-from femgear.system.system import MeshExcitation, Response
+from femgear.system.system import MeshExcitation, Modes, Response
 from femgear.trains.elastic.checks import (
     HIGHEST_RESPONSE,
     NOTICEABLE,
@@ -68,6 +70,7 @@ from femgear.trains.elastic.checks import (
     checked_speeds,
     dynamics_warnings,
     fastest_mesh_frequency,
+    fixed_diameters,
     max_nodal_diameter,
     missing_level,
     runup_ends,
@@ -80,6 +83,7 @@ from femgear.trains.elastic.model import (
     RingModel,
     body_flexibility,
     elastic_set,
+    gears_alone,
     highest_mesh_mode,
     mesh_excitation,
     ring_field,
@@ -142,6 +146,10 @@ HARMONICS = 512
 speeds are excited less far, and `_lost_level` tells what they lose."""
 _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
+_FIXED_HARMONICS = 6
+"""Mesh harmonics of the excitation of a ring on supports, unless the case gives another number."""
+_SOUND = 20
+"""Speeds whose sound is computed together."""
 _LINES_TOGETHER = 8000
 """Harmonics of the run-up's speeds that are in memory at a time."""
 _BELOW_WAVES = 0.9
@@ -261,7 +269,7 @@ def mesh_and_ring_outputs(
     """
     model, basis, n_max = result.model, result.modes, result.max_diameter
     ring_rows = np.eye(len(model.system.M))[model.ring_slice]
-    field = ring_field(model, result.ring.modes, np.eye(len(ring_rows)), output, n_max).T
+    field = ring_field(result.ring.modes, np.eye(len(ring_rows)), output, n_max).T
     heard, n_meshes = np.ones(2 * n_max + 1, bool), model.rigid_directions.shape[1]
     if result.ring.modes.count % result.symmetry == 0:
         # planets in phase, of which one follows the other after a turn
@@ -446,6 +454,7 @@ def dynamics_parts(
     if slow.any():
         level_change[slow] = _lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
     short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
+    fixed = fixed_housing(case, modes) if case.housing.support else None
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     for own, part in parts_of_speeds(case, _HARMONIC * limit.response, memory):
         response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
@@ -464,8 +473,58 @@ def dynamics_parts(
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
             warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
             entries=dynamic_entries(part),
+            fixed=None if fixed is None else fixed.solved(carrier[own]),
         )  # fmt: skip
         progress("dynamics", float(own[-1] + 1), float(len(speeds)))
+
+
+def fixed_harmonics(case: Case) -> tuple[int, int]:
+    """Choose the mesh harmonics of excitation and response of a ring on supports, the same at all speeds."""
+    excited = case.dynamics.mesh_harmonics or _FIXED_HARMONICS
+    return excited, case.dynamics.response_harmonics or 2 * excited
+
+
+@dataclass(frozen=True)
+class FixedHousing:
+    """A ring on supports and the set in it: what the two-way solution takes beside speeds."""
+
+    gears: Modes
+    excitation: MeshExcitation
+    structure: FixedStructure
+    paths: MeshPaths
+    harmonics: tuple[int, int]
+
+    def solved(self, carrier: np.ndarray) -> tuple[FixedStructure, TwoWayResponse]:
+        """Solve at speeds of the carrier [rad/s]."""
+        kept = dict(zip(("excitation_harmonics", "response_harmonics"), self.harmonics))
+        given = self.gears, self.excitation, self.structure, self.paths
+        return self.structure, solve_two_way(*given, carrier, **kept)
+
+
+def fixed_housing(case: Case, modes: ModesResult) -> FixedHousing:
+    """Make the structure of the ring on its supports, and the gears against it.
+
+    The meshes keep what nodal diameters beyond those of the structure give way. Sensors stand around the
+    outer surface, enough for all nodal diameters of the ring.
+    """
+    gears, ring, n_max = planetary_set(case), modes.ring, fixed_diameters(case)
+    kept = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
+    excitation, flexibility = _excitation(gears, replace(ring, **kept), modes.state)
+    system, damping = gears_alone(modes.model, flexibility), case.dynamics.damping_ratio
+    harmonics = fixed_harmonics(case)
+    highest = _MODES_ABOVE * max(modes.reach, harmonics[1] * fastest_mesh_frequency(case, gears))
+    points, radius = 4 * (modes.max_diameter + 1), case.ring.outer_radius
+    supports = [Support(**{**one.model_dump(), "width": one.width / radius}) for one in case.housing.support]
+    structure = supported_ring(
+        ring.modes, supports, max_diameter=n_max, max_frequency=highest, damping_ratio=damping,
+        sensor_angles=2 * np.pi * np.arange(points) / points,
+    )  # fmt: skip
+    alone = solve_eigenproblem(
+        system, excitation.stiffness.mean(axis=1), damping_ratio=damping, max_frequency=highest
+    )
+    angles = tuple(float(one) for one in gears.planet_angles)
+    paths = MeshPaths(gears.ring.teeth, angles, ring.load_angle, modes.symmetry)
+    return FixedHousing(alone, excitation, structure, paths, harmonics)
 
 
 @one_blas_thread()
@@ -493,13 +552,56 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     place = dynamics.ring_teeth, np.array([s.carrier for s in dynamics.speeds]), case.housing.sensor_angle
     heard, width = case.housing.microphone, planetary_set(case).ring.face_width
     angle = case.housing.sensor_angle if heard.angle is None else heard.angle
-    return HousingResult(
+    found = HousingResult(
         input_speed=np.array(case.operation.speeds),
         exact=component_lines(dynamics.ring_radial, *place, symmetry=dynamics.symmetry),
         form=case.housing.form, points=case.housing.points, harmonics=dynamics.harmonics,
         symmetry=dynamics.symmetry, excitation_limit=dynamics.excitation_limit,
         cylinder=Cylinder(case.ring.outer_radius, width), microphone=Microphone(heard.distance, angle),
     )  # fmt: skip
+    return found if dynamics.fixed is None else _on_supports(case, dynamics, found, *dynamics.fixed)
+
+
+def _on_supports(
+    case: Case,
+    dynamics: DynamicsResult,
+    found: HousingResult,
+    structure: FixedStructure,
+    two_way: TwoWayResponse,
+) -> HousingResult:
+    """What the sensor and the microphone hear of the structure, by the forces of both routes."""
+    exact, points, top = found.exact, structure.sensor_shape.shape[1], dynamics.ring_radial.shape[-1] // 2
+    n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / points
+    wave = np.exp(1j * np.outer(place, n)) / points
+    at = np.real(wave.conj() @ np.exp(1j * n * exact.sensor_angle))
+    sensor = structure.combined(at[:, None])
+    order, moved = structure_lines(sensor, two_way)
+    lines = replace(exact, order=order, displacement=moved[:, 0], method="supports")
+    ahead = replace(two_way, force=_one_way_forces(case, dynamics.response.force, two_way))
+    _, behind = structure_lines(sensor, ahead)
+    sound = list[tuple[np.ndarray, ...]]()
+    for some in np.array_split(np.arange(len(moved)), -(-len(moved) // _SOUND)):
+        here = replace(two_way, carrier_speed=two_way.carrier_speed[some], force=two_way.force[some])
+        velocity = 1j * np.outer(lines.base_speed[some], order)[..., None]
+        waves = velocity * np.swapaxes(structure_lines(structure, here)[1], 1, 2) @ wave.conj()
+        sound.append(surface_sound(waves, n, lines.frequency[some], found.cylinder, found.microphone))
+    pressure, power, equivalent = (np.concatenate(parts) for parts in zip(*sound))
+    return replace(
+        found, exact=lines, pressure=pressure, power=power, equivalent_power=equivalent,
+        one_way_level=order_level(replace(lines, displacement=behind[:, 0])),
+        two_way_residual=two_way.residual, order_tail=two_way.tail,
+        excitation_limit=dynamics.response.mesh_frequency * fixed_harmonics(case)[0],
+    )  # fmt: skip
+
+
+def _one_way_forces(case: Case, force: np.ndarray, two_way: TwoWayResponse) -> np.ndarray:
+    """Forces of the ring without supports as those of the two-way solution, which lack side bands."""
+    leaders = planet_groups(planetary_set(case).planet_angles, two_way.symmetry)[0]
+    kept = min(two_way.harmonics + 1, force.shape[-1])
+    found = np.zeros(two_way.force.shape, complex)
+    at = np.flatnonzero(two_way.order % two_way.z_ring == 0)[:kept]
+    found[..., at] = force[:, np.concatenate([leaders, force.shape[1] // 2 + leaders]), :kept]
+    return found
 
 
 @one_blas_thread()
@@ -516,9 +618,8 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     first, last = _runup_ends(case, modes)
     slowest, fastest = first * one.mesh_frequency, last * one.mesh_frequency
     count = int(limited(case, [slowest], up_to, given=given).excitation[0])
-    field = ring_field(
-        modes.model, modes.ring.modes, basis.shape[modes.model.ring_slice].T, RADIAL, modes.max_diameter
-    )
+    motions = basis.shape[modes.model.ring_slice].T
+    field = ring_field(modes.ring.modes, motions, RADIAL, modes.max_diameter)
     forces = modal_forces(basis, excitation, count, output=field)
     met = crossings(forces, slowest, fastest, up_to if given is None else math.inf)
     resonance = met.mesh_frequency / one.mesh_frequency

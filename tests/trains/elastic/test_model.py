@@ -326,7 +326,7 @@ def test_ring_field_is_the_displacement_of_the_sectors(ring, output):
     rng = np.random.default_rng(5)
     count = model.ring_slice.stop - model.ring_slice.start
     q = rng.normal(size=count) + 1j * rng.normal(size=count)
-    field = ring_field(model, ring.modes, q, output, 26)
+    field = ring_field(ring.modes, q, output, 26)
     k = np.arange(108)
     ours = field @ np.exp(2j * np.pi * np.outer(np.arange(-26, 27), k) / 108)
     modes = ring.modes
@@ -347,7 +347,7 @@ def test_ring_turns_and_widens_the_way_its_teeth_are_pushed(ring, back_ring, sid
     # the free rotation of the mechanism moves no ring
     K = system.K + (system.W * SPRING) @ system.W.T
     q = np.linalg.lstsq(K, system.load)[0][model.ring_slice]
-    radial, around = (ring_field(model, own.modes, q, output, 26)[26] for output in (RADIAL, TANGENTIAL))
+    radial, around = (ring_field(own.modes, q, output, 26)[26] for output in (RADIAL, TANGENTIAL))
     # foundation of 1e10 N/m^3 on the outer surface
     turned = -side * 4 * TORQUE / (1e10 * 2 * np.pi * 0.1**2 * gears.ring.face_width)
     assert around == pytest.approx(turned, rel=1e-6)
