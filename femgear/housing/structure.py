@@ -3,7 +3,7 @@
 `FixedStructure` is all that the two-way solution (`femgear.housing.two_way`) knows of a casing, and
 what every source of one is converted to: natural frequencies, damping, mode shapes along the path of the
 meshes and at the sensors, and the static compliance of the modes left out. It comes from the cyclic modes of
-a ring on springs (`supported_ring`) or from arrays (`from_arrays`, `read_arrays`).
+a ring on springs (`supported_ring`) or from arrays (`from_arrays`), those of a file by `numpy.load`.
 
 At the housing angle phi the path has the displacement ``w_m(phi) = sum_n P[m, n] exp(i n phi)`` of mode m,
 n = -n_max .. n_max: the component, on the pitch circle, along the line of action of the planet-ring mesh,
@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -189,20 +188,6 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
         residual=fit @ (0.5 * (between + between.T)) @ fit.conj().T,
         sensor_residual=away @ fit.conj().T,
     )
-
-
-def read_arrays(path: Path, *, direction, max_diameter: int) -> FixedStructure:
-    """Read a structure from a file .npz that holds the arrays of `from_arrays` under their names.
-
-    CaseError: as there; E-FILE: no such file.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = dict(stored.items())
-    except (OSError, ValueError, AttributeError) as error:
-        message = f"the arrays of a structure cannot be read: {error}"
-        raise CaseError(message, code="E-FILE", file=str(path), limit="a file .npz of numbers") from error
-    return from_arrays(arrays, direction=direction, max_diameter=max_diameter)
 
 
 @dataclass(frozen=True)

@@ -36,42 +36,10 @@ _MEMORY = 6e7
 """Size of the speeds that are solved together [bytes]."""
 _BYTES = 130
 """Of one unknown order times one, while a speed is solved."""
+_MOST = 4e9
+"""What one speed may need [bytes]."""
 _RESIDUAL = 1e-8
 """Residual from which a solution is refused."""
-
-
-@dataclass(frozen=True)
-class TwoWayResponse(ReadOnlyArrays):
-    """Forces of the meshes over carrier orders: ``Re sum_k force[k] exp(i order[k] |carrier_speed| t)``.
-
-    Parameters
-    ----------
-    carrier_speed : (n_speeds,) array
-        [rad/s], counter-clockwise positive.
-    order : (n_orders,) int array
-        From 0 upwards.
-    force : (n_speeds, 2 G, n_orders) complex array
-        Of the sun-planet, then the planet-ring meshes of the G planets that the others repeat [N].
-    mesh_angle : (G,) array
-        Housing angles of those planet-ring meshes at time zero [rad].
-    residual : (n_speeds,) array
-        Of the planet-ring forces in their equations, over their norm.
-    tail : (n_speeds,) array
-        Share of the fluctuating planet-ring forces beyond n_max side bands (root of energies), a measure of
-        truncation.
-    harmonics, z_ring, symmetry : int
-        Mesh harmonics H, teeth of the ring, and N: turns by ``2 pi/N`` map the set on itself.
-    """
-
-    carrier_speed: np.ndarray
-    order: np.ndarray
-    force: np.ndarray
-    mesh_angle: np.ndarray
-    residual: np.ndarray
-    tail: np.ndarray
-    harmonics: int
-    z_ring: int
-    symmetry: int
 
 
 @dataclass(frozen=True)
@@ -96,6 +64,38 @@ class MeshPaths:
     symmetry: int = 1
 
 
+@dataclass(frozen=True)
+class TwoWayResponse(ReadOnlyArrays):
+    """Forces of the meshes over carrier orders: ``Re sum_k force[k] exp(i order[k] |carrier_speed| t)``.
+
+    Parameters
+    ----------
+    carrier_speed : (n_speeds,) array
+        [rad/s], counter-clockwise positive.
+    order : (n_orders,) int array
+        From 0 upwards.
+    force : (n_speeds, 2 G, n_orders) complex array
+        Of the sun-planet, then the planet-ring meshes of the G planets that the others repeat [N].
+    residual : (n_speeds,) array
+        Of the planet-ring forces in their equations, over their norm.
+    tail : (n_speeds,) array
+        Share of the fluctuating planet-ring forces beyond n_max side bands (root of energies), a measure of
+        truncation.
+    harmonics, side_bands : int
+        Mesh harmonics H, and side bands on either side of each.
+    paths : MeshPaths
+    """
+
+    carrier_speed: np.ndarray
+    order: np.ndarray
+    force: np.ndarray
+    residual: np.ndarray
+    tail: np.ndarray
+    harmonics: int
+    side_bands: int
+    paths: MeshPaths
+
+
 def solve_two_way(
     gears: Modes,
     excitation: MeshExcitation,
@@ -105,6 +105,7 @@ def solve_two_way(
     *,
     excitation_harmonics: int = 6,
     response_harmonics: int = 6,
+    side_bands: int | None = None,
 ) -> TwoWayResponse:
     """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
 
@@ -121,24 +122,33 @@ def solve_two_way(
         [rad/s], counter-clockwise positive, all of one direction.
     excitation_harmonics, response_harmonics : int
         Mesh harmonics kept in the data, and in the response.
+    side_bands : int, optional
+        Of every harmonic of the forces; default ``2 n_max``. An axisymmetric structure makes none.
 
     Raises
     ------
     CaseError
         ``E-RANGE``, ``E-SPEED``, ``E-SHAPE``, ``E-HARMONICS``, ``E-PERIODS``, ``E-TEETH``; ``E-SYMMETRY``:
-        planets that do not repeat one another.
+        planets that do not repeat one another; ``E-MEMORY``.
     ConvergenceError
         Equations that are singular (E-RESONANCE).
     """
     kept, angles = (excitation_harmonics, response_harmonics), np.asarray(paths.planet_angles, float)
     speeds = _checked(gears, excitation, carrier_speed, paths, structure.max_diameter, *kept)
     groups = planet_groups(angles, paths.symmetry)
-    orders = _Orders(paths.z_ring, kept[1], structure.max_diameter, paths.symmetry, int(np.sign(speeds[0])))
+    bands = 2 * structure.max_diameter if side_bands is None else side_bands
+    orders = _Orders(paths, kept[1], structure.max_diameter, bands, int(np.sign(speeds[0])))
     one_sided = mesh_harmonics(excitation, kept[0])
     _check_repeated(one_sided, orders, *groups)
     known, place = _Gears.build(gears, one_sided, orders, *groups), angles[groups[0]] + paths.load_angle
     count, n_orders = len(place), len(orders.positive)
-    step = max(int(_MEMORY / (_BYTES * (count * n_orders) ** 2)), 1)
+    size = _BYTES * (count * n_orders) ** 2
+    if size > _MOST:
+        raise CaseError(
+            f"{count} planets with {n_orders} carrier orders need {size / 1e9:.2g} GB", code="E-MEMORY",
+            limit=f"{_MOST / 1e9:g} GB", remedy="take fewer mesh harmonics or nodal diameters",
+        )  # fmt: skip
+    step = max(int(_MEMORY / size), 1)
     force = np.empty((len(speeds), 2 * count, n_orders), complex)
     residual, tail = np.empty((2, len(speeds)))
     for first in range(0, len(speeds), step):
@@ -151,43 +161,35 @@ def solve_two_way(
             f"residual {residual[worst]:.3e} of the two-way equations at {speeds[worst]:.6g} rad/s",
             code="E-RESONANCE", limit=f"{_RESIDUAL:g}", remedy="give gears and structure some damping",
         )  # fmt: skip
-    return TwoWayResponse(
-        speeds, orders.positive, force, place, residual, tail, kept[1], paths.z_ring, paths.symmetry
-    )
+    return TwoWayResponse(speeds, orders.positive, force, residual, tail, kept[1], bands, paths)
 
 
-def structure_lines(
-    structure: FixedStructure, response: TwoWayResponse, sensors=slice(None)
-) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the lines of sensors on the structure under forces that run around in it.
+def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the lines of the sensors of a structure under forces that run around in it.
 
     Carrier orders (n_orders,) from 0, multiples of the symmetry, and displacements
-    (n_speeds, n_sensors, n_orders) [m] of ``u(t) = Re sum_k u[k] exp(i order[k] |carrier_speed| t)``, of some
-    of the sensors where they are chosen. The sensors stand still: nothing is modulated after that.
+    (n_speeds, n_sensors, n_orders) [m] of ``u(t) = Re sum_k u[k] exp(i order[k] |carrier_speed| t)``. The
+    sensors stand still: nothing is modulated after that.
     """
-    s = int(np.sign(response.carrier_speed[0]))
-    orders = _Orders(response.z_ring, response.harmonics, structure.max_diameter, response.symmetry, s)
-    speed, G = np.abs(response.carrier_speed), len(response.mesh_angle)
-    ring = _mirrored(response.force[:, G:] * np.where(response.order == 0, 1.0, 0.5))
-    ring = ring.reshape(len(speed), G, len(orders.h), -1)
-    parts, found = list[np.ndarray](), list[int]()
-    for h in range(orders.harmonics + 1):
-        for r, (into, of) in orders.scatter(h):
-            K = h * response.z_ring + r
-            if K < 0:
-                continue
-            load = np.zeros((len(speed), 2 * orders.n_max + 1), complex)
-            wave = np.exp(-1j * np.outer(orders.n[of], response.mesh_angle))
-            load[:, of] = response.symmetry * np.einsum(
-                "ng,sgn->sn", wave, ring[:, :, h + orders.harmonics, into]
-            )
-            modal = _receptance(structure, speed, np.array([K]))[:, 0] * (
-                load @ structure.ring_shape.conj().T
-            )
-            moved = modal @ structure.sensor_shape[:, sensors] + load @ structure.sensor_residual[sensors].T
-            parts.append((moved if K == 0 else 2 * moved)[..., None])
-            found.append(K)
-    lines, order = np.concatenate(parts, axis=-1), np.array(found)
+    paths, H, speed = response.paths, response.harmonics, np.abs(response.carrier_speed)
+    s, leaders = (
+        int(np.sign(response.carrier_speed[0])),
+        planet_groups(paths.planet_angles, paths.symmetry)[0],
+    )
+    orders = _Orders(paths, H, structure.max_diameter, response.side_bands, s)
+    place = np.array(paths.planet_angles)[leaders] + paths.load_angle
+    ring = _mirrored(response.force[:, len(place) :] * np.where(response.order == 0, 1.0, 0.5))
+    ring = ring.reshape(len(speed), len(place), 2 * H + 1, -1)
+    wave = paths.symmetry * np.exp(-1j * np.outer(place, orders.n))
+    near = [(h, *one) for h in range(H + 1) for one in orders.scatter(h)]
+    near = [(K, h, into, of) for h, r, (into, of) in near if (K := h * paths.z_ring + r) >= 0]
+    load = np.zeros((len(speed), len(near), len(orders.n)), complex)
+    for i, (_, h, into, of) in enumerate(near):
+        load[:, i, of] = np.einsum("gn,sgn->sn", wave[:, of], ring[:, :, h + H, into])
+    order = np.array([K for K, *_ in near])
+    modal = _receptance(structure, speed, order) * (load @ structure.ring_shape.conj().T)
+    lines = modal @ structure.sensor_shape + load @ structure.sensor_residual.T
+    lines = np.swapaxes(lines, 1, 2) * np.where(order == 0, 1.0, 2.0)
     return order, np.where(order == 0, np.real(lines), lines)
 
 
@@ -250,21 +252,11 @@ def planet_groups(planet_angles, symmetry: int) -> tuple[np.ndarray, np.ndarray,
 class _Orders:
     """Carrier orders ``h z_ring + r`` and how the structure connects them, with the sense of the carrier."""
 
-    z_ring: int
+    paths: MeshPaths
     harmonics: int
     n_max: int
-    symmetry: int
+    side_bands: int
     sense: int
-
-    @property
-    def h(self) -> np.ndarray:
-        """Mesh harmonics, both signs."""
-        return np.arange(-self.harmonics, self.harmonics + 1)
-
-    @property
-    def r(self) -> np.ndarray:
-        """Side bands."""
-        return np.arange(-2 * self.n_max, 2 * self.n_max + 1)
 
     @property
     def n(self) -> np.ndarray:
@@ -274,7 +266,8 @@ class _Orders:
     @property
     def every(self) -> np.ndarray:
         """All orders (2 H + 1, R), ascending; the one at the same place from the end is the negative."""
-        return self.h[:, None] * self.z_ring + self.r
+        h = np.arange(-self.harmonics, self.harmonics + 1)
+        return h[:, None] * self.paths.z_ring + np.arange(-self.side_bands, self.side_bands + 1)
 
     @property
     def positive(self) -> np.ndarray:
@@ -283,10 +276,11 @@ class _Orders:
 
     def scatter(self, h: int):
         """Side bands r_K of the structure's orders near a harmonic; which r and n stand for ``r_K + s n``."""
-        for r in range(-3 * self.n_max, 3 * self.n_max + 1):
-            if (h * self.z_ring + r) % self.symmetry == 0:
-                place = r + self.sense * self.n + 2 * self.n_max
-                of = np.flatnonzero((place >= 0) & (place <= 4 * self.n_max))
+        reach = self.side_bands + self.n_max
+        for r in range(-reach, reach + 1):
+            if (h * self.paths.z_ring + r) % self.paths.symmetry == 0:
+                place = r + self.sense * self.n + self.side_bands
+                of = np.flatnonzero((place >= 0) & (place <= 2 * self.side_bands))
                 yield r, (place[of], of)
 
 
@@ -306,13 +300,17 @@ class _Gears:
     @classmethod
     def build(cls, modes: Modes, one_sided, orders: _Orders, leaders, group, turn) -> _Gears:
         """From harmonics (2N, count + 1) of stiffness, deflection and force of all meshes."""
-        N, H, meshes = orders.symmetry, orders.harmonics, np.concatenate([leaders, len(group) + leaders])
+        N, H, meshes = (
+            orders.paths.symmetry,
+            orders.harmonics,
+            np.concatenate([leaders, len(group) + leaders]),
+        )
         owner = np.concatenate([group, len(leaders) + group])
         phase = np.exp(2j * np.pi * (orders.sense * np.outer(np.arange(N), turn) % N) / N)
         member = (owner == np.arange(len(meshes))[:, None]) * np.tile(phase, 2)[:, None]
         stiffness, deflection, force = (_two_sided(values[meshes]) for values in one_sided)
         count = stiffness.shape[1] // 2
-        apart = np.subtract.outer(orders.h, orders.h)
+        apart = np.subtract.outer(np.arange(2 * H + 1), np.arange(2 * H + 1))
         inside = np.abs(apart) <= count
         product = np.where(inside, stiffness[:, np.where(inside, apart, 0) + count], 0.0)
         wide = ((0, 0), (H - count, H - count))
@@ -328,12 +326,13 @@ class _Gears:
 
         ``a`` (S, 2 G, 2 H + 1), which has no side bands, and ``Y`` (S, R, 2 G, 2 H + 1, G, 2 H + 1).
         """
-        (S, R), (n, size), G = (len(speed), len(orders.r)), self.forcing.shape, len(self.rows) // 2
+        every, N = orders.every, orders.paths.symmetry
+        (S, R), (n, size), G = (len(speed), every.shape[1]), self.forcing.shape, len(self.rows) // 2
         T = np.empty((S, R, size, n, n), complex)
-        for c in range(orders.symmetry):
-            h, r = np.nonzero(orders.every % orders.symmetry == c)
+        for c in range(N):
+            h, r = np.nonzero(every % N == c)
             pairs = (self.rows[:, None] * self.folded[c]).reshape(n * n, -1)
-            modal = compliance(self.modes, speed[:, None] * orders.every[h, r])
+            modal = compliance(self.modes, speed[:, None] * every[h, r])
             T[:, r, h] = (modal @ pairs.T).reshape(S, -1, n, n) + self.residual[c]
         # unknowns (mesh, harmonic): d + T (k - mean) d = d_load - T F' + T k u
         fluctuating = self.product - self.mean[:, None, None] * np.eye(size)
@@ -361,9 +360,9 @@ def _two_sided(one_sided: np.ndarray) -> np.ndarray:
 
 def _check_repeated(one_sided, orders: _Orders, leaders, group, turn) -> None:
     """Refuse planets whose meshes do not repeat those of their leaders (E-SYMMETRY)."""
-    N, harmonic = orders.symmetry, np.arange(one_sided[0].shape[1])
+    N, harmonic = orders.paths.symmetry, np.arange(one_sided[0].shape[1])
     # whole turns have no rounding
-    whole = turn[:, None] * harmonic * (orders.sense * orders.z_ring % N)
+    whole = turn[:, None] * harmonic * (orders.sense * orders.paths.z_ring % N)
     shift = np.exp(2j * np.pi * (whole % N) / N)
     for name, values in zip(("stiffness", "deflection", "force"), one_sided):
         apart = [half - shift * half[leaders][group] for half in np.split(values, 2)]
@@ -384,15 +383,15 @@ def _receptance(structure: FixedStructure, speed: np.ndarray, order: np.ndarray)
 
 def _ring(structure: FixedStructure, orders: _Orders, place: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """What the ring gives way at the leaders per force, harmonics 0 .. H: (S, H + 1, G, R, G, R) [m/N]."""
-    P, n, R, G = structure.ring_shape, orders.n, len(orders.r), len(place)
+    P, n, R, G = structure.ring_shape, orders.n, orders.every.shape[1], len(place)
     pairs = (P[:, :, None] * P[:, None].conj()).reshape(len(P), -1)
     wave = np.exp(1j * np.outer(place, n))
     found = np.zeros((len(speed), orders.harmonics + 1, G, R, G, R), complex)
     for h in range(orders.harmonics + 1):
         places = list(orders.scatter(h))
-        order = h * orders.z_ring + np.array([r for r, _ in places])
+        order = h * orders.paths.z_ring + np.array([r for r, _ in places])
         every = (_receptance(structure, speed, order) @ pairs).reshape(len(speed), len(order), len(n), len(n))
-        every = orders.symmetry * (every + structure.residual)
+        every = orders.paths.symmetry * (every + structure.residual)
         for one, (_, (r, of)) in zip(np.moveaxis(every, 1, 0), places):
             # places rise or fall by one
             to, part = slice(r.min(), r.max() + 1), of[np.argsort(r)]
@@ -410,7 +409,7 @@ def _solve(gears: _Gears, structure: FixedStructure, place, orders: _Orders, spe
     half = _ring(structure, orders, place, speed)
     # of negative harmonics: both side bands change their sign
     R = np.concatenate([half[:, :0:-1, :, ::-1, :, ::-1].conj(), half], axis=1)
-    (S, G, bands), size, H = (len(speed), len(place), len(orders.r)), len(orders.h), orders.harmonics
+    (size, bands), S, G, H = orders.every.shape, len(speed), len(place), orders.harmonics
     middle = size * bands // 2
     source = np.zeros((S, G, size, bands), complex)
     source[..., bands // 2] = a[:, G:]
@@ -434,7 +433,8 @@ def _solve(gears: _Gears, structure: FixedStructure, place, orders: _Orders, spe
     norm = np.linalg.norm(two_sided.reshape(S, -1), axis=1)
     residual = np.linalg.norm((every[:, G:] - two_sided).reshape(S, -1), axis=1) / norm
     energy = (np.abs(force[:, G:]) ** 2).sum(axis=1)[:, 1:]
-    beyond = np.abs((orders.positive[1:] + orders.z_ring // 2) % orders.z_ring - orders.z_ring // 2)
+    z, half_band = orders.paths.z_ring, orders.paths.z_ring // 2
+    beyond = np.abs((orders.positive[1:] + half_band) % z - half_band)
     total = np.maximum(energy.sum(axis=1), np.finfo(float).tiny)
     return force, residual, np.sqrt(energy[:, beyond > orders.n_max].sum(axis=1) / total)
 

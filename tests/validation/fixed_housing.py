@@ -390,7 +390,14 @@ def green() -> tuple[Row, ...]:
     constant[..., 0] = 1.0
     order = np.arange(2 * top + 1)
     load = TwoWayResponse(
-        np.array([speed]), order, constant, np.zeros(1), np.zeros(1), np.zeros(1), 0, 6 * top + 1, 1
+        np.array([speed]),
+        np.zeros(1, int),
+        constant[..., :1],
+        np.zeros(1),
+        np.zeros(1),
+        0,
+        0,
+        MeshPaths(1, (0.0,)),
     )
     heard_order, heard = structure_lines(structure, load)
     n = np.arange(1, top + 1)

@@ -401,7 +401,9 @@ def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], 
     from matplotlib.ticker import MaxNLocator
 
     own = np.rint(lines.order / lines.z_ring) == harmonic
-    order, n, highest = lines.order[own], _diameters(lines)[own], np.full(own.sum(), -np.inf)
+    order, highest = lines.order[own], np.full(own.sum(), -np.inf)
+    # of a ring on supports a line has many
+    n = np.abs(nodal_diameters(lines)[own]) if (one := lines.method == "exact") else [""] * len(order)
     for (text, amplitude), colour, side in zip(amplitudes.items(), (BLUE, VERMILION), (-0.2, 0.2)):
         relative = amplitude[own] / (amplitude[own].max(initial=0.0) or 1.0)
         level = 20 * np.log10(np.maximum(relative, 1e-30))
@@ -410,21 +412,14 @@ def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], 
         highest = np.maximum(highest, level)
     shown = highest > _BAND_FLOOR
     for k in np.flatnonzero(shown):
-        ax.text(order[k], highest[k] + 1.0, n[k], ha="center", fontsize=SMALL)
+        ax.text(order[k], highest[k] + 1.0, str(n[k]), ha="center", fontsize=SMALL)
     reach = np.abs(order[shown] - harmonic * lines.z_ring).max(initial=4) + 2
     ax.set_xlim(harmonic * lines.z_ring - reach, harmonic * lines.z_ring + reach)
     ax.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=_STEPS, integer=True))
     ax.set_ylim(_BAND_FLOOR, 10)
     title = f"mesh harmonic {harmonic} (order {harmonic * lines.z_ring})"
-    title += "; numbers: nodal diameters" if lines.method == "exact" else ""
+    title += "; numbers: nodal diameters" if one else ""
     label(ax, "carrier order [1]", "level [dB re\nlargest line]", title)
-
-
-def _diameters(lines: SensorLines) -> np.ndarray:
-    """Nodal diameters (n_orders,) as they are written; empty where a line has many."""
-    if lines.method != "exact":
-        return np.full(len(lines.order), "")
-    return np.abs(nodal_diameters(lines)).astype(str)
 
 
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:

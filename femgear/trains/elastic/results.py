@@ -7,7 +7,7 @@ belong to real motions by ``x(t) = Re sum_h X_h exp(i h omega t)``.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -78,11 +78,11 @@ _FIRST, _STRONGEST = 6, 4
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
-_SUPPORTED = (
-    ("one_way_level", "m/s^2", "level by the mesh forces of the ring without its supports"),
-    ("two_way_residual", "1", "residual of the two-way equations"),
-    ("order_tail", "1", "share of the mesh forces in the outer half of the side bands"),
-)
+_SUPPORTED = {
+    "one_way_level": ("m/s^2", "level by the mesh forces of the ring without its supports"),
+    "two_way_residual": ("1", "residual of the two-way equations"),
+    "order_tail": ("1", "share of the mesh forces in the outer half of the side bands"),
+}
 _DIRECTIONS = {RADIAL: "radial", TANGENTIAL: "tangential"}
 
 
@@ -162,8 +162,8 @@ class DynamicsResult:
     ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial``
     (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its outer surface, as
     ``ring_tangential`` (H + 1, 2 n_max + 1) at the last speed; of a ring on supports ``fixed`` are
-    its structure, whose sensors stand at equal distances around its outer surface, and the forces in it, all
-    else is the ring without supports; ``symmetry`` is that of `ModesResult`,
+    its structure, whose sensors stand at equal distances around its outer surface, the forces in it, and
+    those in the ring without supports, which all else is of; ``symmetry`` is that of `ModesResult`,
     ``harmonics`` their number at the speed of the case that has the most. The excitation ends at
     ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
     changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at. ``warnings``
@@ -185,7 +185,7 @@ class DynamicsResult:
     compared_to: float
     warnings: tuple[Finding, ...]
     entries: Entries
-    fixed: tuple[FixedStructure, TwoWayResponse] | None = None
+    fixed: tuple[FixedStructure, TwoWayResponse, TwoWayResponse] | None = None
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
@@ -223,11 +223,9 @@ class HousingResult:
 
     ``exact`` are the lines of the components, ``lines`` those of the case's ``form``, "exact" or "linear"
     (interpolated over ``points`` points of the ring). The excitation ends at ``excitation_limit`` (speeds,)
-    [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`. Of a ring on supports ``pressure``
-    (speeds, n_orders) [Pa] are the lines of the microphone, ``power`` and ``equivalent_power`` [W] those that
-    all of the surface radiates, ``one_way_level`` (speeds,) [m/s^2] the level by the forces of the ring
-    without supports, ``two_way_residual`` and ``order_tail`` (speeds,)
-    are those of `TwoWayResponse`.
+    [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`. Of a ring on supports ``sound`` are
+    the three results of `surface_sound` (speeds, n_orders), and ``supported`` has the numbers (speeds,) of
+    `_SUPPORTED`.
     """
 
     input_speed: np.ndarray
@@ -239,12 +237,8 @@ class HousingResult:
     excitation_limit: np.ndarray
     cylinder: Cylinder
     microphone: Microphone
-    pressure: np.ndarray | None = None
-    power: np.ndarray | None = None
-    equivalent_power: np.ndarray | None = None
-    one_way_level: np.ndarray | None = None
-    two_way_residual: np.ndarray | None = None
-    order_tail: np.ndarray | None = None
+    sound: tuple[np.ndarray, ...] | None = None
+    supported: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @cached_property
     def lines(self) -> SensorLines:
@@ -262,33 +256,26 @@ class HousingResult:
             )
         lines = ("lines", "speed order", values, "m", words)
         cylinder, frequency = self.cylinder, exact.frequency
-        pressure, radiated, equivalent = self.pressure, self.power, self.equivalent_power
         stored: list[Any] = [lines]
-        if pressure is None:
+        if self.sound is None:
             pressure = sound_pressure(exact, cylinder, self.microphone)
             radiated, equivalent = (sound_power(exact, cylinder, equivalent=one) for one in (False, True))
         else:
+            pressure, radiated, equivalent = self.sound
             stored.append(("pressure", "speed order", pressure, "Pa", "sound pressure at the microphone"))
         heard, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
-        supported = {
-            name: ("speed", getattr(self, name), unit, words)
-            for name, unit, words in _SUPPORTED if getattr(self, name) is not None
-        }  # fmt: skip
-        variables = (
-            complex_entries(tuple(stored), single=True)
-            | supported
-            | {
-                "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
-                "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
-                "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
-                "pressure_level": ("speed", pressure_level(pressure, frequency), "dB", f"A-weighted {heard}"),
-                "power_level": ("speed", power_level(radiated, frequency), "dB", f"A-weighted {power}"),
-                "equivalent_power_level": ("speed", power_level(equivalent, frequency), "dB", _EQUIVALENT),
-            }
-        )
+        supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in self.supported.items()}
+        variables = complex_entries(tuple(stored), single=True) | {
+            "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
+            "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
+            "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
+            "pressure_level": ("speed", pressure_level(pressure, frequency), "dB", f"A-weighted {heard}"),
+            "power_level": ("speed", power_level(radiated, frequency), "dB", f"A-weighted {power}"),
+            "equivalent_power_level": ("speed", power_level(equivalent, frequency), "dB", _EQUIVALENT),
+        }
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return dataset(
-            variables, coords=coordinates(speed=self.input_speed / RPM) | order,
+            variables | supported, coords=coordinates(speed=self.input_speed / RPM) | order,
             attrs={
                 "title": "what a sensor fixed on the housing hears", "sensor_angle": exact.sensor_angle,
                 "form": self.form, "points": self.points, "method": exact.method, "ring_teeth": exact.z_ring,

@@ -13,7 +13,7 @@ at all speeds, and the level of the housing is computed again with twice that fr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -45,7 +45,7 @@ from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
 from femgear.housing.sound import Cylinder, Microphone, surface_sound
 from femgear.housing.structure import FixedStructure, Support, supported_ring
-from femgear.housing.two_way import MeshPaths, TwoWayResponse, planet_groups, solve_two_way, structure_lines
+from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
@@ -59,7 +59,7 @@ from femgear.solvers.linear.resonances import (
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
-from femgear.system.system import MeshExcitation, Modes, Response
+from femgear.system.system import MeshExcitation, Response
 from femgear.trains.elastic.checks import (
     HIGHEST_RESPONSE,
     NOTICEABLE,
@@ -473,7 +473,7 @@ def dynamics_parts(
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
             warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
             entries=dynamic_entries(part),
-            fixed=None if fixed is None else fixed.solved(carrier[own]),
+            fixed=None if fixed is None else (fixed[0], *(solved(carrier[own]) for solved in fixed[1:])),
         )  # fmt: skip
         progress("dynamics", float(own[-1] + 1), float(len(speeds)))
 
@@ -484,47 +484,39 @@ def fixed_harmonics(case: Case) -> tuple[int, int]:
     return excited, case.dynamics.response_harmonics or 2 * excited
 
 
-@dataclass(frozen=True)
-class FixedHousing:
-    """A ring on supports and the set in it: what the two-way solution takes beside speeds."""
+def fixed_housing(
+    case: Case, modes: ModesResult
+) -> tuple[FixedStructure, Callable[[np.ndarray], TwoWayResponse], Callable[[np.ndarray], TwoWayResponse]]:
+    """Make the structure of the ring on its supports, and what solves at speeds of the carrier [rad/s].
 
-    gears: Modes
-    excitation: MeshExcitation
-    structure: FixedStructure
-    paths: MeshPaths
-    harmonics: tuple[int, int]
-
-    def solved(self, carrier: np.ndarray) -> tuple[FixedStructure, TwoWayResponse]:
-        """Solve at speeds of the carrier [rad/s]."""
-        kept = dict(zip(("excitation_harmonics", "response_harmonics"), self.harmonics))
-        given = self.gears, self.excitation, self.structure, self.paths
-        return self.structure, solve_two_way(*given, carrier, **kept)
-
-
-def fixed_housing(case: Case, modes: ModesResult) -> FixedHousing:
-    """Make the structure of the ring on its supports, and the gears against it.
+    Two of these: the set in the structure, and in the ring without supports, whose forces act one way.
 
     The meshes keep what nodal diameters beyond those of the structure give way. Sensors stand around the
     outer surface, enough for all nodal diameters of the ring.
     """
     gears, ring, n_max = planetary_set(case), modes.ring, fixed_diameters(case)
-    kept = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
-    excitation, flexibility = _excitation(gears, replace(ring, **kept), modes.state)
+    low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
+    excitation, flexibility = _excitation(gears, replace(ring, **low), modes.state)
     system, damping = gears_alone(modes.model, flexibility), case.dynamics.damping_ratio
     harmonics = fixed_harmonics(case)
     highest = _MODES_ABOVE * max(modes.reach, harmonics[1] * fastest_mesh_frequency(case, gears))
     points, radius = 4 * (modes.max_diameter + 1), case.ring.outer_radius
     supports = [Support(**{**one.model_dump(), "width": one.width / radius}) for one in case.housing.support]
-    structure = supported_ring(
-        ring.modes, supports, max_diameter=n_max, max_frequency=highest, damping_ratio=damping,
-        sensor_angles=2 * np.pi * np.arange(points) / points,
-    )  # fmt: skip
+    known = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
+    around = 2 * np.pi * np.arange(points) / points
+    structure = supported_ring(ring.modes, supports, **known, sensor_angles=around)
+    axisymmetric = supported_ring(ring.modes, (), **known)
     alone = solve_eigenproblem(
         system, excitation.stiffness.mean(axis=1), damping_ratio=damping, max_frequency=highest
     )
     angles = tuple(float(one) for one in gears.planet_angles)
     paths = MeshPaths(gears.ring.teeth, angles, ring.load_angle, modes.symmetry)
-    return FixedHousing(alone, excitation, structure, paths, harmonics)
+    kept = dict(zip(("excitation_harmonics", "response_harmonics"), harmonics))
+    return (
+        structure,
+        partial(solve_two_way, alone, excitation, structure, paths, **kept),
+        partial(solve_two_way, alone, excitation, axisymmetric, paths, side_bands=0, **kept),
+    )
 
 
 @one_blas_thread()
@@ -568,6 +560,7 @@ def _on_supports(
     found: HousingResult,
     structure: FixedStructure,
     two_way: TwoWayResponse,
+    one_way: TwoWayResponse,
 ) -> HousingResult:
     """What the sensor and the microphone hear of the structure, by the forces of both routes."""
     exact, points, top = found.exact, structure.sensor_shape.shape[1], dynamics.ring_radial.shape[-1] // 2
@@ -577,31 +570,19 @@ def _on_supports(
     sensor = structure.combined(at[:, None])
     order, moved = structure_lines(sensor, two_way)
     lines = replace(exact, order=order, displacement=moved[:, 0], method="supports")
-    ahead = replace(two_way, force=_one_way_forces(case, dynamics.response.force, two_way))
-    _, behind = structure_lines(sensor, ahead)
     sound = list[tuple[np.ndarray, ...]]()
     for some in np.array_split(np.arange(len(moved)), -(-len(moved) // _SOUND)):
         here = replace(two_way, carrier_speed=two_way.carrier_speed[some], force=two_way.force[some])
         velocity = 1j * np.outer(lines.base_speed[some], order)[..., None]
         waves = velocity * np.swapaxes(structure_lines(structure, here)[1], 1, 2) @ wave.conj()
         sound.append(surface_sound(waves, n, lines.frequency[some], found.cylinder, found.microphone))
-    pressure, power, equivalent = (np.concatenate(parts) for parts in zip(*sound))
+    order, moved = structure_lines(sensor, one_way)
+    level = order_level(replace(lines, order=order, displacement=moved[:, 0]))
+    told = {"one_way_level": level, "two_way_residual": two_way.residual, "order_tail": two_way.tail}
     return replace(
-        found, exact=lines, pressure=pressure, power=power, equivalent_power=equivalent,
-        one_way_level=order_level(replace(lines, displacement=behind[:, 0])),
-        two_way_residual=two_way.residual, order_tail=two_way.tail,
+        found, exact=lines, supported=told, sound=tuple(np.concatenate(parts) for parts in zip(*sound)),
         excitation_limit=dynamics.response.mesh_frequency * fixed_harmonics(case)[0],
     )  # fmt: skip
-
-
-def _one_way_forces(case: Case, force: np.ndarray, two_way: TwoWayResponse) -> np.ndarray:
-    """Forces of the ring without supports as those of the two-way solution, which lack side bands."""
-    leaders = planet_groups(planetary_set(case).planet_angles, two_way.symmetry)[0]
-    kept = min(two_way.harmonics + 1, force.shape[-1])
-    found = np.zeros(two_way.force.shape, complex)
-    at = np.flatnonzero(two_way.order % two_way.z_ring == 0)[:kept]
-    found[..., at] = force[:, np.concatenate([leaders, force.shape[1] // 2 + leaders]), :kept]
-    return found
 
 
 @one_blas_thread()
