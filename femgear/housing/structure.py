@@ -70,11 +70,7 @@ class FixedStructure(ReadOnlyArrays):
 
     def __post_init__(self):
         super().__post_init__()
-        m, width, sensors = (
-            len(self.natural_frequency),
-            self.ring_shape.shape[-1],
-            self.sensor_shape.shape[-1],
-        )
+        (m, width), sensors = self.ring_shape.shape, self.sensor_shape.shape[-1]
         shapes = {
             "natural_frequency": (m,), "damping_ratio": (m,), "ring_shape": (m, width),
             "sensor_shape": (m, sensors), "residual": (width, width), "sensor_residual": (sensors, width),
@@ -89,27 +85,22 @@ class FixedStructure(ReadOnlyArrays):
                 )  # fmt: skip
         if not (self.natural_frequency > 0).all():
             raise CaseError(
-                "a mode of the structure is free, has a negative stiffness, or is no number",
-                code="E-MECHANISM", key="natural_frequency", value=float(self.natural_frequency.min()),
-                limit="above 0 rad/s", remedy="hold the structure: supports, bolts, a foundation",
+                "a mode of the structure is free or has a negative stiffness", code="E-MECHANISM",
+                key="natural_frequency", value=float(self.natural_frequency.min()), limit="above 0 rad/s",
+                remedy="hold the structure: supports, bolts, a foundation",
             )  # fmt: skip
         if not ((self.damping_ratio >= 0) & (self.damping_ratio < 1)).all():
-            raise CaseError(
-                "damping ratios of the structure", code="E-DAMPING", key="damping_ratio",
-                value=self.damping_ratio.tolist(), limit="0 or more, below 1",
-            )  # fmt: skip
-        pairs = {
-            "ring_shape": (self.ring_shape, np.conj(self.ring_shape[:, ::-1])),
-            "residual": (self.residual, np.conj(self.residual.T)),
-            "residual of -n": (self.residual, np.conj(self.residual[::-1, ::-1])),
-            "sensor_residual": (self.sensor_residual, np.conj(self.sensor_residual[:, ::-1])),
-        }
-        for name, (one, other) in pairs.items():
-            if np.abs(one - other).max(initial=0.0) > _ROUNDING * np.abs(one).max(initial=0.0):
-                raise CaseError(
-                    f"the coefficients {name} are those of no real displacement", code="E-SYMMETRY",
-                    key=name.split()[0], limit="coefficient -n is the conjugate of n, compliances Hermitian",
-                )  # fmt: skip
+            message, limit = "damping ratios of the structure", "0 or more, below 1"
+            raise CaseError(message, code="E-DAMPING", value=self.damping_ratio.tolist(), limit=limit)
+        for name, one, other in (
+            ("ring_shape", self.ring_shape, self.ring_shape[:, ::-1]),
+            ("residual", self.residual, self.residual.T),
+            ("residual", self.residual, self.residual[::-1, ::-1]),
+            ("sensor_residual", self.sensor_residual, self.sensor_residual[:, ::-1]),
+        ):
+            if np.abs(one - other.conj()).max(initial=0.0) > _ROUNDING * np.abs(one).max(initial=0.0):
+                message, limit = "no real displacement has such coefficients", "that of -n conjugate to n"
+                raise CaseError(message, code="E-SYMMETRY", key=name, limit=f"{limit}, compliances Hermitian")
 
     @property
     def max_diameter(self) -> int:

@@ -103,8 +103,7 @@ def solve_two_way(
     paths: MeshPaths,
     carrier_speed,
     *,
-    excitation_harmonics: int = 6,
-    response_harmonics: int = 6,
+    harmonics: tuple[int, int] = (6, 12),
     side_bands: int | None = None,
 ) -> TwoWayResponse:
     """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
@@ -113,14 +112,14 @@ def solve_two_way(
     ----------
     gears : Modes
         Of gears and carrier with mean mesh stiffnesses against a rigid ring: N sun-planet, then N planet-ring
-        meshes.
+        meshes. What damps them acts against the ring at rest.
     excitation : MeshExcitation
         Of the 2N meshes, over one mesh period; their stiffness without what the structure is elastic.
     structure : FixedStructure
     paths : MeshPaths
     carrier_speed : (n_speeds,) array
         [rad/s], counter-clockwise positive, all of one direction.
-    excitation_harmonics, response_harmonics : int
+    harmonics : (int, int)
         Mesh harmonics kept in the data, and in the response.
     side_bands : int, optional
         Of every harmonic of the forces; default ``2 n_max``. An axisymmetric structure makes none.
@@ -133,12 +132,11 @@ def solve_two_way(
     ConvergenceError
         Equations that are singular (E-RESONANCE).
     """
-    kept, angles = (excitation_harmonics, response_harmonics), np.asarray(paths.planet_angles, float)
-    speeds = _checked(gears, excitation, carrier_speed, paths, structure.max_diameter, *kept)
-    groups = planet_groups(angles, paths.symmetry)
-    bands = 2 * structure.max_diameter if side_bands is None else side_bands
-    orders = _Orders(paths, kept[1], structure.max_diameter, bands, int(np.sign(speeds[0])))
-    one_sided = mesh_harmonics(excitation, kept[0])
+    n_max, angles = structure.max_diameter, np.asarray(paths.planet_angles, float)
+    speeds = _checked(gears, excitation, carrier_speed, paths, n_max, harmonics)
+    groups, bands = planet_groups(angles, paths.symmetry), 2 * n_max if side_bands is None else side_bands
+    orders = _Orders(paths, harmonics[1], n_max, bands, int(np.sign(speeds[0])))
+    one_sided = mesh_harmonics(excitation, harmonics[0])
     _check_repeated(one_sided, orders, *groups)
     known, place = _Gears.build(gears, one_sided, orders, *groups), angles[groups[0]] + paths.load_angle
     count, n_orders = len(place), len(orders.positive)
@@ -161,7 +159,7 @@ def solve_two_way(
             f"residual {residual[worst]:.3e} of the two-way equations at {speeds[worst]:.6g} rad/s",
             code="E-RESONANCE", limit=f"{_RESIDUAL:g}", remedy="give gears and structure some damping",
         )  # fmt: skip
-    return TwoWayResponse(speeds, orders.positive, force, residual, tail, kept[1], bands, paths)
+    return TwoWayResponse(speeds, orders.positive, force, residual, tail, harmonics[1], bands, paths)
 
 
 def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tuple[np.ndarray, np.ndarray]:
@@ -193,35 +191,26 @@ def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tupl
     return order, np.where(order == 0, np.real(lines), lines)
 
 
-def _checked(gears, excitation, carrier_speed, paths, n_max, excited, harmonics) -> np.ndarray:
+def _checked(gears, excitation, carrier_speed, paths, n_max, harmonics) -> np.ndarray:
     """Speeds (n_speeds,) [rad/s] of data that belong together."""
-    checked_count(excited, "excitation harmonics", code="E-HARMONICS")
-    checked_count(harmonics, "response harmonics", code="E-HARMONICS", least=excited)
-    z_ring = checked_count(paths.z_ring, "ring teeth", code="E-TEETH")
-    if z_ring <= 6 * n_max:
-        raise CaseError(
-            f"side bands of {n_max} nodal diameters overlap between the harmonics of {z_ring} teeth",
-            code="E-RANGE", key="max_diameter", value=n_max, limit=f"up to {(z_ring - 1) // 6}",
-            remedy="keep fewer nodal diameters of the structure",
-        )  # fmt: skip
+    checked_count(harmonics[0], "excitation harmonics", code="E-HARMONICS")
+    checked_count(harmonics[1], "response harmonics", code="E-HARMONICS", least=harmonics[0])
+    teeth = checked_count(paths.z_ring, "ring teeth", code="E-TEETH")
+    if teeth <= 6 * n_max:
+        message = f"side bands of {n_max} nodal diameters overlap between the harmonics of {teeth} teeth"
+        raise CaseError(message, code="E-RANGE", limit=f"up to {(teeth - 1) // 6} nodal diameters")
     if excitation.periods != 1:
-        raise CaseError(
-            f"the excitation spans {excitation.periods} mesh periods", code="E-PERIODS", limit="one",
-            remedy="leave out errors that turn with a member",
-        )  # fmt: skip
-    meshes = len(gears.mesh_stiffness), len(excitation.stiffness)
-    if {*meshes} != {2 * len(paths.planet_angles)}:
-        raise CaseError(
-            f"modes of {meshes[0]} meshes, excitation of {meshes[1]}, {len(paths.planet_angles)} planets",
-            code="E-SHAPE", limit="two meshes a planet",
-        )  # fmt: skip
+        message = f"the excitation spans {excitation.periods} mesh periods"
+        raise CaseError(message, code="E-PERIODS", limit="one")
+    meshes = len(gears.mesh_stiffness), len(excitation.stiffness), 2 * len(paths.planet_angles)
+    if len({*meshes}) > 1:
+        message = f"modes, excitation and planets of {meshes} meshes do not fit each other"
+        raise CaseError(message, code="E-SHAPE", limit="two meshes a planet")
     speeds = np.atleast_1d(np.asarray(carrier_speed, float))
     sense = np.unique(np.sign(speeds))
     if speeds.ndim != 1 or len(sense) != 1 or sense[0] == 0 or not np.isfinite(speeds).all():
-        raise CaseError(
-            "speeds of the carrier must be one list, of one direction", code="E-SPEED", key="carrier_speed",
-            value=carrier_speed, limit="finite, none zero",
-        )  # fmt: skip
+        message, limit = "speeds of the carrier must be one list", "finite, of one direction, none zero"
+        raise CaseError(message, code="E-SPEED", key="carrier_speed", value=carrier_speed, limit=limit)
     return speeds
 
 
@@ -300,11 +289,8 @@ class _Gears:
     @classmethod
     def build(cls, modes: Modes, one_sided, orders: _Orders, leaders, group, turn) -> _Gears:
         """From harmonics (2N, count + 1) of stiffness, deflection and force of all meshes."""
-        N, H, meshes = (
-            orders.paths.symmetry,
-            orders.harmonics,
-            np.concatenate([leaders, len(group) + leaders]),
-        )
+        N, H = orders.paths.symmetry, orders.harmonics
+        meshes = np.concatenate([leaders, len(group) + leaders])
         owner = np.concatenate([group, len(leaders) + group])
         phase = np.exp(2j * np.pi * (orders.sense * np.outer(np.arange(N), turn) % N) / N)
         member = (owner == np.arange(len(meshes))[:, None]) * np.tile(phase, 2)[:, None]

@@ -126,7 +126,7 @@ def test_refused_sets(paths, speeds, code):
     drive = fixed_housing.excitation(MeshPaths(97, EQUAL))
     modes = solve_modes(gears(EQUAL), drive.stiffness.mean(axis=1), damping_ratio=0.04)
     with pytest.raises(CaseError) as error:
-        solve_two_way(modes, drive, feet(4), paths, speeds, excitation_harmonics=2)
+        solve_two_way(modes, drive, feet(4), paths, speeds, harmonics=(2, 4))
     assert error.value.code == code
 
 

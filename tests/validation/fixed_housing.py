@@ -127,8 +127,7 @@ def solved(paths: MeshPaths, structure, speeds, *, depth=0.15, harmonics=6, rati
     """The set in a structure by the two-way solution."""
     drive = excitation(paths, int(np.sign(speeds[0])), depth)
     modes = solve_modes(gears(paths.planet_angles), drive.stiffness.mean(axis=1), damping_ratio=ratio)
-    kept = {"excitation_harmonics": 2, "response_harmonics": harmonics}
-    return solve_two_way(modes, drive, structure, paths, speeds, **kept)
+    return solve_two_way(modes, drive, structure, paths, speeds, harmonics=(2, harmonics))
 
 
 def order_rules() -> tuple[Row, ...]:
@@ -179,7 +178,7 @@ def axisymmetric() -> tuple[Row, ...]:
     kept = {"excitation_harmonics": 2, "response_harmonics": 6}
     present = solve_spectral(modes, drive, speed / (2 * np.pi), tolerance=1e-12, method="direct", **kept)
     rigid = solve_modes(system, drive.stiffness.mean(axis=1), damping_ratio=0.0)
-    two_way = solve_two_way(rigid, drive, structure, paths, speed / teeth, **kept)
+    two_way = solve_two_way(rigid, drive, structure, paths, speed / teeth, harmonics=(2, 6))
     middle = two_way.force[..., np.isin(two_way.order, np.arange(7) * teeth)]
     apart = np.abs(middle - present.force).max() / np.abs(present.force[..., 1:]).max()
     words = "against the dynamics of the set on its foundation, 1e13 teeth"
@@ -386,19 +385,8 @@ def green() -> tuple[Row, ...]:
         thin_ring(top, (1.0, 0.0), lowest=1), held, max_diameter=top, max_frequency=1e5, damping_ratio=0.0,
         sensor_angles=(sensor,),
     )  # fmt: skip
-    constant = np.zeros((1, 2, 2 * top + 1), complex)
-    constant[..., 0] = 1.0
-    order = np.arange(2 * top + 1)
-    load = TwoWayResponse(
-        np.array([speed]),
-        np.zeros(1, int),
-        constant[..., :1],
-        np.zeros(1),
-        np.zeros(1),
-        0,
-        0,
-        MeshPaths(1, (0.0,)),
-    )
+    constant, none, paths = np.array([[[0.0], [1.0]]]), np.zeros(1), MeshPaths(1, (0.0,))
+    load = TwoWayResponse(np.array([speed]), np.zeros(1, int), constant, none, none, 0, 0, paths)
     heard_order, heard = structure_lines(structure, load)
     n = np.arange(1, top + 1)
     exact = np.empty(top, complex)

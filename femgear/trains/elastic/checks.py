@@ -74,38 +74,31 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
 
 
 def fixed_diameters(case: Case) -> int:
-    """Choose the nodal diameters in which a ring on supports and the meshes act both ways."""
-    return case.housing.nodal_diameters or min(_DIAMETERS, _apart(case), max_nodal_diameter(case))
+    """Choose the nodal diameters in which a ring on supports and the meshes act both ways.
 
-
-def _apart(case: Case) -> int:
-    """Nodal diameters of a structure up to which side bands of neighbouring mesh harmonics stay apart."""
-    return (case.ring.teeth - 1) // 6
+    CaseError: so many that side bands of neighbouring mesh harmonics overlap (E-RANGE).
+    """
+    most, given = min((case.ring.teeth - 1) // 6, max_nodal_diameter(case)), case.housing.nodal_diameters
+    if given is not None and given > most:
+        message, key = "side bands of neighbouring mesh harmonics would overlap", "housing.nodal_diameters"
+        raise CaseError(message, code="E-RANGE", key=key, value=given, limit=f"2 to {most}")
+    return given or min(_DIAMETERS, most)
 
 
 def _check_housing_supports(case: Case) -> None:
-    """Refuse supports of the ring that cannot be: twice at one angle, wider than the ring, linear form."""
-    section, around = case.housing, 2 * math.pi * case.ring.outer_radius
-    angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in section.support]
-    for i, one in enumerate(section.support):
-        key = f"housing.support[{i}]"
-        if angles[i] in angles[:i]:
-            message, remedy = "two supports stand at this angle", "make one of them, with the sum of both"
-            raise CaseError(message, code="E-DUPLICATE", key=f"{key}.angle", value=one.angle, remedy=remedy)
-        if one.width > around:
-            message, limit = "the support is wider than the ring", f"{around:.6g} m, its circumference"
-            raise CaseError(message, code="E-RANGE", key=f"{key}.width", value=one.width, limit=limit)
-    if section.support and section.form == "linear":
+    """Refuse supports of the ring that cannot be: two at one angle, with the linear form."""
+    angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in case.housing.support]
+    again = next((i for i, angle in enumerate(angles) if angle in angles[:i]), None)
+    if again is not None:
+        message, remedy = "two supports stand at this angle", "make one of them, with the sum of both"
+        key, value = f"housing.support[{again}].angle", f"{math.degrees(angles[again]):.6g} deg"
+        raise CaseError(message, code="E-DUPLICATE", key=key, value=value, remedy=remedy)
+    if angles and case.housing.form == "linear":
         raise CaseError(
             "the linear form interpolates a field that turns with the carrier; a ring on supports has none",
             code="E-CHOICE", key="housing.form", value="linear", limit='"exact" with housing.support',
         )  # fmt: skip
-    most = min(_apart(case), max_nodal_diameter(case))
-    if (section.nodal_diameters or 0) > most:
-        raise CaseError(
-            "side bands of neighbouring mesh harmonics would overlap", code="E-RANGE",
-            key="housing.nodal_diameters", value=section.nodal_diameters, limit=f"2 to {most}",
-        )  # fmt: skip
+    fixed_diameters(case)
 
 
 def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:

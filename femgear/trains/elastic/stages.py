@@ -13,7 +13,7 @@ at all speeds, and the level of the housing is computed again with twice that fr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -454,7 +454,6 @@ def dynamics_parts(
     if slow.any():
         level_change[slow] = _lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
     short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
-    fixed = fixed_housing(case, modes) if case.housing.support else None
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     for own, part in parts_of_speeds(case, _HARMONIC * limit.response, memory):
         response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
@@ -473,7 +472,7 @@ def dynamics_parts(
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
             warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
             entries=dynamic_entries(part),
-            fixed=None if fixed is None else (fixed[0], *(solved(carrier[own]) for solved in fixed[1:])),
+            fixed=fixed_housing(case, modes, carrier[own]) if case.housing.support else None,
         )  # fmt: skip
         progress("dynamics", float(own[-1] + 1), float(len(speeds)))
 
@@ -485,38 +484,32 @@ def fixed_harmonics(case: Case) -> tuple[int, int]:
 
 
 def fixed_housing(
-    case: Case, modes: ModesResult
-) -> tuple[FixedStructure, Callable[[np.ndarray], TwoWayResponse], Callable[[np.ndarray], TwoWayResponse]]:
-    """Make the structure of the ring on its supports, and what solves at speeds of the carrier [rad/s].
+    case: Case, modes: ModesResult, carrier: np.ndarray
+) -> tuple[FixedStructure, TwoWayResponse, TwoWayResponse]:
+    """Make the structure of the ring on its supports, and solve for forces at speeds of the carrier [rad/s].
 
-    Two of these: the set in the structure, and in the ring without supports, whose forces act one way.
-
-    The meshes keep what nodal diameters beyond those of the structure give way. Sensors stand around the
-    outer surface, enough for all nodal diameters of the ring.
+    Of the set in the structure, and in the ring without supports. Sensors stand around the outer surface,
+    enough for all nodal diameters of the ring; the meshes keep what those beyond the structure's give way.
     """
     gears, ring, n_max = planetary_set(case), modes.ring, fixed_diameters(case)
     low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
     excitation, flexibility = _excitation(gears, replace(ring, **low), modes.state)
-    system, damping = gears_alone(modes.model, flexibility), case.dynamics.damping_ratio
-    harmonics = fixed_harmonics(case)
+    harmonics, damping = fixed_harmonics(case), case.dynamics.damping_ratio
     highest = _MODES_ABOVE * max(modes.reach, harmonics[1] * fastest_mesh_frequency(case, gears))
+    alone = solve_eigenproblem(
+        gears_alone(modes.model, flexibility), excitation.stiffness.mean(axis=1), damping_ratio=damping,
+        max_frequency=highest,
+    )  # fmt: skip
     points, radius = 4 * (modes.max_diameter + 1), case.ring.outer_radius
-    supports = [Support(**{**one.model_dump(), "width": one.width / radius}) for one in case.housing.support]
-    known = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
+    supports = [Support(**one.model_dump() | {"width": one.width / radius}) for one in case.housing.support]
+    known: Any = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
     around = 2 * np.pi * np.arange(points) / points
     structure = supported_ring(ring.modes, supports, **known, sensor_angles=around)
-    axisymmetric = supported_ring(ring.modes, (), **known)
-    alone = solve_eigenproblem(
-        system, excitation.stiffness.mean(axis=1), damping_ratio=damping, max_frequency=highest
+    paths = MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), ring.load_angle, modes.symmetry)
+    solved = partial(
+        solve_two_way, alone, excitation, paths=paths, carrier_speed=carrier, harmonics=harmonics
     )
-    angles = tuple(float(one) for one in gears.planet_angles)
-    paths = MeshPaths(gears.ring.teeth, angles, ring.load_angle, modes.symmetry)
-    kept = dict(zip(("excitation_harmonics", "response_harmonics"), harmonics))
-    return (
-        structure,
-        partial(solve_two_way, alone, excitation, structure, paths, **kept),
-        partial(solve_two_way, alone, excitation, axisymmetric, paths, side_bands=0, **kept),
-    )
+    return structure, solved(structure), solved(supported_ring(ring.modes, (), **known), side_bands=0)
 
 
 @one_blas_thread()
@@ -555,13 +548,9 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
 
 
 def _on_supports(
-    case: Case,
-    dynamics: DynamicsResult,
-    found: HousingResult,
-    structure: FixedStructure,
-    two_way: TwoWayResponse,
-    one_way: TwoWayResponse,
-) -> HousingResult:
+    case: Case, dynamics: DynamicsResult, found: HousingResult, structure: FixedStructure,
+    two_way: TwoWayResponse, one_way: TwoWayResponse,
+) -> HousingResult:  # fmt: skip
     """What the sensor and the microphone hear of the structure, by the forces of both routes."""
     exact, points, top = found.exact, structure.sensor_shape.shape[1], dynamics.ring_radial.shape[-1] // 2
     n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / points
