@@ -19,16 +19,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import eigh
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError
 from femgear.housing.sensor import ReadOnlyArrays
 
 if TYPE_CHECKING:
     from femgear.fe.reduction import CyclicModes
 
-_ROUNDING = 1e-9
-"""Part of an array by which it may miss a symmetry."""
-_FREE = 1e-12
-"""Square of a natural frequency over the largest one below which nothing holds the motion."""
+_ROUNDING, _FREE = 1e-9, 1e-12
+"""Part of an array by which it may miss a symmetry; of the largest omega^2 below which a motion is free."""
 _CONDITION = 1e3
 """Of the Fourier matrix of points around the ring, beyond which they leave gaps."""
 
@@ -142,35 +140,28 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
     """
     missing = [name for name in _ARRAYS if name not in arrays]
     if missing:
-        raise CaseError(
-            f"the structure lacks {', '.join(missing)}", code="E-KEY-MISSING", key=missing[0],
-            limit=f"the arrays {', '.join(_ARRAYS)}",
-        )  # fmt: skip
+        message, limit = f"the structure lacks {', '.join(missing)}", f"the arrays {', '.join(_ARRAYS)}"
+        raise CaseError(message, code="E-KEY-MISSING", key=missing[0], limit=limit)
     values = {name: np.asarray(arrays[name], float) for name in arrays}
     angle, shape, sensors = (values[name] for name in ("ring_angle", "ring_shape", "sensor_shape"))
     points, least = angle.size, max(4 * max_diameter, 1)
     if points < least:
-        raise CaseError(
-            f"{points} points of the ring do not resolve {max_diameter} nodal diameters", code="E-COUNT",
-            key="ring_angle", limit=f"{least} or more", remedy="give more points, or keep fewer diameters",
-        )  # fmt: skip
+        message = f"{points} points of the ring do not resolve {max_diameter} nodal diameters"
+        raise CaseError(message, code="E-COUNT", key="ring_angle", limit=f"{least} points or more")
     between = values.get("ring_compliance", np.zeros((points, points)))
     away = values.get("sensor_compliance", np.zeros((sensors.shape[-1], points)))
     fits = shape.shape[1:] == (points, 2) and between.shape == (points, points)
     if angle.ndim != 1 or not fits or away.shape[-1] != points:
-        raise CaseError(
-            f"shapes {shape.shape} and compliances {between.shape}, {away.shape} at {points} points",
-            code="E-SHAPE", key="ring_shape", limit=f"(modes, {points}, 2), ({points}, {points})",
-        )  # fmt: skip
+        message = f"shapes {shape.shape} and compliances {between.shape}, {away.shape} at {points} points"
+        raise CaseError(message, code="E-SHAPE", key="ring_shape", limit=f"(modes, {points}, 2)")
     waves = np.exp(1j * np.outer(angle, np.arange(-max_diameter, max_diameter + 1)))
+    fit = np.linalg.pinv(waves)
     if not np.linalg.cond(waves) < _CONDITION or abs(np.linalg.norm(direction) - 1.0) > _ROUNDING:
         raise CaseError(
             "the points leave gaps around the ring, or the direction of the force is no unit vector",
             code="E-RANGE", key="ring_angle", value=f"direction {np.asarray(direction).tolist()}",
-            limit="points all around, a direction of length 1",
             remedy="give equally spaced points; sine and cosine of the working pressure angle",
         )  # fmt: skip
-    fit = np.linalg.pinv(waves)
     return FixedStructure(
         natural_frequency=values["natural_frequency"],
         damping_ratio=np.broadcast_to(values["damping_ratio"], shape.shape[:1]),
@@ -233,11 +224,9 @@ def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
     sine = np.append(False, mode[1:] == mode[:-1])
     n, single = ring.nodal_diameter[mode], ~ring.paired[mode]
     value = np.where(sine, -1j, 1.0) * np.where(single, 1.0, 0.5) * (ring.norm * values)[mode]
-    columns, row = np.zeros((len(mode), 2 * max_diameter + 1), complex), np.arange(len(mode))
-    inside = n <= max_diameter
-    np.add.at(columns, (row[inside], max_diameter + n[inside]), value[inside])
-    mirrored = inside & ~single
-    np.add.at(columns, (row[mirrored], max_diameter - n[mirrored]), np.conj(value[mirrored]))
+    columns = np.zeros((len(mode), 2 * max_diameter + 1), complex)
+    for own, sign in ((n <= max_diameter, 1), ((n <= max_diameter) & ~single, -1)):
+        columns[own, max_diameter + sign * n[own]] = value[own] if sign > 0 else np.conj(value[own])
     return columns
 
 
@@ -285,11 +274,7 @@ def supported_ring(
         for stiffness, field in ((one.radial_stiffness, radial), (one.tangential_stiffness, tangential)):
             both = np.real(field @ mean @ field.conj().T)
             K, M = K + stiffness * both, M + one.mass * both
-    try:
-        square, shape = eigh(K, M)
-    except np.linalg.LinAlgError as error:
-        message = f"the modes of the ring on its supports cannot be computed: {error}"
-        raise ConvergenceError(message, code="E-MASS") from error
+    square, shape = eigh(K, M)
     square = np.where(square < _FREE * square[-1], 0.0, square)
     if not square[0] > 0:
         raise CaseError(

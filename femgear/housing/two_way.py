@@ -30,16 +30,10 @@ from femgear.housing.structure import FixedStructure
 from femgear.solvers.periodic.spectral import compliance
 from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
 
-_EQUAL = 1e-9
-"""Part of the largest harmonic by which meshes that repeat one another may differ."""
-_MEMORY = 6e7
-"""Size of the speeds that are solved together [bytes]."""
-_BYTES = 130
-"""Of one unknown order times one, while a speed is solved."""
-_MOST = 4e9
-"""What one speed may need [bytes]."""
-_RESIDUAL = 1e-8
-"""Residual from which a solution is refused."""
+_EQUAL, _RESIDUAL = 1e-9, 1e-8
+"""Part of the largest harmonic by which meshes that repeat others may differ; residual that is refused."""
+_MEMORY, _MOST, _BYTES = 6e7, 4e9, 130
+"""Size of the speeds that are solved together, of one at most, and of one unknown times one [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -351,12 +345,11 @@ def _check_repeated(one_sided, orders: _Orders, leaders, group, turn) -> None:
     whole = turn[:, None] * harmonic * (orders.sense * orders.paths.z_ring % N)
     shift = np.exp(2j * np.pi * (whole % N) / N)
     for name, values in zip(("stiffness", "deflection", "force"), one_sided):
-        apart = [half - shift * half[leaders][group] for half in np.split(values, 2)]
-        if np.abs(apart).max() > _EQUAL * np.abs(values).max():
+        apart = max(np.abs(half - shift * half[leaders][group]).max() for half in np.split(values, 2))
+        if apart > _EQUAL * np.abs(values).max():
             raise CaseError(
-                f"the {name} of meshes of equal planets differs by "
-                f"{np.abs(apart).max() / np.abs(values).max():.2e} of its largest harmonic",
-                code="E-SYMMETRY", key="symmetry", value=N, limit=f"{_EQUAL:g}",
+                f"the {name} of equal planets differs by {apart / np.abs(values).max():.2e} of its largest "
+                "harmonic", code="E-SYMMETRY", key="symmetry", value=N, limit=f"{_EQUAL:g}",
                 remedy="take symmetry 1, which solves for every planet",
             )  # fmt: skip
 

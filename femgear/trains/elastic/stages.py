@@ -146,10 +146,6 @@ HARMONICS = 512
 speeds are excited less far, and `_lost_level` tells what they lose."""
 _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
-_FIXED_HARMONICS = 6
-"""Mesh harmonics of the excitation of a ring on supports, unless the case gives another number."""
-_SOUND = 20
-"""Speeds whose sound is computed together."""
 _LINES_TOGETHER = 8000
 """Harmonics of the run-up's speeds that are in memory at a time."""
 _BELOW_WAVES = 0.9
@@ -479,7 +475,7 @@ def dynamics_parts(
 
 def fixed_harmonics(case: Case) -> tuple[int, int]:
     """Choose the mesh harmonics of excitation and response of a ring on supports, the same at all speeds."""
-    excited = case.dynamics.mesh_harmonics or _FIXED_HARMONICS
+    excited = case.dynamics.mesh_harmonics or 6
     return excited, case.dynamics.response_harmonics or 2 * excited
 
 
@@ -560,7 +556,7 @@ def _on_supports(
     order, moved = structure_lines(sensor, two_way)
     lines = replace(exact, order=order, displacement=moved[:, 0], method="supports")
     sound = list[tuple[np.ndarray, ...]]()
-    for some in np.array_split(np.arange(len(moved)), -(-len(moved) // _SOUND)):
+    for some in np.array_split(np.arange(len(moved)), -(-len(moved) // 20)):  # fit into memory
         here = replace(two_way, carrier_speed=two_way.carrier_speed[some], force=two_way.force[some])
         velocity = 1j * np.outer(lines.base_speed[some], order)[..., None]
         waves = velocity * np.swapaxes(structure_lines(structure, here)[1], 1, 2) @ wave.conj()
