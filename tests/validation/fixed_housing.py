@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from femgear.fe.reduction import CyclicModes
+from femgear.housing.orders import order_level
 from femgear.housing.sensor import component_lines
 from femgear.housing.structure import FixedStructure, Support, circumferential, supported_ring
 from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
@@ -19,7 +20,11 @@ from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.periodic.spectral import HarmonicProblem, solve_direct, solve_spectral
 from femgear.system.fourier import Product, harmonics_of, pad
 from femgear.system.system import MechanicalSystem, MeshExcitation
-from validation.rows import Row, at_most, counted, printed
+from femgear.trains.elastic import stages as elastic
+from femgear.trains.reading import with_values
+from femgear.trains.static.stages import solve_static
+from validation.cases import reference_case
+from validation.rows import Row, at_most, counted, printed, within
 
 E, RHO, R, WIDTH, HEIGHT = 206e9, 7850.0, 0.1, 0.025, 0.01
 AREA, INERTIA = WIDTH * HEIGHT, WIDTH * HEIGHT**3 / 12
@@ -402,3 +407,34 @@ def green() -> tuple[Row, ...]:
     apart = np.abs(lines - exact).max() / np.abs(exact).max()
     words = "four radial springs, force at 500 rad/s: lines of a sensor over the largest"
     return (at_most("moving force", "Green's function", words, 1e-6, apart),)
+
+
+def reference_set_on_supports() -> tuple[Row, ...]:
+    """The reference set, hardly damped, on next to no support: its present dynamics but for the inertia of
+    waves that run around in the frame of the carrier, which is little at low speed."""
+    weak = [{"angle": "0 deg", "radial_stiffness": "1 N/m", "tangential_stiffness": "1 N/m"}]
+    entries = {"dynamics.damping_ratio": 1e-4, "housing.form": "exact", "housing.published": []}
+    case = with_values(reference_case(), entries | {"operation.speeds": ["250 rpm"]})
+    static = solve_static(case)
+    modes = elastic.solve_modes(case, static)
+    held = with_values(case, {"housing.support": weak})
+    dynamics = [elastic.solve_dynamics(one, static, modes) for one in (case, held)]
+    present, ours = (elastic.solve_housing(*two) for two in zip((case, held), dynamics))
+    one, other = present.exact, ours.exact
+    apart = np.abs(one.order - one.z_ring * np.rint(one.order / one.z_ring))
+    kept = (one.order < 6.5 * one.z_ring) & (apart <= 14)
+    lines = one.acceleration[0, kept]
+    apart = np.abs(other.acceleration[0, np.isin(other.order, one.order[kept])] - lines).max()
+    words = "reference set, 250 rpm, damping 1e-4: lines of six mesh harmonics, n to 14, over the largest"
+    level = float(ours.supported["one_way_level"][0])
+    return (
+        at_most("axisymmetric", "present dynamics", words, 0.01, apart / np.abs(lines).max()),
+        within(
+            "axisymmetric",
+            "forces one way",
+            "the same: level, m/s^2",
+            level,
+            order_level(ours.lines)[0],
+            1e-6,
+        ),
+    )

@@ -12,6 +12,7 @@ from validation import (
     dynamics,
     elasticity,
     face_width,
+    fixed_housing,
     geometry,
     helical,
     helical_pair,
@@ -407,6 +408,21 @@ THEMES = (
             housing.higher_harmonics,
             housing.resonances,
         ),
+    ),
+    Theme(
+        "fixed_housing",
+        "Housing that stands still",
+        "A ring on supports has no symmetry: forces and motions act both ways in orders of the carrier. The "
+        "ring of these rows is thin and inextensional (206 GPa, 7850 kg/m3, radius 100 mm, 25 mm x 10 mm), "
+        "the set in it a sun in springs and planets on fixed pins. Routes in time and by samples of a turn "
+        "share no equation with the solution.",
+        (
+            fixed_housing.splitting,
+            fixed_housing.order_rules,
+            fixed_housing.axisymmetric,
+            fixed_housing.green,
+        ),
+        (fixed_housing.in_time, fixed_housing.by_samples, fixed_housing.reference_set_on_supports),
     ),
     Theme(
         "sound",

@@ -18,6 +18,7 @@ from femgear.case.quantities import RPM
 from femgear.case.sections import Case, output_member
 from femgear.errors import CaseError, Finding
 from femgear.gears.kinematics import torques
+from femgear.housing.structure import Support
 from femgear.report.tables import response_warnings
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
@@ -85,9 +86,15 @@ def fixed_diameters(case: Case) -> int:
     return given or min(_DIAMETERS, most)
 
 
+def housing_supports(case: Case) -> list[Support]:
+    """Make the supports of the ring, those of the case with their widths as angles."""
+    radius = case.ring.outer_radius
+    return [Support(**one.model_dump() | {"width": one.width / radius}) for one in case.housing.support]
+
+
 def _check_housing_supports(case: Case) -> None:
     """Refuse supports of the ring that cannot be: two at one angle, with the linear form."""
-    angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in case.housing.support]
+    angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in housing_supports(case)]
     again = next((i for i, angle in enumerate(angles) if angle in angles[:i]), None)
     if again is not None:
         message, remedy = "two supports stand at this angle", "make one of them, with the sum of both"

@@ -44,7 +44,7 @@ from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
 from femgear.housing.sound import Cylinder, Microphone, surface_sound
-from femgear.housing.structure import FixedStructure, Support, supported_ring
+from femgear.housing.structure import FixedStructure, supported_ring
 from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
@@ -71,6 +71,7 @@ from femgear.trains.elastic.checks import (
     dynamics_warnings,
     fastest_mesh_frequency,
     fixed_diameters,
+    housing_supports,
     max_nodal_diameter,
     missing_level,
     runup_ends,
@@ -496,11 +497,10 @@ def fixed_housing(
         gears_alone(modes.model, flexibility), excitation.stiffness.mean(axis=1), damping_ratio=damping,
         max_frequency=highest,
     )  # fmt: skip
-    points, radius = 4 * (modes.max_diameter + 1), case.ring.outer_radius
-    supports = [Support(**one.model_dump() | {"width": one.width / radius}) for one in case.housing.support]
+    points = 4 * (modes.max_diameter + 1)
     known: Any = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
     around = 2 * np.pi * np.arange(points) / points
-    structure = supported_ring(ring.modes, supports, **known, sensor_angles=around)
+    structure = supported_ring(ring.modes, housing_supports(case), **known, sensor_angles=around)
     paths = MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), ring.load_angle, modes.symmetry)
     solved = partial(
         solve_two_way, alone, excitation, paths=paths, carrier_speed=carrier, harmonics=harmonics
