@@ -507,8 +507,7 @@ class SupportSection(Section):
 class HousingSection(Section):
     """The fixed sensor, how the ring's field is carried to it, and the microphone.
 
-    With supports the ring is a structure that stands still and has no symmetry; forces and motions of its
-    ``nodal_diameters`` act both ways.
+    With supports the ring stands still without symmetry: ``nodal_diameters`` of it act both ways.
 
     ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
     interpolation between ``points`` points of the paper on carrier modulation, with its images.

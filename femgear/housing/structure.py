@@ -157,11 +157,8 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
     waves = np.exp(1j * np.outer(angle, np.arange(-max_diameter, max_diameter + 1)))
     fit = np.linalg.pinv(waves)
     if not np.linalg.cond(waves) < _CONDITION or abs(np.linalg.norm(direction) - 1.0) > _ROUNDING:
-        raise CaseError(
-            "the points leave gaps around the ring, or the direction of the force is no unit vector",
-            code="E-RANGE", key="ring_angle", value=f"direction {np.asarray(direction).tolist()}",
-            remedy="give equally spaced points; sine and cosine of the working pressure angle",
-        )  # fmt: skip
+        message = "the points leave gaps around the ring, or the direction of the force is no unit vector"
+        raise CaseError(message, code="E-RANGE", key="ring_angle", remedy="give equally spaced points")
     return FixedStructure(
         natural_frequency=values["natural_frequency"],
         damping_ratio=np.broadcast_to(values["damping_ratio"], shape.shape[:1]),
@@ -197,10 +194,8 @@ class Support:
     def __post_init__(self):
         values = self.radial_stiffness, self.tangential_stiffness, self.mass, self.width
         if not (np.isfinite([self.angle, *values]).all() and min(values) >= 0 and self.width <= 2 * np.pi):
-            raise CaseError(
-                f"a support with stiffness, mass and width {values}", code="E-SUPPORT", value=self.angle,
-                limit="finite numbers, not negative, a width of one turn at most",
-            )  # fmt: skip
+            message = f"a support at {self.angle} rad with stiffness, mass and width {values}"
+            raise CaseError(message, code="E-SUPPORT", limit="not negative, a width of one turn at most")
 
 
 def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
@@ -277,11 +272,9 @@ def supported_ring(
     square, shape = eigh(K, M)
     square = np.where(square < _FREE * square[-1], 0.0, square)
     if not square[0] > 0:
-        raise CaseError(
-            f"the supports leave {int((square == 0).sum())} motions of the ring free", code="E-MECHANISM",
-            key="housing.support", limit="radial and tangential stiffness that hold x, y and rotation",
-            remedy="give the supports a tangential stiffness, or the ring a foundation",
-        )  # fmt: skip
+        message = f"the supports leave {int((square == 0).sum())} motions of the ring free"
+        remedy = "hold x, y and rotation by supports, or give the ring a foundation"
+        raise CaseError(message, code="E-MECHANISM", key="housing.support", remedy=remedy)
     middle = slice(top - max_diameter, top + max_diameter + 1)
     heard = np.real(radial @ np.exp(1j * np.outer(n, sensor_angles)))
     waves, sensors = shape.T @ path[:, middle], shape.T @ heard

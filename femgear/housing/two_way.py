@@ -136,10 +136,8 @@ def solve_two_way(
     count, n_orders = len(place), len(orders.positive)
     size = _BYTES * (count * n_orders) ** 2
     if size > _MOST:
-        raise CaseError(
-            f"{count} planets with {n_orders} carrier orders need {size / 1e9:.2g} GB", code="E-MEMORY",
-            limit=f"{_MOST / 1e9:g} GB", remedy="take fewer mesh harmonics or nodal diameters",
-        )  # fmt: skip
+        message = f"{count} planets with {n_orders} carrier orders need {size / 1e9:.2g} GB"
+        raise CaseError(message, code="E-MEMORY", remedy="take fewer mesh harmonics or nodal diameters")
     step = max(int(_MEMORY / size), 1)
     force = np.empty((len(speeds), 2 * count, n_orders), complex)
     residual, tail = np.empty((2, len(speeds)))
@@ -149,10 +147,9 @@ def solve_two_way(
         force[some], residual[some], tail[some] = found
     if not (residual < _RESIDUAL).all():
         worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
-        raise ConvergenceError(
-            f"residual {residual[worst]:.3e} of the two-way equations at {speeds[worst]:.6g} rad/s",
-            code="E-RESONANCE", limit=f"{_RESIDUAL:g}", remedy="give gears and structure some damping",
-        )  # fmt: skip
+        message = f"residual {residual[worst]:.3e} of the two-way equations at {speeds[worst]:.6g} rad/s"
+        remedy = "give gears and structure some damping"
+        raise ConvergenceError(message, code="E-RESONANCE", limit=f"{_RESIDUAL:g}", remedy=remedy)
     return TwoWayResponse(speeds, orders.positive, force, residual, tail, harmonics[1], bands, paths)
 
 
@@ -223,11 +220,9 @@ def planet_groups(planet_angles, symmetry: int) -> tuple[np.ndarray, np.ndarray,
     leaders, group = np.unique(leader, return_inverse=True)
     turn = turns[np.arange(len(angles)), leader].astype(int) % symmetry
     if sorted(zip(group, turn)) != [(g, t) for g in range(len(leaders)) for t in range(symmetry)]:
-        raise CaseError(
-            f"turns by 360/{symmetry} deg do not map the planets on one another", code="E-SYMMETRY",
-            key="symmetry", value=np.degrees(angles).tolist(), limit="planets at angles that repeat",
-            remedy="take symmetry 1, which solves for every planet",
-        )  # fmt: skip
+        message = f"turns by 360/{symmetry} deg do not map planets at {np.degrees(angles)} deg on one another"
+        remedy = "take symmetry 1, which solves for every planet"
+        raise CaseError(message, code="E-SYMMETRY", key="symmetry", remedy=remedy)
     return leaders, group, turn
 
 

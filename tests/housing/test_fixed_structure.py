@@ -1,6 +1,7 @@
 """A structure fixed in space: where it comes from, what it refuses, and the set that runs around in it."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from femgear.housing.structure import FixedStructure, Support, from_arrays, supp
 from femgear.housing.two_way import MeshPaths, planet_groups, solve_two_way
 from femgear.solvers.linear.modal import solve_modes
 
-KNOWN = {"max_diameter": 4, "max_frequency": 6e3, "damping_ratio": 0.03}
+KNOWN: Any = {"max_diameter": 4, "max_frequency": 6e3, "damping_ratio": 0.03}
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,11 @@ The ring is thin and inextensional, the gears are a sun in two springs with rigi
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.sparse.linalg import LinearOperator, gmres
+from scipy.sparse import linalg
 
 from femgear.fe.reduction import CyclicModes
 from femgear.housing.orders import order_level
@@ -222,7 +223,7 @@ def _convective() -> tuple[Row, ...]:
     forcing = F - Product(k)(s)
     source = -np.einsum("ijsh,jsh->ish", receptance, forcing)
     rigid = system.W.T @ np.linalg.solve(system.K, system.load)
-    source[:, 0, 0] += rigid - receptance[:, :, 0, 0].real @ (mean * rigid)
+    source[:, 0, 0] += rigid - np.real(receptance[:, :, 0, 0]) @ (mean * rigid)
     fluctuating = np.array(k)
     fluctuating[..., 0] -= mean[:, None]
     force = forcing + Product(k)(solve_direct(HarmonicProblem(receptance, Product(fluctuating), source)))
@@ -350,9 +351,10 @@ def by_samples() -> tuple[Row, ...]:
         ).ravel()
 
     shape = (6 * count, 6 * count)
-    force, failed = gmres(
-        LinearOperator(shape, product, dtype=float), right, rtol=1e-8, restart=200, maxiter=10,
-        M=LinearOperator(shape, nearly, dtype=float),
+    operator: Any = linalg.LinearOperator
+    force, failed = linalg.gmres(
+        operator(shape, matvec=product, dtype=float), right, rtol=1e-8, restart=200, maxiter=10,
+        M=operator(shape, matvec=nearly, dtype=float),
     )  # fmt: skip
     exact = force.reshape(6, count)[[0, 3]]
     apart = np.abs(_sampled(found, theta) - exact).max() / np.ptp(exact)
@@ -374,10 +376,11 @@ def _green(angle, w: float) -> np.ndarray:
     slope = 2 * z * (bending * (3 * z**4 - 4 * z**2 + 1) - inertia)
     angle = np.mod(angle, 2 * np.pi)[..., None]
     # the larger exponential is divided out
+    forward = np.imag(z) >= 0
     kernel = np.where(
-        z.imag >= 0,
-        np.exp(1j * z * angle) / np.expm1(2j * np.pi * np.where(z.imag >= 0, z, 1j)),
-        np.exp(1j * z * (angle - 2 * np.pi)) / -np.expm1(-2j * np.pi * np.where(z.imag < 0, z, -1j)),
+        forward,
+        np.exp(1j * z * angle) / np.expm1(2j * np.pi * np.where(forward, z, 1j)),
+        np.exp(1j * z * (angle - 2 * np.pi)) / -np.expm1(-2j * np.pi * np.where(forward, -1j, z)),
     )
     return -np.sum(1j * z**2 / slope * kernel, axis=-1)
 

@@ -402,7 +402,6 @@ def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], 
 
     own = np.rint(lines.order / lines.z_ring) == harmonic
     order, highest = lines.order[own], np.full(own.sum(), -np.inf)
-    # of a ring on supports a line has many
     n = np.abs(nodal_diameters(lines)[own]) if (one := lines.method == "exact") else [""] * len(order)
     for (text, amplitude), colour, side in zip(amplitudes.items(), (BLUE, VERMILION), (-0.2, 0.2)):
         relative = amplitude[own] / (amplitude[own].max(initial=0.0) or 1.0)
