@@ -121,10 +121,7 @@ def solve_two_way(
     Raises
     ------
     CaseError
-        ``E-RANGE``, ``E-SPEED``, ``E-SHAPE``, ``E-HARMONICS``, ``E-PERIODS``, ``E-TEETH``; ``E-SYMMETRY``:
-        planets that do not repeat one another; ``E-MEMORY``.
-    ConvergenceError
-        Equations that are singular (E-RESONANCE).
+        Data that do not belong together; ``E-SYMMETRY``: planets that do not repeat one another; ``E-MEMORY``.
     """
     n_max, angles = structure.max_diameter, np.asarray(paths.planet_angles, float)
     speeds = _checked(gears, excitation, carrier_speed, paths, n_max, harmonics)
@@ -145,7 +142,7 @@ def solve_two_way(
         some = slice(first, first + step)
         found = _solve(known, structure, place, orders, np.abs(speeds[some]))
         force[some], residual[some], tail[some] = found
-    if not (residual < _RESIDUAL).all():
+    if not (residual < _RESIDUAL).all():  # singular
         worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
         message = f"residual {residual[worst]:.3e} of the two-way equations at {speeds[worst]:.6g} rad/s"
         remedy = "give gears and structure some damping"

@@ -182,6 +182,9 @@ def case_warnings(case: Case) -> Iterator[Finding]:
         )
     if case.housing.support and case.runup.count:
         yield Finding("W-SUPPORT", "housing.support", "the run-up takes the ring without its supports")
+    if case.housing.support and case.dynamics.mesh_harmonics is None:
+        text = "the ring on supports is excited by six mesh harmonics: slow speeds lack what lies above"
+        yield Finding("W-EXCITATION", "housing.support", text, remedy="give dynamics.mesh_harmonics")
     yield from _wound_up(case)
     if case.planet.bearing_clearance and case.operation.fixed == "ring":
         yield Finding(
