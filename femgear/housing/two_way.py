@@ -121,7 +121,7 @@ def solve_two_way(
     Raises
     ------
     CaseError
-        Data that do not belong together; ``E-SYMMETRY``: planets that do not repeat one another; ``E-MEMORY``.
+        Data that do not belong together, planets that do not repeat one another (E-SYMMETRY), E-MEMORY.
     """
     n_max, angles = structure.max_diameter, np.asarray(paths.planet_angles, float)
     speeds = _checked(gears, excitation, carrier_speed, paths, n_max, harmonics)
