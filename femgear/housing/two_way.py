@@ -173,8 +173,10 @@ def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tupl
     for i, (_, h, into, of) in enumerate(near):
         load[:, i, of] = np.einsum("gn,sgn->sn", wave[:, of], ring[:, :, h + H, into])
     order = np.array([K for K, *_ in near])
-    modal = _receptance(structure, speed, order) * (load @ structure.ring_shape.conj().T)
-    lines = modal @ structure.sensor_shape + load @ structure.sensor_residual.T
+    lines = load @ structure.sensor_residual.T
+    for i in range(len(speed)):  # one by one: modes at all orders of all speeds would fill the memory
+        modal = _receptance(structure, speed[i : i + 1], order)[0] * (load[i] @ structure.ring_shape.conj().T)
+        lines[i] += modal @ structure.sensor_shape
     lines = np.swapaxes(lines, 1, 2) * np.where(order == 0, 1.0, 2.0)
     return order, np.where(order == 0, np.real(lines), lines)
 
