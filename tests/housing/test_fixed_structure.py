@@ -16,19 +16,6 @@ from femgear.solvers.linear.modal import solve_modes
 KNOWN: Any = {"max_diameter": 4, "max_frequency": 6e3, "damping_ratio": 0.03}
 
 
-@pytest.mark.parametrize(
-    "rows", [getattr(fixed_housing, name) for name in ("splitting", "order_rules", "axisymmetric", "green")]
-)
-def test_rows(rows):
-    assert [row.quantity for row in rows() if row.verdict != "passes"] == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rows", [fixed_housing.in_time, fixed_housing.by_samples])
-def test_slow_rows(rows):
-    test_rows(rows)
-
-
 def compliance(one: FixedStructure) -> np.ndarray:
     """Static, from the path to itself and to the sensors."""
     shape = (one.ring_shape / one.natural_frequency[:, None] ** 2).conj()

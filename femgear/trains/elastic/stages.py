@@ -485,8 +485,7 @@ def fixed_housing(
 ) -> tuple[FixedStructure, TwoWayResponse, TwoWayResponse]:
     """Make the structure of the ring on its supports, and solve for forces at speeds of the carrier [rad/s].
 
-    Of the set in the structure, and in the ring without supports. Sensors stand around the outer surface,
-    enough for all nodal diameters of the ring; the meshes keep what those beyond the structure's give way.
+    Of the set in it, and without supports. Sensors stand around; the meshes keep what higher diameters give.
     """
     gears, ring, n_max = planetary_set(case), modes.ring, fixed_diameters(case)
     low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
