@@ -60,7 +60,7 @@ CODES = {
     "E-LIBRARY": "A library that femgear needs cannot be loaded: not installed, or no memory for it.",
     "E-LOAD-BALANCE": "Constant loads do work on a motion that nothing holds.",
     "E-LOCKED": "Another run is writing into the folder.",
-    "E-MASS": "A mass matrix is not positive definite.",
+    "E-MASS": "A modal mass is missing, or a mass matrix is not positive definite.",
     "E-MECHANISM": "Something moves freely that must be held, or is held that must move.",
     "E-MEMORY": "The computation needs more memory than there is.",
     "E-MODEL": "There is no such model, or the model of the case has not what is asked for.",
@@ -106,6 +106,7 @@ CODES = {
     "E-TURNING": "Planets of this stage do not allow turning mesh directions.",
     "E-TYPE": "The value is not of the kind that is needed.",
     "E-UNIT": "A quantity lacks its unit, or has a unit of another kind.",
+    "E-UNITS": "A file is in another system of units than is said.",
     "E-VARIABLE": "There is no such variable, or it has no such values.",
     "E-WORKER": "A task ends its worker, or cannot be given to one.",
 }

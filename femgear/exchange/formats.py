@@ -177,10 +177,10 @@ def write_functions(signals: Iterable[Signal], spectra: Iterable[Spectrum], path
             write(58, rsp_node=number, **data, **kind, **unit, **scalar)
 
 
-def write_modes(shapes: Shapes, path: Path) -> None:
+def write_modes(shapes: Shapes, path: Path, *, words: str = "in the frame of the carrier") -> None:
     """Write modes as universal file: datasets 164 (SI units), 15 (nodes) and one 55 (normal mode) for each.
 
-    Shapes are normalised to the modal mass 1 kg; the format holds six digits.
+    Shapes are normalised to the modal mass 1 kg; the format holds six digits. The words are ID line 1.
     """
     nodes = np.arange(1, len(shapes.points) + 1)
     # structural model, normal mode, displacement vectors, real
@@ -192,7 +192,7 @@ def write_modes(shapes: Shapes, path: Path) -> None:
         for number, (frequency, damping, shape) in enumerate(modes, 1):
             motion = dict(zip(("r1", "r2", "r3"), shape.T))
             known = {"mode_n": number, "freq": frequency, "modal_m": 1.0, "modal_damp_vis": damping}
-            write(55, id1="in the frame of the carrier", **known, **motion, **fixed)
+            write(55, id1=words, **known, **motion, **fixed)
 
 
 @contextmanager

@@ -1,0 +1,513 @@
+"""Casings that somebody else has meshed, as structures fixed in space (`femgear.housing.structure`).
+
+`read_casing` reads, by the ending of the file name,
+
+* ``.npz``, ``.nc``: the arrays of `femgear.housing.structure.from_arrays`;
+* ``.pch``, ``.bdf``, ``.dat``: reduced stiffness and mass as DMIG, with GRID cards or without; ``.op4``: the
+  same in ASCII, rows for the degrees of freedom of the nodes in their order, other coordinates after them;
+* ``.uff``, ``.unv``: normal modes (universal file, datasets 55, 15 or 2411, 164).
+
+Matrices and modes need a table of nodes (CSV): columns ``node`` and ``role``, with ``x``, ``y``, ``z`` where
+the file has no coordinates, ``direction`` (of a sensor: x, y, z, radial, tangential, or one of these after a
+minus sign; radial when empty) and ``dofs`` (OP4: 123 when empty). Roles: ``ring``, a point of the pitch
+circle; ``sensor NAME``; ``foot NAME``, a node that is held, and whose force on the ground is an output;
+``centre``, that of the ring, else the origin. The axis of the ring is z.
+
+A foot feels ``f = -(K_fi u + M_fi u'')``. In the modes of the held structure that is, without damping,
+``-sum_m (K_fi - omega_m^2 M_fi) phi_m q_m`` and ``-M_fi M_ii^-1 F`` of the load F itself, which does not
+depend on the frequency and stands with the static residual: the equation of motion of the held rows with the
+accelerations of the free ones (R. R. Craig and A. J. Kurdila, Fundamentals of Structural Dynamics, ch. 17).
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from femgear.errors import CaseError, Finding, nvh_library
+from femgear.housing.structure import FixedStructure, from_arrays, read_arrays
+
+UNITS = {"SI": (1.0, 1.0), "mm-t-s": (1e-3, 1e3)}
+"""Systems of units: metres and kilograms of the units of length and mass; time is in seconds."""
+_STIFFNESS = {0: "SI", 3: "mm-t-s", 6: "mm-kg-ms"}
+"""System of units by the power of ten of its unit of stiffness [N/m]."""
+_OFF_CIRCLE = 0.01
+"""Distance of a point from the pitch circle over its radius, at most."""
+_ASYMMETRY = 1e-6
+"""Of a matrix over its largest entry, at most: files hold 7 to 16 digits."""
+_FREE = 1e-10
+"""Square of a natural frequency over the largest one, at which it may be rounding of the file."""
+_MISSING = 0.05
+"""Part of the static compliance that may be missing without a word."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A row of the table of nodes; position (3,) in the units of the file, or None."""
+
+    number: int
+    role: str
+    name: str
+    direction: str
+    dofs: str
+    position: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class _Modes:
+    """Mass-normalised modes in SI: frequency (m,) [rad/s], shape (m, r), coordinate by node and component.
+
+    Damping ratio (m,); forces on the feet by modes (m, o), and by the loads themselves (o, r).
+    """
+
+    frequency: np.ndarray
+    shape: np.ndarray
+    row: Mapping[tuple[int, int], int]
+    position: Mapping[int, np.ndarray]
+    damping: np.ndarray | None
+    foot_force: np.ndarray
+    foot_direct: np.ndarray
+
+
+def read_casing(
+    path: Path, *, direction: Sequence[float], pitch_radius: float, max_diameter: int, units: str = "SI",
+    damping_ratio: float | None = None, nodes: Path | None = None, max_frequency: float = np.inf,
+    expected_stiffness: float | None = None,
+) -> FixedStructure:  # fmt: skip
+    """Read a casing from arrays, matrices or modes, the kind told by the ending of the file name.
+
+    Parameters
+    ----------
+    path : path
+        See the head of this module.
+    direction : (radial, tangential)
+        Of the force on the ring along the line of action, a unit vector.
+    pitch_radius : float
+        Of the ring in mesh with the planets [m]. Its points lie on this circle, within 1 % of the radius.
+    max_diameter : int
+        Largest nodal diameter kept; it takes four points of the ring or more for each.
+    units : str
+        Of the file: "SI" or "mm-t-s" (N, MPa).
+    damping_ratio : float, optional
+        Of all modes, in place of those of the file. Matrices have none.
+    nodes : path, optional
+        The table of nodes that matrices and modes need.
+    max_frequency : float, optional
+        Modes of matrices and universal files beyond are represented by their static part [Hz].
+    expected_stiffness : float, optional
+        Static stiffness of the ring along the line of action, one over `mean_compliance` [N/m], roughly: a
+        file that is off by a factor of 32 or more has other units.
+
+    Returns
+    -------
+    FixedStructure
+        Its sensors are the outputs of `output_names`: displacements, and forces on the feet [N].
+
+    Raises
+    ------
+    CaseError
+        As `from_arrays`, and E-FILE, E-UNITS, E-RANGE (points off the circle), E-DUPLICATE, E-KEY-MISSING,
+        E-CHOICE, E-SHAPE, E-SYMMETRY, E-TYPE (complex), E-MASS, E-MECHANISM (eigenvalues of zero or less),
+        E-SUPPORT, E-DAMPING.
+    """
+    kind, kinds = path.suffix.lower(), (".npz", ".nc", *_MODES)
+    with _of_file(path):
+        _check(
+            units in UNITS, "no such units", code="E-CHOICE", key="units", value=units, limit=", ".join(UNITS)
+        )
+        words = "no such file, or no kind of file that holds a casing"
+        _check(path.is_file() and kind in kinds, words, code="E-FILE", limit=f"a file {', '.join(kinds)}")
+        if kind in _MODES:
+            _check(
+                nodes is not None, "matrices and modes do not say where ring and sensors are",
+                code="E-KEY-MISSING", key="nodes", limit="a table of nodes (CSV)",
+            )  # fmt: skip
+            table = read_nodes(Path(nodes or ""))
+            modes = _MODES[kind](path, table, *UNITS[units])
+            arrays = _arrays(modes, table, direction, pitch_radius, max_frequency, units)
+            _check(
+                damping_ratio is not None or modes.damping is not None, "the file has no damping",
+                code="E-DAMPING", key="damping_ratio", limit="0 or more, below 1",
+                remedy="give it; 0.01 to 0.05 is usual of casings",
+            )  # fmt: skip
+            structure = from_arrays(arrays, direction=direction, max_diameter=max_diameter)
+        else:
+            kept: dict[str, Any] = {"direction": direction, "max_diameter": max_diameter}
+            structure = read_arrays(path, **kept) if kind == ".npz" else from_arrays(_dataset(path), **kept)
+            mass = UNITS[units][1]
+            structure = replace(
+                structure, ring_shape=structure.ring_shape / np.sqrt(mass), residual=structure.residual / mass,
+                sensor_shape=structure.sensor_shape / np.sqrt(mass),
+                sensor_residual=structure.sensor_residual / mass,
+            )  # fmt: skip
+        if damping_ratio is not None:
+            ratio = np.full(len(structure.natural_frequency), damping_ratio)
+            structure = replace(structure, damping_ratio=ratio)
+        if expected_stiffness is not None:
+            _check_units(structure, expected_stiffness, units)
+    return structure
+
+
+def output_names(nodes: Path) -> tuple[str, ...]:
+    """Names of the outputs of a casing: its sensors, then "foot NAME x", "y" and "z", forces [N]."""
+    table = read_nodes(nodes)
+    sensors = [one.name for one in table if one.role == "sensor"]
+    return (*sensors, *(f"foot {name} {axis}" for name in _feet(table) for axis in "xyz"))
+
+
+def mean_compliance(structure: FixedStructure) -> float:
+    """Compute the static compliance along the line of action, mean around the path [m/N].
+
+    ``sum_n C[n, n]`` of the circumferential coefficients C: the mean over phi of
+    ``sum_n,n' exp(i n phi) C[n, n'] exp(-i n' phi)``.
+    """
+    shape = structure.ring_shape / structure.natural_frequency[:, None]
+    return float((np.abs(shape) ** 2).sum() + np.trace(structure.residual).real)
+
+
+def missing_compliance(structure: FixedStructure, expected_stiffness: float) -> tuple[Finding, ...]:
+    """Say how much of the static compliance of the path is missing, against that of `read_casing`."""
+    part = 1.0 - mean_compliance(structure) * expected_stiffness
+    if part <= _MISSING:
+        return ()
+    also = "" if structure.residual.any() else ", and its modes come without residual"
+    words = f"{100 * part:.0f} % of the static compliance that is expected of the ring is missing{also}"
+    remedy = "export more modes, or residual vectors, or the reduced matrices"
+    return (Finding("W-RESIDUAL", "housing.structure.file", words, remedy=remedy),)
+
+
+def _check(ok: bool, message: str, **words: Any) -> None:
+    """Refuse what is not as it must be."""
+    if not ok:
+        raise CaseError(message, **words)
+
+
+@contextmanager
+def _of_file(path: Path) -> Iterator[None]:
+    """Name the file in the refusals of the block; what a library says of a damaged one is E-FILE."""
+    try:
+        yield
+    except CaseError as error:
+        error.file = error.file or str(path)
+        raise
+
+
+@contextmanager
+def _foreign(words: str) -> Iterator[None]:
+    """Turn what a library says of a damaged file into E-FILE."""
+    try:
+        yield
+    except Exception as error:
+        text = " ".join(str(error).split())[:200]
+        raise CaseError(f"no {words} that can be read: {text}", code="E-FILE", limit=words) from error
+
+
+def read_nodes(path: Path) -> tuple[Node, ...]:
+    """Read the table of nodes of a casing.
+
+    CaseError: E-FILE, E-KEY-MISSING (columns), E-CHOICE (roles, directions), E-DUPLICATE (nodes).
+    """
+    with _of_file(path):
+        with _foreign("table of nodes (CSV)"), open(path, newline="", encoding="utf-8-sig") as stream:
+            reader = csv.DictReader(stream)
+            rows, columns = list(reader), list(reader.fieldnames or ())
+        _check(
+            {"node", "role"} <= set(columns), "the table of nodes lacks columns", code="E-KEY-MISSING",
+            key="nodes", value=", ".join(columns), limit="node, role; x, y, z, direction, dofs where needed",
+        )  # fmt: skip
+        table = tuple(_node({key: (row[key] or "").strip() for key in columns}) for row in rows)
+        numbers = [one.number for one in table if one.role != "centre"]
+        twice = [number for number in numbers if numbers.count(number) > 1]
+        _check(not twice, "a node stands twice", code="E-DUPLICATE", key="nodes", value=twice[:1])
+    return table
+
+
+def _node(row: Mapping[str, str]) -> Node:
+    """A row of the table of nodes."""
+    (role, _, name), place = row["role"].partition(" "), [row.get(axis, "") for axis in "xyz"]
+    direction, dofs = row.get("direction") or "radial", row.get("dofs") or "123"
+    known = bool(name) == (role in ("sensor", "foot")) and role in ("ring", "sensor", "foot", "centre")
+    known &= direction.removeprefix("-") in ("x", "y", "z", "radial", "tangential")
+    try:
+        position = np.array([float(one) for one in place]) if any(place) else None
+        number = int(row["node"] or 0)
+        known &= role != "centre" if position is None else bool(np.isfinite(position).all())
+    except (TypeError, ValueError):
+        known = False
+    _check(
+        known and set(dofs) <= set("123456"), "a row of the table of nodes that cannot be read",
+        code="E-CHOICE", key="nodes", value=", ".join(row.values()),
+        limit="a whole number, finite coordinates, role ring, sensor NAME, foot NAME or centre, direction x, "
+        "y, z, radial or tangential, dofs of 123456",
+    )  # fmt: skip
+    return Node(number, role, name, direction, dofs, position)
+
+
+def _feet(table: Sequence[Node]) -> list[str]:
+    """Names of the feet, each once."""
+    return list(dict.fromkeys(one.name for one in table if one.role == "foot"))
+
+
+def _arrays(modes: _Modes, table, direction, pitch_radius: float, max_frequency: float, units: str) -> dict:
+    """The arrays of `from_arrays` of modes in all coordinates of a file."""
+    centre = next((UNITS[units][0] * one.position for one in table if one.role == "centre"), np.zeros(3))
+    place = {number: position - centre for number, position in modes.position.items()}
+    ring, sensors = ([one for one in table if one.role == role] for role in ("ring", "sensor"))
+    lost = [one.number for one in (*ring, *sensors) if one.number not in place]
+    _check(
+        not lost, "nodes without coordinates", code="E-KEY-MISSING", key="nodes", value=lost[:9],
+        limit="x, y, z in the file or in the table",
+    )  # fmt: skip
+    points = np.array([place[one.number] for one in ring]).reshape(-1, 3)
+    angle = _ring_angles(points, [one.number for one in ring], pitch_radius, units)
+
+    def motion(number: int, along: np.ndarray) -> np.ndarray:
+        """Displacement of a node along a vector (3,), of unit coordinates (r,)."""
+        row = np.zeros(modes.shape.shape[1])
+        for component in np.flatnonzero(along):
+            where = modes.row.get((number, int(component) + 1), -1)
+            _check(
+                where >= 0, "a node does not move in a direction that is needed", code="E-SHAPE", key="nodes",
+                value=f"node {number}, component {component + 1}", limit="a coordinate of the matrices or modes",
+                remedy="keep it in the reduction, name another node, or choose another direction",
+            )  # fmt: skip
+            row[where] = along[component]
+        return row
+
+    shape = np.array([[motion(one.number, v) for v in _polar(a)] for one, a in zip(ring, angle)])
+    heard = [motion(one.number, _along(one, place[one.number])) for one in sensors]
+    heard = np.array(heard).reshape(len(sensors), modes.shape.shape[1])
+    path = np.asarray(direction, float) @ shape
+    outputs = np.hstack([modes.shape @ heard.T, modes.foot_force])
+    direct = np.vstack([np.zeros_like(heard), modes.foot_direct])
+    kept = modes.frequency <= 2 * np.pi * max_frequency
+    pressed = modes.shape[~kept] @ path.T / modes.frequency[~kept, None]
+    return {
+        "natural_frequency": modes.frequency[kept],
+        "damping_ratio": 0.0 if modes.damping is None else modes.damping[kept],
+        "ring_angle": angle,
+        "ring_shape": np.moveaxis(shape @ modes.shape[kept].T, -1, 0),
+        "sensor_shape": outputs[kept],
+        "ring_compliance": pressed.T @ pressed,
+        "sensor_compliance": (outputs[~kept] / modes.frequency[~kept, None]).T @ pressed + direct @ path.T,
+    }
+
+
+def _polar(angle: float) -> np.ndarray:
+    """Unit vectors (2, 3) outwards and counter-clockwise."""
+    return np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0]])
+
+
+def _along(node: Node, place) -> np.ndarray:
+    """Direction (3,) of a sensor at a place seen from the centre of the ring."""
+    words = ("radial", "tangential", "x", "y", "z")
+    vectors: dict[str, np.ndarray] = dict(zip(words, [*_polar(np.arctan2(place[1], place[0])), *np.eye(3)]))
+    return vectors[node.direction.removeprefix("-")] * (-1.0 if node.direction.startswith("-") else 1.0)
+
+
+def _ring_angles(place: np.ndarray, number: list[int], pitch_radius: float, units: str) -> np.ndarray:
+    """Angles (p,) of points (p, 3) [m] on the pitch circle around the origin, in a plane across z."""
+    _check(
+        len(place) > 1, "no points of the ring", code="E-COUNT", key="nodes", limit="nodes of the role ring"
+    )
+    radius = np.hypot(place[:, 0], place[:, 1])
+    times = np.median(radius) / pitch_radius
+    _check(
+        not 300 < max(times, 1 / (times + 1e-9)) < 3000, f"the points of the ring lie at {times:.4g} times the "
+        f"pitch radius: the lengths of the file look like {'mm' if times > 1 else 'm'}", code="E-UNITS",
+        key="units", value=units, limit=", ".join(UNITS), remedy="give the units of the file",
+    )  # fmt: skip
+    off = np.hypot(radius - pitch_radius, place[:, 2] - np.median(place[:, 2])) / pitch_radius
+    worst, millimetres = int(off.argmax()), 1e3 * pitch_radius
+    _check(
+        off[worst] <= _OFF_CIRCLE, f"{(off > _OFF_CIRCLE).sum()} of {len(off)} points miss the ring",
+        code="E-RANGE", key="nodes", value=f"node {number[worst]}, {off[worst] * millimetres:.4g} mm off",
+        limit=f"{_OFF_CIRCLE * millimetres:.4g} mm off the pitch circle of {millimetres:.6g} mm in one plane",
+        remedy="give the centre of the ring, or nodes on the pitch circle",
+    )  # fmt: skip
+    angle = np.arctan2(place[:, 1], place[:, 0]) % (2 * np.pi)
+    order = np.argsort(angle)
+    gap = np.diff(angle[order], append=angle[order[0]] + 2 * np.pi)
+    one, other = (number[order[(gap.argmin() + i) % len(order)]] for i in (0, 1))
+    _check(
+        gap.min() > 1e-3 * 2 * np.pi / len(angle), "two nodes of the ring stand at the same angle",
+        code="E-DUPLICATE", key="nodes", value=f"nodes {one} and {other}", remedy="keep one of them",
+    )  # fmt: skip
+    return angle
+
+
+def _check_units(structure: FixedStructure, expected: float, units: str) -> None:
+    """Refuse a structure whose stiffness is that of another system of units (E-UNITS)."""
+    stiffness = 1.0 / mean_compliance(structure)
+    power = 3 * round(np.log10(expected / stiffness) / 3)
+    true = _STIFFNESS.get(power + round(np.log10(UNITS[units][1])), "others")
+    _check(
+        power == 0, f"the ring has the mean stiffness {stiffness:.3g} N/m where {expected:.3g} N/m is expected: "
+        f"the units of the file look like {true}, not {units}", code="E-UNITS", key="units", value=units,
+        limit=", ".join(UNITS), remedy="give the units of the file, or export it in one of these",
+    )  # fmt: skip
+
+
+def _dataset(path: Path) -> dict[str, np.ndarray]:
+    """Arrays of a NetCDF file by name."""
+    import xarray as xr
+
+    with _foreign("NetCDF of the arrays of a structure"), xr.open_dataset(path) as data:
+        return {str(name): one.values for name, one in data.data_vars.items()}
+
+
+def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
+    """Modes of the matrices of a punch file of Nastran or OptiStruct."""
+    with nvh_library("matrices of Nastran"):
+        from pyNastran.bdf.bdf import BDF
+    with _foreign("bulk data of Nastran"):
+        deck = BDF(debug=False)
+        deck.read_bdf(str(path), punch=True, xref=False)
+    turned = [number for number, grid in deck.nodes.items() if grid.cp or grid.cd]
+    _check(
+        not turned, "nodes in coordinate systems of their own", code="E-CHOICE", key="nodes", value=turned[:9],
+        limit="the basic system (CP 0, CD 0)", remedy="export in the basic system",
+    )  # fmt: skip
+    both = _pair(deck.dmigs)
+    labels = np.unique(np.vstack([side for one in both for side in (one.GCi, one.GCj)]), axis=0)
+    row = {(int(g), int(c)): i for i, (g, c) in enumerate(labels)}
+    found = [np.zeros((len(row),) * 2, complex) for _ in both]
+    for one, matrix in zip(both, found):
+        i, j = (np.array([row[int(g), int(c)] for g, c in side], int) for side in (one.GCi, one.GCj))
+        matrix[i, j] = np.array(one.Real) + (1j * np.array(one.Complex) if one.is_complex else 0.0)
+        if one.matrix_form == 6:
+            matrix[j, i] = matrix[i, j]
+    place = {number: np.array(grid.xyz, float) for number, grid in deck.nodes.items()}
+    return _modes(found, row, place, table, length, mass)
+
+
+def _pair(matrices: Mapping[str, Any]) -> list[Any]:
+    """Stiffness and mass among matrices by name: the one that begins with K and the one with M."""
+    names = [[name for name in matrices if name.upper().startswith(letter)] for letter in "KM"]
+    _check(
+        [len(one) for one in names] == [1, 1], "the file does not hold one stiffness and one mass matrix",
+        code="E-COUNT", key="matrices", value=", ".join(matrices),
+        limit="one name that begins with K (KAAX), one that begins with M (MAAX)",
+    )  # fmt: skip
+    return [matrices[name] for (name,) in names]
+
+
+def _op4(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
+    """Modes of the matrices of an ASCII OUTPUT4 file."""
+    with nvh_library("matrices of Nastran"):
+        from pyNastran.op4.op4 import OP4
+    with _foreign("ASCII OP4"):
+        matrices = OP4(debug=False).read_op4(str(path))
+    found = [getattr(one, "data", one) for one in _pair(matrices)]
+    found = [one[1].toarray() if hasattr(one[1], "toarray") else np.asarray(one[1]) for one in found]
+    labels = [(one.number, int(dof)) for one in table if one.role != "centre" for dof in one.dofs]
+    _check(
+        len({len(labels) <= n for one in found for n in one.shape} | {n for one in found for n in one.shape}) == 2,
+        f"matrices of {found[0].shape} and {found[1].shape} do not fit the {len(labels)} degrees of freedom of "
+        "the table", code="E-SHAPE", key="nodes", limit=f"square, of one size, {len(labels)} rows or more",
+        remedy="give all nodes of the matrices in their order, with their dofs",
+    )  # fmt: skip
+    return _modes(found, {label: i for i, label in enumerate(labels)}, {}, table, length, mass)
+
+
+def _modes(found, row, place, table: Sequence[Node], length: float, mass: float) -> _Modes:
+    """Modes of a reduced stiffness and mass (r, r) in the units of the file, the feet held."""
+    for matrix, name in zip(found, ("stiffness", "mass")):
+        _check(not np.iscomplexobj(matrix) or not matrix.imag.any(), "a complex matrix", code="E-TYPE", key=name,
+               limit="real numbers", remedy="leave structural damping out; give a damping ratio")  # fmt: skip
+        error = np.abs(matrix - matrix.T).max() / np.abs(matrix).max()
+        _check(error <= _ASYMMETRY, f"the {name} matrix is not symmetric, or not finite", code="E-SYMMETRY",
+               key=name, value=f"{error:.2g} of its largest entry", limit=f"{_ASYMMETRY:g}")  # fmt: skip
+    # with time in seconds a stiffness scales as a mass; generalised coordinates take their units with them
+    K, M = (0.5 * mass * np.real(matrix + matrix.T) for matrix in found)
+    feet = [[row.get((n.number, c), -1) for c in (1, 2, 3)] for n in table if n.role == "foot"]
+    _check(
+        not feet or np.min(feet) >= 0, "a foot without coordinates in the matrices", code="E-SUPPORT",
+        key="nodes", limit="the components 1, 2 and 3 of every foot",
+        remedy="keep the feet in the reduction, or leave out feet that are held already",
+    )  # fmt: skip
+    held = {one.number for one in table if one.role == "foot"}
+    free = np.array([i for i in range(len(K)) if i not in {j for (n, _), j in row.items() if n in held}])
+    try:
+        square, shape = eigh(K[np.ix_(free, free)], M[np.ix_(free, free)])
+    except np.linalg.LinAlgError as error:
+        raise CaseError(
+            "the mass matrix is not positive definite", code="E-MASS", key="mass",
+            limit="mass on every coordinate", remedy="condense coordinates without mass before the export",
+        ) from error  # fmt: skip
+    below = int((square <= _FREE * square[-1]).sum())
+    _check(
+        below == 0, f"{below} eigenvalues are zero or negative", code="E-MECHANISM", key="stiffness",
+        value=f"omega^2 = {square[0]:.4g} 1/s^2", limit=f"above {_FREE * square[-1]:.3g} 1/s^2",
+        remedy="hold the casing (role foot); a negative one means a lost entry or matrices of two models",
+    )  # fmt: skip
+    phi = np.zeros((len(square), len(K)))
+    phi[:, free] = shape.T
+    names = _feet(table)
+    total = np.zeros((len(names), 3, len(K)))
+    for rows, name in zip(feet, (one.name for one in table if one.role == "foot")):
+        total[names.index(name), range(3), rows] += 1.0
+    stiff, heavy = (total.reshape(-1, len(K)) @ matrix for matrix in (K, M))
+    force = square[:, None] * (phi @ heavy.T) - phi @ stiff.T
+    places = place | {one.number: one.position for one in table if one.position is not None}
+    places = {number: length * x for number, x in places.items()}
+    return _Modes(np.sqrt(square), phi, row, places, None, force, -(heavy @ phi.T) @ phi)
+
+
+def _universal(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
+    """Modes of a universal file, datasets 55, at the nodes of datasets 15 or 2411."""
+    with nvh_library("universal files"):
+        import pyuff
+    with _foreign("universal file"):
+        sets = pyuff.UFF(str(path)).read_sets()
+        sets = sets if isinstance(sets, list) else [sets]
+    system = [one["length"] for one in sets if one["type"] == 164]
+    _check(
+        not system or np.isclose(system[0] * length, 1.0, rtol=1e-3), "the file is in other units than told",
+        code="E-UNITS", key="units", value=f"units of length a metre: {system[:1]}", limit=f"{1 / length:g}",
+        remedy="give the units of the file",
+    )  # fmt: skip
+    modes = [one for one in sets if one["type"] == 55]
+    real = all(one["analysis_type"] == 2 and not np.iscomplexobj(one["r1"]) for one in modes)
+    _check(real, "complex modes", code="E-TYPE", key="modes", limit="real normal modes (analysis type 2)")
+    weights = np.array([one["modal_m"] for one in modes], float)
+    _check(
+        len(modes) > 0 and bool((weights > 0).all()), "no modes, or modes without modal mass", code="E-MASS",
+        key="modal mass", value=weights.tolist(), limit="above 0 in every dataset 55",
+        remedy="export modes with the modal mass that they are normalised to",
+    )  # fmt: skip
+    _check(
+        not _feet(table), "modes do not tell the forces on the feet", code="E-SUPPORT", key="nodes",
+        value=_feet(table), limit="feet with matrices",
+        remedy="leave the feet out of the table, or export reduced matrices",
+    )  # fmt: skip
+    numbers = sorted({int(number) for one in modes for number in one["node_nums"]})
+    row = {(number, c + 1): 3 * i + c for i, number in enumerate(numbers) for c in range(3)}
+    shape = np.zeros((len(modes), 3 * len(numbers)))
+    for one, target in zip(modes, shape):
+        first = np.array([row[int(number), 1] for number in one["node_nums"]])
+        for c in range(3):
+            target[first + c] = one[f"r{c + 1}"]
+    places = dict[int, np.ndarray]()
+    for one in sets:
+        if one["type"] in (15, 2411):
+            places |= zip(map(int, one["node_nums"]), np.transpose([one[axis] for axis in "xyz"]))
+    places |= {one.number: one.position for one in table if one.position is not None}
+    damping = np.array([one["modal_damp_vis"] + 0.5 * one["modal_damp_his"] for one in modes], float)
+    return _Modes(
+        2 * np.pi * np.array([one["freq"] for one in modes], float), shape / np.sqrt(mass * weights)[:, None],
+        row, {number: length * x for number, x in places.items()}, damping if damping.any() else None,
+        np.zeros((len(modes), 0)), np.zeros((0, len(shape.T))),
+    )  # fmt: skip
+
+
+_MODES = {
+    ".pch": _dmig, ".bdf": _dmig, ".dat": _dmig, ".op4": _op4, ".uff": _universal, ".unv": _universal,
+}  # fmt: skip
