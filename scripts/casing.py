@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A casing as another program would export it: ring gear body with flange and feet, in 3-D, in four formats."""
+"""A casing as another program would export it: ring gear body with flange and feet, in four formats."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,20 +32,17 @@ import numpy as np
 from scipy.linalg import eigh
 
 from femgear.errors import CaseError, Finding, nvh_library
-from femgear.housing.structure import FixedStructure, from_arrays, read_arrays
+from femgear.housing.structure import FixedStructure, from_arrays
 
 UNITS = {"SI": (1.0, 1.0), "mm-t-s": (1e-3, 1e3)}
 """Systems of units: metres and kilograms of the units of length and mass; time is in seconds."""
-_STIFFNESS = {0: "SI", 3: "mm-t-s", 6: "mm-kg-ms"}
-"""System of units by the power of ten of its unit of stiffness [N/m]."""
-_OFF_CIRCLE = 0.01
-"""Distance of a point from the pitch circle over its radius, at most."""
-_ASYMMETRY = 1e-6
-"""Of a matrix over its largest entry, at most: files hold 7 to 16 digits."""
-_FREE = 1e-10
-"""Square of a natural frequency over the largest one, at which it may be rounding of the file."""
-_MISSING = 0.05
-"""Part of the static compliance that may be missing without a word."""
+_STIFFNESS = {0: "SI", 3: "mm-t-s", 6: "mm-kg-ms"}  # powers of ten of the unit of stiffness [N/m]
+# powers of the unit of mass in arrays, whose outputs are displacements
+_MASS_POWERS = {"ring_shape": -0.5, "sensor_shape": -0.5, "ring_compliance": -1, "sensor_compliance": -1}
+_OFF_CIRCLE = 0.01  # distance of a point from the pitch circle over its radius, at most
+_ASYMMETRY = 1e-6  # of a matrix over its largest entry: files hold 7 to 16 digits
+_FREE = 1e-10  # square of a natural frequency over the largest one: what may be rounding of the file
+_MISSING = 0.05  # part of the static compliance that may be missing without a word
 
 
 @dataclass(frozen=True)
@@ -115,41 +112,28 @@ def read_casing(
     CaseError
         As `from_arrays`, and E-FILE, E-UNITS, E-RANGE (points off the circle), E-DUPLICATE, E-KEY-MISSING,
         E-CHOICE, E-SHAPE, E-SYMMETRY, E-TYPE (complex), E-MASS, E-MECHANISM (eigenvalues of zero or less),
-        E-SUPPORT, E-DAMPING.
+        E-SUPPORT.
     """
     kind, kinds = path.suffix.lower(), (".npz", ".nc", *_MODES)
     with _of_file(path):
+        known = ", ".join(UNITS)
+        _check("no such units", units in UNITS, code="E-CHOICE", key="units", value=units, limit=known)
         _check(
-            units in UNITS, "no such units", code="E-CHOICE", key="units", value=units, limit=", ".join(UNITS)
-        )
-        words = "no such file, or no kind of file that holds a casing"
-        _check(path.is_file() and kind in kinds, words, code="E-FILE", limit=f"a file {', '.join(kinds)}")
+            "no such file, or no kind of file that holds a casing", path.is_file() and kind in kinds,
+            code="E-FILE", limit=f"a file {', '.join(kinds)}",
+        )  # fmt: skip
         if kind in _MODES:
             _check(
-                nodes is not None, "matrices and modes do not say where ring and sensors are",
+                "matrices and modes do not say where ring and sensors are", nodes is not None,
                 code="E-KEY-MISSING", key="nodes", limit="a table of nodes (CSV)",
             )  # fmt: skip
             table = read_nodes(Path(nodes or ""))
             modes = _MODES[kind](path, table, *UNITS[units])
-            arrays = _arrays(modes, table, direction, pitch_radius, max_frequency, units)
-            _check(
-                damping_ratio is not None or modes.damping is not None, "the file has no damping",
-                code="E-DAMPING", key="damping_ratio", limit="0 or more, below 1",
-                remedy="give it; 0.01 to 0.05 is usual of casings",
-            )  # fmt: skip
-            structure = from_arrays(arrays, direction=direction, max_diameter=max_diameter)
+            arrays = _arrays(modes, table, direction, pitch_radius, max_diameter, max_frequency, units)
         else:
-            kept: dict[str, Any] = {"direction": direction, "max_diameter": max_diameter}
-            structure = read_arrays(path, **kept) if kind == ".npz" else from_arrays(_dataset(path), **kept)
-            mass = UNITS[units][1]
-            structure = replace(
-                structure, ring_shape=structure.ring_shape / np.sqrt(mass), residual=structure.residual / mass,
-                sensor_shape=structure.sensor_shape / np.sqrt(mass),
-                sensor_residual=structure.sensor_residual / mass,
-            )  # fmt: skip
-        if damping_ratio is not None:
-            ratio = np.full(len(structure.natural_frequency), damping_ratio)
-            structure = replace(structure, damping_ratio=ratio)
+            arrays = _stored(path, UNITS[units][1])
+        given = {} if damping_ratio is None else {"damping_ratio": damping_ratio}
+        structure = from_arrays(arrays | given, direction=direction, max_diameter=max_diameter)
         if expected_stiffness is not None:
             _check_units(structure, expected_stiffness, units)
     return structure
@@ -183,7 +167,7 @@ def missing_compliance(structure: FixedStructure, expected_stiffness: float) -> 
     return (Finding("W-RESIDUAL", "housing.structure.file", words, remedy=remedy),)
 
 
-def _check(ok: bool, message: str, **words: Any) -> None:
+def _check(message: str, ok: bool, **words: Any) -> None:
     """Refuse what is not as it must be."""
     if not ok:
         raise CaseError(message, **words)
@@ -219,13 +203,18 @@ def read_nodes(path: Path) -> tuple[Node, ...]:
             reader = csv.DictReader(stream)
             rows, columns = list(reader), list(reader.fieldnames or ())
         _check(
-            {"node", "role"} <= set(columns), "the table of nodes lacks columns", code="E-KEY-MISSING",
+            "the table of nodes lacks columns", {"node", "role"} <= set(columns), code="E-KEY-MISSING",
             key="nodes", value=", ".join(columns), limit="node, role; x, y, z, direction, dofs where needed",
         )  # fmt: skip
         table = tuple(_node({key: (row[key] or "").strip() for key in columns}) for row in rows)
-        numbers = [one.number for one in table if one.role != "centre"]
-        twice = [number for number in numbers if numbers.count(number) > 1]
-        _check(not twice, "a node stands twice", code="E-DUPLICATE", key="nodes", value=twice[:1])
+        ring = any(one.role == "ring" for one in table)
+        _check("no points of the ring", ring, code="E-COUNT", key="nodes", limit="nodes of the role ring")
+        keys = [(one.number, one.role, one.direction * (one.role == "sensor")) for one in table]
+        twice = [key for key in keys if keys.count(key) > 1]
+        _check(
+            "a node stands twice", not twice, code="E-DUPLICATE", key="nodes", value=twice[:1],
+            limit="each node once, as a sensor once a direction",
+        )  # fmt: skip
     return table
 
 
@@ -242,7 +231,7 @@ def _node(row: Mapping[str, str]) -> Node:
     except (TypeError, ValueError):
         known = False
     _check(
-        known and set(dofs) <= set("123456"), "a row of the table of nodes that cannot be read",
+        "a row of the table of nodes that cannot be read", known and set(dofs) <= set("123456"),
         code="E-CHOICE", key="nodes", value=", ".join(row.values()),
         limit="a whole number, finite coordinates, role ring, sensor NAME, foot NAME or centre, direction x, "
         "y, z, radial or tangential, dofs of 123456",
@@ -255,18 +244,18 @@ def _feet(table: Sequence[Node]) -> list[str]:
     return list(dict.fromkeys(one.name for one in table if one.role == "foot"))
 
 
-def _arrays(modes: _Modes, table, direction, pitch_radius: float, max_frequency: float, units: str) -> dict:
+def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, max_frequency, units) -> dict:
     """The arrays of `from_arrays` of modes in all coordinates of a file."""
     centre = next((UNITS[units][0] * one.position for one in table if one.role == "centre"), np.zeros(3))
     place = {number: position - centre for number, position in modes.position.items()}
     ring, sensors = ([one for one in table if one.role == role] for role in ("ring", "sensor"))
     lost = [one.number for one in (*ring, *sensors) if one.number not in place]
     _check(
-        not lost, "nodes without coordinates", code="E-KEY-MISSING", key="nodes", value=lost[:9],
+        "nodes without coordinates", not lost, code="E-KEY-MISSING", key="nodes", value=lost[:9],
         limit="x, y, z in the file or in the table",
     )  # fmt: skip
     points = np.array([place[one.number] for one in ring]).reshape(-1, 3)
-    angle = _ring_angles(points, [one.number for one in ring], pitch_radius, units)
+    angle = _ring_angles(points, [one.number for one in ring], pitch_radius, max_diameter, units)
 
     def motion(number: int, along: np.ndarray) -> np.ndarray:
         """Displacement of a node along a vector (3,), of unit coordinates (r,)."""
@@ -274,8 +263,8 @@ def _arrays(modes: _Modes, table, direction, pitch_radius: float, max_frequency:
         for component in np.flatnonzero(along):
             where = modes.row.get((number, int(component) + 1), -1)
             _check(
-                where >= 0, "a node does not move in a direction that is needed", code="E-SHAPE", key="nodes",
-                value=f"node {number}, component {component + 1}", limit="a coordinate of the matrices or modes",
+                "a node does not move in a direction that is needed", where >= 0, code="E-SHAPE", key="nodes",
+                value=f"node {number}, component {component + 1}", limit="coordinates of matrices or modes",
                 remedy="keep it in the reduction, name another node, or choose another direction",
             )  # fmt: skip
             row[where] = along[component]
@@ -289,9 +278,9 @@ def _arrays(modes: _Modes, table, direction, pitch_radius: float, max_frequency:
     direct = np.vstack([np.zeros_like(heard), modes.foot_direct])
     kept = modes.frequency <= 2 * np.pi * max_frequency
     pressed = modes.shape[~kept] @ path.T / modes.frequency[~kept, None]
-    return {
+    damping = {} if modes.damping is None else {"damping_ratio": modes.damping[kept]}
+    return damping | {
         "natural_frequency": modes.frequency[kept],
-        "damping_ratio": 0.0 if modes.damping is None else modes.damping[kept],
         "ring_angle": angle,
         "ring_shape": np.moveaxis(shape @ modes.shape[kept].T, -1, 0),
         "sensor_shape": outputs[kept],
@@ -312,22 +301,19 @@ def _along(node: Node, place) -> np.ndarray:
     return vectors[node.direction.removeprefix("-")] * (-1.0 if node.direction.startswith("-") else 1.0)
 
 
-def _ring_angles(place: np.ndarray, number: list[int], pitch_radius: float, units: str) -> np.ndarray:
+def _ring_angles(place, number: list[int], pitch_radius: float, max_diameter: int, units: str) -> np.ndarray:
     """Angles (p,) of points (p, 3) [m] on the pitch circle around the origin, in a plane across z."""
-    _check(
-        len(place) > 1, "no points of the ring", code="E-COUNT", key="nodes", limit="nodes of the role ring"
-    )
     radius = np.hypot(place[:, 0], place[:, 1])
     times = np.median(radius) / pitch_radius
     _check(
-        not 300 < max(times, 1 / (times + 1e-9)) < 3000, f"the points of the ring lie at {times:.4g} times the "
-        f"pitch radius: the lengths of the file look like {'mm' if times > 1 else 'm'}", code="E-UNITS",
+        f"the points of the ring lie at {times:.4g} times the pitch radius: lengths of the file look like "
+        f"{'mm' if times > 1 else 'm'}", not 300 < max(times, 1 / (times + 1e-9)) < 3000, code="E-UNITS",
         key="units", value=units, limit=", ".join(UNITS), remedy="give the units of the file",
     )  # fmt: skip
     off = np.hypot(radius - pitch_radius, place[:, 2] - np.median(place[:, 2])) / pitch_radius
     worst, millimetres = int(off.argmax()), 1e3 * pitch_radius
     _check(
-        off[worst] <= _OFF_CIRCLE, f"{(off > _OFF_CIRCLE).sum()} of {len(off)} points miss the ring",
+        f"{(off > _OFF_CIRCLE).sum()} of {len(off)} points miss the ring", off[worst] <= _OFF_CIRCLE,
         code="E-RANGE", key="nodes", value=f"node {number[worst]}, {off[worst] * millimetres:.4g} mm off",
         limit=f"{_OFF_CIRCLE * millimetres:.4g} mm off the pitch circle of {millimetres:.6g} mm in one plane",
         remedy="give the centre of the ring, or nodes on the pitch circle",
@@ -335,10 +321,18 @@ def _ring_angles(place: np.ndarray, number: list[int], pitch_radius: float, unit
     angle = np.arctan2(place[:, 1], place[:, 0]) % (2 * np.pi)
     order = np.argsort(angle)
     gap = np.diff(angle[order], append=angle[order[0]] + 2 * np.pi)
-    one, other = (number[order[(gap.argmin() + i) % len(order)]] for i in (0, 1))
+    low, high = (
+        [number[order[(at + i) % len(order)]] for i in (0, 1)] for at in (gap.argmin(), gap.argmax())
+    )
     _check(
-        gap.min() > 1e-3 * 2 * np.pi / len(angle), "two nodes of the ring stand at the same angle",
-        code="E-DUPLICATE", key="nodes", value=f"nodes {one} and {other}", remedy="keep one of them",
+        "two nodes of the ring stand at the same angle", gap.min() > 1e-3 * 2 * np.pi / len(angle),
+        code="E-DUPLICATE", key="nodes", value=f"nodes {low}", limit="one node at an angle",
+        remedy="keep one of them",
+    )  # fmt: skip
+    _check(
+        "the points leave a gap in the ring", gap.max() * max_diameter <= np.pi, code="E-RANGE", key="nodes",
+        value=f"{np.degrees(gap.max()):.4g} deg between nodes {high}", limit=f"half a wave of {max_diameter} "
+        "nodal diameters", remedy="give points all around, or keep fewer diameters",
     )  # fmt: skip
     return angle
 
@@ -349,18 +343,26 @@ def _check_units(structure: FixedStructure, expected: float, units: str) -> None
     power = 3 * round(np.log10(expected / stiffness) / 3)
     true = _STIFFNESS.get(power + round(np.log10(UNITS[units][1])), "others")
     _check(
-        power == 0, f"the ring has the mean stiffness {stiffness:.3g} N/m where {expected:.3g} N/m is expected: "
-        f"the units of the file look like {true}, not {units}", code="E-UNITS", key="units", value=units,
+        f"the ring has the mean stiffness {stiffness:.3g} N/m where {expected:.3g} N/m is expected: units of "
+        f"the file look like {true}, not {units}", power == 0, code="E-UNITS", key="units", value=units,
         limit=", ".join(UNITS), remedy="give the units of the file, or export it in one of these",
     )  # fmt: skip
 
 
-def _dataset(path: Path) -> dict[str, np.ndarray]:
-    """Arrays of a NetCDF file by name."""
-    import xarray as xr
+def _stored(path: Path, mass: float) -> dict[str, np.ndarray]:
+    """Arrays of a file .npz or NetCDF by name, of a unit of mass [kg]."""
+    with _foreign("arrays of a structure (.npz, NetCDF)"):
+        if path.suffix.lower() == ".npz":
+            with np.load(path, allow_pickle=False) as stored:
+                found = dict(stored.items())
+        else:
+            import xarray as xr
 
-    with _foreign("NetCDF of the arrays of a structure"), xr.open_dataset(path) as data:
-        return {str(name): one.values for name, one in data.data_vars.items()}
+            with xr.open_dataset(path) as data:
+                found = {str(name): one.values for name, one in data.data_vars.items()}
+        return {
+            name: np.asarray(one, float) * mass ** _MASS_POWERS.get(name, 0) for name, one in found.items()
+        }
 
 
 def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
@@ -372,8 +374,8 @@ def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Mod
         deck.read_bdf(str(path), punch=True, xref=False)
     turned = [number for number, grid in deck.nodes.items() if grid.cp or grid.cd]
     _check(
-        not turned, "nodes in coordinate systems of their own", code="E-CHOICE", key="nodes", value=turned[:9],
-        limit="the basic system (CP 0, CD 0)", remedy="export in the basic system",
+        "nodes in coordinate systems of their own", not turned, code="E-CHOICE", key="nodes",
+        value=turned[:9], limit="the basic system (CP 0, CD 0)", remedy="export in the basic system",
     )  # fmt: skip
     both = _pair(deck.dmigs)
     labels = np.unique(np.vstack([side for one in both for side in (one.GCi, one.GCj)]), axis=0)
@@ -390,9 +392,11 @@ def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Mod
 
 def _pair(matrices: Mapping[str, Any]) -> list[Any]:
     """Stiffness and mass among matrices by name: the one that begins with K and the one with M."""
-    names = [[name for name in matrices if name.upper().startswith(letter)] for letter in "KM"]
+    # KAAX goes before what else begins with K, such as the structural damping K4AAX
+    names = [[f"{k}AAX"] if f"{k}AAX" in matrices else [name for name in matrices if name[:1].upper() == k]
+             for k in "KM"]  # fmt: skip
     _check(
-        [len(one) for one in names] == [1, 1], "the file does not hold one stiffness and one mass matrix",
+        "the file does not hold one stiffness and one mass matrix", [len(one) for one in names] == [1, 1],
         code="E-COUNT", key="matrices", value=", ".join(matrices),
         limit="one name that begins with K (KAAX), one that begins with M (MAAX)",
     )  # fmt: skip
@@ -407,11 +411,13 @@ def _op4(path: Path, table: Sequence[Node], length: float, mass: float) -> _Mode
         matrices = OP4(debug=False).read_op4(str(path))
     found = [getattr(one, "data", one) for one in _pair(matrices)]
     found = [one[1].toarray() if hasattr(one[1], "toarray") else np.asarray(one[1]) for one in found]
-    labels = [(one.number, int(dof)) for one in table if one.role != "centre" for dof in one.dofs]
+    pairs = ((one.number, int(dof)) for one in table if one.role != "centre" for dof in one.dofs)
+    labels = list(dict.fromkeys(pairs))
+    sizes = {n for one in found for n in one.shape}
     _check(
-        len({len(labels) <= n for one in found for n in one.shape} | {n for one in found for n in one.shape}) == 2,
-        f"matrices of {found[0].shape} and {found[1].shape} do not fit the {len(labels)} degrees of freedom of "
-        "the table", code="E-SHAPE", key="nodes", limit=f"square, of one size, {len(labels)} rows or more",
+        f"matrices of {found[0].shape} and {found[1].shape} do not fit the {len(labels)} degrees of freedom "
+        "of the table", len(sizes) == 1 and max(sizes) >= len(labels), code="E-SHAPE", key="nodes",
+        limit=f"square, of one size, {len(labels)} rows or more",
         remedy="give all nodes of the matrices in their order, with their dofs",
     )  # fmt: skip
     return _modes(found, {label: i for i, label in enumerate(labels)}, {}, table, length, mass)
@@ -420,21 +426,28 @@ def _op4(path: Path, table: Sequence[Node], length: float, mass: float) -> _Mode
 def _modes(found, row, place, table: Sequence[Node], length: float, mass: float) -> _Modes:
     """Modes of a reduced stiffness and mass (r, r) in the units of the file, the feet held."""
     for matrix, name in zip(found, ("stiffness", "mass")):
-        _check(not np.iscomplexobj(matrix) or not matrix.imag.any(), "a complex matrix", code="E-TYPE", key=name,
-               limit="real numbers", remedy="leave structural damping out; give a damping ratio")  # fmt: skip
-        error = np.abs(matrix - matrix.T).max() / np.abs(matrix).max()
-        _check(error <= _ASYMMETRY, f"the {name} matrix is not symmetric, or not finite", code="E-SYMMETRY",
-               key=name, value=f"{error:.2g} of its largest entry", limit=f"{_ASYMMETRY:g}")  # fmt: skip
+        _check(
+            "a complex matrix", not np.iscomplexobj(matrix) or not matrix.imag.any(), code="E-TYPE", key=name,
+            limit="real numbers", remedy="leave structural damping out; give a damping ratio",
+        )  # fmt: skip
+        with np.errstate(invalid="ignore"):
+            apart, largest = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
+        _check(
+            f"the {name} matrix is not symmetric, or not finite", apart <= _ASYMMETRY * largest,
+            code="E-SYMMETRY", key=name, value=f"{apart:.3g} of {largest:.3g}", limit=f"{_ASYMMETRY:g} of it",
+        )  # fmt: skip
     # with time in seconds a stiffness scales as a mass; generalised coordinates take their units with them
     K, M = (0.5 * mass * np.real(matrix + matrix.T) for matrix in found)
-    feet = [[row.get((n.number, c), -1) for c in (1, 2, 3)] for n in table if n.role == "foot"]
+    standing = [one for one in table if one.role == "foot"]
+    feet = [[row.get((one.number, c), -1) for c in (1, 2, 3)] for one in standing]
+    held = {one.number for one in standing}
+    free = np.setdiff1d(np.arange(len(K)), [i for (number, _), i in row.items() if number in held])
     _check(
-        not feet or np.min(feet) >= 0, "a foot without coordinates in the matrices", code="E-SUPPORT",
-        key="nodes", limit="the components 1, 2 and 3 of every foot",
+        "a foot without coordinates in the matrices, or nothing but feet",
+        not feet or (np.min(feet) >= 0 and len(free) > 0), code="E-SUPPORT", key="nodes",
+        limit="the components 1, 2 and 3 of every foot",
         remedy="keep the feet in the reduction, or leave out feet that are held already",
     )  # fmt: skip
-    held = {one.number for one in table if one.role == "foot"}
-    free = np.array([i for i in range(len(K)) if i not in {j for (n, _), j in row.items() if n in held}])
     try:
         square, shape = eigh(K[np.ix_(free, free)], M[np.ix_(free, free)])
     except np.linalg.LinAlgError as error:
@@ -444,7 +457,7 @@ def _modes(found, row, place, table: Sequence[Node], length: float, mass: float)
         ) from error  # fmt: skip
     below = int((square <= _FREE * square[-1]).sum())
     _check(
-        below == 0, f"{below} eigenvalues are zero or negative", code="E-MECHANISM", key="stiffness",
+        f"{below} eigenvalues are zero or negative", below == 0, code="E-MECHANISM", key="stiffness",
         value=f"omega^2 = {square[0]:.4g} 1/s^2", limit=f"above {_FREE * square[-1]:.3g} 1/s^2",
         remedy="hold the casing (role foot); a negative one means a lost entry or matrices of two models",
     )  # fmt: skip
@@ -452,8 +465,8 @@ def _modes(found, row, place, table: Sequence[Node], length: float, mass: float)
     phi[:, free] = shape.T
     names = _feet(table)
     total = np.zeros((len(names), 3, len(K)))
-    for rows, name in zip(feet, (one.name for one in table if one.role == "foot")):
-        total[names.index(name), range(3), rows] += 1.0
+    for rows, one in zip(feet, standing):
+        total[names.index(one.name), range(3), rows] += 1.0
     stiff, heavy = (total.reshape(-1, len(K)) @ matrix for matrix in (K, M))
     force = square[:, None] * (phi @ heavy.T) - phi @ stiff.T
     places = place | {one.number: one.position for one in table if one.position is not None}
@@ -470,21 +483,21 @@ def _universal(path: Path, table: Sequence[Node], length: float, mass: float) ->
         sets = sets if isinstance(sets, list) else [sets]
     system = [one["length"] for one in sets if one["type"] == 164]
     _check(
-        not system or np.isclose(system[0] * length, 1.0, rtol=1e-3), "the file is in other units than told",
+        "the file is in other units than told", not system or np.isclose(system[0] * length, 1.0, rtol=1e-3),
         code="E-UNITS", key="units", value=f"units of length a metre: {system[:1]}", limit=f"{1 / length:g}",
         remedy="give the units of the file",
     )  # fmt: skip
     modes = [one for one in sets if one["type"] == 55]
     real = all(one["analysis_type"] == 2 and not np.iscomplexobj(one["r1"]) for one in modes)
-    _check(real, "complex modes", code="E-TYPE", key="modes", limit="real normal modes (analysis type 2)")
+    _check("complex modes", real, code="E-TYPE", key="modes", limit="real normal modes (analysis type 2)")
     weights = np.array([one["modal_m"] for one in modes], float)
     _check(
-        len(modes) > 0 and bool((weights > 0).all()), "no modes, or modes without modal mass", code="E-MASS",
+        "no modes, or modes without modal mass", len(modes) > 0 and bool((weights > 0).all()), code="E-MASS",
         key="modal mass", value=weights.tolist(), limit="above 0 in every dataset 55",
         remedy="export modes with the modal mass that they are normalised to",
     )  # fmt: skip
     _check(
-        not _feet(table), "modes do not tell the forces on the feet", code="E-SUPPORT", key="nodes",
+        "modes do not tell the forces on the feet", not _feet(table), code="E-SUPPORT", key="nodes",
         value=_feet(table), limit="feet with matrices",
         remedy="leave the feet out of the table, or export reduced matrices",
     )  # fmt: skip
