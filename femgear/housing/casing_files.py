@@ -360,9 +360,8 @@ def _stored(path: Path, mass: float) -> dict[str, np.ndarray]:
 
             with xr.open_dataset(path) as data:
                 found = {str(name): one.values for name, one in data.data_vars.items()}
-        return {
-            name: np.asarray(one, float) * mass ** _MASS_POWERS.get(name, 0) for name, one in found.items()
-        }
+        numbers = {name: one for name, one in found.items() if one.dtype.kind not in "OSU"}
+        return {n: np.asarray(one, float) * mass ** _MASS_POWERS.get(n, 0) for n, one in numbers.items()}
 
 
 def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
