@@ -25,6 +25,7 @@ import csv
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -364,17 +365,28 @@ def _stored(path: Path, mass: float) -> dict[str, np.ndarray]:
         return {n: np.asarray(one, float) * mass ** _MASS_POWERS.get(n, 0) for n, one in numbers.items()}
 
 
-def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
-    """Modes of the matrices of a punch file of Nastran or OptiStruct."""
+def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:
+    """Read stiffness and mass (r, r) of a punch file, row of (node, component), positions of its nodes.
+
+    Other cards than GRID, coordinate systems and DMIG are passed over, BEGIN SUPER among them.
+    """
     with nvh_library("matrices of Nastran"):
         from pyNastran.bdf.bdf import BDF
+    kept, lines = False, list[str]()
+    for line in path.read_text(encoding="latin-1").splitlines():
+        kept = line[:4].upper() in ("GRID", "CORD", "DMIG") if line[:1].isalpha() else kept
+        lines += [line] if kept and not line.startswith("$") else []
+    deck, place = BDF(debug=False), dict[int, np.ndarray]()
     with _foreign("bulk data of Nastran"):
-        deck = BDF(debug=False)
-        deck.read_bdf(str(path), punch=True, xref=False)
-    turned = [number for number, grid in deck.nodes.items() if grid.cp or grid.cd]
+        if lines:
+            source: Any = StringIO("\n".join([*lines, ""]))
+            deck.read_bdf(source, punch=True, xref=False)
+        for number, grid in deck.nodes.items():
+            place[number] = np.array(grid.get_position_no_xref(deck), float)
+    turned = [number for number, grid in deck.nodes.items() if grid.cd]
     _check(
-        "nodes in coordinate systems of their own", not turned, code="E-CHOICE", key="nodes",
-        value=turned[:9], limit="the basic system (CP 0, CD 0)", remedy="export in the basic system",
+        "displacements in coordinate systems of their own", not turned, code="E-CHOICE", key="nodes",
+        value=turned[:9], limit="the basic system (CD 0)", remedy="export displacements in the basic system",
     )  # fmt: skip
     both = _pair(deck.dmigs)
     labels = np.unique(np.vstack([side for one in both for side in (one.GCi, one.GCj)]), axis=0)
@@ -385,8 +397,12 @@ def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Mod
         matrix[i, j] = np.array(one.Real) + (1j * np.array(one.Complex) if one.is_complex else 0.0)
         if one.matrix_form == 6:
             matrix[j, i] = matrix[i, j]
-    place = {number: np.array(grid.xyz, float) for number, grid in deck.nodes.items()}
-    return _modes(found, row, place, table, length, mass)
+    return found, row, place
+
+
+def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
+    """Modes of the matrices of a punch file of Nastran or OptiStruct."""
+    return _modes(*dmig_matrices(path), table, length, mass)
 
 
 def _pair(matrices: Mapping[str, Any]) -> list[Any]:

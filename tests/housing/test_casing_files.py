@@ -1,16 +1,20 @@
 """Casings from files: all formats hold the same one, closed forms, and everything that is refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import pyuff
-from casing import NU, RHO, Casing, E, assembled, punch, write_casing
+from casing import NU, RHO, Casing, E, assembled, card, punch, write_casing
 from pyNastran.op4.op4 import OP4
+from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 from validation.reference.annulus import annulus_frequencies
 
 from femgear.errors import CaseError
 from femgear.fe.elasticity import Material
 from femgear.housing.casing_files import (
+    dmig_matrices,
     mean_compliance,
     missing_compliance,
     output_names,
@@ -163,6 +167,33 @@ def test_points_on_springs(name, tmp_path):
     assert mean_compliance(one) == pytest.approx(5 / (K0 * POINTS))
 
 
+def test_punch_of_an_external_superelement(tmp_path):
+    """Cards of others, and nodes in a coordinate system (CP): that of the ring a quarter turn ahead."""
+    head = "$ STANDARD PUNCH\nBEGIN SUPER     111\nEXTRN   1       12\nDTI     TUG1    0       66      105\n"
+    head += "CORD2R  7               0.      0.      0.      0.      0.      1.\n        0.      1.      0.\n"
+
+    def cards(text):
+        for n in range(1, 9):
+            text = text.replace(f"GRID*   {n:16d}{'':16}", f"GRID*   {n:16d}{7:16d}")
+        return head + text
+
+    ring(tmp_path, cards=cards)
+    (tmp_path / "nodes.csv").write_text("node,role\n" + "".join(f"{n},ring\n" for n in range(1, 9)))
+    arrays = read_ring(tmp_path, "ring.pch")
+    assert mean_compliance(arrays) == pytest.approx(5 / (K0 * POINTS))
+    place = dmig_matrices(tmp_path / "ring.pch")[2]
+    np.testing.assert_allclose(place[1], [0.0, R, 0.0], atol=1e-12)
+
+
+def test_eigenvalues_that_nastran_printed():
+    """A beam by MSC Nastran 2013: PARAM,EXTOUT,matrixpch, and the table of its .f06 (MIT, see the file)."""
+    (K, M), row, _ = dmig_matrices(Path(__file__).with_name("nastran_beam.pch"))
+    assert sorted(row) == [(n, c) for n in range(1, 6) for c in (3, 4)]
+    printed = "1.764385E+04 1.800475E+04 6.542455E+05 6.645972E+05 7.545368E+06 7.580662E+06 6.257528E+07"
+    found = eigh(K.real, M.real, eigvals_only=True)[2:]
+    assert [f"{one:.6E}" for one in found] == [*printed.split(), "6.263273E+07"]
+
+
 def test_units_and_centre(tmp_path):
     """The same ring in mm, t, s, away from the origin, and a node with sensors above its centre."""
     angle, (x, y) = 2 * np.pi * np.arange(8) / 8, (30.0, -7.0)
@@ -299,7 +330,9 @@ ONE[2, 3] = 1.0
          {"name": "ring.pch"}, "E-COUNT"),
         ({"cards": lambda t: t[:-40]}, {"name": "ring.pch"}, "E-FILE"),
         ({"cards": lambda t: t.replace(f"{1:16d}{'':16}", f"{1:16d}{2:16d}", 1)}, {"name": "ring.pch"},
-         "E-CHOICE"),
+         "E-FILE"),
+        ({"cards": lambda t: t.replace("*       " + card(0.0), f"*       {card(0.0)}{2:16d}", 1)},
+         {"name": "ring.pch"}, "E-CHOICE"),
     ],
 )  # fmt: skip
 def test_refused_matrices(changed, known, code, tmp_path):
