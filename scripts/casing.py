@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import astuple, dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
@@ -59,7 +60,7 @@ class Casing:
     foot_height: float = 0.08
 
 
-def assembled(casing: Casing, folder: Path):
+def assembled(casing: Casing):
     """Basis, stiffness [N/m] and mass [kg] of the casing, nothing held; Gmsh runs in a process of its own."""
     from skfem import Basis, BilinearForm, ElementTetP2, ElementVector, MeshTet
     from skfem.helpers import dot
@@ -67,15 +68,15 @@ def assembled(casing: Casing, folder: Path):
 
     names = {"bottom": -casing.width / 2, **vars(casing)}
     parts = HOUSED.format(**names) if casing.housed else ""
-    source, grid = folder / "casing.geo", folder / "casing.msh"
-    source.write_text(GEOMETRY.format(parts=parts, **names), encoding="utf-8")
-    run = "import sys, gmsh; gmsh.initialize(sys.argv, run=True)"
-    words = ["-3", "-v", "1", "-format", "msh22", str(source), "-o", str(grid)]
-    done = subprocess.run([sys.executable, "-c", run, *words], capture_output=True, text=True, timeout=300)
-    if done.returncode or not grid.is_file():
-        raise CaseError(f"Gmsh made no grid: {done.stderr[-200:]}", code="E-GRID-GMSH", file=str(source))
-    mesh, element = MeshTet.load(grid), ElementVector(ElementTetP2())
-    source.unlink(), grid.unlink()
+    with TemporaryDirectory() as folder:
+        source, grid = Path(folder) / "casing.geo", Path(folder) / "casing.msh"
+        source.write_text(GEOMETRY.format(parts=parts, **names), encoding="utf-8")
+        run = "import sys, gmsh; gmsh.initialize(sys.argv, run=True)"
+        words = [sys.executable, "-c", run, "-3", "-v", "1", "-format", "msh22", source, "-o", grid]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=300)
+        if done.returncode or not grid.is_file():
+            raise CaseError(f"Gmsh made no grid: {done.stderr[-200:]}", code="E-GRID-GMSH")
+        mesh, element = MeshTet.load(grid), ElementVector(ElementTetP2())
     K = linear_elasticity(*lame_parameters(E, NU)).assemble(Basis(mesh, element, intorder=2))
     basis = Basis(mesh, element, intorder=4)
     return basis, K.tocsc(), BilinearForm(lambda u, v, w: RHO * dot(u, v)).assemble(basis).tocsc()
@@ -107,13 +108,13 @@ def means_of_bore(casing: Casing, basis) -> np.ndarray:
     return columns
 
 
-def reduced(casing: Casing, folder: Path):
+def reduced(casing: Casing):
     """Stiffness and mass (r, r) on the nodes of the files and internal coordinates, and those nodes.
 
     Nodes are (role, dofs, position): ring, sensors, feet. A foot is the lower face of a block and moves
     without turning.
     """
-    basis, K, M = assembled(casing, folder)
+    basis, K, M = assembled(casing)
     mesh, angle = basis.mesh, 2 * np.pi * np.arange(casing.points) / casing.points
 
     def unit(dofs) -> np.ndarray:
@@ -133,9 +134,8 @@ def reduced(casing: Casing, folder: Path):
         chosen = below[side * mesh.p[0][mesh.facets[:, below]].mean(axis=0) > 0]
         dofs = basis.get_dofs(chosen)
         carried += [unit(dofs.all(f"u^{c}")).sum(axis=1) for c in (1, 2, 3)]
-        nodes.append(
-            (f"foot {name}", "123", np.array([side * (casing.foot_end - casing.foot / 2), -casing.base, 0]))
-        )
+        middle = np.array([side * (casing.foot_end - casing.foot / 2), -casing.base, 0.0])
+        nodes.append((f"foot {name}", "123", middle))
     return *condensed(K, M, np.hstack(watched), np.array(carried).T, casing.modes), nodes
 
 
@@ -207,11 +207,11 @@ def punch(K, M, nodes) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_casing(casing: Casing, folder: Path) -> np.ndarray:
-    """Write all files of a casing; its natural frequencies [Hz]."""
+def write_casing(casing: Casing, folder: Path) -> None:
+    """Write all files of a casing."""
     from pyNastran.op4.op4 import OP4
 
-    K, M, nodes = reduced(casing, folder)
+    K, M, nodes = reduced(casing)
     nodes = [(role, dofs, six_digits(x)) for role, dofs, x in nodes]
     frequency, shape, K, M = in_six_digits(K, M, nodes)
     p, omega = casing.points, 2 * np.pi * frequency
@@ -233,14 +233,12 @@ def write_casing(casing: Casing, folder: Path) -> np.ndarray:
     moved = np.zeros((len(omega), held, 3))
     moved[:, :p, 0], moved[:, :p, 1], moved[:, p:] = x, y, sensors
     points = np.array([x for _, _, x in nodes[:held]])
-    write_modes(
-        Shapes(points, frequency, np.full(len(omega), DAMPING), moved), folder / FILES[3], words="casing"
-    )
+    shapes = Shapes(points, frequency, np.full(len(omega), DAMPING), moved)
+    write_modes(shapes, folder / FILES[3], words="casing")
     way = {"sensor top": "z", "sensor flange": "x"}
     rows = [(n, role, *map(float, x), way.get(role, ""), d) for n, (role, d, x) in enumerate(nodes, 1)]
     for name, listed in ((FILES[4], rows), (FILES[5], rows[:held])):
         write_csv(folder / name, ("node", "role", "x", "y", "z", "direction", "dofs"), listed)
-    return frequency
 
 
 def main(
@@ -262,22 +260,15 @@ def main(
     """
     casing, folder = Casing(size=size, points=points, modes=modes), ready_folder(output, FILES)
     if not (0.003 <= size <= 0.03 and 8 <= points <= 200 and 1 <= modes <= 100):
-        raise CaseError(
-            f"{size} m, {points} points, {modes} modes",
-            code="E-RANGE",
-            limit="0.003 to 0.03 m, 8 to 200, 1 to 100",
-        )
-    if all((folder / name).is_file() for name in FILES):
-        with np.load(folder / FILES[0]) as stored:
-            same = stored["sizes"].tolist() == list(map(float, astuple(casing)))
-            frequency = stored["natural_frequency"] / (2 * np.pi)
-    else:
-        same = False
-    if not same:
+        limit = "0.003 to 0.03 m, 8 to 200 points, 1 to 100 modes"
+        raise CaseError("sizes of the casing", code="E-RANGE", value=(size, points, modes), limit=limit)
+    there = all((folder / name).is_file() for name in FILES)
+    if not there or tuple(np.load(folder / FILES[0])["sizes"]) != astuple(casing):
         with Progress() as progress:
             progress("casing")
-            frequency = write_casing(casing, folder)
+            write_casing(casing, folder)
             progress("casing", 1)
+    frequency = np.load(folder / FILES[0])["natural_frequency"] / (2 * np.pi)
     rows = [(str(i), f"{one:.1f}") for i, one in enumerate(frequency[:12], 1)]
     print_table("Lowest natural frequencies, feet clamped", ("mode", "Hz"), rows)
     say_files(folder, FILES)

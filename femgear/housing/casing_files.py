@@ -37,6 +37,8 @@ from femgear.housing.structure import FixedStructure, from_arrays
 
 UNITS = {"SI": (1.0, 1.0), "mm-t-s": (1e-3, 1e3)}
 """Systems of units: metres and kilograms of the units of length and mass; time is in seconds."""
+_ARRAYS, _PUNCH, _UNIVERSAL = (".npz", ".nc"), (".pch", ".bdf", ".dat"), (".uff", ".unv")
+_KINDS = (*_ARRAYS, *_PUNCH, ".op4", *_UNIVERSAL)
 _STIFFNESS = {0: "SI", 3: "mm-t-s", 6: "mm-kg-ms"}  # powers of ten of the unit of stiffness [N/m]
 # powers of the unit of mass in arrays, whose outputs are displacements
 _MASS_POWERS = {"ring_shape": -0.5, "sensor_shape": -0.5, "ring_compliance": -1, "sensor_compliance": -1}
@@ -115,24 +117,28 @@ def read_casing(
         E-CHOICE, E-SHAPE, E-SYMMETRY, E-TYPE (complex), E-MASS, E-MECHANISM (eigenvalues of zero or less),
         E-SUPPORT.
     """
-    kind, kinds = path.suffix.lower(), (".npz", ".nc", *_MODES)
+    kind = path.suffix.lower()
     with _of_file(path):
         known = ", ".join(UNITS)
         _check("no such units", units in UNITS, code="E-CHOICE", key="units", value=units, limit=known)
         _check(
-            "no such file, or no kind of file that holds a casing", path.is_file() and kind in kinds,
-            code="E-FILE", limit=f"a file {', '.join(kinds)}",
+            "no such file, or no kind of file that holds a casing", path.is_file() and kind in _KINDS,
+            code="E-FILE", limit=f"a file {', '.join(_KINDS)}",
         )  # fmt: skip
-        if kind in _MODES:
+        if kind in _ARRAYS:
+            arrays = _stored(path, UNITS[units][1])
+        else:
             _check(
                 "matrices and modes do not say where ring and sensors are", nodes is not None,
                 code="E-KEY-MISSING", key="nodes", limit="a table of nodes (CSV)",
             )  # fmt: skip
             table = read_nodes(Path(nodes or ""))
-            modes = _MODES[kind](path, table, *UNITS[units])
+            if kind in _UNIVERSAL:
+                modes = _universal(path, table, *UNITS[units])
+            else:
+                found = dmig_matrices(path) if kind in _PUNCH else _op4(path, table)
+                modes = _modes(*found, table, *UNITS[units])
             arrays = _arrays(modes, table, direction, pitch_radius, max_diameter, max_frequency, units)
-        else:
-            arrays = _stored(path, UNITS[units][1])
         given = {} if damping_ratio is None else {"damping_ratio": damping_ratio}
         structure = from_arrays(arrays | given, direction=direction, max_diameter=max_diameter)
         if expected_stiffness is not None:
@@ -271,8 +277,10 @@ def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, max_fre
             row[where] = along[component]
         return row
 
-    shape = np.array([[motion(one.number, v) for v in _polar(a)] for one, a in zip(ring, angle)])
-    heard = [motion(one.number, _along(one, place[one.number])) for one in sensors]
+    ways = [_directions(a) for a in angle]
+    shape = [[motion(o.number, w[word]) for word in ("radial", "tangential")] for o, w in zip(ring, ways)]
+    shape, across = np.array(shape), [np.arctan2(*place[one.number][1::-1]) for one in sensors]
+    heard = [motion(one.number, _directions(a)[one.direction]) for one, a in zip(sensors, across)]
     heard = np.array(heard).reshape(len(sensors), modes.shape.shape[1])
     path = np.asarray(direction, float) @ shape
     outputs = np.hstack([modes.shape @ heard.T, modes.foot_force])
@@ -290,16 +298,11 @@ def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, max_fre
     }
 
 
-def _polar(angle: float) -> np.ndarray:
-    """Unit vectors (2, 3) outwards and counter-clockwise."""
-    return np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0]])
-
-
-def _along(node: Node, place) -> np.ndarray:
-    """Direction (3,) of a sensor at a place seen from the centre of the ring."""
-    words = ("radial", "tangential", "x", "y", "z")
-    vectors: dict[str, np.ndarray] = dict(zip(words, [*_polar(np.arctan2(place[1], place[0])), *np.eye(3)]))
-    return vectors[node.direction.removeprefix("-")] * (-1.0 if node.direction.startswith("-") else 1.0)
+def _directions(angle: float) -> dict[str, np.ndarray]:
+    """Unit vectors (3,) at an angle around the ring by the words for them, of either sign."""
+    out, around = [np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0]
+    found = zip(("radial", "tangential", "x", "y", "z"), np.array([out, around, *np.eye(3)]))
+    return {sign + word: (-v if sign else v) for word, v in found for sign in ("", "-")}
 
 
 def _ring_angles(place, number: list[int], pitch_radius: float, max_diameter: int, units: str) -> np.ndarray:
@@ -400,11 +403,6 @@ def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:
     return found, row, place
 
 
-def _dmig(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
-    """Modes of the matrices of a punch file of Nastran or OptiStruct."""
-    return _modes(*dmig_matrices(path), table, length, mass)
-
-
 def _pair(matrices: Mapping[str, Any]) -> list[Any]:
     """Stiffness and mass among matrices by name: the one that begins with K and the one with M."""
     # KAAX goes before what else begins with K, such as the structural damping K4AAX
@@ -418,8 +416,8 @@ def _pair(matrices: Mapping[str, Any]) -> list[Any]:
     return [matrices[name] for (name,) in names]
 
 
-def _op4(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
-    """Modes of the matrices of an ASCII OUTPUT4 file."""
+def _op4(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], dict, dict]:
+    """Matrices of an ASCII OUTPUT4 file, as `dmig_matrices`."""
     with nvh_library("matrices of Nastran"):
         from pyNastran.op4.op4 import OP4
     with _foreign("ASCII OP4"):
@@ -435,7 +433,7 @@ def _op4(path: Path, table: Sequence[Node], length: float, mass: float) -> _Mode
         limit=f"square, of one size, {len(labels)} rows or more",
         remedy="give all nodes of the matrices in their order, with their dofs",
     )  # fmt: skip
-    return _modes(found, {label: i for i, label in enumerate(labels)}, {}, table, length, mass)
+    return found, {label: i for i, label in enumerate(labels)}, {}
 
 
 def _modes(found, row, place, table: Sequence[Node], length: float, mass: float) -> _Modes:
@@ -534,8 +532,3 @@ def _universal(path: Path, table: Sequence[Node], length: float, mass: float) ->
         row, {number: length * x for number, x in places.items()}, damping if damping.any() else None,
         np.zeros((len(modes), 0)), np.zeros((0, len(shape.T))),
     )  # fmt: skip
-
-
-_MODES = {
-    ".pch": _dmig, ".bdf": _dmig, ".dat": _dmig, ".op4": _op4, ".uff": _universal, ".unv": _universal,
-}  # fmt: skip

@@ -61,22 +61,18 @@ def test_formats_hold_the_same_casing(folder, name, nodes):
             assert np.abs(one - two[: len(one)]).max() < 1e-6 * np.abs(one).max()
 
 
-def test_free_annulus_is_that_of_plane_stress(tmp_path):
+def test_free_annulus_is_that_of_plane_stress():
     """Solid elements of the example against zeros of the Bessel determinant; the gate is 2 %."""
     casing = Casing(size=0.014, housed=False)
-    basis, K, M = assembled(casing, tmp_path)
+    basis, K, M = assembled(casing)
     shift = (2 * np.pi * 200.0) ** 2
     square, shape = eigsh(K, 24, M, sigma=-shift)
-    energy = np.array([(shape[dofs] * (M @ shape)[dofs]).sum(axis=0) for dofs in component_dofs(basis)])
-    bending = np.sqrt(np.abs(square[energy[2] < 0.2])) / (2 * np.pi)
+    axial = basis.get_dofs(elements=True).all("u^3")
+    plane = (shape[axial] * (M @ shape)[axial]).sum(axis=0) < 0.2  # kinetic energy along the axis
+    found = np.sqrt(np.abs(square[plane])) / (2 * np.pi)
     steel = Material(E, NU, RHO)
     exact = annulus_frequencies(casing.bore, casing.outer, steel, nodal_diameters=[2, 3])[:, 0]
-    found = bending[bending > 50.0]
-    np.testing.assert_allclose(found[:4], np.repeat(exact, 2), rtol=0.02)
-
-
-def component_dofs(basis):
-    return [basis.get_dofs(elements=True).all(f"u^{c}") for c in (1, 2, 3)]
+    np.testing.assert_allclose(found[found > 50.0][:4], np.repeat(exact, 2), rtol=0.02)
 
 
 def test_forces_on_the_feet(folder):
