@@ -9,6 +9,7 @@ from casing import NU, RHO, Casing, E, assembled, card, punch, write_casing
 from pyNastran.op4.op4 import OP4
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
+from validation.fixed_housing import EQUAL, solved
 from validation.reference.annulus import annulus_frequencies
 
 from femgear.errors import CaseError
@@ -20,6 +21,7 @@ from femgear.housing.casing_files import (
     output_names,
     read_casing,
 )
+from femgear.housing.two_way import MeshPaths, structure_lines
 
 PRESSURE = np.radians(20.0)
 KNOWN = {"direction": (np.sin(PRESSURE), -np.cos(PRESSURE)), "pitch_radius": 0.081, "damping_ratio": 0.02}
@@ -59,6 +61,20 @@ def test_formats_hold_the_same_casing(folder, name, nodes):
     for hertz in (0.0, 150.0, 800.0, 2500.0, 7000.0, 0.2 * highest, 0.49 * highest):
         for one, two in zip(transfer(arrays, hertz), transfer(other, hertz)):
             assert np.abs(one - two[: len(one)]).max() < 1e-6 * np.abs(one).max()
+
+
+def test_a_set_runs_in_the_same_casing(folder):
+    """Mesh forces and lines at the sensors of the small set of the validation; the gate is 1e-6."""
+    paths, speeds = MeshPaths(97, EQUAL, 0.1, 3), np.array([8.0, 60.0])
+    found = []
+    for name in ("casing.npz", "casing.pch", "casing.uff"):
+        one = read(folder, name, "nodes_held.csv" if name.endswith("uff") else "nodes.csv")
+        one = one.combined(np.eye(one.sensor_shape.shape[1])[:, :2])
+        response = solved(paths, one, speeds)
+        found.append((response.force, structure_lines(one, response)[1]))
+    for other in found[1:]:
+        for a, b in zip(found[0], other):
+            assert np.abs(a - b).max() < 1e-6 * np.abs(a).max()
 
 
 def test_free_annulus_is_that_of_plane_stress():
