@@ -122,8 +122,8 @@ THEMES = (
         "standard's solid disc has no twist between teeth and hub. Whole bodies: all teeth in one plane "
         "grid, held at the bore. Helical pairs: module and shifts of the normal section. Rows *finite*: both "
         "gears solid over their face width, half as fine as in plane contact, contacts on the path alone.",
-        (pairs.iso_stiffness,),
-        (pairs.whole_bodies, helical_pair.finite_width),
+        (),
+        (pairs.iso_stiffness, pairs.whole_bodies, helical_pair.finite_width),
     ),
     Theme(
         "static",
@@ -150,9 +150,9 @@ THEMES = (
             face_width.half_space,
             face_width.cosine_transform,
             face_width.cantilever_plate,
-            face_width.solid_elements,
         ),
         (
+            face_width.solid_elements,
             face_width.ends_of_teeth,
             face_width.root_stresses,
             face_width.whole_sets,
@@ -431,11 +431,11 @@ THEMES = (
         (
             sound.efficiency,
             sound.side_bands,
-            sound.short_ring,
             sound.power,
             sound.weighting,
             sound.signals,
             sound.loudness,
         ),
+        (sound.short_ring,),
     ),
 )
