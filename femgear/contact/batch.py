@@ -481,6 +481,8 @@ class PairLaws:
         As of `Candidates`, but of every window.
     loads, motions : (P, W, 3), (P, m) arrays
         Moments of the loads [N], and motions [m], at the given state.
+    pressure : (P, W, K) array
+        Largest of all cells over the root of the force, which Hertz's law has constant [Pa/N^(1/2)].
     """
 
     force: np.ndarray
@@ -494,6 +496,7 @@ class PairLaws:
     approach: np.ndarray
     loads: np.ndarray
     motions: np.ndarray
+    pressure: np.ndarray
 
     @cached_property
     def _cubics(self) -> np.ndarray:
@@ -518,10 +521,18 @@ class PairLaws:
 
     def moments_under(self, force: np.ndarray) -> np.ndarray:
         """Moments ``mu`` (n, P, W, 3) under forces (n, P, W) [N]."""
+        return self._by_lines(self.moments, force)
+
+    def pressure_under(self, force: np.ndarray) -> np.ndarray:
+        """Largest pressure (..., P, W) [Pa] under forces (..., P, W) [N]."""
+        return np.sqrt(force) * self._by_lines(self.pressure[..., None], force)[..., 0]
+
+    def _by_lines(self, curves: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Values (..., P, W, n) of curves (P, W, K, n) under forces (..., P, W) [N], by straight lines."""
         interval, x = self._between(force)
         share = (x / np.log(self.force[1] / self.force[0]))[..., None]
-        place = np.arange(force.shape[1])[:, None], np.arange(force.shape[2])
-        low, high = (self.moments[*place, interval + one] for one in (0, 1))
+        place = np.arange(force.shape[-2])[:, None], np.arange(force.shape[-1])
+        low, high = (curves[*place, interval + one] for one in (0, 1))
         return low + share * (high - low)
 
 
@@ -547,6 +558,7 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
     cells, right = found.candidate[rows], np.ones((len(rows[0]), C, 2))
     right[..., 1] = np.where(cells, beyond, 0.0)
     yields, moments = np.ones((len(force), P, W)), np.zeros((len(force), P, W, 3))
+    pressure, carried = np.zeros((len(force), P, W)), np.zeros((P, W, C))
     touching, active = np.full((P, W, C), np.inf), beyond == 0.0
     per, offset, pressed = (np.zeros(active.shape) for _ in range(3))
     approach = np.zeros(len(active))
@@ -569,6 +581,8 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
             active[some] ^= flips
             some = np.flatnonzero(changed)
         yields[k][rows], moments[k][rows] = approach / one, (onto[rows] @ pressed[..., None])[..., 0] / one
+        carried[rows] = pressed
+        pressure[k] = found.equal_cell_pressure(carried).max(axis=-1) / np.sqrt(one)
         touching[rows] = np.where(active & np.isinf(touching[rows]), one, touching[rows])
     return PairLaws(
         force=force,
@@ -582,6 +596,7 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
         approach=found.approach[found.mesh],
         loads=loads,
         motions=state.motions,
+        pressure=np.moveaxis(pressure, 0, -1),
     )
 
 

@@ -21,8 +21,8 @@ from femgear.errors import ContactError
 from femgear.gears.deviations import SetDeviations, lead_separation
 from femgear.gears.modifications import FlankTwist
 
-_FORCES, _LEAST = 32, 1e-4
-"""Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
+_FORCES, _LEAST, _MOST = 32, 1e-4, 4.0
+"""Of the curves of tooth pairs: their number, and the shares of the torque at which they begin and end."""
 _EVEN = ("deflection", "sun_arc", "force", "stiffness", "member_motion", "held_stiffness")
 """What all slices of helical teeth have in common, and forces and stiffnesses that are sums over them."""
 
@@ -80,16 +80,11 @@ def contact_over_width(
         With ``reach`` (meshes, rows), the approach up to which pairs may touch [m], and ``overflow``, whether
         a contact leaves its window.
     """
-    N, W = found.setup.n_planets, len(found.mesh)
-    driver, turns = found.setup.driver, found.setup.gears.rotation_approach
-    whole, places = found.setup.images * load[driver], found.setup.places
-    curves = np.geomspace(_LEAST * load[driver] / N, 4.0 * whole, _FORCES)
-    S, rows = over.slices, len(found.position)
+    W, driver, turns = len(found.mesh), found.setup.driver, found.setup.gears.rotation_approach
+    S, rows, places = over.slices, len(found.position), found.setup.places
     P = rows // S if over.helical else rows
     lead, apart = _leads(found, deviations, S, P)
-    held = None if over.held is None else (found.images_of(over.held[0]), over.held[1])
-    laws = pair_laws(found, state, curves)
-    sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
+    laws, sliced = _solve(over, found, state, load, apart)
     force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
     motion = np.zeros((len(members.names), P))
     motion[members.free] = sliced.motions.T[driver + 1 : len(load)] if found.setup.images == 1 else 0.0
@@ -113,9 +108,29 @@ def contact_over_width(
     for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
         # tangents of the springs change; what they begin at is that of the cells
         values[name] = plane.get(name, 0.0) + tangent.T
-    if held is not None:
+    if over.held is not None:
         values["held_tangents"] = plane.get("held_tangents", 0.0) + sliced.joint
     return values
+
+
+def _solve(
+    over: FaceWidth, found: Candidates, state: BatchState, load, apart: np.ndarray
+) -> tuple[PairLaws, SliceState]:
+    """Solve the slices that separations part (P, S, W) [m], with curves of pairs as far as their forces."""
+    driven, held = load[found.setup.driver], None
+    if over.held is not None:
+        held = found.images_of(over.held[0]), over.held[1]
+    whole = found.setup.images * driven
+    curves = np.geomspace(_LEAST * driven / found.setup.n_planets, _MOST * whole, _FORCES)
+    laws = pair_laws(found, state, curves)
+    sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
+    if sliced.force.max() > curves[-1]:
+        # by equilibrium no slice carries more than all of them
+        step = np.log(curves[1] / curves[0])
+        curves = np.exp(np.arange(np.log(curves[0]), np.log(over.slices * whole) + step, step))
+        laws = pair_laws(found, state, curves)
+        sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
+    return laws, sliced
 
 
 def _by_tilts(tilting: TiltingMembers | None, sliced: SliceState, tilts: np.ndarray) -> tuple:
@@ -136,13 +151,14 @@ def _of_pairs(found: Candidates, state: BatchState, laws: PairLaws, sliced: Slic
     (P, S, W), rows, width = sliced.force.shape, len(found.position), found.bodies.face_width
     contact, spur = sliced.contact_width(found, laws), P == rows
     _check_lines(sliced.force if spur else None, contact, width, S)
-    # by Hertz's law the largest pressure of a slice grows with the root of its force
+    # pressures are those of the laws, which fall between their forces beside the plane state
     pressure, before = found.equal_cell_pressure(state.loads).max(axis=2), state.loads.sum(axis=-1)
+    by_law = laws.pressure_under(before)
+    right = np.divide(pressure, by_law, out=np.ones(by_law.shape), where=by_law > 0)
     at_edge, of_rows = sliced.reaches_ends(found, laws), sliced.force.reshape(rows, -1, W)
 
     def pressed(force):
-        raised = np.divide(force, before, out=np.zeros(force.shape), where=before > 0)
-        return np.where(at_edge, 0.0, pressure * np.sqrt(raised))
+        return np.where(at_edge, 0.0, right * laws.pressure_under(force))
 
     def over_width(values):
         """Springs (rows, slices of each, W) stand for all slices of spur teeth, for one of helical."""

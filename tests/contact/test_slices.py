@@ -149,6 +149,7 @@ def spring_newton(separation, *, stiffness, load, slices, tilting=None):
         touching=np.zeros((1, 1, 1)), smooth=np.zeros((1, 1, 3, 1, 3)), supports=np.zeros((1, 1)),
         separation=np.zeros((1, 1)), mesh=np.zeros(1, int), approach=np.ones((1, 1)),
         loads=np.full((1, 1, 3), load / 3), motions=np.full((1, 1), load / stiffness),
+        pressure=np.zeros((1, 1, 8)),
     )  # fmt: skip
     across = np.zeros((1, slices, 1, slices, 1))
     apart = np.asarray(separation)[None, :, None]

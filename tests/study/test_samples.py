@@ -115,6 +115,7 @@ def linear_laws(n_planets, load, *, bearing, sun=None, others=math.inf, mesh=5e8
         approach=approach,
         loads=np.zeros((1, n_planets, 3)),
         motions=np.zeros((1, approach.shape[1])),
+        pressure=np.zeros((1, n_planets, 6)),
     )
 
 

@@ -84,6 +84,7 @@ def spring_loads(separation: np.ndarray, per_width: float) -> np.ndarray:
         smooth=np.zeros((1, 1, 3, 1, 3)), supports=np.zeros((1, 1)),
         separation=np.zeros((1, 1)), mesh=np.zeros(1, int), approach=np.ones((1, 1)),
         loads=np.full((1, 1, 3), load / 3), motions=np.full((1, 1), load / whole),
+        pressure=np.zeros((1, 1, 8)),
     )  # fmt: skip
     N, rows = len(separation), np.zeros((1, 1), int)
     across, apart = np.zeros((1, N, 1, N, 1)), np.asarray(separation)[None, :, None]

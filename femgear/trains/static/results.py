@@ -554,6 +554,9 @@ def _lifted(data: xr.Dataset) -> Iterator[Finding]:
             f"{'both ends are' if both else 'one end is'} lifted: {100 * share[worst]:.0f} % of the width of "
             f"{data['mesh'].values[worst]} carry at all"
         )
+        count = int(carries[worst].sum())
+        if count < 3:
+            text += f", {count} of the slices: K_Hbeta and stiffness are 10 % off over two, more over one"
         yield Finding("W-LIFTED", "", text)
 
 

@@ -54,6 +54,8 @@ from femgear.trains.static.results import (
 WHOLE_RECORD = 16
 _PER_OVERLAP = 6
 """Slices of helical teeth in the part of the width in which they turn by a pitch."""
+_MORE = 64
+"""Positions beside three times those that are wanted, for the sake of slices."""
 LARGEST_MOTION, LARGEST_APPROACH = 2.0, 0.5
 """Of a member and of the flanks of a mesh for which displacements count as small [modules]."""
 
@@ -247,12 +249,15 @@ def record_positions(case: Case, gears: PlanetarySet) -> int:
     """Choose the number of equidistant positions of a mesh period, as many as the case asks for at least.
 
     They meet all planets alike. Those of helical teeth meet the slices alike, as nearly as whole numbers
-    can: what slices add in coming into contact one by one is then mistaken for nothing else.
+    can: three times or more while one slice follows another, where that takes no more than three times the
+    positions and `_MORE`, so that `femgear.contact.face_width.over_slices` finds what slices add in coming
+    into contact one by one. Slices that follow one another faster than positions add little.
     """
     wanted, slices = case.static.positions, case.static.slices
     if slices > 1 and (overlap := abs(_overlap(case, gears))):
         passed = slices / overlap
-        wanted = round(math.ceil(wanted / passed) * passed)
+        often = 3.0 * passed <= 3.0 * wanted + _MORE
+        wanted = round(passed * max(3, math.ceil(wanted / passed)) if often else passed / (passed // wanted))
     return gears.equal_positions(wanted)
 
 
