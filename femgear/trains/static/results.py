@@ -556,7 +556,7 @@ def _lifted(data: xr.Dataset) -> Iterator[Finding]:
         )
         count = int(carries[worst].sum())
         if count < 3:
-            text += f", {count} of the slices: K_Hbeta and stiffness are 10 % off over two, more over one"
+            text += f", {count} of the slices: stiffness and K_Hbeta are 10 % off over two, more over one"
         yield Finding("W-LIFTED", "", text)
 
 
