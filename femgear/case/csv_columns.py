@@ -1,16 +1,18 @@
-"""CSV files that a case names: two columns, numbers with their units in the heading.
+"""Files that a case names; of CSV files two columns, numbers with their units in the heading.
 
 `read_columns` reads any such file. `embed_points` puts the points of one in its place in the case, and
 `embed_profiles` those of all measured profiles and leads: they are read once and kept inside the case.
+Casings are too large for that: `embed_checksum` keeps the SHA-256 of their files.
 """
 
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise, product
@@ -269,6 +271,38 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
         options = {"read": read, "units": _PROFILE_UNITS, "plain": partial(plain, kind=kind)}
         found |= embed_points(data, f"{gear}.modifications", name, **options)
     return found
+
+
+def embed_checksum(data: dict, name: str) -> dict[str, str]:
+    """Put the SHA-256 of the files of a casing beside their names, where a case does not have it already."""
+    housing: Any = data.get("housing")
+    table = housing.get("structure") if isinstance(housing, dict) else None
+    if not isinstance(table, dict) or "sha256" in table or not isinstance(table.get("file"), str):
+        return {}
+    names = {key: table[key] for key in ("file", "nodes") if isinstance(table.get(key), str)}
+    del housing["structure"]  # a file that cannot be read is refused for that alone
+    found = [embedded(file, name, f"housing.structure.{key}", checksum) for key, file in names.items()]
+    housing["structure"] = table | {"sha256": checksum_of_all(found)}
+    return {"housing.structure": text.printable(names["file"])}
+
+
+def checksum_of_all(checksums: Iterable[str]) -> str:
+    """Compute the SHA-256 of those of several files, in their order."""
+    return hashlib.sha256("".join(checksums).encode()).hexdigest()
+
+
+def checksum(path: str | os.PathLike) -> str:
+    """Compute the SHA-256 of a file, as hexadecimal text. CaseError: it cannot be read (E-FILE)."""
+    name = os.fsdecode(path)
+    try:
+        if not os.path.isfile(path):
+            raise FileNotFoundError(0, "no such file")
+        with open(path, "rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except (OSError, ValueError) as error:
+        reason, remedy = getattr(error, "strerror", None) or str(error), "check its name and permissions"
+        message = f"cannot read the file: {reason}"
+        raise CaseError(message, code="E-FILE", file=name, remedy=remedy) from error
 
 
 def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:

@@ -68,7 +68,8 @@ def modal_entries(case: Any) -> Entries:
 
 def dynamic_entries(case: Case) -> Entries:
     """List the entries that decide the periodic response: all but sensor and microphone."""
-    return _entries(case, _DYNAMIC, kept={"housing.support", "housing.nodal_diameters"})
+    casing = {f"housing.structure.{name}" for name in ("sha256", "units", "damping_ratio", "max_frequency")}
+    return _entries(case, _DYNAMIC, kept={"housing.support", "housing.nodal_diameters", *casing})
 
 
 def compliance_entries(case: Case) -> Entries:

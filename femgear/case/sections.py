@@ -504,10 +504,25 @@ class SupportSection(Section):
     width: Annotated[float, Quantity(LENGTH, 0.0, 60.0)] = 0.0
 
 
+class StructureSection(Section):
+    """A casing that somebody else has meshed, the ring gear being part of it, read by `read_casing`.
+
+    ``sha256`` is that of file and table of nodes: results belong to what these hold. Reading fills it in.
+    """
+
+    file: Annotated[str, Field(max_length=1000)]
+    nodes: Annotated[str, Field(max_length=1000)] | None = None
+    units: Literal["SI", "mm-t-s"] = "SI"
+    damping_ratio: DampingRatio | None = None
+    max_frequency: Annotated[float, Quantity(FREQUENCY, 10.0, 1e6)] | None = None
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
+
+
 class HousingSection(Section):
     """The fixed sensor, how the ring's field is carried to it, and the microphone.
 
-    With supports the ring stands still without symmetry: ``nodal_diameters`` of it act both ways.
+    With supports or a structure ring and casing stand still without symmetry: ``nodal_diameters`` of the ring
+    act both ways.
 
     ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
     interpolation between ``points`` points of the paper on carrier modulation, with its images.
@@ -519,7 +534,20 @@ class HousingSection(Section):
     microphone: MicrophoneSection = MicrophoneSection()
     published: Annotated[tuple[PublishedLines, ...], Field(max_length=100)] = ()
     support: Annotated[tuple[SupportSection, ...], Field(max_length=200)] = ()
+    structure: StructureSection | None = None
     nodal_diameters: Annotated[int, Count(2, 26)] | None = None
+
+    @model_validator(mode="after")
+    def _one_structure(self):
+        if self.support and self.structure:
+            message, remedy = "a casing holds its ring itself", "leave support or structure out"
+            raise CaseError(message, code="E-CHOICE", remedy=remedy)
+        return self
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether ring and casing are a structure fixed in space, on supports or of a file."""
+        return bool(self.support) or self.structure is not None
 
 
 class Case(Section, ReadCase):

@@ -147,10 +147,38 @@ def read_casing(
 
 
 def output_names(nodes: Path) -> tuple[str, ...]:
-    """Names of the outputs of a casing: its sensors, then "foot NAME x", "y" and "z", forces [N]."""
-    table = read_nodes(nodes)
-    sensors = [one.name for one in table if one.role == "sensor"]
-    return (*sensors, *(f"foot {name} {axis}" for name in _feet(table) for axis in "xyz"))
+    """Names of the outputs of a casing: its sensors, then "foot NAME x", "y" and "z", forces [N].
+
+    Sensors of one name have their direction after it.
+    """
+    return sum(_output_names(read_nodes(nodes)), ())
+
+
+def _output_names(table: Sequence[Node]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of sensors, and of the forces on feet."""
+    names = [one.name for one in table if one.role == "sensor"]
+    ways = [one.direction for one in table if one.role == "sensor"]
+    sensors = (f"{name} {way}" if names.count(name) > 1 else name for name, way in zip(names, ways))
+    return tuple(sensors), tuple(f"foot {name} {axis}" for name in _feet(table) for axis in "xyz")
+
+
+def named_outputs(structure: FixedStructure, nodes: Path | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the sensors of a casing that was read, and of the forces on its feet; it has a sensor.
+
+    Of arrays without a table of nodes "sensor 1" and so on. CaseError: E-COUNT, E-SHAPE.
+    """
+    count = structure.sensor_shape.shape[1]
+    plain = tuple(f"sensor {i}" for i in range(1, count + 1))
+    sensors, forces = (plain, ()) if nodes is None else _output_names(read_nodes(nodes))
+    _check(
+        "the casing has no sensor", len(sensors) > 0, code="E-COUNT", key="nodes", limit="one or more",
+        remedy="give a node the role sensor NAME, or the arrays a sensor_shape",
+    )  # fmt: skip
+    _check(
+        f"the table names {len(sensors)} sensors and {len(forces)} forces, the file has {count}",
+        len(sensors) + len(forces) == count, code="E-SHAPE", key="nodes", limit=f"{count} outputs",
+    )  # fmt: skip
+    return sensors, forces
 
 
 def mean_compliance(structure: FixedStructure) -> float:
@@ -161,6 +189,12 @@ def mean_compliance(structure: FixedStructure) -> float:
     """
     shape = structure.ring_shape / structure.natural_frequency[:, None]
     return float((np.abs(shape) ** 2).sum() + np.trace(structure.residual).real)
+
+
+def may_lack_compliance(path: Path, structure: FixedStructure) -> bool:
+    """Tell whether what was read of a file are modes that others are missing of: matrices have them all."""
+    kind = path.suffix.lower()
+    return kind in _UNIVERSAL or (kind in _ARRAYS and not structure.residual.any())
 
 
 def missing_compliance(structure: FixedStructure, expected_stiffness: float) -> tuple[Finding, ...]:

@@ -289,7 +289,13 @@ def _decibels(power: np.ndarray, reference: float) -> np.ndarray:
 
 
 def stored_sound(housing: Any) -> tuple[SensorLines, np.ndarray]:
-    """Read the exact lines of the sensor from housing.nc, and compute those of the microphone [Pa]."""
+    """Read the exact lines of the sensor from housing.nc, and compute those of the microphone [Pa].
+
+    CaseError: a casing of a file, whose surface is not known (E-CHOICE).
+    """
+    if "pressure_level" not in housing:
+        message, limit = "the sound of a casing of a file is not computed", "a ring, also on supports"
+        raise CaseError(message, code="E-CHOICE", key="housing.structure", limit=limit)
     lines = stored_lines(housing, form="exact")
     if "pressure_real" in housing:
         pressure = housing["pressure_real"].values + 1j * housing["pressure_imag"].values

@@ -18,7 +18,7 @@ from pydantic import ValidationError, create_model
 
 from femgear.case import text as case_text
 from femgear.case.checks import cross_check
-from femgear.case.csv_columns import embed_profiles
+from femgear.case.csv_columns import embed_checksum, embed_profiles
 from femgear.case.gear_set import with_shafts
 from femgear.case.mistakes import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
@@ -66,7 +66,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     except CaseError as error:
         raise combine([error], lines, name) from None
     file, of_set = known.file, known.key != "model"
-    files, unread = _embedded_files(embed_profiles if of_set else file.embed, data, name)
+    files, unread = _embedded_files(_embed_of_set if of_set else file.embed, data, name)
     case_text.check_tree(data, name)
     try:
         case = file.model.model_validate(data)
@@ -90,6 +90,11 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     said = (*notices(data, case), *said, *added_material(case)) if of_set else said
     case.read_from(text, lines, name, notices=said, profile_files=files)
     return with_shafts(case) if of_set else case
+
+
+def _embed_of_set(data: dict, name: str) -> dict[str, str]:
+    """Files of a planetary set: points of profiles and checksums of a casing are put into the tables."""
+    return embed_profiles(data, name) | embed_checksum(data, name)
 
 
 def _embedded_files(embed: Callable, data: dict, name: str) -> tuple[dict[str, str], list[CaseError]]:

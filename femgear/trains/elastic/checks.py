@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.checks import check_floating, runup_range
-from femgear.case.gear_set import planetary_set
+from femgear.case.csv_columns import checksum, checksum_of_all
+from femgear.case.gear_set import driving_torque, planetary_set
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case, output_member
 from femgear.errors import CaseError, Finding
-from femgear.gears.kinematics import torques
-from femgear.housing.structure import Support
+from femgear.gears.kinematics import mesh_normals, torques
+from femgear.housing.casing_files import named_outputs, read_casing
+from femgear.housing.structure import FixedStructure, Support
 from femgear.report.tables import response_warnings
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
@@ -69,6 +72,8 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
         )
     check_one_period(case, gears, "modes, dynamics and housing take")
     _check_housing_supports(case)
+    if case.housing.structure:
+        imported_casing(case, gears)
     fastest_mesh_frequency(case, gears)
     if case.runup.count:
         runup_ends(case)
@@ -100,12 +105,49 @@ def _check_housing_supports(case: Case) -> None:
         message, remedy = "two supports stand at this angle", "make one of them, with the sum of both"
         key, value = f"housing.support[{again}].angle", f"{math.degrees(angles[again]):.6g} deg"
         raise CaseError(message, code="E-DUPLICATE", key=key, value=value, remedy=remedy)
-    if angles and case.housing.form == "linear":
+    if case.housing.stands_still and case.housing.form == "linear":
         raise CaseError(
-            "the linear form interpolates a field that turns with the carrier; a ring on supports has none",
-            code="E-CHOICE", key="housing.form", value="linear", limit='"exact" with housing.support',
+            "the linear form interpolates a field that turns with the carrier; a ring on supports or in a "
+            "casing has none", code="E-CHOICE", key="housing.form", value="linear",
+            limit='"exact" with housing.support and housing.structure',
         )  # fmt: skip
     fixed_diameters(case)
+
+
+def imported_casing(
+    case: Case, gears: PlanetarySet, *, max_frequency: float = np.inf, expected_stiffness: float | None = None
+) -> tuple[FixedStructure, tuple[str, ...], tuple[str, ...]]:
+    """Read the casing of a case, with the names of its sensors and of the forces on its feet.
+
+    Its ring is loaded on the pitch circle, at the angles of the planets, along the line of action of the
+    flanks that carry. ``max_frequency`` [Hz] where the case gives none; ``expected_stiffness`` [N/m] as for
+    `read_casing`.
+
+    CaseError: as `read_casing`; E-OTHER-CASE: files that are not those that the case was read with.
+    """
+    section, folder = case.housing.structure, Path(case.name).parent
+    assert section is not None
+    file, nodes = folder / section.file, None if section.nodes is None else folder / section.nodes
+    psi, on_ring = gears.planet_angles[0], mesh_normals(gears, back=driving_torque(case) < 0)[gears.n_planets]
+    turned = np.array([[np.cos(psi), np.sin(psi)], [-np.sin(psi), np.cos(psi)]])
+    try:
+        if checksum_of_all(checksum(one) for one in (file, nodes) if one) != section.sha256:
+            raise CaseError(
+                "these are not the files that the case was read with", code="E-OTHER-CASE", key="file",
+                value=section.file, limit=f"SHA-256 {section.sha256}",
+                remedy="put them beside the case file, or leave out sha256 for those that are there",
+            )  # fmt: skip
+        structure = read_casing(
+            file, direction=turned @ on_ring, max_diameter=fixed_diameters(case), units=section.units,
+            pitch_radius=gears.ring.base_radius / math.cos(gears.working_pressure_angle_planet_ring),
+            damping_ratio=section.damping_ratio, nodes=nodes,
+            max_frequency=section.max_frequency or max_frequency, expected_stiffness=expected_stiffness,
+        )  # fmt: skip
+        return structure, *named_outputs(structure, nodes)
+    except CaseError as error:
+        known = error.key in type(section).model_fields
+        error.key, error.file = f"housing.structure.{error.key if known else 'file'}", error.file or str(file)
+        raise
 
 
 def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
@@ -180,11 +222,13 @@ def case_warnings(case: Case) -> Iterator[Finding]:
             "without damping resonances have no limit, and levels depend on how near a line lies to one",
             remedy="0.02 to 0.05 is usual",
         )
-    if case.housing.support and case.runup.count:
-        yield Finding("W-SUPPORT", "housing.support", "the run-up takes the ring without its supports")
-    if case.housing.support and case.dynamics.mesh_harmonics is None:
-        text = "the ring on supports is excited by six mesh harmonics: slow speeds lack what lies above"
-        yield Finding("W-EXCITATION", "housing.support", text, remedy="give dynamics.mesh_harmonics")
+    if case.housing.stands_still:
+        key = "housing.support" if case.housing.support else "housing.structure"
+        if case.runup.count:
+            yield Finding("W-SUPPORT", key, "the run-up takes the ring without its supports or casing")
+        if case.dynamics.mesh_harmonics is None:
+            text = "a housing that stands still is excited by six mesh harmonics: slow speeds lack what lies "
+            yield Finding("W-EXCITATION", key, f"{text}above", remedy="give dynamics.mesh_harmonics")
     yield from _wound_up(case)
     if case.planet.bearing_clearance and case.operation.fixed == "ring":
         yield Finding(
@@ -268,6 +312,15 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
         change, limit = data["level_change"].values, data["excitation_limit"].values
         yield from missing_level(data["speed"].values, change, limit, float(data.attrs["compared_to"]))
     yield from response_warnings(data)
+
+
+def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """List what housing.nc says against itself: static compliance that a casing lacks."""
+    if missing := data.attrs.get("missing_compliance"):
+        remedy = (
+            "export more modes, or residual vectors, or matrices, unless the casing is as stiff as that"
+        )
+        yield Finding("W-RESIDUAL", "housing.structure.file", missing, remedy=remedy)
 
 
 def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[Finding, ...]:

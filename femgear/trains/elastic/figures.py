@@ -518,8 +518,9 @@ def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
             f"housing_signal_{speed}": housing_signal(one),
             f"order_spectrum_{speed}": order_spectrum(one),
             f"modulation_{speed}": modulation_polar(one, angles, windowed=model),
-            f"microphone_spectrum_{speed}": microphone_spectrum(one),
         }
+        if "pressure_level" in one:
+            figures[f"microphone_spectrum_{speed}"] = microphone_spectrum(one)
     return figures
 
 

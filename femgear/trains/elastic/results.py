@@ -83,6 +83,10 @@ _SUPPORTED = {
     "two_way_residual": ("1", "residual of the two-way equations"),
     "order_tail": ("1", "share of the mesh forces in the outer half of the side bands"),
 }
+_OUTPUTS = {
+    "sensor": ("m", "displacement at the sensor, in its direction"),
+    "force": ("N", "force of the housing on the ground"),
+}
 _DIRECTIONS = {RADIAL: "radial", TANGENTIAL: "tangential"}
 
 
@@ -156,14 +160,29 @@ class ModesResult:
 
 
 @dataclass(frozen=True)
+class FixedHousing:
+    """Ring and casing that stand still, the forces in them, and those in the ring on its foundation alone.
+
+    Sensors of the structure: some at equal distances around the outer surface of a ring on supports, then
+    the displacements ``sensors`` and the forces ``forces`` by name; ``missing`` as in `HousingResult`.
+    """
+
+    structure: FixedStructure
+    two_way: TwoWayResponse
+    one_way: TwoWayResponse
+    sensors: tuple[str, ...] = ()
+    forces: tuple[str, ...] = ()
+    missing: str = ""
+
+
+@dataclass(frozen=True)
 class DynamicsResult:
     """Periodic response at every ``input_speed`` (speeds,) [rad/s], stability, and field of the ring.
 
     ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial``
     (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its outer surface, as
-    ``ring_tangential`` (H + 1, 2 n_max + 1) at the last speed; of a ring on supports ``fixed`` are
-    its structure, whose sensors stand at equal distances around its outer surface, the forces in it, and
-    those in the ring without supports, which all else is of; ``symmetry`` is that of `ModesResult`,
+    ``ring_tangential`` (H + 1, 2 n_max + 1) at the last speed; ``fixed`` is the housing that stands still,
+    all else of the ring on its foundation; ``symmetry`` is that of `ModesResult`,
     ``harmonics`` their number at the speed of the case that has the most. The excitation ends at
     ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
     changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at. ``warnings``
@@ -185,7 +204,7 @@ class DynamicsResult:
     compared_to: float
     warnings: tuple[Finding, ...]
     entries: Entries
-    fixed: tuple[FixedStructure, TwoWayResponse, TwoWayResponse] | None = None
+    fixed: FixedHousing | None = None
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
@@ -223,9 +242,10 @@ class HousingResult:
 
     ``exact`` are the lines of the components, ``lines`` those of the case's ``form``, "exact" or "linear"
     (interpolated over ``points`` points of the ring). The excitation ends at ``excitation_limit`` (speeds,)
-    [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`. Of a ring on supports ``sound`` are
-    the three results of `surface_sound` (speeds, n_orders), and ``supported`` has the numbers (speeds,) of
-    `_SUPPORTED`.
+    [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`. Of a housing that stands still
+    ``sound`` are the three results of `surface_sound` (speeds, n_orders), none of a casing of a file,
+    ``supported`` has the numbers (speeds,) of `_SUPPORTED`. ``outputs`` are names and lines (speeds, n_names,
+    n_orders) of each of `_OUTPUTS`; ``missing`` says what static compliance a casing lacks.
     """
 
     input_speed: np.ndarray
@@ -239,6 +259,8 @@ class HousingResult:
     microphone: Microphone
     sound: tuple[np.ndarray, ...] | None = None
     supported: Mapping[str, np.ndarray] = field(default_factory=dict)
+    outputs: Mapping[str, tuple[tuple[str, ...], np.ndarray]] = field(default_factory=dict)
+    missing: str = ""
 
     @cached_property
     def lines(self) -> SensorLines:
@@ -254,29 +276,33 @@ class HousingResult:
             rounding = (
                 f"less than {_ROUNDED:g} of the largest acceleration of a speed; smaller lines are zero"
             )
-        lines = ("lines", "speed order", values, "m", words)
-        cylinder, frequency = self.cylinder, exact.frequency
-        stored: list[Any] = [lines]
-        if self.sound is None:
+        cylinder, frequency, sound = self.cylinder, exact.frequency, self.sound
+        stored: list[Any] = [("lines", "speed order", values, "m", words)]
+        if sound is not None:
+            stored.append(("pressure", "speed order", sound[0], "Pa", "sound pressure at the microphone"))
+        elif not self.supported:
             pressure = sound_pressure(exact, cylinder, self.microphone)
-            radiated, equivalent = (sound_power(exact, cylinder, equivalent=one) for one in (False, True))
-        else:
-            pressure, radiated, equivalent = self.sound
-            stored.append(("pressure", "speed order", pressure, "Pa", "sound pressure at the microphone"))
-        heard, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
-        supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in self.supported.items()}
+            sound = pressure, *(sound_power(exact, cylinder, equivalent=one) for one in (False, True))
+        for kind, (_, moved) in self.outputs.items():
+            stored.append((f"{kind}_lines", f"speed {kind} order", moved, *_OUTPUTS[kind]))
         variables = complex_entries(tuple(stored), single=True) | {
             "carrier_speed": ("speed", exact.carrier_speed, "rad/s", "speed of the carrier"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
-            "pressure_level": ("speed", pressure_level(pressure, frequency), "dB", f"A-weighted {heard}"),
-            "power_level": ("speed", power_level(radiated, frequency), "dB", f"A-weighted {power}"),
-            "equivalent_power_level": ("speed", power_level(equivalent, frequency), "dB", _EQUIVALENT),
         }
+        if sound is not None:
+            heard, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
+            variables |= {
+                "pressure_level": ("speed", pressure_level(sound[0], frequency), "dB", f"A-weighted {heard}"),
+                "power_level": ("speed", power_level(sound[1], frequency), "dB", f"A-weighted {power}"),
+                "equivalent_power_level": ("speed", power_level(sound[2], frequency), "dB", _EQUIVALENT),
+            }
+        supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in self.supported.items()}
+        names = {kind: (kind, one[0], "1", f"name of the {kind}") for kind, one in self.outputs.items()}
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return dataset(
-            variables | supported, coords=coordinates(speed=self.input_speed / RPM) | order,
-            attrs={
+            variables | supported, coords=coordinates(speed=self.input_speed / RPM) | order | names,
+            attrs=({"missing_compliance": self.missing} if self.missing else {}) | {
                 "title": "what a sensor fixed on the housing hears", "sensor_angle": exact.sensor_angle,
                 "form": self.form, "points": self.points, "method": exact.method, "ring_teeth": exact.z_ring,
                 "symmetry": self.symmetry, "rounding": rounding,
@@ -432,11 +458,12 @@ def _near_resonances(runup: xr.Dataset) -> Block:
 
 def describe_housing(data: xr.Dataset) -> Block:
     """Tabulate level and largest lines [m/s^2] at every speed [rpm] of housing.nc."""
+    audible = "pressure_level" in data
     columns = {
         "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
         "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
         "rms [m/s^2]": lambda one: f"{float(one.level):.4g}",
-        "microphone [dB(A)]": lambda one: f"{float(one.pressure_level):.1f}",
+        **({"microphone [dB(A)]": lambda one: f"{float(one.pressure_level):.1f}"} if audible else {}),
         "largest lines: carrier order (amplitude [m/s^2])": _largest_lines,
     }
     form = data.attrs["form"]
@@ -445,6 +472,8 @@ def describe_housing(data: xr.Dataset) -> Block:
         "microphone: {microphone_distance:g} m from the ring, which radiates over its face width in a rigid "
         "cylinder into air of {air_density:g} kg/m^3 and {sound_speed:g} m/s"
     ).format(**data.attrs)
+    if not audible:
+        heard = "the sound of a casing of a file is not computed"
     if "one_way_level" in data:
         columns["one way [m/s^2]"] = lambda one: f"{float(one.one_way_level):.4g}"
         heard += "; one way: by the mesh forces of the ring without its supports"
@@ -517,10 +546,12 @@ def _recordings(results: Results) -> Iterator[tuple[float, str, str, np.ndarray,
     housing = results.housing
     for s, rpm in enumerate(housing["speed"].values):
         one = housing.isel(speed=s)
-        (exact, pressure), lines = stored_sound(one), stored_lines(one)
-        name, speed = np.format_float_positional(rpm, 9, fractional=False, trim="-"), float(exact.base_speed)
+        lines, name = stored_lines(one), np.format_float_positional(rpm, 9, fractional=False, trim="-")
+        speed = float(lines.base_speed)
         yield speed, f"accelerometer_{name}_rpm", "m/s^2", lines.order, lines.acceleration
-        yield speed, f"microphone_{name}_rpm", "Pa", exact.order, pressure
+        if "pressure_level" in one:
+            exact, pressure = stored_sound(one)
+            yield speed, f"microphone_{name}_rpm", "Pa", exact.order, pressure
 
 
 def ring_shapes(results: Results) -> Shapes:

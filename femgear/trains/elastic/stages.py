@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ from femgear.errors import Finding
 from femgear.fe.elasticity import mass
 from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.planetary import PlanetarySet, mesh_names
+from femgear.housing.casing_files import may_lack_compliance, missing_compliance
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
 from femgear.housing.sound import Cylinder, Microphone, surface_sound
@@ -72,6 +74,8 @@ from femgear.trains.elastic.checks import (
     fastest_mesh_frequency,
     fixed_diameters,
     housing_supports,
+    housing_warnings,
+    imported_casing,
     max_nodal_diameter,
     missing_level,
     runup_ends,
@@ -93,6 +97,7 @@ from femgear.trains.elastic.model import (
 )
 from femgear.trains.elastic.results import (
     DynamicsResult,
+    FixedHousing,
     HousingResult,
     ModesResult,
     describe_housing,
@@ -469,7 +474,7 @@ def dynamics_parts(
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
             warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
             entries=dynamic_entries(part),
-            fixed=fixed_housing(case, modes, carrier[own]) if case.housing.support else None,
+            fixed=fixed_housing(case, modes, carrier[own]) if case.housing.stands_still else None,
         )  # fmt: skip
         progress("dynamics", float(own[-1] + 1), float(len(speeds)))
 
@@ -480,12 +485,10 @@ def fixed_harmonics(case: Case) -> tuple[int, int]:
     return excited, case.dynamics.response_harmonics or 2 * excited
 
 
-def fixed_housing(
-    case: Case, modes: ModesResult, carrier: np.ndarray
-) -> tuple[FixedStructure, TwoWayResponse, TwoWayResponse]:
-    """Make the structure of the ring on its supports, and solve for forces at speeds of the carrier [rad/s].
+def fixed_housing(case: Case, modes: ModesResult, carrier: np.ndarray) -> FixedHousing:
+    """Make the structure of ring and casing, and solve for forces at speeds of the carrier [rad/s].
 
-    Of the set in it, and without supports. Sensors stand around; the meshes keep what higher diameters give.
+    Of the set in it, and in the ring on its foundation alone. The meshes keep what higher diameters give.
     """
     gears, ring, n_max = planetary_set(case), modes.ring, fixed_diameters(case)
     low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
@@ -496,15 +499,25 @@ def fixed_housing(
         gears_alone(modes.model, flexibility), excitation.stiffness.mean(axis=1), damping_ratio=damping,
         max_frequency=highest,
     )  # fmt: skip
-    points = 4 * (modes.max_diameter + 1)
     known: Any = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
-    around = 2 * np.pi * np.arange(points) / points
-    structure = supported_ring(ring.modes, housing_supports(case), **known, sensor_angles=around)
     paths = MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), ring.load_angle, modes.symmetry)
-    solved = partial(
-        solve_two_way, alone, excitation, paths=paths, carrier_speed=carrier, harmonics=harmonics
-    )
-    return structure, solved(structure), solved(supported_ring(ring.modes, (), **known), side_bands=0)
+    sensors, forces, missing = (), (), ""
+    if case.housing.structure:
+        expected = 1.0 / ring_mesh_compliance(low["compliance"], gears.ring.teeth, [0.0])[0, 0]
+        structure, sensors, forces = imported_casing(
+            case, gears, max_frequency=highest, expected_stiffness=expected
+        )
+        if may_lack_compliance(Path(case.housing.structure.file), structure):
+            missing = " ".join(one.text for one in missing_compliance(structure, expected))
+        own = replace(paths, load_angle=0.0)
+    else:
+        points, own = 4 * (modes.max_diameter + 1), paths
+        around = 2 * np.pi * np.arange(points) / points
+        structure = supported_ring(ring.modes, housing_supports(case), **known, sensor_angles=around)
+    solved = partial(solve_two_way, alone, excitation, carrier_speed=carrier, harmonics=harmonics)
+    one_way = solved(supported_ring(ring.modes, (), **known), paths=paths, side_bands=0)
+    two_way, one_way = solved(structure, paths=own), replace(one_way, paths=own)
+    return FixedHousing(structure, two_way, one_way, sensors, forces, missing)
 
 
 @one_blas_thread()
@@ -539,34 +552,52 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
         symmetry=dynamics.symmetry, excitation_limit=dynamics.excitation_limit,
         cylinder=Cylinder(case.ring.outer_radius, width), microphone=Microphone(heard.distance, angle),
     )  # fmt: skip
-    return found if dynamics.fixed is None else _on_supports(case, dynamics, found, *dynamics.fixed)
+    return found if dynamics.fixed is None else _standing_still(case, dynamics, found, dynamics.fixed)
 
 
-def _on_supports(
-    case: Case, dynamics: DynamicsResult, found: HousingResult, structure: FixedStructure,
-    two_way: TwoWayResponse, one_way: TwoWayResponse,
-) -> HousingResult:  # fmt: skip
-    """What the sensor and the microphone hear of the structure, by the forces of both routes."""
-    exact, points, top = found.exact, structure.sensor_shape.shape[1], dynamics.ring_radial.shape[-1] // 2
-    n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / points
-    wave = np.exp(1j * np.outer(place, n)) / points
-    at = np.real(wave.conj() @ np.exp(1j * n * exact.sensor_angle))
-    sensor = structure.combined(at[:, None])
-    order, moved = structure_lines(sensor, two_way)
-    lines = replace(exact, order=order, displacement=moved[:, 0], method="supports")
-    sound = list[tuple[np.ndarray, ...]]()
-    for some in np.array_split(np.arange(len(moved)), -(-len(moved) // 20)):  # fit into memory
-        here = replace(two_way, carrier_speed=two_way.carrier_speed[some], force=two_way.force[some])
-        velocity = 1j * np.outer(lines.base_speed[some], order)[..., None]
-        waves = velocity * np.swapaxes(structure_lines(structure, here)[1], 1, 2) @ wave.conj()
-        sound.append(surface_sound(waves, n, lines.frequency[some], found.cylinder, found.microphone))
-    order, moved = structure_lines(sensor, one_way)
-    level = order_level(replace(lines, order=order, displacement=moved[:, 0]))
-    told = {"one_way_level": level, "two_way_residual": two_way.residual, "order_tail": two_way.tail}
+def _standing_still(
+    case: Case, dynamics: DynamicsResult, found: HousingResult, fixed: FixedHousing
+) -> HousingResult:
+    """What sensors and the microphone hear of the structure, by the forces of both routes."""
+    structure, exact, top = fixed.structure, found.exact, dynamics.ring_radial.shape[-1] // 2
+    count = structure.sensor_shape.shape[1]
+    points = count - len(fixed.sensors) - len(fixed.forces)
+    n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / max(points, 1)
+    wave = np.exp(1j * np.outer(place, n)) / max(points, 1)
+    weights = np.eye(count)[:, [0, *range(points, count)]]  # the sensor, then all that have names
+    if points:
+        weights[:, 0] = 0.0
+        weights[:points, 0] = np.real(wave.conj() @ np.exp(1j * n * exact.sensor_angle))
+    named, around = structure.combined(weights), structure.combined(np.eye(count)[:, :points])
+    order, moved = structure_lines(named, fixed.two_way)
+    lines = replace(exact, order=order, displacement=moved[:, 0], method="supports" if points else "casing")
+    by_kind = moved[:, 1:][:, : len(fixed.sensors)], moved[:, 1 + len(fixed.sensors) :]
+    outputs = dict(zip(("sensor", "force"), zip((fixed.sensors, fixed.forces), by_kind)))
+    order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
+    told = {
+        "one_way_level": order_level(replace(lines, order=order, displacement=one_way[:, 0])),
+        "two_way_residual": fixed.two_way.residual, "order_tail": fixed.two_way.tail,
+    }  # fmt: skip
     return replace(
-        found, exact=lines, supported=told, sound=tuple(np.concatenate(parts) for parts in zip(*sound)),
+        found, exact=lines, supported=told, missing=fixed.missing,
+        outputs={kind: one for kind, one in outputs.items() if one[0]},
+        sound=_sound_around(around, fixed.two_way, lines, n, wave, found) if points else None,
         excitation_limit=dynamics.response.mesh_frequency * fixed_harmonics(case)[0],
     )  # fmt: skip
+
+
+def _sound_around(
+    around: FixedStructure, two_way: TwoWayResponse, lines: SensorLines, n, wave, found: HousingResult
+) -> tuple[np.ndarray, ...]:
+    """Sound of a structure by its sensors around the outer surface, with waves (points, n)."""
+    sound = list[tuple[np.ndarray, ...]]()
+    speeds = np.arange(len(lines.base_speed))
+    for some in np.array_split(speeds, -(-len(speeds) // 20)):  # fit into memory
+        here = replace(two_way, carrier_speed=two_way.carrier_speed[some], force=two_way.force[some])
+        velocity = 1j * np.outer(lines.base_speed[some], lines.order)[..., None]
+        waves = velocity * np.swapaxes(structure_lines(around, here)[1], 1, 2) @ wave.conj()
+        sound.append(surface_sound(waves, n, lines.frequency[some], found.cylinder, found.microphone))
+    return tuple(np.concatenate(parts) for parts in zip(*sound))
 
 
 @one_blas_thread()
@@ -691,7 +722,7 @@ ELASTIC = Train(
             name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
             verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(results.housing),
-            tables=lambda results: (mesh_bands(results),),
+            tables=lambda results: (mesh_bands(results),), warnings=housing_warnings,
         ),
     ),
     describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,

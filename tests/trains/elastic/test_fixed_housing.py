@@ -1,17 +1,21 @@
-"""A case whose ring stands on supports: both ways and one way, lines and sound on disk, refusals."""
+"""A case whose ring stands on supports or in a casing: both ways and one way, lines and sound on disk."""
 
 from pathlib import Path
+from shutil import copy
 
 import numpy as np
 import pytest
+from casing import Casing, write_casing
 
 from femgear.errors import CaseError
 from femgear.housing.sensor import stored_lines
 from femgear.housing.sound import pressure_level, stored_sound
+from femgear.trains.elastic.checks import fixed_diameters, housing_warnings
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
-from femgear.trains.reading import read_case, with_values
+from femgear.trains.reading import parse_case, read_case, with_values
 from femgear.trains.static.stages import solve_static
 
+CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 FEET = [
     {"angle": f"{angle} deg", "radial_stiffness": "4e8 N/m", "tangential_stiffness": "2e8 N/m"}
     for angle in (35, 145, 215, 325)
@@ -24,8 +28,7 @@ WEAK = [{"angle": "10 deg", "radial_stiffness": "1 N/m", "tangential_stiffness":
 
 
 def reference(**entries):
-    file = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
-    return with_values(read_case(file), SMALL | entries)
+    return with_values(read_case(CASE), SMALL | entries)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +60,7 @@ def test_next_to_no_support_is_the_ring_on_its_foundation(before):
         # nodal diameters to 14, and waves that run around in the frame of the carrier
         np.testing.assert_allclose(data[name], other[name], atol=0.3)
     mean = dynamics.response.force[:, [0, 3], 0]
-    np.testing.assert_allclose(dynamics.fixed[1].force[..., 0], mean, rtol=1e-6)
+    np.testing.assert_allclose(dynamics.fixed.two_way.force[..., 0], mean, rtol=1e-6)
 
 
 def test_feet_change_the_level_and_the_file_holds_what_is_heard(before):
@@ -80,6 +83,154 @@ def test_planets_that_differ_make_all_orders():
     lines = heard(case, static, solve_modes(case, static)).exact
     size = np.abs(lines.acceleration[1])
     assert size[lines.order % 3 != 0].max() > 1e-3 * size.max()
+
+
+WAYS = np.array([np.sin(np.radians(20.0)), -np.cos(np.radians(20.0))])
+TINY = Casing(size=0.02, points=24, modes=8)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("casing")
+    write_casing(TINY, path)
+    return path
+
+
+def in_casing(folder, structure, **entries):
+    """The reference case beside the files of its casing."""
+    copy(CASE, folder / "case.toml")
+    fixed = {"housing.nodal_diameters": 6, "housing.structure": structure}
+    return with_values(read_case(folder / "case.toml"), SMALL | fixed | entries)
+
+
+def checksum_of(case) -> str:
+    return case.housing.structure.sha256
+
+
+def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path):
+    """The ring of a file is loaded where flanks touch, that of the case at the middle of its teeth."""
+    case = reference(**{"housing.support": FEET, "housing.sensor_angle": "20 deg"})
+    dynamics = solve_dynamics(case, *before)
+    assert dynamics.fixed is not None
+    one, n_max = dynamics.fixed.structure, fixed_diameters(case)
+    angle = 2 * np.pi * np.arange(60) / 60
+    wave = np.exp(1j * np.outer(angle + before[1].ring.load_angle, np.arange(-n_max, n_max + 1)))
+    top, count = before[1].max_diameter, one.sensor_shape.shape[1]
+    around = np.exp(1j * np.outer(2 * np.pi * np.arange(count) / count, np.arange(-top, top + 1))) / count
+    at = np.real(around.conj() @ np.exp(1j * np.arange(-top, top + 1) * np.radians(20.0)))
+    arrays = {
+        "natural_frequency": one.natural_frequency, "damping_ratio": one.damping_ratio, "ring_angle": angle,
+        "ring_shape": (one.ring_shape @ wave.T).real[..., None] * WAYS,
+        "sensor_shape": (one.sensor_shape @ at)[:, None],
+        "ring_compliance": (wave @ one.residual @ wave.conj().T).real,
+        "sensor_compliance": (at @ one.sensor_residual @ wave.conj().T).real[None],
+    }  # fmt: skip
+    np.savez(tmp_path / "ring.npz", **arrays)
+    held = in_casing(tmp_path, {"file": "ring.npz"}, **{"housing.nodal_diameters": n_max})
+    ours, theirs = solve_housing(case, dynamics), heard(held, *before)
+    lines, size = theirs.exact.acceleration, np.abs(ours.exact.acceleration).max()
+    np.testing.assert_allclose(lines, ours.exact.acceleration, rtol=0, atol=1e-9 * size)
+    for name, values in ours.supported.items():
+        np.testing.assert_allclose(theirs.supported[name], values, rtol=1e-6, atol=1e-12)
+    data = theirs.dataset()
+    assert "pressure_level" not in data and list(data["sensor"].values) == ["sensor 1"]
+    assert "missing_compliance" not in data.attrs
+    with pytest.raises(CaseError, match="sound"):
+        stored_sound(data)
+
+
+def test_one_casing_in_three_kinds_of_files(before, folder):
+    nodes = {"npz": "nodes_held.csv", "pch": "nodes.csv", "uff": "nodes_held.csv"}
+    more = {"damping_ratio": 0.02, "max_frequency": "1e6 Hz"}
+    held = {kind: {"file": f"casing.{kind}", "nodes": one, **more} for kind, one in nodes.items()}
+    found = {kind: heard(in_casing(folder, table), *before) for kind, table in held.items()}
+    names, lines = found["npz"].outputs["sensor"]
+    assert names == ("top", "flange") and list(found) == ["npz", "pch", "uff"]
+    for one in found.values():
+        assert one.outputs["sensor"][0] == names
+        np.testing.assert_allclose(one.outputs["sensor"][1], lines, rtol=0, atol=1e-6 * np.abs(lines).max())
+    forces, ground = found["pch"].outputs["force"]
+    assert forces[0] == "foot left x" and list(found["uff"].outputs) == ["sensor"]
+    data = found["pch"].dataset()
+    stored = data["force_lines_real"] + 1j * data["force_lines_imag"]
+    assert stored.dims == ("speed", "force", "order") and data["force_lines_real"].units == "N"
+    np.testing.assert_allclose(stored, ground, rtol=1e-6)
+    # mean force on the ground: that of the planets, which changes with the place where they mesh
+    fixed = solve_dynamics(in_casing(folder, held["pch"]), *before).fixed
+    assert fixed is not None
+    two_way = fixed.two_way
+    once = np.conj(two_way.force[:, 1, list(two_way.order).index(1)]) / 2
+    x, y, z = np.real(ground[..., 0]).reshape(-1, 2, 3).sum(axis=1).T
+    scale = np.abs(ground[..., 0]).max()
+    np.testing.assert_allclose(x + 1j * y, 3 * once * (WAYS[0] + 1j * WAYS[1]), atol=1e-5 * scale)
+    assert np.abs(once).max() > 0.01 * scale and np.abs(z).max() < 1e-5 * scale
+
+
+def test_modes_that_lack_compliance_are_said(before, folder):
+    """Modes of the example up to 900 Hz, without residual; matrices lack nothing, however few are kept."""
+    with np.load(folder / "casing.npz") as arrays:
+        few = {
+            name: one[:3] if name.endswith(("frequency", "shape")) else one for name, one in arrays.items()
+        }
+    np.savez(folder / "few.npz", **few)
+    for table, codes in (
+        ({"file": "few.npz"}, ["W-RESIDUAL"]),
+        ({"file": "casing.op4", "nodes": "nodes.csv", "damping_ratio": 0.02, "max_frequency": "900 Hz"}, []),
+    ):
+        data = heard(in_casing(folder, table, **{"operation.speeds": ["400 rpm"]}), *before).dataset()
+        found = list(housing_warnings(data))
+        assert [one.code for one in found] == codes
+        assert not found or "without residual" in found[0].text
+    tonnes = {**few, "ring_shape": 1e-2 * few["ring_shape"]}
+    np.savez(folder / "tonnes.npz", **tonnes)
+    with pytest.raises(CaseError, match="expected") as error:
+        heard(in_casing(folder, {"file": "tonnes.npz"}), *before)
+    assert (error.value.code, error.value.key) == ("E-UNITS", "housing.structure.units")
+
+
+def test_results_belong_to_what_the_files_hold(before, folder):
+    table = {"file": "casing.npz", "nodes": "nodes_held.csv"}
+    case = in_casing(folder, table)
+    digest = checksum_of(case)
+    again = parse_case(case.source, name=str(folder / "elsewhere.toml"))
+    assert again == case and len(digest) == 64
+    dynamics = solve_dynamics(case, *before)
+    changed = folder / "changed.npz"
+    with np.load(folder / "casing.npz") as arrays:
+        np.savez(changed, **{**arrays, "sensor_shape": 2 * arrays["sensor_shape"]})
+    other = in_casing(folder, table | {"file": "changed.npz"})
+    assert checksum_of(other) != digest
+    for late, key in ((other, "housing.structure.sha256"), (None, "housing.structure.file")):
+        with pytest.raises(CaseError) as error:
+            if late:
+                solve_housing(late, dynamics)
+            else:
+                changed.write_bytes(b"")
+                solve_modes(other, before[0])
+        assert (error.value.code, error.value.key) == ("E-OTHER-CASE", key)
+
+
+@pytest.mark.parametrize(
+    ("table", "entries", "code", "key"),
+    [
+        ({"file": "none.npz"}, {}, "E-FILE", "housing.structure.file"),
+        ({"file": "../casing.npz"}, {}, "E-FILE", "housing.structure.file"),
+        ({"file": "casing.npz", "nodes": "none.csv"}, {}, "E-FILE", "housing.structure.nodes"),
+        ({"nodes": "nodes.csv"}, {}, "E-KEY-MISSING", "housing.structure.file"),
+        ({"file": "casing.npz"}, {"housing.support": FEET}, "E-CHOICE", "housing"),
+        ({"file": "casing.npz"}, {"housing.form": "linear"}, "E-CHOICE", "housing.form"),
+        ({"file": "casing.npz"}, {"housing.nodal_diameters": 7}, "E-COUNT", "housing.structure.file"),
+        ({"file": "casing.npz", "nodes": "nodes.csv"}, {}, "E-SHAPE", "housing.structure.nodes"),
+        ({"file": "casing.pch"}, {}, "E-KEY-MISSING", "housing.structure.nodes"),
+        ({"file": "casing.pch", "nodes": "nodes.csv"}, {}, "E-KEY-MISSING",
+         "housing.structure.damping_ratio"),
+        ({"file": "casing.npz", "units": "inch"}, {}, "E-CHOICE", "housing.structure.units"),
+    ],
+)  # fmt: skip
+def test_refused_casings(before, folder, table, entries, code, key):
+    with pytest.raises(CaseError) as error:
+        solve_modes(in_casing(folder, table, **entries), before[0])
+    assert (error.value.code, error.value.key) == (code, key)
 
 
 @pytest.mark.parametrize(
