@@ -309,7 +309,7 @@ def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
     from femgear.storage.files import replaced_file
 
     shown = slice(0, max(EXPORTED, heard.harmonic) + 1)
-    field = dynamics.ring_radial[0, shown], dynamics.ring_tangential[shown]
+    field = dynamics.ring_radial[0, shown], dynamics.ring_tangential[-1, shown]
     surface = ring_surface(planetary_set, *field)
     write_vtu(surface, folder / "ring_deflection.vtu")
     radius = planetary_set.ring.rim_radius

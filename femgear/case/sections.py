@@ -504,6 +504,22 @@ class SupportSection(Section):
     width: Annotated[float, Quantity(LENGTH, 0.0, 60.0)] = 0.0
 
 
+def _turned(value: object) -> object:
+    """Angle from outwards, counter-clockwise, of a direction in words."""
+    return {"radial": "0 deg", "tangential": "90 deg"}.get(value, value) if isinstance(value, str) else value
+
+
+class SensorSection(Section):
+    """A sensor on the outer surface of the ring, which feels its motion in a direction.
+
+    ``direction`` is "radial", "tangential", or an angle from outwards, counter-clockwise.
+    """
+
+    name: Title
+    angle: Angle
+    direction: Annotated[Angle, BeforeValidator(_turned)] = 0.0
+
+
 class StructureSection(Section):
     """A casing that somebody else has meshed, the ring gear being part of it, read by `read_casing`.
 
@@ -534,6 +550,7 @@ class HousingSection(Section):
     microphone: MicrophoneSection = MicrophoneSection()
     published: Annotated[tuple[PublishedLines, ...], Field(max_length=100)] = ()
     support: Annotated[tuple[SupportSection, ...], Field(max_length=200)] = ()
+    sensor: Annotated[tuple[SensorSection, ...], Field(max_length=100)] = ()
     structure: StructureSection | None = None
     nodal_diameters: Annotated[int, Count(2, 26)] | None = None
 
@@ -542,6 +559,12 @@ class HousingSection(Section):
         if self.support and self.structure:
             message, remedy = "a casing holds its ring itself", "leave support or structure out"
             raise CaseError(message, code="E-CHOICE", remedy=remedy)
+        if self.sensor and self.structure:
+            message, remedy = "a casing has the sensors of its table of nodes", "leave housing.sensor out"
+            raise CaseError(message, code="E-CHOICE", remedy=remedy)
+        if len({one.name for one in self.sensor}) < len(self.sensor):
+            message, remedy = "two sensors have one name", "give each a name of its own"
+            raise CaseError(message, code="E-DUPLICATE", remedy=remedy)
         return self
 
     @property

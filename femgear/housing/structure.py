@@ -227,7 +227,7 @@ def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
 
 def supported_ring(
     ring: CyclicModes, supports: Sequence[Support], *, max_diameter: int, max_frequency: float,
-    damping_ratio: float, sensor_angles: Any = (0.0,),
+    damping_ratio: float, sensor_angles: Any = (0.0,), sensor_directions: Any = 0.0, sensor_widths: Any = 0.0,
 ) -> FixedStructure:  # fmt: skip
     """Make a structure of a ring on supports: a Ritz approximation in the cyclic modes of the ring.
 
@@ -250,7 +250,10 @@ def supported_ring(
     damping_ratio : float
         Of all modes.
     sensor_angles : (n_sensors,) array
-        Places of the sensors, which feel the radial displacement of the outer surface [rad].
+        Places of the sensors, which feel the displacement of the outer surface [rad].
+    sensor_directions, sensor_widths : float or (n_sensors,) array
+        Directions from outwards, counter-clockwise, and angles over which sensors take the mean [rad]. The
+        mean over a support times its stiffness is its force on the ground.
 
     Raises
     ------
@@ -276,7 +279,11 @@ def supported_ring(
         remedy = "hold x, y and rotation by supports, or give the ring a foundation"
         raise CaseError(message, code="E-MECHANISM", key="housing.support", remedy=remedy)
     middle = slice(top - max_diameter, top + max_diameter + 1)
-    heard = np.real(radial @ np.exp(1j * np.outer(n, sensor_angles)))
+    waves = np.exp(1j * np.outer(n, sensor_angles)) * np.sinc(np.outer(n, sensor_widths) / (2 * np.pi))
+    felt = (turned * (field @ waves) for turned, field in (
+        (np.cos(sensor_directions), radial), (np.sin(sensor_directions), tangential)
+    ))  # fmt: skip
+    heard = np.real(sum(felt))
     waves, sensors = shape.T @ path[:, middle], shape.T @ heard
     kept = square <= (2 * np.pi * max_frequency) ** 2
     left = waves[~kept] / square[~kept, None]

@@ -31,6 +31,28 @@ def test_support_all_around_is_a_foundation():
     np.testing.assert_allclose(compliance(one), compliance(other), atol=1e-9 * abs(compliance(other)).max())
 
 
+@pytest.mark.parametrize("phi", [0.4, 2.9])
+def test_supports_carry_the_load(phi):
+    """Equilibrium: what the feet give the ground is the force on the ring and its moment."""
+    held = [Support(angle, 3e7, 2e7) for angle in (0.3, 1.9, 3.3, 5.0)]
+    angle, way = np.repeat([one.angle for one in held], 2), np.tile([0.0, np.pi / 2], 4)
+    one = supported_ring(thin_ring(20), held, **KNOWN, sensor_angles=angle, sensor_directions=way)
+    moved = compliance(one)[-8:] @ np.exp(-1j * np.arange(-4, 5) * phi)
+    force = np.real(moved) * np.tile([3e7, 2e7], 4)
+    net = (force * np.exp(1j * (angle + way))).sum()
+    assert net == pytest.approx(complex(*DIRECTION) * np.exp(1j * phi), rel=1e-9)
+    assert force[1::2].sum() == pytest.approx(DIRECTION[1], rel=1e-9)
+
+
+def test_sensors_over_a_width_take_the_mean():
+    fine = {"sensor_angles": 0.7 + 0.5 * ((np.arange(400) + 0.5) / 400 - 0.5), "sensor_directions": 1.1}
+    points, mean = (
+        supported_ring(thin_ring(20), FEET, **KNOWN, **known).sensor_shape
+        for known in (fine, {"sensor_angles": [0.7], "sensor_directions": 1.1, "sensor_widths": 0.5})
+    )
+    np.testing.assert_allclose(points.mean(axis=1), mean[:, 0], atol=1e-4 * abs(mean).max())
+
+
 def _sampled(structure: FixedStructure, angle):
     n = np.arange(-structure.max_diameter, structure.max_diameter + 1)
     waves = np.exp(1j * np.outer(angle, n))

@@ -227,8 +227,8 @@ def case_warnings(case: Case) -> Iterator[Finding]:
         if case.runup.count:
             yield Finding("W-SUPPORT", key, "the run-up takes the ring without its supports or casing")
         if case.dynamics.mesh_harmonics is None:
-            text = "a housing that stands still is excited by six mesh harmonics: slow speeds lack what lies "
-            yield Finding("W-EXCITATION", key, f"{text}above", remedy="give dynamics.mesh_harmonics")
+            text = "a fixed housing is excited by six mesh harmonics: slow speeds lack what lies above"
+            yield Finding("W-EXCITATION", key, text, remedy="give dynamics.mesh_harmonics")
     yield from _wound_up(case)
     if case.planet.bearing_clearance and case.operation.fixed == "ring":
         yield Finding(
@@ -317,9 +317,7 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
 def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """List what housing.nc says against itself: static compliance that a casing lacks."""
     if missing := data.attrs.get("missing_compliance"):
-        remedy = (
-            "export more modes, or residual vectors, or matrices, unless the casing is as stiff as that"
-        )
+        remedy = "export more modes, or residual vectors, or matrices, unless the casing is as stiff as that"
         yield Finding("W-RESIDUAL", "housing.structure.file", missing, remedy=remedy)
 
 

@@ -7,7 +7,7 @@ belong to real motions by ``x(t) = Re sum_h X_h exp(i h omega t)``.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -181,8 +181,8 @@ class DynamicsResult:
 
     ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial``
     (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its outer surface, as
-    ``ring_tangential`` (H + 1, 2 n_max + 1) at the last speed; ``fixed`` is the housing that stands still,
-    all else of the ring on its foundation; ``symmetry`` is that of `ModesResult`,
+    ``ring_tangential`` at all speeds where a sensor of the case hears it, else at the last; ``fixed`` is the
+    housing that stands still, all else of the ring on its foundation; ``symmetry`` is that of `ModesResult`,
     ``harmonics`` their number at the speed of the case that has the most. The excitation ends at
     ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
     changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at. ``warnings``
@@ -215,7 +215,7 @@ class DynamicsResult:
             ("dte", lines, self.dte, "m", "dynamic transmission error"),
             ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
             ("ring", field, self.ring_radial[-1], "m", words.replace("tangential", "radial")),
-            ("ring_tangential", field, self.ring_tangential, "m", words),
+            ("ring_tangential", field, self.ring_tangential[-1], "m", words),
         )
         change = "change of the housing level with excitation up to the frequency compared_to"
         reach = {
@@ -290,6 +290,11 @@ class HousingResult:
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level": ("speed", order_level(self.lines), "m/s^2", "root mean square of the acceleration"),
         }
+        if "sensor" in self.outputs:
+            moved = np.swapaxes(self.outputs["sensor"][1], 0, 1)
+            level = order_level(replace(exact, displacement=moved)).T
+            words = "root mean square of the acceleration of the sensor"
+            variables["sensor_level"] = ("speed sensor", level, "m/s^2", words)
         if sound is not None:
             heard, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
             variables |= {

@@ -13,7 +13,7 @@ at all speeds, and the level of the housing is computed again with twice that fr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -464,12 +464,13 @@ def dynamics_parts(
         if (complete := own[-1] + 1 == len(speeds)) and part is not case:
             response = replace(response, message=joint_message(told))
         last = replace(response, **{name: getattr(response, name)[-1:] for name in _LINES})
+        heard = response if any(math.sin(one.direction) for one in case.housing.sensor) else last
         dte, radial = mesh_and_ring_outputs(modes, response)
         yield part, DynamicsResult(
             input_speed=speeds[own], response=response, dte=dte, ring_radial=radial,
             speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
             stability=stability(basis, excitation, frequency[own], excitation_harmonics=decisive),
-            ring_tangential=mesh_and_ring_outputs(modes, last, TANGENTIAL)[1][0],
+            ring_tangential=mesh_and_ring_outputs(modes, heard, TANGENTIAL)[1],
             ring_teeth=gears.ring.teeth, symmetry=modes.symmetry, harmonics=int(limit.response.max()),
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
             warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
@@ -511,13 +512,33 @@ def fixed_housing(case: Case, modes: ModesResult, carrier: np.ndarray) -> FixedH
             missing = " ".join(one.text for one in missing_compliance(structure, expected))
         own = replace(paths, load_angle=0.0)
     else:
-        points, own = 4 * (modes.max_diameter + 1), paths
-        around = 2 * np.pi * np.arange(points) / points
-        structure = supported_ring(ring.modes, housing_supports(case), **known, sensor_angles=around)
+        own, (structure, sensors, forces) = paths, _ring_on_supports(case, modes, known)
     solved = partial(solve_two_way, alone, excitation, carrier_speed=carrier, harmonics=harmonics)
     one_way = solved(supported_ring(ring.modes, (), **known), paths=paths, side_bands=0)
     two_way, one_way = solved(structure, paths=own), replace(one_way, paths=own)
     return FixedHousing(structure, two_way, one_way, sensors, forces, missing)
+
+
+def _ring_on_supports(
+    case: Case, modes: ModesResult, known: Mapping[str, Any]
+) -> tuple[FixedStructure, tuple[str, ...], tuple[str, ...]]:
+    """Structure of a ring on supports with sensors all around, those of the case, and forces on the ground.
+
+    Names of the latter two.
+    """
+    supports, points = housing_supports(case), 4 * (modes.max_diameter + 1)
+    places = [(2 * np.pi * i / points, 0.0, 0.0, 1.0) for i in range(points)]
+    places += [(one.angle, one.direction, 0.0, 1.0) for one in case.housing.sensor]
+    for one in supports:
+        for turned, stiffness in ((0.0, one.radial_stiffness), (0.5 * np.pi, one.tangential_stiffness)):
+            places.append((one.angle, turned, one.width, stiffness))
+    angle, turned, width, factor = np.array(places).T
+    structure = supported_ring(
+        modes.ring.modes, supports, **known, sensor_angles=angle, sensor_directions=turned,
+        sensor_widths=width,
+    )  # fmt: skip
+    ways = [f"support {i} {way}" for i in range(1, len(supports) + 1) for way in ("radial", "tangential")]
+    return structure.combined(np.diag(factor)), tuple(one.name for one in case.housing.sensor), tuple(ways)
 
 
 @one_blas_thread()
@@ -552,7 +573,21 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
         symmetry=dynamics.symmetry, excitation_limit=dynamics.excitation_limit,
         cylinder=Cylinder(case.ring.outer_radius, width), microphone=Microphone(heard.distance, angle),
     )  # fmt: skip
+    if case.housing.sensor:
+        found = replace(found, outputs={"sensor": _named_sensors(case, dynamics)})
     return found if dynamics.fixed is None else _standing_still(case, dynamics, found, dynamics.fixed)
+
+
+def _named_sensors(case: Case, dynamics: DynamicsResult) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names and lines (speeds, n_sensors, n_orders) [m] of the sensors of a case on the ring."""
+    carrier, lines = np.array([s.carrier for s in dynamics.speeds]), list[np.ndarray]()
+    for one in case.housing.sensor:
+        field = math.cos(one.direction) * dynamics.ring_radial
+        if math.sin(one.direction):
+            field = field + math.sin(one.direction) * dynamics.ring_tangential
+        place = dynamics.ring_teeth, carrier, one.angle
+        lines.append(component_lines(field, *place, symmetry=dynamics.symmetry).displacement)
+    return tuple(one.name for one in case.housing.sensor), np.stack(lines, axis=1)
 
 
 def _standing_still(

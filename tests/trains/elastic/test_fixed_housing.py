@@ -75,6 +75,44 @@ def test_feet_change_the_level_and_the_file_holds_what_is_heard(before):
     np.testing.assert_allclose(pressure_level(pressure, lines.frequency), data["pressure_level"], atol=1e-4)
 
 
+SENSORS = [
+    {"name": "top", "angle": "90 deg"},
+    {"name": "tangential", "angle": "90 deg", "direction": "tangential"},
+    {"name": "across", "angle": "90 deg", "direction": "30 deg"},
+    {"name": "where the level is", "angle": "20 deg"},
+    {"name": "foot", "angle": "35 deg", "direction": "tangential"},
+]
+
+
+@pytest.mark.parametrize("held", [{}, {"housing.support": FEET}])
+def test_named_sensors(before, held):
+    case = reference(**{"housing.sensor": SENSORS, "housing.sensor_angle": "20 deg", **held})
+    result = heard(case, *before)
+    (names, moved), data = result.outputs["sensor"], result.dataset()
+    assert names == tuple(one["name"] for one in SENSORS) == tuple(data["sensor"].values)
+    size = np.abs(moved).max()
+    turned = np.sqrt(3) / 2 * moved[:, 0] + moved[:, 1] / 2
+    np.testing.assert_allclose(moved[:, 2], turned, rtol=0, atol=1e-9 * size)
+    np.testing.assert_allclose(moved[:, 3], result.exact.displacement, rtol=0, atol=1e-9 * size)
+    np.testing.assert_allclose(data["sensor_level"][:, 3], data["level"], rtol=1e-6)
+    if held:
+        names, force = result.outputs["force"]
+        assert names[:2] == ("support 1 radial", "support 1 tangential") and len(names) == 8
+        np.testing.assert_allclose(force[:, 1], 2e8 * moved[:, 4], rtol=0, atol=1e-9 * np.abs(force).max())
+
+
+def test_sensors_of_both_routes(before):
+    """Next to no support at low speed: radial and tangential lines by two ways."""
+    entries = {"dynamics.damping_ratio": 1e-4, "operation.speeds": ["400 rpm"], "housing.sensor": SENSORS}
+    case = reference(**entries)
+    modes = solve_modes(case, before[0])
+    both = [heard(one, before[0], modes) for one in (with_values(case, {"housing.support": WEAK}), case)]
+    orders = np.intersect1d(*(one.exact.order for one in both))
+    ours, theirs = (one.outputs["sensor"][1][..., np.isin(one.exact.order, orders)] for one in both)
+    for i in range(len(SENSORS)):
+        np.testing.assert_allclose(ours[:, i], theirs[:, i], rtol=0, atol=0.01 * np.abs(theirs[:, i]).max())
+
+
 def test_planets_that_differ_make_all_orders():
     pin = {"planet": 1, "tangential": "3 um"}
     case = reference(**{"housing.support": FEET, "set.pin_errors": [pin], "housing.nodal_diameters": 6})
@@ -115,7 +153,8 @@ def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path):
     one, n_max = dynamics.fixed.structure, fixed_diameters(case)
     angle = 2 * np.pi * np.arange(60) / 60
     wave = np.exp(1j * np.outer(angle + before[1].ring.load_angle, np.arange(-n_max, n_max + 1)))
-    top, count = before[1].max_diameter, one.sensor_shape.shape[1]
+    top, count = before[1].max_diameter, 4 * (before[1].max_diameter + 1)
+    one = one.combined(np.eye(one.sensor_shape.shape[1])[:, :count])
     around = np.exp(1j * np.outer(2 * np.pi * np.arange(count) / count, np.arange(-top, top + 1))) / count
     at = np.real(around.conj() @ np.exp(1j * np.arange(-top, top + 1) * np.radians(20.0)))
     arrays = {
@@ -218,6 +257,7 @@ def test_results_belong_to_what_the_files_hold(before, folder):
         ({"file": "casing.npz", "nodes": "none.csv"}, {}, "E-FILE", "housing.structure.nodes"),
         ({"nodes": "nodes.csv"}, {}, "E-KEY-MISSING", "housing.structure.file"),
         ({"file": "casing.npz"}, {"housing.support": FEET}, "E-CHOICE", "housing"),
+        ({"file": "casing.npz"}, {"housing.sensor": SENSORS}, "E-CHOICE", "housing"),
         ({"file": "casing.npz"}, {"housing.form": "linear"}, "E-CHOICE", "housing.form"),
         ({"file": "casing.npz"}, {"housing.nodal_diameters": 7}, "E-COUNT", "housing.structure.file"),
         ({"file": "casing.npz", "nodes": "nodes.csv"}, {}, "E-SHAPE", "housing.structure.nodes"),
@@ -240,6 +280,8 @@ def test_refused_casings(before, folder, table, entries, code, key):
         ({"housing.support": FEET, "housing.form": "linear"}, "E-CHOICE"),
         ({"housing.support": FEET, "housing.nodal_diameters": 18}, "E-RANGE"),
         ({"housing.support": [{**FEET[0], "width": "1 m"}]}, "E-SUPPORT"),
+        ({"housing.sensor": SENSORS + SENSORS[:1]}, "E-DUPLICATE"),
+        ({"housing.sensor": [{**SENSORS[0], "direction": "axial"}]}, "E-UNIT"),
         (
             {"housing.support": FEET, "dynamics.mesh_harmonics": 20, "dynamics.response_harmonics": 120},
             "E-MEMORY",

@@ -176,7 +176,7 @@ def test_the_ring_turns_against_the_sun_at_rest(case, dynamics):
     """T z_r / z_s over k R 2 pi R b: clockwise under a positive torque of the sun, and outwards."""
     zero = dynamics.ring_radial.shape[-1] // 2
     turned = -case.operation.torque * 4.0 / (case.ring.foundation_tangential * 2 * np.pi * 0.1**2 * 0.025)
-    assert dynamics.ring_tangential[0, zero] == pytest.approx(turned, rel=1e-5)
+    assert dynamics.ring_tangential[-1, 0, zero] == pytest.approx(turned, rel=1e-5)
     assert np.all(dynamics.ring_radial[:, 0, zero].real > 0.0)
 
 
