@@ -107,6 +107,27 @@ def order_spectrum(signal) -> OrderSpectrum:
     return OrderSpectrum(np.arange(float(value.shape[-1])), value)
 
 
+def array_factor(planet_angles, order) -> np.ndarray:
+    """Compute the planet array factor ``|sum_j exp(i L psi_j)|/N`` of carrier orders L, 0 to 1.
+
+    The mesh of a planet ahead by psi_j does what the first one does, earlier by that angle of the carrier:
+    the lines of N identical planets that know nothing of each other are those of one times N times this
+    factor, on any fixed housing and around every mesh harmonic. Where it vanishes because of a symmetry of
+    the spacing (equal: L no multiple of N; opposite pairs: L odd) the line does not exist at all, whatever
+    planets and housing do to each other. It contains the five groups of M. Inalpolat and A. Kahraman, J.
+    Sound Vib. 323 (2009) 677-696.
+
+    Parameters
+    ----------
+    planet_angles : (N,) array
+        In the frame of the carrier [rad].
+    order : (...) int array
+        Carrier orders.
+    """
+    angles = np.asarray(planet_angles, float)
+    return np.abs(np.exp(1j * np.multiply.outer(np.asarray(order), angles)).mean(axis=-1))
+
+
 def order_level(lines: SensorLines) -> np.ndarray:
     """Compute the root mean square acceleration of a fixed sensor [m/s^2], shape (...), without its mean."""
     return np.sqrt(0.5 * (np.abs(lines.acceleration[..., lines.order > 0]) ** 2).sum(axis=-1))

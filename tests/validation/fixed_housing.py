@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.sparse import linalg
 
 from femgear.fe.reduction import CyclicModes
-from femgear.housing.orders import order_level
+from femgear.housing.orders import array_factor, order_level
 from femgear.housing.sensor import component_lines
 from femgear.housing.structure import FixedStructure, Support, circumferential, supported_ring
 from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
@@ -410,6 +410,49 @@ def green() -> tuple[Row, ...]:
     apart = np.abs(lines - exact).max() / np.abs(exact).max()
     words = "four radial springs, force at 500 rad/s: lines of a sensor over the largest"
     return (at_most("moving force", "Green's function", words, 1e-6, apart),)
+
+
+# teeth of sun and ring, places of the planets over the assembly positions, factors around the first harmonic
+_PRINTED = (
+    ((28, 68), np.arange(4) / 4, {64: 1.0, 66: 0.0, 67: 0.0, 68: 1.0, 70: 0.0, 72: 1.0}),
+    ((30, 70), np.arange(4) / 4, {68: 1.0, 69: 0.0, 70: 0.0, 71: 0.0, 72: 1.0}),
+    ((31, 95), np.arange(3) / 3, {93: 1.0, 94: 0.0, 95: 0.0, 96: 1.0}),
+    ((27, 108), np.arange(3) / 3, {105: 1.0, 107: 0.0, 108: 1.0, 109: 0.0, 111: 1.0}),
+    (
+        (30, 70), np.array([0, 24, 50, 74]) / 100,
+        {62: 0.930, 64: 0.426, 66: 0.876, 68: 0.536, 70: 0.809, 72: 0.637, 74: 0.729, 76: 0.729, 78: 0.637}
+        | dict.fromkeys(range(61, 79, 2), 0.0),
+    ),
+    (
+        (36, 84), np.array([0, 2, 6, 8]) / 12,
+        {76: 0.5, 78: 1.0, 80: 0.5, 82: 0.5, 84: 1.0, 86: 0.5, 88: 0.5, 90: 1.0, 92: 0.5}
+        | dict.fromkeys(range(75, 92, 2), 0.0),
+    ),
+)  # fmt: skip
+# spacing and phasing, teeth, assembly positions of the planets, factor at the mesh order
+_GROUPS = (
+    ("equal, in phase", (28, 68), (0, 24, 48, 72), 1.0),
+    ("equal, sequentially phased", (30, 70), (0, 25, 50, 75), 0.0),
+    ("unequal, in phase", (36, 84), (0, 20, 60, 80), 1.0),
+    ("unequal, sequentially phased", (30, 70), (0, 15, 50, 65), 0.0),
+    ("unequal, arbitrarily phased", (30, 70), (0, 24, 50, 74), np.cos(np.pi / 5)),
+)
+
+
+def array_factors() -> tuple[Row, ...]:
+    """The planet array factor against cosines, and the five groups by tooth numbers."""
+    rows = list[Row]()
+    for (sun, ring), place, factors in _PRINTED:
+        apart = np.abs(array_factor(2 * np.pi * place, [*factors]) - [*factors.values()]).max()
+        words = f"{sun}/{ring}, planets at {', '.join(f'{360 * one:.4g}' for one in place)} deg: factors of "
+        source = "closed form, three digits"
+        rows.append(at_most("array factor", source, f"{words}{len(factors)} orders", 0.0005, apart))
+    for i, (words, (sun, ring), place, factor) in enumerate(_GROUPS, 1):
+        ours = float(array_factor(2 * np.pi * np.array(place) / (sun + ring), ring))
+        source = f"group {i} of Inalpolat and Kahraman (2009)"
+        text = f"{sun}/{ring}, {words}: factor of the mesh order"
+        rows.append(within("array factor", source, text, factor, ours, 1e-12, relative=False))
+    return tuple(rows)
 
 
 def reference_set_on_supports() -> tuple[Row, ...]:

@@ -107,7 +107,7 @@ def test_sensors_of_both_routes(before):
     case = reference(**entries)
     modes = solve_modes(case, before[0])
     both = [heard(one, before[0], modes) for one in (with_values(case, {"housing.support": WEAK}), case)]
-    orders = np.intersect1d(*(one.exact.order for one in both))
+    orders = np.intersect1d(both[0].exact.order, both[1].exact.order)
     ours, theirs = (one.outputs["sensor"][1][..., np.isin(one.exact.order, orders)] for one in both)
     for i in range(len(SENSORS)):
         np.testing.assert_allclose(ours[:, i], theirs[:, i], rtol=0, atol=0.01 * np.abs(theirs[:, i]).max())
