@@ -14,6 +14,7 @@ SLICED = {"static.slices": 8, "sun.modifications": [{"kind": "lead slope", "amou
 HELICAL = {
     "set.helix_angle": "8 deg", "set.centre_distance": "51.5 mm",
     "sun.profile_shift": None, "ring.profile_shift": None,
+    "static.slices": 25,  # forces of a record are means while one slice follows another
 }  # fmt: skip
 CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 
@@ -42,7 +43,7 @@ def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members, more):
     seen = np.concatenate([force[order], force[3 + order]])
     # the cells of a walk fit the largest load of all its positions
     np.testing.assert_allclose(cycle.force[:, 0], seen, rtol=1e-3)
-    name = "slice_load" if SLICED.items() <= more.items() else "tooth_load"
+    name = "slice_load" if "static.slices" in more else "tooth_load"
     records = ((cycle, 0), (static.cycle, start))
     image, loads = (getattr(one, name)[..., at].max(axis=1) for one, at in records)
     seen = loads[[*order, *(3 + order)]]
