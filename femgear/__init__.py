@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-__version__ = "0.1.0"
-
 if TYPE_CHECKING:
+    __version__: str
     from femgear.case.gear_set import planetary_set
     from femgear.case.sections import Case
     from femgear.errors import FemgearError
@@ -51,6 +50,11 @@ _HOME = {
 
 def __getattr__(name: str) -> object:
     """Public names are imported when they are first asked for, so that ``import femgear`` stays light."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        globals()[name] = version("femgear")
+        return globals()[name]
     if name not in _HOME:
         raise AttributeError(f"module 'femgear' has no attribute {name!r}")
     from importlib import import_module

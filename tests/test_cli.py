@@ -11,6 +11,7 @@ import sys
 import time
 from dataclasses import replace
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +19,7 @@ import numpy as np
 import pytest
 from edited_manifests import finish
 
+import femgear
 from femgear import cli
 from femgear import run as run_module
 from femgear.errors import ConvergenceError
@@ -247,7 +249,7 @@ def test_no_arguments_and_version(capsys):
     assert cli.main([]) == 0
     assert "Usage" in capsys.readouterr().out
     assert cli.main(["--version"]) == 0
-    assert capsys.readouterr().out.strip() == "0.1.0"
+    assert capsys.readouterr().out.strip() == version("femgear") == femgear.__version__
 
 
 def test_schema_is_json(capsys):
