@@ -39,7 +39,7 @@ try:
     import numpy as np
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
-    from femgear import __version__
+    import femgear
     from femgear.errors import CaseError, FemgearError, printable
     from femgear.exchange.formats import Sampling
     from femgear.storage.files import noted_interrupts, storage_error
@@ -54,7 +54,7 @@ except (ImportError, MemoryError) as error:
 
 app = App(
     name="femgear",
-    version=__version__,
+    version=lambda: femgear.__version__,
     help="Planetary gear sets: from tooth geometry to the vibration heard on the housing.",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,

@@ -32,7 +32,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from femgear import __version__
+import femgear
 from femgear.errors import StorageError
 
 try:
@@ -101,7 +101,7 @@ def _create(dataset: xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> N
     longest = {dim: None if dim in free or not size else size for dim, size in sizes.items()}
     stored = {"O": h5py.string_dtype(), "U": h5py.string_dtype(), "b": np.dtype("i1")}
     with h5py.File(stream, "w", track_order=True) as file:
-        file.attrs.update(dataset.attrs, femgear_format=_FORMAT, femgear_version=__version__)
+        file.attrs.update(dataset.attrs, femgear_format=_FORMAT, femgear_version=femgear.__version__)
         if beside := [str(name) for name in dataset.coords if name not in sizes]:
             file.attrs["coordinates"] = " ".join(beside)
         made: dict[Any, h5py.Dataset] = {}

@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 from edited_manifests import finish
 
+import femgear
 from femgear.errors import StorageError
 from femgear.storage import files
 from femgear.storage.files import checksum, list_own, read_dataset, write_csv, write_dataset, write_text
@@ -69,7 +70,7 @@ def test_a_file_reads_as_one_that_xarray_has_written(tmp_path):
         words=(("way",), ["there", "back"], NAMED),
     ).assign_coords(teeth=("mesh", np.arange(6), NAMED), path=(("mesh", "way"), np.ones((6, 2)), NAMED))
     write_dataset(data, tmp_path / "ours.nc")
-    stamp = {"femgear_format": 1, "femgear_version": files.__version__}
+    stamp = {"femgear_format": 1, "femgear_version": femgear.__version__}
     data.assign_attrs(stamp).to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf")
     ours, theirs = (read_dataset(tmp_path / f"{name}.nc") for name in ("ours", "theirs"))
     xr.testing.assert_identical(ours, theirs)
