@@ -253,8 +253,16 @@ def slices_modes(reference: Reference):
 
 def help_text(_):
     """``femgear --help`` in a new process."""
-    command = [sys.executable, "-c", "from femgear.cli import main; main(['--help'])"]
-    subprocess.run(command, check=True, capture_output=True, env=os.environ)
+    _in_new_process("from femgear.cli import main; main(['--help'])")
+
+
+def package(_):
+    """``import femgear`` in a new process."""
+    _in_new_process("import femgear")
+
+
+def _in_new_process(program: str) -> None:
+    subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, env=os.environ)
 
 
 @dataclass(frozen=True)
@@ -330,7 +338,8 @@ STAGES = {
     "housing": Stage("housing, 2 speeds", housing, ("dynamics",), lambda _, h: h.lines.displacement.size, 9),
     "whole": Stage("whole computation, grids cached", whole, ("grids",), _none, 3, 3.0),
     "whole_cold": Stage("whole computation, new grids", whole_cold, (), _none, 3),
-    "help": Stage("femgear --help", help_text, (), _none, 5, 0.5),
+    "help": Stage("femgear --help", help_text, (), _none, 9, 0.3),
+    "package": Stage("import femgear, with the start of Python", package, (), _none, 9, 0.1),
 }
 
 
