@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -126,6 +128,117 @@ def array_factor(planet_angles, order) -> np.ndarray:
     """
     angles = np.asarray(planet_angles, float)
     return np.abs(np.exp(1j * np.multiply.outer(np.asarray(order), angles)).mean(axis=-1))
+
+
+NORMAL, UNEQUAL, FOREIGN = "normal", "needs unequal turning parts", "not from this stage"
+"""Verdicts on a line."""
+_MOST_TURNS = 2
+"""Turns of a part in a line: a planet that hits sun and ring meets one of them twice a turn."""
+_ZERO = 5e-4
+"""Array factor that angles given to a thousandth of a degree may leave where there is none."""
+
+
+@dataclass(frozen=True)
+class LineVerdict:
+    """What a carrier order of a spectrum says about the set: see `classify_line`.
+
+    Parameters
+    ----------
+    nearest : int
+        Whole carrier order next to the line.
+    factor : float
+        Array factor there.
+    verdict : str
+        `NORMAL`, `UNEQUAL` or `FOREIGN`.
+    reason : str
+        Why, and the turns of sun or planets that give this order.
+    """
+
+    nearest: int
+    factor: float
+    verdict: str
+    reason: str
+
+
+def spacing_symmetry(planet_angles) -> int:
+    """Find the largest g for which turns by ``2 pi/g`` map the planet angles [rad] on one another."""
+    place = np.exp(1j * np.asarray(planet_angles, float))
+    turned = (place[:, None] * np.exp(2j * np.pi / g) - place for g in range(len(place), 0, -1))
+    return next(len(place) - i for i, one in enumerate(turned) if np.abs(one).min(axis=1).max() < 1e-5)
+
+
+def classify_line(
+    order: float, planet_angles, teeth: tuple[int, int | None, int | None], *, tolerance: float
+) -> LineVerdict:
+    """Tell whether a healthy set makes a line that is heard on its housing, and what else would.
+
+    A function of the angle of the carrier that is the same after its turns by ``2 pi/g``, g of
+    `spacing_symmetry`, has orders that are multiples of g: on any housing, whatever equal planets do to each
+    other. An error of the sun turns with it, by ``1 + z_ring/z_sun`` a turn of the carrier, and adds
+    multiples of that to those orders; one of a single planet turns by ``z_ring/z_planet`` against the carrier
+    and may stand beside any whole order.
+
+    Parameters
+    ----------
+    order : float
+        Carrier order, above zero.
+    planet_angles : (N,) array
+        In the frame of the carrier [rad].
+    teeth : (ring, sun, planet)
+        Of the ring, which stands still; of sun and planet None where they are not known.
+    tolerance : float
+        Distance of orders that are taken as one, below a half: about half the resolution of the spectrum. An
+        order without meaning fits one of four turns of a part by chance in ``8 tolerance`` of all cases.
+
+    Raises
+    ------
+    CaseError
+        ``E-RANGE``: an order or a tolerance out of range.
+    """
+    if not (0 < order < np.inf and 0 < tolerance < 0.5):
+        message, limit = "no such line", "a finite order above 0, 0 < tolerance < 0.5"
+        raise CaseError(message, code="E-RANGE", value=(order, tolerance), limit=limit)
+    g, nearest = spacing_symmetry(planet_angles), round(order)
+    factor, whole = float(array_factor(planet_angles, nearest)), abs(order - nearest) <= tolerance
+    if whole and nearest % g == 0:
+        shared = "factor zero: by sun and ring, which unequally spaced planets share"
+        return LineVerdict(nearest, factor, NORMAL, "" if factor > _ZERO else shared)
+    found = [one for one in _turns(order, teeth, g, tolerance) if not (whole and one[1])]
+    turned = min(found)[2] if found else ""
+    if whole:
+        words = f"no multiple of {g}" + (f"; {turned}" if turned else "")
+        return LineVerdict(nearest, factor, UNEQUAL, words)
+    return LineVerdict(nearest, factor, UNEQUAL if turned else FOREIGN, turned or "no whole carrier order")
+
+
+def _turns(order: float, teeth, symmetry: int, tolerance: float) -> Iterator[tuple[int, int, str]]:
+    """Turns of sun and planet that give an order: how many, carrier orders beside a mesh harmonic, words."""
+    ring, sun, planet = teeth
+    parts = (("the sun", sun and 1 + ring / sun, symmetry), ("a planet", planet and ring / planet, 1))
+    for (name, rate, step), k in product(parts, [one for n in range(1, _MOST_TURNS + 1) for one in (n, -n)]):
+        if not rate:
+            continue
+        rest = order - k * rate
+        whole, harmonic = round(rest), max(round(rest / ring), 0) * ring
+        if abs(rest - whole) <= tolerance and whole % step == 0:
+            n, beside = abs(k), whole - harmonic
+            words = f"{harmonic} {'+' if k > 0 else '-'} {n} turn{'s' * (n > 1)} of {name}"
+            yield n, abs(beside), words + (f" {'+' if beside > 0 else '-'} {abs(beside)}" if beside else "")
+
+
+def find_lines(order, amplitude, *, threshold: float) -> np.ndarray:
+    """Find the lines of a spectrum that reach a threshold [dB] over its largest value, by number, ascending.
+
+    Of orders (n,), ascending, and amplitudes (n,). Where they are closer than half an order, a line is a
+    value above its neighbours; else, as in lists of lines, every value is one.
+    """
+    order, amplitude = np.asarray(order, float), np.asarray(amplitude, float)
+    top = amplitude[order > 0].max(initial=0.0)
+    high = (amplitude >= top * 10 ** (threshold / 20)) & (order > 0) & (amplitude > 0)
+    if np.median(np.diff(order)) < 0.5:
+        around = np.pad(amplitude, 1, constant_values=-np.inf)
+        high &= (amplitude > around[:-2]) & (amplitude >= around[2:])
+    return np.flatnonzero(high)
 
 
 def order_level(lines: SensorLines) -> np.ndarray:
