@@ -118,6 +118,11 @@ RUNS = {
         envelope="Acceleration of a fixed point and its envelope: six lobes, three by the Hanning model.",
         modulation="The same envelopes around the ring over the angle of the carrier.",
     ),
+    "side_bands": _script(
+        "side_bands.py --ring 70 --sun 30 --planet 20 --angle 0 --angle 86.4 --angle 180 --angle 266.4 "
+        "--spectrum cases/spectra/lines_30_70.csv", "Which side bands are normal",
+        side_bands="Array factor around mesh harmonics, and what is measured there.",
+    ),
     "gyroscopic": _script(
         "gyroscopic.py", "Gyroscopic and convective terms",
         gyroscopic="Change of the natural frequencies with the carrier speed, and what is heard on the ring.",

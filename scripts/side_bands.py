@@ -263,7 +263,9 @@ def _read_universal(path: Path, channel: str | None) -> Measured:
     if len(every) > 1:  # a signal may have the name of its spectrum
         found = [item for item in every if item[2]["func_type"] in KNOWN]
     if len(found) != 1:
-        listed = "; ".join(f"{name} (dataset {i}, type {one['func_type']})" for i, name, one in found or every)
+        listed = "; ".join(
+            f"{name} (dataset {i}, type {one['func_type']})" for i, name, one in found or every
+        )
         raise problem(
             f"{len(found)} spectra in the file", value=listed[:600] or None,
             limit="one dataset 58 of a spectrum", remedy="choose one by --channel and its ID line 1",

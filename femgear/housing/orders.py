@@ -204,7 +204,7 @@ def classify_line(
         shared = "factor zero: by sun and ring, which unequally spaced planets share"
         return LineVerdict(nearest, factor, NORMAL, "" if factor > _ZERO else shared)
     found = [one for one in _turns(order, teeth, g, tolerance) if not (whole and one[1])]
-    turned = min(found)[2] if found else ""
+    turned = min(found, key=lambda one: one[0] + one[1])[2] if found else ""
     if whole:
         words = f"no multiple of {g}" + (f"; {turned}" if turned else "")
         return LineVerdict(nearest, factor, UNEQUAL, words)

@@ -1,9 +1,34 @@
 """docs/side_bands.md: its example prints what it says."""
 
-from page_examples import read_page, run_examples
+import csv
+import re
+import shlex
+from pathlib import Path
 
-_, EXAMPLES, PRINTED = read_page("side_bands.md")
+from page_examples import read_page, run_examples
+from script_runs import run_script
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE, EXAMPLES, PRINTED = read_page("side_bands.md")
 
 
 def test_example_prints_what_the_page_says():
     assert len(EXAMPLES) == 1 and run_examples("side_bands.md", EXAMPLES) == PRINTED
+
+
+def test_command_gives_the_table_of_the_page(tmp_path):
+    (command,) = re.findall(r"^scripts/(side_bands\.py .+)$", PAGE, flags=re.MULTILINE)
+    name, *words = shlex.split(command)
+    words = [str(ROOT / word) if word.startswith("cases/") else word for word in words]
+    done = run_script(name, *words, "-o", tmp_path / "out", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "out" / "lines.csv", newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    made = [
+        f"| {float(row['order']):g} | {float(row['level [dB]']):.1f} | {float(row['array factor']):.3f} | "
+        f"{row['verdict']} | {row['why']} |".replace("|  |", "| |")
+        for row in rows
+    ]
+    shown = PAGE.split("| verdict | why |\n")[1].split("\n\n")[0].splitlines()[1:]
+    assert shown == made
+    assert "by chance in 28% of cases at most" in done.stdout

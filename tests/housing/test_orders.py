@@ -6,13 +6,19 @@ from validation.reference.sensor_in_time import mean_square, symmetry_leakage
 
 from femgear.errors import CaseError
 from femgear.housing.orders import (
+    FOREIGN,
+    NORMAL,
+    UNEQUAL,
     OrderSpectrum,
     analyse_band,
     analytic_signal,
     band_pass,
+    classify_line,
     count_lobes,
     dominant_lines,
+    find_lines,
     order_spectrum,
+    spacing_symmetry,
 )
 from femgear.housing.sensor import fixed_sensor_lines
 
@@ -169,3 +175,81 @@ def test_lobes_of_a_tenth_of_the_largest_count():
     for share, count in ((0.11, 6), (0.19, 6), (0.09, 0)):
         lobes = count_lobes(1.0 - share * np.sin(3 * THETA) ** 2)
         assert (len(lobes.position), lobes.threshold) == (count, 0.1)
+
+
+PLACES = {
+    "equal": (0, 25, 50, 75),
+    "pairs": (0, 24, 50, 74),
+    "silent pairs": (0, 15, 50, 65),
+    "none": (0, 24, 51, 74),
+}
+
+
+@pytest.mark.parametrize(("name", "symmetry"), [("equal", 4), ("pairs", 2), ("silent pairs", 2), ("none", 1)])
+def test_symmetry_of_the_spacing(name, symmetry):
+    angles = 2 * np.pi * np.array(PLACES[name]) / 100
+    assert spacing_symmetry(angles) == spacing_symmetry(angles + 0.7) == symmetry
+    assert spacing_symmetry([0.3]) == 1 and spacing_symmetry(np.radians([0, 120, 240])) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "order", "verdict", "reason"),
+    [
+        ("equal", 72, NORMAL, ""),
+        ("equal", 72.04, NORMAL, ""),
+        ("equal", 70, UNEQUAL, "no multiple of 4"),
+        ("pairs", 70, NORMAL, ""),
+        ("silent pairs", 70, NORMAL, "factor zero"),
+        ("pairs", 71, UNEQUAL, "no multiple of 2"),
+        ("none", 71, NORMAL, ""),
+        ("pairs", 70 + 10 / 3, UNEQUAL, "70 + 1 turn of the sun"),
+        ("pairs", 70 - 20 / 3, UNEQUAL, "70 - 2 turns of the sun"),
+        # orders of an error of the sun are multiples of the symmetry beside its turns
+        ("equal", 70 + 10 / 3, UNEQUAL, "70 - 2 turns of the sun + 10"),
+        ("equal", 71 + 10 / 3, FOREIGN, "no whole carrier order"),
+        ("equal", 72 + 10 / 3, UNEQUAL, "70 + 1 turn of the sun + 2"),
+        ("pairs", 71 + 10 / 3, FOREIGN, "no whole carrier order"),
+        ("equal", 140 - 3.5, UNEQUAL, "140 - 1 turn of a planet"),
+        ("equal", 141 - 3.5, UNEQUAL, "140 - 1 turn of a planet + 1"),
+        ("equal", 70.2, FOREIGN, "no whole carrier order"),
+    ],
+)
+def test_verdicts_on_lines(name, order, verdict, reason):
+    angles = 2 * np.pi * np.array(PLACES[name]) / 100
+    found = classify_line(order, angles, (70, 30, 20), tolerance=0.05)
+    assert (
+        found.verdict == verdict
+        and found.reason.startswith(reason)
+        and (found.reason == "") == (reason == "")
+    )
+    assert found.nearest == round(order)
+    without = classify_line(order, angles, (70, None, None), tolerance=0.05)
+    assert without.verdict == (FOREIGN if "turn" in reason else verdict)
+
+
+def test_whole_turns_of_the_sun_are_named_where_they_stand_beside_a_mesh_harmonic():
+    """27/108: a turn of the sun is five of the carrier."""
+    angles = np.radians([0.0, 120.0, 240.0])
+    known = {653: "no multiple of 3; 648 + 1 turn of the sun", 649: "no multiple of 3"}
+    known |= {638: "no multiple of 3; 648 - 2 turns of the sun"}
+    for order, reason in known.items():
+        found = classify_line(order, angles, (108, 27, 40), tolerance=0.02)
+        assert (found.verdict, found.reason) == (UNEQUAL, reason)
+    assert classify_line(648, angles, (108, 27, 40), tolerance=0.02).verdict == NORMAL
+
+
+def test_lines_of_fine_and_of_coarse_spectra():
+    fine = np.arange(0.0, 20.0, 0.1)
+    peaks = np.exp(-(((fine - 6) / 0.1) ** 2)) + 0.05 * np.exp(-(((fine - 9.5) / 0.1) ** 2))
+    peaks[0] = 50.0  # the mean is no line
+    assert fine[find_lines(fine, peaks, threshold=-30)] == pytest.approx([6.0, 9.5])
+    assert fine[find_lines(fine, peaks, threshold=-20)] == pytest.approx([6.0])
+    whole = np.arange(20.0)
+    assert find_lines(whole, np.exp(-np.abs(whole - 6)), threshold=-20).tolist() == [4, 5, 6, 7, 8]
+
+
+@pytest.mark.parametrize(("order", "tolerance"), [(0.0, 0.1), (np.nan, 0.1), (5.0, 0.0), (5.0, 0.5)])
+def test_no_lines(order, tolerance):
+    with pytest.raises(CaseError, match="no such line") as error:
+        classify_line(order, [0.0, np.pi], (70, 30, 20), tolerance=tolerance)
+    assert error.value.code == "E-RANGE"

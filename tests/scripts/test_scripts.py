@@ -25,6 +25,7 @@ SCRIPTS = (
     "optimise.py",
     "drivetrain.py",
     "gyroscopic.py",
+    "side_bands.py",
 )
 # of published sets, without a case file
 SET_SCRIPTS = (
@@ -156,6 +157,7 @@ def test_bad_input_ends_in_a_message(name, arguments, code, message, tmp_path):
         ("optimise.py", "journal_fine.jsonl"),
         ("pin_error_load_sharing.py", "load_sharing_samples.csv"),
         ("planet_phasing.py", "phases.png"),
+        ("side_bands.py", "side_bands.png"),
         ("tip_relief_design.py", "relief.toml"),
     ],
 )

@@ -13,7 +13,8 @@ from scipy.integrate import solve_ivp
 from scipy.sparse import linalg
 
 from femgear.fe.reduction import CyclicModes
-from femgear.housing.orders import array_factor, order_level
+from femgear.gears.phasing import MeshPhasing, phasing_table
+from femgear.housing.orders import FOREIGN, NORMAL, array_factor, classify_line, order_level, order_spectrum
 from femgear.housing.sensor import component_lines
 from femgear.housing.structure import FixedStructure, Support, circumferential, supported_ring
 from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
@@ -452,6 +453,42 @@ def array_factors() -> tuple[Row, ...]:
         source = f"group {i} of Inalpolat and Kahraman (2009)"
         text = f"{sun}/{ring}, {words}: factor of the mesh order"
         rows.append(within("array factor", source, text, factor, ours, 1e-12, relative=False))
+        # torque of all ring meshes over that of meshes in phase, from the phases of the teeth
+        torque = round(float(phasing_table(MeshPhasing(sun, ring, place), (1,)).members[0, 1, 0]), 12)
+        text = f"{sun}/{ring}, {words}: factor of the mesh order, torque on the ring by its mesh phases"
+        rows.append(within("array factor", "phases of the teeth", text, torque, ours, 1e-12, relative=False))
+    return tuple(rows)
+
+
+def turning_errors() -> tuple[Row, ...]:
+    """Planets that are heard while they pass a sensor, with a sun or one planet that runs out: every line.
+
+    Amplitudes ``(1 + 0.3 cos(angle of the error to the mesh)) cos(z_ring (theta + psi))`` through a window
+    ``exp(cos(theta + psi))``, over so many turns of the carrier that all repeats itself.
+    """
+    rows, (sun, planet, ring) = list[Row](), (30, 20, 70)
+    for places in ((0, 25, 50, 75), (0, 24, 50, 74)):
+        psi = 2 * np.pi * np.array(places) / (sun + ring)
+        for name, turns in (("no error", 0), ("the sun", sun), ("one planet", planet)):
+            count = max(turns, 1)
+            theta = 2 * np.pi * np.arange(640 * count) / 640
+            passing = theta[:, None] + psi
+            # of the sun its turn against the arm of each planet
+            error = ring / sun * theta[:, None] - psi if turns == sun else ring / planet * theta[:, None]
+            shaken = np.array([turns != planet or j == 0 for j in range(4)]) * 0.3 * bool(turns)
+            heard = (1 + shaken * np.cos(error)) * np.cos(ring * passing) * np.exp(np.cos(passing))
+            spectrum = order_spectrum(heard.sum(axis=1))
+            lines = np.flatnonzero(spectrum.amplitude > 1e-9 * spectrum.amplitude.max())
+            found = [classify_line(k / count, psi, (ring, sun, planet), tolerance=1e-6) for k in lines if k]
+            kinds = [one.verdict for one in found]
+            unequal = len(kinds) - kinds.count(NORMAL)
+            # a healthy set has multiples of its symmetry alone
+            whole = (lines % count == 0) & (lines // count % (4 if places[1] == 25 else 2) == 0)
+            words = f"30/20/70 at {places}/100 turn, {name} with an error: lines that need it"
+            words = words if turns else f"30/20/70 at {places}/100 turn, no error: lines that need one"
+            rows.append(counted("turning parts", "sum in time", words, int((~whole).sum()), unequal))
+            text = f"the same: lines that are not of this stage, of {len(lines)}"
+            rows.append(counted("turning parts", "sum in time", text, 0, kinds.count(FOREIGN)))
     return tuple(rows)
 
 

@@ -420,6 +420,7 @@ THEMES = (
             fixed_housing.splitting,
             fixed_housing.order_rules,
             fixed_housing.array_factors,
+            fixed_housing.turning_errors,
             fixed_housing.axisymmetric,
             fixed_housing.green,
         ),
