@@ -20,8 +20,11 @@ from femgear.errors import CaseError
 from femgear.exchange.formats import Shapes, write_modes
 from femgear.storage.files import replaced_file, write_csv, write_text
 
-FILES = ("casing.npz", "casing.pch", "casing.op4", "casing.uff", "nodes.csv", "nodes_held.csv")
+FILES = (
+    "casing.npz", "casing.pch", "casing.op4", "casing.uff", "nodes.csv", "nodes_held.csv", "surface.npz",
+)  # fmt: skip
 E, NU, RHO, DAMPING = 206e9, 0.3, 7850.0, 0.02
+PART = 0.03  # of the surface that moves as one, edge of the grid [m]
 GEOMETRY = """SetFactory("OpenCASCADE");
 Cylinder(1) = {{0, 0, {bottom}, 0, 0, {width}, {outer}}};
 {parts}
@@ -109,10 +112,10 @@ def means_of_bore(casing: Casing, basis) -> np.ndarray:
 
 
 def reduced(casing: Casing):
-    """Stiffness and mass (r, r) on the nodes of the files and internal coordinates, and those nodes.
+    """Stiffness and mass (r, r) on the nodes of the files and internal coordinates, those nodes, the surface.
 
     Nodes are (role, dofs, position): ring, sensors, feet. A foot is the lower face of a block and moves
-    without turning.
+    without turning. Of the surface the motion of its parts (parts, r) in these coordinates, and their areas.
     """
     basis, K, M = assembled(casing)
     mesh, angle = basis.mesh, 2 * np.pi * np.arange(casing.points) / casing.points
@@ -136,11 +139,40 @@ def reduced(casing: Casing):
         carried += [unit(dofs.all(f"u^{c}")).sum(axis=1) for c in (1, 2, 3)]
         middle = np.array([side * (casing.foot_end - casing.foot / 2), -casing.base, 0.0])
         nodes.append((f"foot {name}", "123", middle))
-    return *condensed(K, M, np.hstack(watched), np.array(carried).T, casing.modes), nodes
+    K, M, T = condensed(K, M, np.hstack(watched), np.array(carried).T, casing.modes)
+    across, area = parts_of_surface(casing, basis)
+    return K, M, nodes, (across.T @ T, area)
+
+
+def parts_of_surface(casing: Casing, basis) -> tuple[np.ndarray, np.ndarray]:
+    """Columns (n, parts): mean displacement outwards of parts of the outer surface; areas (parts,) [m^2].
+
+    A part has one side and lies in one cube of a grid: short against the waves of the casing. The bore and
+    the lower faces of the feet belong to no part.
+    """
+    from skfem import FacetBasis, LinearForm
+    from skfem.helpers import dot
+
+    mesh, outside = basis.mesh, basis.mesh.boundary_facets()
+    x = mesh.p[:, mesh.facets[:, outside]]
+    bore = (np.hypot(x[0], x[1]) < casing.bore + 1e-6).all(axis=0)
+    outside = outside[~bore & ~(x[1] < 1e-6 - casing.base).all(axis=0)]
+    normal = np.asarray(FacetBasis(mesh, basis.elem, facets=outside, intorder=1).normals)[:, :, 0]
+    middle = mesh.p[:, mesh.facets[:, outside]].mean(axis=1)
+    keys = np.vstack([np.rint(2 * normal), np.floor(middle / PART)]).astype(int)
+    part = np.unique(keys, axis=1, return_inverse=True)[1].ravel()
+    columns, area = np.zeros((basis.N, part.max() + 1)), np.zeros(part.max() + 1)
+    for i in range(len(area)):
+        surface = FacetBasis(mesh, basis.elem, facets=outside[part == i], intorder=2)
+        area[i] = surface.dx.sum()
+        columns[:, i] = LinearForm(lambda v, w: dot(v, w.n)).assemble(surface) / area[i]
+    return columns, area
 
 
 def condensed(K, M, watched, carried, modes: int):
     """Stiffness and mass on watched means (columns), bodies that are carried (columns) and internal modes.
+
+    And the displacements (n, r) of these coordinates.
 
     R. R. Craig and M. C. C. Bampton, AIAA J. 6 (1968) 1313-1319, the internal shapes from the lowest modes
     with the bodies held: statics and those modes are exact.
@@ -158,7 +190,7 @@ def condensed(K, M, watched, carried, modes: int):
     T[:, watched.shape[1] : -modes] += carried
     internal = T[:, -modes:]
     T[:, -modes:] = internal @ np.linalg.inv(np.linalg.cholesky(internal.T @ (M @ internal))).T
-    return T.T @ (K @ T), T.T @ (M @ T)
+    return T.T @ (K @ T), T.T @ (M @ T), T
 
 
 def six_digits(values) -> np.ndarray:
@@ -211,7 +243,7 @@ def write_casing(casing: Casing, folder: Path) -> None:
     """Write all files of a casing."""
     from pyNastran.op4.op4 import OP4
 
-    K, M, nodes = reduced(casing)
+    K, M, nodes, (across, area) = reduced(casing)
     nodes = [(role, dofs, six_digits(x)) for role, dofs, x in nodes]
     frequency, shape, K, M = in_six_digits(K, M, nodes)
     p, omega = casing.points, 2 * np.pi * frequency
@@ -226,6 +258,10 @@ def write_casing(casing: Casing, folder: Path) -> None:
     }  # fmt: skip
     with replaced_file(folder / FILES[0]) as path, open(path, "wb") as stream:
         np.savez(stream, **arrays, sizes=astuple(casing))
+    moved = shape @ np.delete(across, np.arange(2 * p + 6, 2 * p + 12), axis=1).T  # the feet are held
+    arrays["sensor_shape"] = np.hstack([arrays["sensor_shape"], moved])
+    with replaced_file(folder / FILES[6]) as path, open(path, "wb") as stream:
+        np.savez(stream, **arrays, sensor_area=np.append(np.zeros(2), area))
     write_text(punch(K, M, nodes), folder / FILES[1])
     with replaced_file(folder / FILES[2]) as path:
         OP4(debug=False).write_op4(str(path), {"KAAX": (6, K), "MAAX": (6, M)}, is_binary=False)

@@ -40,8 +40,11 @@ UNITS = {"SI": (1.0, 1.0), "mm-t-s": (1e-3, 1e3)}
 _ARRAYS, _PUNCH, _UNIVERSAL = (".npz", ".nc"), (".pch", ".bdf", ".dat"), (".uff", ".unv")
 _KINDS = (*_ARRAYS, *_PUNCH, ".op4", *_UNIVERSAL)
 _STIFFNESS = {0: "SI", 3: "mm-t-s", 6: "mm-kg-ms"}  # powers of ten of the unit of stiffness [N/m]
-# powers of the unit of mass in arrays, whose outputs are displacements
-_MASS_POWERS = {"ring_shape": -0.5, "sensor_shape": -0.5, "ring_compliance": -1, "sensor_compliance": -1}
+# powers of the units of mass and length in arrays, whose outputs are displacements
+_POWERS = {
+    "ring_shape": (-0.5, 0), "sensor_shape": (-0.5, 0), "ring_compliance": (-1, 0),
+    "sensor_compliance": (-1, 0), "sensor_area": (0, 2),
+}  # fmt: skip
 _OFF_CIRCLE = 0.01  # distance of a point from the pitch circle over its radius, at most
 _ASYMMETRY = 1e-6  # of a matrix over its largest entry: files hold 7 to 16 digits
 _FREE = 1e-10  # square of a natural frequency over the largest one: what may be rounding of the file
@@ -126,7 +129,7 @@ def read_casing(
             code="E-FILE", limit=f"a file {', '.join(_KINDS)}",
         )  # fmt: skip
         if kind in _ARRAYS:
-            arrays = _stored(path, UNITS[units][1])
+            arrays = _stored(path, *UNITS[units])
         else:
             _check(
                 "matrices and modes do not say where ring and sensors are", nodes is not None,
@@ -387,8 +390,8 @@ def _check_units(structure: FixedStructure, expected: float, units: str) -> None
     )  # fmt: skip
 
 
-def _stored(path: Path, mass: float) -> dict[str, np.ndarray]:
-    """Arrays of a file .npz or NetCDF by name, of a unit of mass [kg]."""
+def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
+    """Arrays of a file .npz or NetCDF by name in SI units, of units of length [m] and mass [kg]."""
     with _foreign("arrays of a structure (.npz, NetCDF)"):
         if path.suffix.lower() == ".npz":
             with np.load(path, allow_pickle=False) as stored:
@@ -399,7 +402,9 @@ def _stored(path: Path, mass: float) -> dict[str, np.ndarray]:
             with xr.open_dataset(path) as data:
                 found = {str(name): one.values for name, one in data.data_vars.items()}
         numbers = {name: one for name, one in found.items() if one.dtype.kind not in "OSU"}
-        return {n: np.asarray(one, float) * mass ** _MASS_POWERS.get(n, 0) for n, one in numbers.items()}
+        powers = {name: _POWERS.get(name, (0, 0)) for name in numbers}
+        return {n: np.asarray(one, float) * mass ** powers[n][0] * length ** powers[n][1]
+                for n, one in numbers.items()}  # fmt: skip
 
 
 def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:

@@ -30,6 +30,7 @@ from femgear.errors import CaseError, nvh_library
 from femgear.housing.sensor import SensorLines, stored_lines
 
 REFERENCE_PRESSURE, REFERENCE_POWER = 20e-6, 1e-12  # 20 uPa and 1 pW (ISO 1683)
+NO_AREAS = "no sound: the file of the casing has no sensor_area, the areas of surface of its sensors"
 REFERENCE_ACCELERATION = 1e-6  # m/s^2 (ISO 1683)
 _UNITS = {"m/s^2": (0, 1.0), "g": (0, 1 / 9.80665), "mm/s": (1, 1e3), "um": (2, 1e6), "dB": (0, None)}
 """Times that the acceleration is integrated, and units in the SI one, by unit of levels."""
@@ -241,6 +242,24 @@ def surface_sound(
     return (heard * waves).sum(axis=-1), (efficiency * power).sum(axis=-1), power.sum(axis=-1)
 
 
+def equivalent_sound(
+    velocity, area, density: float, sound_speed: float, distance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Estimate the sound of a surface from above: every part of it radiates as a large plane one.
+
+    Of velocities (..., n_orders, n_parts) [m/s] across parts of areas (n_parts,) [m^2], in air [kg/m^3],
+    [m/s]: lines of the pressure [Pa] at a distance [m] in a free field, (..., n_orders), and their power [W],
+    the equivalent radiated power ``rho c/2 sum |v|^2 S`` of the radiation efficiency one. It spreads evenly,
+    ``|p|^2 = rho c W/(2 pi r^2)``; the phase is that of the acceleration of the volume, as of a small body.
+    Below coincidence, or of parts that move against each other within a wavelength, less is radiated
+    (F. Fahy and P. Gardonio, Sound and Structural Vibration, 2nd ed., Academic Press 2007, ch. 3).
+    """
+    velocity, area = np.asarray(velocity), np.asarray(area, float)
+    power = 0.5 * density * sound_speed * np.abs(velocity) ** 2 @ area
+    phase = np.exp(1j * (np.angle(velocity @ area) + 0.5 * np.pi))
+    return np.sqrt(density * sound_speed * power / (2 * np.pi)) / distance * phase, power
+
+
 def _velocity(lines: SensorLines) -> np.ndarray:
     """Radial velocity of the surface at the sensor [m/s], complex, (..., n_orders)."""
     return 1j * lines.order * lines.base_speed[..., None] * lines.displacement
@@ -291,11 +310,11 @@ def _decibels(power: np.ndarray, reference: float) -> np.ndarray:
 def stored_sound(housing: Any) -> tuple[SensorLines, np.ndarray]:
     """Read the exact lines of the sensor from housing.nc, and compute those of the microphone [Pa].
 
-    CaseError: a casing of a file, whose surface is not known (E-CHOICE).
+    CaseError: a casing of a file that does not tell the areas of its surface (E-CHOICE).
     """
     if "pressure_level" not in housing:
-        message, limit = "the sound of a casing of a file is not computed", "a ring, also on supports"
-        raise CaseError(message, code="E-CHOICE", key="housing.structure", limit=limit)
+        limit = "a ring, also on supports, or a casing of arrays with sensor_area"
+        raise CaseError(NO_AREAS, code="E-CHOICE", key="housing.structure", limit=limit)
     lines = stored_lines(housing, form="exact")
     if "pressure_real" in housing:
         pressure = housing["pressure_real"].values + 1j * housing["pressure_imag"].values

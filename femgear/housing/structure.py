@@ -51,6 +51,8 @@ class FixedStructure(ReadOnlyArrays):
         the missing modes m: Hermitian.
     sensor_residual : (n_sensors, 2 n_max + 1) complex array
         The same from the path to the sensors [m/N], ``sum_m phi_m conj(P[m, n'])/omega_m^2``.
+    sensor_area : (n_sensors,) array, optional
+        Of the outer surface that moves as the sensor does, across it [m^2]; 0 of sensors that stand for none.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class FixedStructure(ReadOnlyArrays):
     sensor_shape: np.ndarray
     residual: np.ndarray
     sensor_residual: np.ndarray
+    sensor_area: np.ndarray | None = None
 
     def __post_init__(self):
         super().__post_init__()
@@ -81,6 +84,14 @@ class FixedStructure(ReadOnlyArrays):
                     f"circumferential coefficients and {sensors} sensors, or is not finite", code="E-SHAPE",
                     key=name, limit=f"finite numbers of shape {shape}, coefficients n = -n_max .. n_max",
                 )  # fmt: skip
+        area = self.sensor_area
+        if area is not None and (
+            area.shape != (sensors,) or not (area >= 0).all() or not 0 < area.sum() < np.inf
+        ):
+            raise CaseError(
+                f"areas of shape {area.shape} are not those of the {sensors} sensors", code="E-SHAPE",
+                key="sensor_area", limit="one for each, 0 or more [m^2], one above 0",
+            )  # fmt: skip
         if not (self.natural_frequency > 0).all():
             raise CaseError(
                 "a mode of the structure is free or has a negative stiffness", code="E-MECHANISM",
@@ -109,7 +120,7 @@ class FixedStructure(ReadOnlyArrays):
         """Replace the sensors by k weighted sums of them, ``weights`` (n_sensors, k)."""
         weights = np.asarray(weights, float)
         shape, residual = self.sensor_shape @ weights, weights.T @ self.sensor_residual
-        return replace(self, sensor_shape=shape, sensor_residual=residual)
+        return replace(self, sensor_shape=shape, sensor_residual=residual, sensor_area=None)
 
 
 _ARRAYS = ("natural_frequency", "damping_ratio", "ring_angle", "ring_shape", "sensor_shape")
@@ -126,7 +137,8 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
         nodal diameter; ``ring_shape`` (m, p, 2), displacement there outwards and counter-clockwise
         [kg^-1/2]; ``sensor_shape`` (m, n_sensors) [kg^-1/2]. Where modes are missing, their static compliance
         [m/N]: ``ring_compliance`` (p, p) between the points in that direction, ``sensor_compliance``
-        (n_sensors, p) from the points to the sensors.
+        (n_sensors, p) from the points to the sensors. For the sound ``sensor_area`` (n_sensors,), of the
+        surface that every sensor across it stands for [m^2], 0 of others.
     direction : (radial, tangential)
         Of the force on the ring along the line of action, a unit vector.
     max_diameter : int
@@ -166,6 +178,7 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
         sensor_shape=sensors,
         residual=fit @ (0.5 * (between + between.T)) @ fit.conj().T,
         sensor_residual=away @ fit.conj().T,
+        sensor_area=values.get("sensor_area"),
     )
 
 

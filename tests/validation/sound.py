@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.special import j1
 
 from femgear.housing.sensor import SensorLines
 from femgear.housing.sound import (
     Cylinder,
     Microphone,
     a_weighting,
+    equivalent_sound,
     pressure_transfer,
     radiation_efficiency,
     sampled_signal,
@@ -171,6 +173,34 @@ def power() -> tuple[Row, ...]:
         )
         quantity = f"1031 Hz, n = {n}: pressure times distance at 5 km [Pa m]"
         rows.append(within("power", "far field by stationary phase", quantity, expected, beside, 1e-3))
+    return tuple(rows)
+
+
+def equivalent() -> tuple[Row, ...]:
+    """The estimate from above by sums over a surface: a sphere that pulsates, a piston in a baffle.
+
+    Efficiencies ``(ka)^2/(1 + (ka)^2)`` and ``1 - J1(2 ka)/ka`` (Junger and Feit).
+    """
+    rho, c, a, rows = 1.204, 343.0, 0.1, list[Row]()
+    area = np.diff(np.linspace(0, 4 * np.pi * a**2, 101) ** 1.5) / np.sqrt(4 * np.pi * a**2)
+    velocity = np.full((1, len(area)), 1e-3 * np.exp(0.7j))
+    for ka, gate in ((1.0, 1e-12), (5.0, 1e-12), (200.0, 1e-12)):
+        pressure, power = (one[0] for one in equivalent_sound(velocity, area, rho, c, 1.0))
+        exact = ka**2 / (1 + ka**2)
+        # waves in all directions: pressure at 1 m, power through its sphere
+        far = rho * c * 1e-3 * a * ka / np.sqrt(1 + ka**2)
+        words = f"sphere that pulsates, ka = {ka:g}: "
+        through = 4 * np.pi * far**2 / (2 * rho * c)
+        over = within(
+            "estimate", JUNGER, words + "power over the exact one", 1 / exact, power / through, gate
+        )
+        rows += [over, within("estimate", JUNGER, words + "pressure at 1 m, the same",
+                              1 / np.sqrt(exact), abs(pressure) / far, gate)]  # fmt: skip
+    piston = 1 - j1(2 * 300.0) / 300.0
+    ours = equivalent_sound(velocity[:, :1], np.array([np.pi * a**2]), rho, c, 1.0)[1][0]
+    exact = 0.5 * rho * c * np.pi * a**2 * 1e-6 * piston
+    rows.append(within("estimate", JUNGER, "piston in a baffle, ka = 300: power over the exact one", 1.0,
+                       ours / exact, 5e-4))  # fmt: skip
     return tuple(rows)
 
 

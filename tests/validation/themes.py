@@ -434,6 +434,7 @@ THEMES = (
             sound.efficiency,
             sound.side_bands,
             sound.power,
+            sound.equivalent,
             sound.weighting,
             sound.signals,
             sound.loudness,

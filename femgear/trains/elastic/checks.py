@@ -41,6 +41,8 @@ _CHECKED = 12
 """Speeds at which the level is computed again, at most."""
 NOTICEABLE = 1.0
 """Change of the level that is worth a warning [dB]."""
+_FAR = 3.0
+"""Change of the level by supports or casing that is worth a warning [dB]."""
 MOST_WINDING = 1.0
 """Angle between the ends of a coupling that is worth a warning [rad]."""
 
@@ -315,7 +317,18 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
 
 
 def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """List what housing.nc says against itself: static compliance that a casing lacks."""
+    """List what housing.nc says: how far two ways change the level, static compliance that a casing lacks."""
+    if "one_way_difference" in data:
+        apart, speeds = data["one_way_difference"].values, data["speed"].values
+        size = np.where(np.isfinite(apart), np.abs(apart), 0.0)
+        if size.max() > _FAR:
+            worst = int(size.argmax())
+            text = (
+                f"at {speeds[worst]:.6g} rpm the level is {apart[worst]:+.1f} dB from that by the mesh "
+                f"forces of the ring without supports or casing, at {(size > _FAR).sum()} of {len(speeds)} "
+                f"speeds more than {_FAR:g} dB away: load factors and dynamics.nc are without them"
+            )
+            yield Finding("W-ONE-WAY", "", text)
     if missing := data.attrs.get("missing_compliance"):
         remedy = "export more modes, or residual vectors, or matrices, unless the casing is as stiff as that"
         yield Finding("W-RESIDUAL", "housing.structure.file", missing, remedy=remedy)

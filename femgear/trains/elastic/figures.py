@@ -391,7 +391,8 @@ def microphone_spectrum(housing: xr.Dataset) -> Figure:
     for ax, harmonic in zip(axes[1:], bands):
         _draw_sensors(ax, lines, {_ACCELEROMETER: acceleration, _MICROPHONE: pressure}, harmonic)
     speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
-    figure.suptitle(f"Microphone at {place:g} m, {speed}: {total:.1f} dB(A)", fontsize=12)
+    how = ", equivalent radiated power" if housing.attrs["method"] == "casing" else ""
+    figure.suptitle(f"Microphone at {place:g} m{how}, {speed}: {total:.1f} dB(A)", fontsize=12)
     legend_below(figure)
     return figure
 
@@ -573,7 +574,8 @@ FIGURES = STATIC | {
             "microphone_spectrum": (
                 "Lines of a microphone beside the ring ({}), and levels of both sensors around "
                 "mesh harmonics, each relative to its strongest line there: waves of many nodal diameters "
-                "hardly radiate at low frequency, so that the microphone hears other side bands."
+                "hardly radiate at low frequency, so that the microphone hears other side bands. Of a casing "
+                "of a file all of its surface radiates as large plates do, an estimate from above."
             ),
         },
         draw=_housing_figures,

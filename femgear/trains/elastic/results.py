@@ -30,6 +30,7 @@ from femgear.housing.sensor import (
     stored_lines,
 )
 from femgear.housing.sound import (
+    NO_AREAS,
     Cylinder,
     Microphone,
     levels_of,
@@ -76,13 +77,20 @@ _ROUNDED, _MANY = 1e-5, 40
 _FEW, _CUTS = 4, 24
 _FIRST, _STRONGEST = 6, 4
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
+_ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
 _SUPPORTED = {
     "one_way_level": ("m/s^2", "level by the mesh forces of the ring without its supports"),
+    "one_way_difference": ("dB", "level over that by the mesh forces of the ring without its supports"),
     "two_way_residual": ("1", "residual of the two-way equations"),
     "order_tail": ("1", "share of the mesh forces in the outer half of the side bands"),
 }
+_ONE_WAY = {
+    "one way [m/s²]": lambda one: f"{float(one.one_way_level):.4g}",
+    "difference [dB]": lambda one: f"{float(one.one_way_difference):+.1f}",
+}
+_ONE_WAY_WORDS = "one way: by the mesh forces of the ring on its foundation alone, without supports or casing"
 _OUTPUTS = {
     "sensor": ("m", "displacement at the sensor, in its direction"),
     "force": ("N", "force of the housing on the ground"),
@@ -243,9 +251,10 @@ class HousingResult:
     ``exact`` are the lines of the components, ``lines`` those of the case's ``form``, "exact" or "linear"
     (interpolated over ``points`` points of the ring). The excitation ends at ``excitation_limit`` (speeds,)
     [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`. Of a housing that stands still
-    ``sound`` are the three results of `surface_sound` (speeds, n_orders), none of a casing of a file,
-    ``supported`` has the numbers (speeds,) of `_SUPPORTED`. ``outputs`` are names and lines (speeds, n_names,
-    n_orders) of each of `_OUTPUTS`; ``missing`` says what static compliance a casing lacks.
+    ``sound`` are the three results of `surface_sound` (speeds, n_orders), those of `equivalent_sound` as the
+    first and the last of a casing whose areas are known, else none; ``supported`` has the numbers (speeds,)
+    of `_SUPPORTED`. ``outputs`` are names and lines (speeds, n_names, n_orders) of each of `_OUTPUTS`;
+    ``missing`` says what static compliance a casing lacks.
     """
 
     input_speed: np.ndarray
@@ -257,7 +266,7 @@ class HousingResult:
     excitation_limit: np.ndarray
     cylinder: Cylinder
     microphone: Microphone
-    sound: tuple[np.ndarray, ...] | None = None
+    sound: tuple[np.ndarray, np.ndarray | None, np.ndarray] | None = None
     supported: Mapping[str, np.ndarray] = field(default_factory=dict)
     outputs: Mapping[str, tuple[tuple[str, ...], np.ndarray]] = field(default_factory=dict)
     missing: str = ""
@@ -297,11 +306,12 @@ class HousingResult:
             variables["sensor_level"] = ("speed sensor", level, "m/s^2", words)
         if sound is not None:
             heard, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
-            variables |= {
-                "pressure_level": ("speed", pressure_level(sound[0], frequency), "dB", f"A-weighted {heard}"),
-                "power_level": ("speed", power_level(sound[1], frequency), "dB", f"A-weighted {power}"),
-                "equivalent_power_level": ("speed", power_level(sound[2], frequency), "dB", _EQUIVALENT),
-            }
+            levels = {"pressure_level": (pressure_level(sound[0], frequency), f"A-weighted {heard}")}
+            if sound[1] is not None:
+                levels["power_level"] = power_level(sound[1], frequency), f"A-weighted {power}"
+            words = _EQUIVALENT if sound[1] is not None else f"A-weighted {power}, {_ESTIMATE}"
+            levels["equivalent_power_level"] = power_level(sound[2], frequency), words
+            variables |= {name: ("speed", one, "dB", said) for name, (one, said) in levels.items()}
         supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in self.supported.items()}
         names = {kind: (kind, one[0], "1", f"name of the {kind}") for kind, one in self.outputs.items()}
         order = {"order": ("order", exact.order, "1", "carrier order")}
@@ -427,13 +437,18 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
         **{f"K_v {kind}": lambda i, k=k: f"{factors[shown.index(i), k]:.3f}" for k, kind in enumerate(KINDS)},
         "level [m/s²]": lambda i: f"{float(results.housing['level'][i]):.4g}" if housing else "-",
     }
-    ring, end = case.ring, ""
+    ring, end, notes = case.ring, "", list[str]()
+    if housing and "one_way_difference" in results.housing:
+        columns |= {
+            name: lambda i, say=say: say(results.housing.isel(speed=i)) for name, say in _ONE_WAY.items()
+        }
+        notes.append(_ONE_WAY_WORDS)
     if "excitation_limit" in dynamics:
         end = f"excitation up to {1e-3 * float(dynamics['excitation_limit'].min()):.4g} kHz; "
-    notes = (
+    notes.append(
         f"levels assume: foundation of the ring {ring.foundation_radial:.3g} N/m³ radial, "
         f"{ring.foundation_tangential:.3g} N/m³ tangential; damping ratio {case.dynamics.damping_ratio:g} of "
-        f"all modes; {end}small motion about the static state",
+        f"all modes; {end}small motion about the static state"
     )
     return tabulate("At the operating speeds", shown, columns, notes)
 
@@ -463,11 +478,12 @@ def _near_resonances(runup: xr.Dataset) -> Block:
 
 def describe_housing(data: xr.Dataset) -> Block:
     """Tabulate level and largest lines [m/s^2] at every speed [rpm] of housing.nc."""
-    audible = "pressure_level" in data
+    audible, both = "pressure_level" in data, "one_way_difference" in data
     columns = {
         "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
         "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
         "rms [m/s^2]": lambda one: f"{float(one.level):.4g}",
+        **(_ONE_WAY if both else {}),
         **({"microphone [dB(A)]": lambda one: f"{float(one.pressure_level):.1f}"} if audible else {}),
         "largest lines: carrier order (amplitude [m/s^2])": _largest_lines,
     }
@@ -477,11 +493,13 @@ def describe_housing(data: xr.Dataset) -> Block:
         "microphone: {microphone_distance:g} m from the ring, which radiates over its face width in a rigid "
         "cylinder into air of {air_density:g} kg/m^3 and {sound_speed:g} m/s"
     ).format(**data.attrs)
+    if data.attrs["method"] == "casing":
+        place = f"{data.attrs['microphone_distance']:g} m from the casing"
+        heard = f"microphone: {place} in a free field, {_ESTIMATE}"
     if not audible:
-        heard = "the sound of a casing of a file is not computed"
-    if "one_way_level" in data:
-        columns["one way [m/s^2]"] = lambda one: f"{float(one.one_way_level):.4g}"
-        heard += "; one way: by the mesh forces of the ring without its supports"
+        heard = NO_AREAS
+    if both:
+        heard += f"; {_ONE_WAY_WORDS}"
     speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
     return tabulate("Housing", speeds, columns, (note, heard))
 

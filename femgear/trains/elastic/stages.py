@@ -45,7 +45,7 @@ from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.casing_files import may_lack_compliance, missing_compliance
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
-from femgear.housing.sound import Cylinder, Microphone, surface_sound
+from femgear.housing.sound import Cylinder, Microphone, equivalent_sound, surface_sound
 from femgear.housing.structure import FixedStructure, supported_ring
 from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
@@ -603,20 +603,31 @@ def _standing_still(
     if points:
         weights[:, 0] = 0.0
         weights[:points, 0] = np.real(wave.conj() @ np.exp(1j * n * exact.sensor_angle))
-    named, around = structure.combined(weights), structure.combined(np.eye(count)[:, :points])
+    named, sound = structure.combined(weights), None
     order, moved = structure_lines(named, fixed.two_way)
     lines = replace(exact, order=order, displacement=moved[:, 0], method="supports" if points else "casing")
     by_kind = moved[:, 1:][:, : len(fixed.sensors)], moved[:, 1 + len(fixed.sensors) :]
     outputs = dict(zip(("sensor", "force"), zip((fixed.sensors, fixed.forces), by_kind)))
     order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
+    if points:
+        around = structure.combined(np.eye(count)[:, :points])
+        sound = _sound_around(around, fixed.two_way, lines, n, wave, found)
+    elif structure.sensor_area is not None:
+        velocity = 1j * np.outer(lines.base_speed, lines.order)[..., None] * np.swapaxes(moved[:, 1:], 1, 2)
+        air = found.cylinder.density, found.cylinder.sound_speed
+        pressure, power = equivalent_sound(velocity, structure.sensor_area, *air, found.microphone.distance)
+        sound = pressure, None, power
+    level = order_level(replace(lines, order=order, displacement=one_way[:, 0]))
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a sensor that stands still
+        apart = 20.0 * np.log10(order_level(lines) / level)
     told = {
-        "one_way_level": order_level(replace(lines, order=order, displacement=one_way[:, 0])),
+        "one_way_level": level, "one_way_difference": apart,
         "two_way_residual": fixed.two_way.residual, "order_tail": fixed.two_way.tail,
     }  # fmt: skip
     return replace(
         found, exact=lines, supported=told, missing=fixed.missing,
         outputs={kind: one for kind, one in outputs.items() if one[0]},
-        sound=_sound_around(around, fixed.two_way, lines, n, wave, found) if points else None,
+        sound=sound,
         excitation_limit=dynamics.response.mesh_frequency * fixed_harmonics(case)[0],
     )  # fmt: skip
 
