@@ -14,7 +14,7 @@ By stage:
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,6 +61,7 @@ from femgear.report.style import (
 )
 from femgear.report.waterfall import KIND_COLOURS, RUNUP_CAPTIONS, runup_figures
 from femgear.storage.files import write_text
+from femgear.trains.elastic.checks import housing_supports
 from femgear.trains.elastic.results import hanning_spectrum, run_up_lines
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
@@ -72,6 +73,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from femgear.gears.planetary import PlanetarySet
+    from femgear.housing.structure import Support
 
 _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 
@@ -311,14 +313,16 @@ def _labelled(order, amplitude, candidates, *, spacing):
 
 
 def modulation_polar(
-    housing: xr.Dataset, planet_angles=(), *, windowed: OrderSpectrum | None = None
-) -> Figure:
+    housing: xr.Dataset, planet_angles=(), *, windowed: OrderSpectrum | None = None,
+    supports: Sequence[Support] = (),
+) -> Figure:  # fmt: skip
     """Draw envelopes of the acceleration of housing.nc over the sensor's angle to the carrier.
 
     At the first speed, around the two mesh harmonics with the strongest lines, as if the carrier, drawn with
     its planets (N,) [rad], stood still and the sensor went round it. Beside them those of the Hanning-window
     model, ``windowed``, to the same largest value: every planet is heard while it passes the sensor
-    (M. Inalpolat and A. Kahraman, J. Sound Vib. 323, 2009, 677-696).
+    (M. Inalpolat and A. Kahraman, J. Sound Vib. 323, 2009, 677-696). Supports of the ring go round with the
+    sensor and are drawn where they stand at the start.
     """
     from matplotlib.ticker import MaxNLocator
     from scipy.ndimage import uniform_filter1d
@@ -345,6 +349,11 @@ def modulation_polar(
         for n, psi in enumerate(np.asarray(planet_angles, float)):
             ax.plot([psi, psi], [0.0, 1.12 * largest], color=VERMILION, linewidth=1.2, label="carrier arms")
             ax.text(psi, 1.12 * largest, str(n + 1), bbox=_BADGE, ha="center", va="center", fontsize=SMALL)
+        for one in supports:
+            half = max(0.5 * one.width, 0.02)
+            arc, edge = np.linspace(one.angle - half, one.angle + half, 9), [1.36 * largest] * 9
+            ax.plot(arc, edge, color=BLACK, linewidth=7, solid_capstyle="butt", label="supports at the start",
+                    clip_on=False)  # fmt: skip
         ax.plot([start], [1.28 * largest], "^", color=GREEN, markersize=9, label="sensor at the start")
         ax.set_ylim(0, 1.36 * largest)
         ax.set_yticks(
@@ -354,7 +363,7 @@ def modulation_polar(
         speed = rpm(housing["speed"].values[0])
         text = f"{speed}, mesh harmonic {harmonic}: {len(lobes.position)} lobes up to {largest:.3g} m/s²"
         ax.set_title(f"{text}\nenvelope [m/s²] over angle in the carrier frame", fontsize=SMALL, pad=12)
-    legend_below(figure, columns=4)
+    legend_below(figure, columns=3 if supports else 4)
     return figure
 
 
@@ -511,14 +520,14 @@ def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
 
 def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
     figures, housing, dynamics = {}, drawn.data["housing"], drawn.data.get("dynamics")
-    angles = planetary_set(drawn.case).planet_angles
+    angles, supports = planetary_set(drawn.case).planet_angles, housing_supports(drawn.case)
     for s in shown_speeds(housing):
         one, speed = housing.isel(speed=[s]), f"{round(float(housing['speed'][s]))}_rpm"
         model = None if dynamics is None else hanning_spectrum(dynamics, housing, angles, s)
         figures |= {
             f"housing_signal_{speed}": housing_signal(one),
             f"order_spectrum_{speed}": order_spectrum(one),
-            f"modulation_{speed}": modulation_polar(one, angles, windowed=model),
+            f"modulation_{speed}": modulation_polar(one, angles, windowed=model, supports=supports),
         }
         if "pressure_level" in one:
             figures[f"microphone_spectrum_{speed}"] = microphone_spectrum(one)
@@ -547,7 +556,8 @@ FIGURES = STATIC | {
             ),
             "operating_deflection": (
                 "Operating deflection of the ring, without its mean, during one revolution of the carrier. "
-                "Every frame is a true instant; the meshes appear slowed down as under a stroboscope."
+                "Every frame is a true instant; the meshes appear slowed down as under a stroboscope. It stands "
+                "on its foundation: supports and casings of housing.nc are not in it."
             ),
         },
         draw=_dynamics_figures,

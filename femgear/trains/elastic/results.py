@@ -86,11 +86,7 @@ _SUPPORTED = {
     "two_way_residual": ("1", "residual of the two-way equations"),
     "order_tail": ("1", "share of the mesh forces in the outer half of the side bands"),
 }
-_ONE_WAY = {
-    "one way [m/s²]": lambda one: f"{float(one.one_way_level):.4g}",
-    "difference [dB]": lambda one: f"{float(one.one_way_difference):+.1f}",
-}
-_ONE_WAY_WORDS = "one way: by the mesh forces of the ring on its foundation alone, without supports or casing"
+_ONE_WAY = "that by the mesh forces of the ring on its foundation, without supports or casing"
 _OUTPUTS = {
     "sensor": ("m", "displacement at the sensor, in its direction"),
     "force": ("N", "force of the housing on the ground"),
@@ -439,10 +435,9 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
     }
     ring, end, notes = case.ring, "", list[str]()
     if housing and "one_way_difference" in results.housing:
-        columns |= {
-            name: lambda i, say=say: say(results.housing.isel(speed=i)) for name, say in _ONE_WAY.items()
-        }
-        notes.append(_ONE_WAY_WORDS)
+        apart = results.housing["one_way_difference"].values
+        columns["level [m/s²]"] = lambda i: f"{float(results.housing['level'][i]):.4g} ({apart[i]:+.1f} dB)"
+        notes.append(f"level: in brackets how far from {_ONE_WAY} (one way)")
     if "excitation_limit" in dynamics:
         end = f"excitation up to {1e-3 * float(dynamics['excitation_limit'].min()):.4g} kHz; "
     notes.append(
@@ -476,6 +471,11 @@ def _near_resonances(runup: xr.Dataset) -> Block:
     return tabulate("Resonances near the operating speeds", rows, columns, (note if rows else "none",))
 
 
+def _one_way(one: xr.Dataset) -> str:
+    """Write the level of one speed by the forces of one way, and how far that of both ways is from it."""
+    return f"{float(one.one_way_level):.4g} ({float(one.one_way_difference):+.1f} dB)"
+
+
 def describe_housing(data: xr.Dataset) -> Block:
     """Tabulate level and largest lines [m/s^2] at every speed [rpm] of housing.nc."""
     audible, both = "pressure_level" in data, "one_way_difference" in data
@@ -483,7 +483,7 @@ def describe_housing(data: xr.Dataset) -> Block:
         "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
         "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
         "rms [m/s^2]": lambda one: f"{float(one.level):.4g}",
-        **(_ONE_WAY if both else {}),
+        **({"one way [m/s^2]": _one_way} if both else {}),
         **({"microphone [dB(A)]": lambda one: f"{float(one.pressure_level):.1f}"} if audible else {}),
         "largest lines: carrier order (amplitude [m/s^2])": _largest_lines,
     }
@@ -499,7 +499,7 @@ def describe_housing(data: xr.Dataset) -> Block:
     if not audible:
         heard = NO_AREAS
     if both:
-        heard += f"; {_ONE_WAY_WORDS}"
+        heard += f"; one way: {_ONE_WAY}, and how far the level is from it"
     speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
     return tabulate("Housing", speeds, columns, (note, heard))
 

@@ -218,8 +218,9 @@ def test_both_ways_are_told_beside_one_way(before):
     level, one_way = data["level"].values, data["one_way_level"].values
     np.testing.assert_allclose(data["one_way_difference"], 20 * np.log10(level / one_way))
     table = describe_housing(data)
-    at = table.header.index("difference [dB]")
-    assert [row[at] for row in table.rows] == [f"{one:+.1f}" for one in data["one_way_difference"].values]
+    at = table.header.index("one way [m/s^2]")
+    told = zip(one_way, data["one_way_difference"].values)
+    assert [row[at] for row in table.rows] == [f"{one:.4g} ({two:+.1f} dB)" for one, two in told]
     far = np.flatnonzero(abs(data["one_way_difference"].values) > 3.0)
     assert len(far) == 1
     (finding,) = housing_warnings(data)
