@@ -17,7 +17,7 @@ from femgear.case.checks import check_floating, runup_range
 from femgear.case.csv_columns import checksum, checksum_of_all
 from femgear.case.gear_set import driving_torque, planetary_set
 from femgear.case.quantities import RPM
-from femgear.case.sections import Case, output_member
+from femgear.case.sections import Case, SupportSection, output_member
 from femgear.errors import CaseError, Finding
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.housing.casing_files import named_outputs, read_casing
@@ -99,14 +99,35 @@ def housing_supports(case: Case) -> list[Support]:
     return [Support(**one.model_dump() | {"width": one.width / radius}) for one in case.housing.support]
 
 
+def _acts(support: SupportSection) -> bool:
+    return bool(support.radial_stiffness or support.tangential_stiffness or support.mass)
+
+
 def _check_housing_supports(case: Case) -> None:
-    """Refuse supports of the ring that cannot be: two at one angle, with the linear form."""
-    angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in housing_supports(case)]
+    """Refuse supports of the ring that cannot be: idle, two at one place, with the linear form."""
+    found, circle = case.housing.support, 2 * math.pi * case.ring.outer_radius
+    idle = next((i for i, one in enumerate(found) if not _acts(one)), None)
+    if idle is not None:
+        message, key = "a support without stiffness and mass does nothing", f"housing.support[{idle}]"
+        raise CaseError(message, code="E-SUPPORT", key=key, limit="a stiffness or mass above zero")
+    angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in found]
     again = next((i for i, angle in enumerate(angles) if angle in angles[:i]), None)
     if again is not None:
         message, remedy = "two supports stand at this angle", "make one of them, with the sum of both"
         key, value = f"housing.support[{again}].angle", f"{math.degrees(angles[again]):.6g} deg"
         raise CaseError(message, code="E-DUPLICATE", key=key, value=value, remedy=remedy)
+    around = sorted(range(len(found)), key=lambda i: angles[i])
+    for i, j in zip(around, around[1:] + around[:1]):
+        room = (angles[j] - angles[i]) % (2 * math.pi) / (2 * math.pi) * circle or circle
+        wide = 0.5 * (found[i].width + found[j].width)
+        if wide > room * (1 + 1e-9):
+            message = "supports overlap" if i != j else "a support is longer than the ring is around"
+            raise CaseError(
+                message, code="E-SUPPORT", key=f"housing.support[{j}].width",
+                value=f"{1e3 * found[i].width:g} and {1e3 * found[j].width:g} mm, {1e3 * room:.4g} mm apart",
+                limit="half of both widths up to the distance along the circumference",
+                remedy="make them narrower, or one of both",
+            )  # fmt: skip
     if case.housing.stands_still and case.housing.form == "linear":
         raise CaseError(
             "the linear form interpolates a field that turns with the carrier; a ring on supports or in a "

@@ -556,8 +556,8 @@ FIGURES = STATIC | {
             ),
             "operating_deflection": (
                 "Operating deflection of the ring, without its mean, during one revolution of the carrier. "
-                "Every frame is a true instant; the meshes appear slowed down as under a stroboscope. It stands "
-                "on its foundation: supports and casings of housing.nc are not in it."
+                "Every frame is a true instant; the meshes appear slowed down as under a stroboscope. It "
+                "stands on its foundation: supports and casings of housing.nc are not in it."
             ),
         },
         draw=_dynamics_figures,

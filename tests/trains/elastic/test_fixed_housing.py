@@ -21,6 +21,7 @@ FEET = [
     {"angle": f"{angle} deg", "radial_stiffness": "4e8 N/m", "tangential_stiffness": "2e8 N/m"}
     for angle in (35, 145, 215, 325)
 ]
+NOTHING = ("radial_stiffness", "tangential_stiffness")
 SMALL = {
     "static.positions": 8, "static.flank_elements": 6, "static.stresses": False, "housing.published": [],
     "dynamics.mesh_harmonics": 2, "operation.speeds": ["400 rpm", "3100 rpm"], "runup.count": 0,
@@ -323,6 +324,12 @@ def test_refused_casings(before, folder, table, entries, code, key):
     assert (error.value.code, error.value.key) == (code, key)
 
 
+def test_supports_side_by_side_are_allowed(before):
+    touching = [{**FEET[0], "angle": f"{angle} deg", "width": "17.4 mm"} for angle in (355, 5)]
+    case = reference(**{"housing.support": touching, "operation.speeds": ["400 rpm"]})
+    assert heard(case, *before).supported["two_way_residual"].max() < 1e-10
+
+
 @pytest.mark.parametrize(
     ("entries", "code"),
     [
@@ -330,6 +337,12 @@ def test_refused_casings(before, folder, table, entries, code, key):
         ({"housing.support": FEET, "housing.form": "linear"}, "E-CHOICE"),
         ({"housing.support": FEET, "housing.nodal_diameters": 18}, "E-RANGE"),
         ({"housing.support": [{**FEET[0], "width": "1 m"}]}, "E-SUPPORT"),
+        ({"housing.support": [FEET[0], {"angle": "1 deg"} | dict.fromkeys(NOTHING, "0 N/m")]}, "E-SUPPORT"),
+        ({"housing.support": [{**one, "width": "200 mm"} for one in FEET]}, "E-SUPPORT"),
+        (
+            {"housing.support": [{**FEET[0], "angle": a, "width": "9 mm"} for a in ("359 deg", "2 deg")]},
+            "E-SUPPORT",
+        ),
         ({"housing.sensor": SENSORS + SENSORS[:1]}, "E-DUPLICATE"),
         ({"housing.sensor": [{**SENSORS[0], "direction": "axial"}]}, "E-UNIT"),
         (
