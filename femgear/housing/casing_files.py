@@ -380,7 +380,11 @@ def _ring_angles(place, number: list[int], pitch_radius: float, max_diameter: in
 
 def _check_units(structure: FixedStructure, expected: float, units: str) -> None:
     """Refuse a structure whose stiffness is that of another system of units (E-UNITS)."""
-    stiffness = 1.0 / mean_compliance(structure)
+    _check(
+        "the ring gives way nowhere: no modes, or shapes of zero", (soft := mean_compliance(structure)) > 0,
+        code="E-COUNT", key="ring_shape", limit="modes that move the ring",
+    )  # fmt: skip
+    stiffness = 1.0 / soft
     power = 3 * round(np.log10(expected / stiffness) / 3)
     true = _STIFFNESS.get(power + round(np.log10(UNITS[units][1])), "others")
     _check(
@@ -402,9 +406,17 @@ def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
             with xr.open_dataset(path) as data:
                 found = {str(name): one.values for name, one in data.data_vars.items()}
         numbers = {name: one for name, one in found.items() if one.dtype.kind not in "OSU"}
-        powers = {name: _POWERS.get(name, (0, 0)) for name in numbers}
-        return {n: np.asarray(one, float) * mass ** powers[n][0] * length ** powers[n][1]
-                for n, one in numbers.items()}  # fmt: skip
+    # complex numbers are some if they have an imaginary part
+    turned = [name for name, one in numbers.items() if np.iscomplexobj(one) and one.imag.any()]
+    _check(
+        "complex arrays", not turned, code="E-TYPE", key="arrays", value=", ".join(turned),
+        limit="real numbers", remedy="give modes without damping, and damping ratios",
+    )  # fmt: skip
+    powers = {name: _POWERS.get(name, (0, 0)) for name in numbers}
+    return {
+        name: np.asarray(np.real(one), float) * mass ** powers[name][0] * length ** powers[name][1]
+        for name, one in numbers.items()
+    }
 
 
 def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:

@@ -156,6 +156,11 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
         raise CaseError(message, code="E-KEY-MISSING", key=missing[0], limit=limit)
     values = {name: np.asarray(arrays[name], float) for name in arrays}
     angle, shape, sensors = (values[name] for name in ("ring_angle", "ring_shape", "sensor_shape"))
+    if np.abs(angle).max(initial=0.0) > 4 * np.pi:
+        message, limit = "angles of the points beyond two turns", "radians, up to one turn"
+        raise CaseError(
+            message, code="E-UNITS", key="ring_angle", value=float(np.abs(angle).max()), limit=limit
+        )
     points, least = angle.size, max(4 * max_diameter, 1)
     if points < least:
         message = f"{points} points of the ring do not resolve {max_diameter} nodal diameters"

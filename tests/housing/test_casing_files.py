@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyuff
-from casing import NU, RHO, Casing, E, assembled, card, punch, write_casing
+from casing import NU, RHO, Casing, E, assembled, card, parts_of_surface, punch, write_casing
 from pyNastran.op4.op4 import OP4
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
@@ -387,3 +387,55 @@ def test_damaged_files(kind, content, folder, tmp_path):
     with pytest.raises(CaseError) as error:
         read_casing(path, nodes=folder / "nodes_held.csv", max_diameter=4, **KNOWN)
     assert error.value.file == str(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "key"),
+    [
+        (lambda a: {"ring_shape": a["ring_shape"] * (1 + 0.1j)}, "E-TYPE", "arrays"),
+        (lambda a: {"ring_angle": np.degrees(a["ring_angle"])}, "E-UNITS", "ring_angle"),
+        (lambda a: {"ring_shape": 0 * a["ring_shape"]}, "E-COUNT", "ring_shape"),
+        (lambda a: {name: a[name][:0] for name in ("natural_frequency", "ring_shape", "sensor_shape")},
+         "E-COUNT", "ring_shape"),
+    ],
+)  # fmt: skip
+def test_refused_arrays(change, code, key, folder, tmp_path):
+    with np.load(folder / "casing.npz") as stored:
+        arrays = dict(stored)
+    np.savez(tmp_path / "a.npz", **arrays | change(arrays))
+    with pytest.raises(CaseError) as error:
+        read_casing(tmp_path / "a.npz", max_diameter=4, expected_stiffness=1e8, **KNOWN)
+    assert (error.value.code, error.value.key) == (code, key) and error.value.limit
+
+
+def test_complex_arrays_without_imaginary_part_and_areas_in_mm(folder, tmp_path):
+    with np.load(folder / "surface.npz") as stored:
+        arrays = dict(stored)
+    tonnes = {name: arrays[name] * np.sqrt(1e3) for name in ("ring_shape", "sensor_shape")}
+    tonnes |= {"sensor_area": 1e6 * arrays["sensor_area"], "damping_ratio": arrays["damping_ratio"] + 0j}
+    np.savez(tmp_path / "a.npz", **arrays | tonnes)
+    known = {**KNOWN, "max_diameter": 4}
+    one, other = (
+        read_casing(tmp_path / "a.npz", units="mm-t-s", **known),
+        read_casing(folder / "surface.npz", **known),
+    )
+    assert one.sensor_area is not None and other.sensor_area is not None
+    np.testing.assert_allclose(one.sensor_area, other.sensor_area, rtol=1e-12)
+    np.testing.assert_allclose(one.sensor_shape, other.sensor_shape, rtol=1e-12)
+
+
+def test_parts_of_the_surface(folder):
+    """The outer surface is closed but for the bore and the lower faces of the feet (divergence theorem)."""
+    small = Casing(size=0.02, points=16, modes=4)
+    basis = assembled(small)[0]
+    across, area = parts_of_surface(small, basis)
+    flows = []
+    for axis in range(3):
+        moved = np.zeros(basis.N)
+        moved[basis.get_dofs(elements=True).all(f"u^{axis + 1}")] = 1.0
+        assert np.abs(across.T @ moved).max() <= 1.0 + 1e-9
+        flows.append(area @ (across.T @ moved))
+    np.testing.assert_allclose(flows, [0.0, 2 * small.foot * small.width, 0.0], atol=1e-12)
+    with np.load(folder / "surface.npz") as stored:
+        area, shape = stored["sensor_area"], stored["sensor_shape"]
+    assert (area[:2] == 0).all() and (area[2:] > 0).all() and shape.shape[1] == len(area)
