@@ -198,6 +198,30 @@ def housing(reference: Reference):
     return solve_housing(reference.case, reference.dynamics)
 
 
+def on_feet(case, harmonics: int, diameters: int, count: int):
+    """The case on the four feet of docs/bolts.md at 300 to 3100 rpm, half of the harmonics excited."""
+    from femgear.trains.reading import with_values
+
+    stiffness = dict.fromkeys(("radial_stiffness", "tangential_stiffness"), "4e8 N/m")
+    feet = [{"angle": f"{a} deg", "width": "20 mm", "mass": "50 g", **stiffness} for a in (35, 145, 215, 325)]
+    entries = {
+        "housing.support": feet, "housing.nodal_diameters": diameters, "housing.published": [],
+        "dynamics.mesh_harmonics": harmonics // 2, "dynamics.response_harmonics": harmonics,
+        "operation.speeds": {"from": "300 rpm", "to": "3100 rpm", "count": count},
+    }  # fmt: skip
+    return with_values(case, entries)
+
+
+def two_way(reference: Reference, modes=None, *, count: int = 1000, harmonics: int = 6, diameters: int = 14):
+    """Mesh forces of the set on four feet both ways, and of the ring without them."""
+    from femgear.trains.elastic.stages import fixed_housing
+    from femgear.trains.rigid import member_speeds
+
+    case = on_feet(reference.case, harmonics, diameters, count)
+    carrier = member_speeds(case, reference.gears).carrier * np.array(case.operation.speeds)
+    return fixed_housing(case, modes or reference.modes, carrier)
+
+
 def whole(reference: Reference):
     """Static, modes, dynamics and housing, grids cached; no pictures."""
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
@@ -334,6 +358,14 @@ STAGES = {
     "sweep": Stage("sweep of 1000 speeds", sweep, ("modes",), _lines, 3, 1.0),
     "sweep_verdicts": Stage(
         "sweep of 1000 speeds with Floquet verdicts", sweep_verdicts, ("modes",), _lines, 3
+    ),
+    "two_way": Stage(
+        "both ways, four feet, 1000 speeds, six harmonics, n to 14",
+        two_way,
+        ("modes",),
+        lambda _, r: r.two_way.force[:, 1:].size * 2,
+        1,
+        60.0,
     ),
     "housing": Stage("housing, 2 speeds", housing, ("dynamics",), lambda _, h: h.lines.displacement.size, 9),
     "whole": Stage("whole computation, grids cached", whole, ("grids",), _none, 3, 3.0),
