@@ -407,7 +407,7 @@ def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
                 found = {str(name): one.values for name, one in data.data_vars.items()}
         numbers = {name: one for name, one in found.items() if one.dtype.kind not in "OSU"}
     # complex numbers are some if they have an imaginary part
-    turned = [name for name, one in numbers.items() if np.iscomplexobj(one) and one.imag.any()]
+    turned = [name for name, one in numbers.items() if np.iscomplexobj(one) and np.imag(one).any()]
     _check(
         "complex arrays", not turned, code="E-TYPE", key="arrays", value=", ".join(turned),
         limit="real numbers", remedy="give modes without damping, and damping ratios",

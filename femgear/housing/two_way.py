@@ -135,7 +135,8 @@ def solve_two_way(
     if size > _MOST:
         message = f"{count} planets with {n_orders} carrier orders need {size / 1e9:.2g} GB"
         raise CaseError(message, code="E-MEMORY", remedy="take fewer mesh harmonics or nodal diameters")
-    step = max(int(_MEMORY / size), 1)
+    # without side bands what the ring gives way takes more than the unknowns
+    step = max(int(_MEMORY / (size + _BYTES * (2 * n_max + 1) ** 3)), 1)
     force = np.empty((len(speeds), 2 * count, n_orders), complex)
     residual, tail = np.empty((2, len(speeds)))
     for first in range(0, len(speeds), step):
