@@ -27,7 +27,7 @@ _STILL = 1e-12
 _UNDAMPED = 1e-10
 # Harmonics of speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 4000
-# Krylov steps of a cycle at most, cycles, their residual, and that which single precision reaches.
+# Krylov steps of the first cycle at most, twice as many of each one after it; cycles, their residual, and that which single precision reaches.
 _KRYLOV, _CYCLES, _ROUNDING, _SINGLE = 250, 4, 1e-13, 1e-7
 # Unknowns of one speed up to which the spectral radius is exact.
 _FEW = 60
@@ -203,22 +203,22 @@ def solve_direct(problem: HarmonicProblem, accuracy: float = _ROUNDING) -> np.nd
     """
     found = problem.source.copy()
     limit = accuracy * _norm(problem.source)
-    for _ in range(_CYCLES):
+    for cycle in range(_CYCLES):
         rest = problem.source - found - _apply(problem, found)
         todo = np.flatnonzero(_norm(rest) > limit)
         if not len(todo):
             break
         part = problem.take(todo, np.complex64 if accuracy >= _SINGLE else complex)
-        found[:, todo] += _cycle(part, _rows(rest[:, todo]), limit[todo])
+        found[:, todo] += _cycle(part, _rows(rest[:, todo]), limit[todo], _KRYLOV * 2**cycle)
     return found
 
 
-def _cycle(problem: HarmonicProblem, rest: np.ndarray, limit: np.ndarray) -> np.ndarray:
+def _cycle(problem: HarmonicProblem, rest: np.ndarray, limit: np.ndarray, steps_at_most: int) -> np.ndarray:
     """Correction (n, n_speeds, H + 1) [m] that brings residuals, as rows, below limits (n_speeds,) [m].
 
     In the precision of the receptances.
     """
-    speeds, n, most = len(rest), len(problem.source), min(_KRYLOV, rest.shape[1])
+    speeds, n, most = len(rest), len(problem.source), min(steps_at_most, rest.shape[1])
     rest = rest.astype(np.real(problem.receptance).dtype, copy=False)
     ways, images = (np.empty((speeds, most, rest.shape[1]), rest.dtype) for _ in range(2))
     shares, steps, before = np.zeros((speeds, most, most)), np.zeros((speeds, most, 1)), limit
