@@ -128,11 +128,9 @@ def _check_set(case: Case):
 def _check_supports(case: Case):
     for name in ("sun", "carrier"):
         section = getattr(case, name)
-        if (section.support_stiffness is None) == (not section.support_shaft):
-            both = section.support_stiffness is not None
-            how = "twice" if both else "neither as stiffness nor as shaft"
+        if section.support_stiffness is not None and section.support_shaft:
             yield CaseError(
-                f"the support of the {name} is given {how}", code="E-DUPLICATE" if both else "E-KEY-MISSING",
+                f"the support of the {name} is given twice", code="E-DUPLICATE",
                 key=f"{name}.support_stiffness", limit="one of support_stiffness and support_shaft",
                 remedy='write support_stiffness = "5e7 N/m" or the like, "0 N/m" for a member that floats',
             )  # fmt: skip

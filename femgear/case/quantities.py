@@ -5,6 +5,7 @@ No other module talks to pint.
 
 from __future__ import annotations
 
+import difflib
 import functools
 import math
 import re
@@ -35,12 +36,20 @@ _FACTORS = {
     "kg m^2": {"kg m^2": 1.0, "kg mm^2": 1e-6},
     "kg/m^3": {"kg/m^3": 1.0},
     "Pa": {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6},
-    "N/m": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6, "N/µm": 1e6},
+    "N/m": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6, "N/um": 1e6, "N/µm": 1e6},
     "N m/rad": {"N m/rad": 1.0, "kN m/rad": 1e3},
     "Hz": {"Hz": 1.0, "kHz": 1e3},
     "s": {"s": 1.0, "ms": 1e-3},
     "m/s^2": {"m/s^2": 1.0},
     "N/m^3": {"N/m^3": 1.0},
+}
+# Words of drawings and other programs that pint does not know, or takes for something else.
+_WORDS = {
+    "rad": {"°": "deg"},
+    "rad/s": dict.fromkeys(("rev/min", "r/min", "U/min", "1/min", "min^-1"), "rpm"),
+    "N m": {"Nm": "N m", "Nmm": "N mm", "kNm": "kN m", "MNm": "MN m"},
+    "kg m^2": {"kgm^2": "kg m^2"},
+    "N m/rad": {"Nm/rad": "N m/rad", "Nmm/rad": "N mm/rad", "kNm/rad": "kN m/rad"},
 }
 _SPELLING = str.maketrans({"*": " ", "·": " ", "⋅": " ", "²": "^2", "³": "^3", "μ": "µ"})
 
@@ -212,16 +221,20 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
             f"{unit[:60]!a} is not a product of units", code="E-UNIT", value=text,
             limit="unit names with * / ^ or blanks, without brackets", remedy=example,
         )  # fmt: skip
-    usual = " ".join(unit.replace("**", "^").translate(_SPELLING).split())
-    if (factor := _FACTORS.get(dimension.si, {}).get(usual)) is not None:
+    usual = re.sub(r" ?/ ?", "/", " ".join(unit.replace("**", "^").translate(_SPELLING).split()))
+    known, words = _FACTORS.get(dimension.si, {}), _WORDS.get(dimension.si, {})
+    usual = words.get(usual, usual)
+    if (factor := known.get(usual)) is not None:
         return factor
-    found, expected = _root(unit), _root(dimension.si)
-    if found is None or expected is None:
-        raise CaseError(f"unknown unit {unit!a}", code="E-UNIT", value=text, remedy=example)
-    if found[1] != expected[1]:
+    found, expected = _root(usual), _root(dimension.si)
+    if found is None or expected is None or found[1] != expected[1]:
+        what = f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}"
+        spelt = {one.lower(): one for one in (*words, *known)}
+        near = [spelt[one] for one in difflib.get_close_matches(usual.lower(), spelt, n=2)]
         raise CaseError(
-            f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}", code="E-UNIT", value=text,
-            limit=f"units convertible to {dimension.si}", remedy=example,
+            what if found else f"unknown unit {unit!a}", code="E-UNIT", value=text,
+            limit=f"units convertible to {dimension.si}",
+            remedy=f"did you mean {' or '.join(near)}? {example}" if near else example,
         )  # fmt: skip
     return found[0] / expected[0]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
@@ -69,6 +69,8 @@ Points, Pitches = (Values(max_length=most) for most in (MOST_POINTS, 5000))
 Member = Literal["sun", "ring", "carrier"]
 Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
 Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
+LEFT_OUT: Any = Field(default_factory=lambda: math.nan)
+"""Of entries that `femgear.case.estimates` fills in when a case is read: a default that no schema shows."""
 Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
 Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
 Shift = Annotated[float, Number(-5.0, 5.0)]
@@ -327,8 +329,8 @@ class SunSection(Section):
     pressure_angle: PressureAngle
     profile_shift: Shift | None = None
     bore_radius: Radius
-    mass: Mass
-    inertia: Inertia
+    mass: Mass = LEFT_OUT
+    inertia: Inertia = LEFT_OUT
     support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)] | None = None
     support_shaft: _Shaft = ()
     tilt_stiffness: Turning | None = None
@@ -348,9 +350,9 @@ class PlanetSection(Section):
     teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
     profile_shift: Shift = 0.0
     bore_radius: Radius
-    mass: Mass
-    inertia: Inertia
-    bearing_stiffness: Stiffness
+    mass: Mass = LEFT_OUT
+    inertia: Inertia = LEFT_OUT
+    bearing_stiffness: Stiffness = LEFT_OUT
     bearing_clearance: Annotated[float, Quantity(LENGTH, 0.0, 0.002)] = 0.0
     tilt_stiffness: Turning | None = None
     misalignment: Annotated[tuple[PlanetMisalignment, ...], Field(max_length=1000)] = ()
@@ -370,8 +372,8 @@ class RingSection(Section):
     outer_radius: Radius
     cutter_teeth: Annotated[int, Count(5, 1000)] | None = None
     cutter_profile_shift: Shift = 0.0
-    foundation_radial: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)]
-    foundation_tangential: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)]
+    foundation_radial: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)] = LEFT_OUT
+    foundation_tangential: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)] = LEFT_OUT
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
@@ -382,8 +384,8 @@ class RingSection(Section):
 class CarrierSection(Section):
     """The rigid carrier, without its planets."""
 
-    mass: Mass
-    inertia: Inertia
+    mass: Mass = LEFT_OUT
+    inertia: Inertia = LEFT_OUT
     support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)] | None = None
     support_shaft: _Shaft = ()
     tilt_stiffness: Turning | None = None
@@ -576,8 +578,9 @@ class HousingSection(Section):
 class Case(Section, ReadCase):
     """A planetary gear set, its operation and how to compute it, in SI units.
 
-    The sections carry the names of the case file. ``source`` is the text that gives this case,
-    ``notices`` what was read in a way that deserves to be said.
+    The sections carry the names of the case file; masses, inertias and stiffnesses that it leaves out are
+    estimates. ``source`` is the text that gives this case, ``notices`` what was read in a way that deserves
+    to be said.
     """
 
     train: ClassVar[str] = "elastic"
@@ -590,7 +593,7 @@ class Case(Section, ReadCase):
     sun: SunSection
     planet: PlanetSection
     ring: RingSection
-    carrier: CarrierSection
+    carrier: CarrierSection = Field(default_factory=CarrierSection)
     motor: MachineSection | None = None
     brake: MachineSection | None = None
     operation: OperationSection

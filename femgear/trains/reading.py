@@ -19,6 +19,7 @@ from pydantic import ValidationError, create_model
 from femgear.case import text as case_text
 from femgear.case.checks import cross_check
 from femgear.case.csv_columns import embed_checksum, embed_profiles
+from femgear.case.estimates import with_estimates
 from femgear.case.gear_set import with_shafts
 from femgear.case.mistakes import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
@@ -34,13 +35,14 @@ _MOST_UNREAD = 20
 """Files of a case that are refused at once."""
 
 
-def read_case(path: str | os.PathLike) -> Any:
+def read_case(source: str | os.PathLike | Mapping[str, Any]) -> Any:
     """Read the case of a TOML file: a planetary set, or what its ``model`` names, as ``"drivetrain"``.
 
     Parameters
     ----------
-    path : path-like
-        A regular UTF-8 file of at most 1 MB.
+    source : path-like, str or mapping
+        A regular UTF-8 file of at most 1 MB. A text of several lines is the TOML text itself, a mapping its
+        tables, ``{"set": {"planets": 3, "face_width": "25 mm"}, ...}``.
 
     Returns
     -------
@@ -52,7 +54,11 @@ def read_case(path: str | os.PathLike) -> Any:
     CaseError
         Everything that is wrong with the file, at once; ``problems`` holds one `CaseError` for each.
     """
-    return parse_case(case_text.read_text(path), name=os.fsdecode(path))
+    if isinstance(source, Mapping):
+        return parse_case(case_text.write(dict(source)), numbered=False)
+    if isinstance(source, str) and "\n" in source:
+        return parse_case(source)
+    return parse_case(case_text.read_text(source), name=os.fsdecode(source))
 
 
 def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
@@ -89,7 +95,10 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     said = file.notices(data, case)
     said = (*notices(data, case), *said, *added_material(case)) if of_set else said
     case.read_from(text, lines, name, notices=said, profile_files=files)
-    return with_shafts(case) if of_set else case
+    if of_set:
+        case, estimated = with_estimates(with_shafts(case))
+        case._notices += estimated
+    return case
 
 
 def _embed_of_set(data: dict, name: str) -> dict[str, str]:

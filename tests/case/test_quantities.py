@@ -1,6 +1,7 @@
 """Units of case files."""
 
 import functools
+import math
 from functools import partial
 from types import FunctionType
 
@@ -47,6 +48,47 @@ def test_units_of_messages_are_what_they_say():
         assert dimension.scale == pytest.approx(read, rel=1e-15), dimension.name
         assert quantities.to_si(f"1 {dimension.si}", dimension) == 1.0
     assert quantities.MODULUS.window(1e9, 206e9) == "1 GPa to 206 GPa"
+
+
+@pytest.mark.parametrize(
+    ("text", "si", "value"),
+    [
+        ("120 Nm", "N m", 120.0),
+        ("120 N*m", "N m", 120.0),
+        ("3 kNm", "N m", 3e3),
+        ("5 N mm / rad", "N m/rad", 5e-3),
+        ("30 rev/min", "rad/s", math.pi),
+        ("30 1/min", "rad/s", math.pi),
+        ("30 1 / min", "rad/s", math.pi),
+        ("2 kN/mm", "N/m", 2e6),
+        ("20 °", "rad", math.radians(20.0)),
+        ("4 µm", "m", 4e-6),
+        ("4 μm", "m", 4e-6),
+        ("4 mum", "m", 4e-6),
+        ("7.85 kg / dm^3", "kg/m^3", 7850.0),
+    ],
+)
+def test_words_of_drawings_and_other_programs(text, si, value):
+    dimension = quantities.Dimension("a quantity", si, si, 1.0)
+    assert quantities.to_si(text, dimension) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "near"),
+    [
+        ("3 nm", quantities.TORQUE, "Nm"),
+        ("3 rmp", quantities.SPEED, "rpm"),
+        ("3 Nm/deg", quantities.TORSION, "Nm/rad"),
+        ("3 kN/m^2", quantities.STIFFNESS, "kN/mm"),
+        ("3 gPa", quantities.MODULUS, "GPa"),
+    ],
+)
+def test_wrong_units_name_near_ones(text, dimension, near):
+    with pytest.raises(CaseError) as caught:
+        quantities.to_si(text, dimension)
+    error = caught.value
+    assert error.code == "E-UNIT" and error.limit == f"units convertible to {dimension.si}"
+    assert error.remedy.startswith("did you mean ") and near in error.remedy.split("?")[0].split()
 
 
 def test_absorbed_doses_are_no_angles():

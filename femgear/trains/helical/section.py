@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 
+from pydantic import Field
+
 from femgear.case.checks import steep_helix
 from femgear.case.quantities import ANGLE, STIFFNESS, TORSION, Count, Quantity, Section
-from femgear.case.sections import LARGEST_HELIX, Inertia, Mass, MeshStiffnessSection, RigidCase
+from femgear.case.sections import (
+    LARGEST_HELIX,
+    LEFT_OUT,
+    Inertia,
+    Mass,
+    MeshStiffnessSection,
+    RigidCase,
+)
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError, Finding, remark
 from femgear.trains.rigid import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
@@ -26,18 +35,18 @@ Turning = Annotated[float, Quantity(TORSION, 0.0, 1e13)]
 class HelicalBodySection(Section):
     """What sun, carrier and planets need beyond mass, polar inertia and radial support to move in space."""
 
-    diametral_inertia: Inertia
-    axial_stiffness: Stiffness
-    tilt_stiffness: Turning
+    diametral_inertia: Inertia = LEFT_OUT
+    axial_stiffness: Stiffness = LEFT_OUT
+    tilt_stiffness: Turning = LEFT_OUT
     torsional_stiffness: Turning | None = None
 
 
 class HelicalRingSection(HelicalBodySection):
     """The ring as a rigid body on its support in the housing."""
 
-    mass: Mass
-    inertia: Inertia
-    support_stiffness: Stiffness
+    mass: Mass = LEFT_OUT
+    inertia: Inertia = LEFT_OUT
+    support_stiffness: Stiffness = LEFT_OUT
 
 
 class HelicalSection(Section):
@@ -53,10 +62,10 @@ class HelicalSection(Section):
     contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
     section: Literal["normal", "transverse"] = "normal"
     mesh_stiffness: MeshStiffnessSection | None = None
-    sun: HelicalBodySection
-    ring: HelicalRingSection
-    carrier: HelicalBodySection
-    planet: HelicalBodySection
+    sun: HelicalBodySection = Field(default_factory=HelicalBodySection)
+    ring: HelicalRingSection = Field(default_factory=HelicalRingSection)
+    carrier: HelicalBodySection = Field(default_factory=HelicalBodySection)
+    planet: HelicalBodySection = Field(default_factory=HelicalBodySection)
 
     @property
     def signed_helix_angle(self) -> float:

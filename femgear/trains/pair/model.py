@@ -13,12 +13,12 @@ resolved where tooth pairs begin and cease to carry (`femgear.contact.loaded_per
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
 
+from femgear.case.estimates import cylinder
 from femgear.case.gear_set import line_play, set_deviations
 from femgear.case.sections import MaterialSection
 from femgear.contact.cycle import CycleOptions
@@ -85,11 +85,11 @@ class PairModel:
 def body_of(section: GearSection, gear: Gear, material: MaterialSection) -> tuple[float, float]:
     """Compute mass [kg] and polar inertia [kg m^2] of a gear: as given, else of a disc or ring without teeth.
 
-    Between rim and root circle: ``m = rho b pi (R^2 - r^2)``, ``I = m (R^2 + r^2) / 2``.
+    Between rim and root circle, see `femgear.case.estimates.cylinder`.
     """
     inner, outer = sorted((gear.rim_radius, gear.root_radius))
-    mass = material.density * gear.face_width * math.pi * (outer**2 - inner**2)
-    return section.mass or mass, section.inertia or 0.5 * mass * (outer**2 + inner**2)
+    mass, inertia, _ = cylinder(inner, outer, gear.face_width, material.density)
+    return section.mass or mass, section.inertia or inertia
 
 
 def pair_model(case: PairCase, gears: GearPair) -> PairModel:

@@ -24,6 +24,7 @@ from femgear.case.quantities import (
     printable_line,
 )
 from femgear.case.sections import (
+    LEFT_OUT,
     DampingRatio,
     Inertia,
     Mass,
@@ -70,9 +71,9 @@ FigureName = Literal[
 class PlanarRingSection(Section):
     """The ring as a rigid body on its support in the housing."""
 
-    mass: Mass
-    inertia: Inertia
-    support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)]
+    mass: Mass = LEFT_OUT
+    inertia: Inertia = LEFT_OUT
+    support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)] = LEFT_OUT
 
 
 class TorsionSection(Section):
@@ -149,7 +150,7 @@ class PlanarSection(Section):
     damping_ratios: Annotated[tuple[DampingRatio, ...], Values(min_length=1, max_length=1000)] | None = None
     gyroscopic: StrictBool = False
     reaction: Literal["supports", "output"] = "output"
-    ring: PlanarRingSection
+    ring: PlanarRingSection = Field(default_factory=PlanarRingSection)
     torsion: TorsionSection = TorsionSection()
     carrier_bearing: CarrierBearingSection | None = None
     gravity: GravitySection | None = None

@@ -1,0 +1,171 @@
+"""Estimates of masses, inertias and stiffnesses from the shapes of the gears, where a case leaves them out.
+
+Bodies are full cylinders, stiffnesses fractions of the mesh stiffness of usual gears; every estimate says how
+it was made. They tell where natural frequencies may lie: give what is known of bearings and shafts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from femgear.case.gear_set import planetary_set
+from femgear.case.quantities import FOUNDATION, INERTIA, MASS, STIFFNESS, TORSION, Dimension, Section
+from femgear.case.sections import MaterialSection
+from femgear.errors import Finding
+from femgear.gears.gear import Gear
+
+STEEL = 206e9
+"""Modulus of elasticity of the gears that `USUAL_STIFFNESS` is given for [Pa], of ISO 6336-1."""
+USUAL_STIFFNESS = 20e9
+"""Mesh stiffness per face width c_gamma of steel gears [N/m^2], 20 N/(mm um): DIN 3990-1:1987, method C."""
+SUPPORT_SHARE = 0.2
+"""Stiffness of a bearing or support per mesh stiffness: 1e8 and 5e8 N/m in Table 1 of J. Lin, R. G. Parker,
+J. Vib. Acoust. 121, 1999, 316-321."""
+USUAL_LOAD = 1e6
+"""K factor ``F_t / (b d_1) (u + 1) / u`` of moderately loaded gears [Pa], D. W. Dudley's measure of size."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An estimated entry of a case.
+
+    Parameters
+    ----------
+    value : float
+        In SI units.
+    dimension : Dimension
+    how : str
+        What it is made from, in words.
+    """
+
+    value: float
+    dimension: Dimension
+    how: str
+
+    def __str__(self) -> str:
+        return self.dimension.show(float(f"{self.value:.4g}"))
+
+
+def cylinder(inner: float, outer: float, width: float, density: float) -> tuple[float, float, float]:
+    """Compute mass [kg], polar and diametral inertia [kg m^2] of a hollow cylinder, radii and width in m.
+
+    ``m = rho b pi (R^2 - r^2)``, ``I = m (R^2 + r^2) / 2`` and ``m (3 (R^2 + r^2) + b^2) / 12``.
+    """
+    mass, squares = density * width * math.pi * (outer**2 - inner**2), outer**2 + inner**2
+    return mass, 0.5 * mass * squares, mass * (3.0 * squares + width**2) / 12.0
+
+
+def gear_cylinder(gear: Gear, density: float) -> tuple[float, float, float]:
+    """Compute the mass properties of a gear, as `cylinder`, between its rim and the circle ``r + x m``.
+
+    There teeth are as wide as the spaces between them: what stands out of the circle fills these.
+    """
+    inner, outer = sorted((gear.rim_radius, gear.reference_radius + gear.profile_shift * gear.module))
+    return cylinder(inner, outer, gear.face_width, density)
+
+
+def mesh_stiffness(material: MaterialSection, width: float) -> float:
+    """Estimate the stiffness of a mesh of a face width [m] in N/m; that of steel by the modulus."""
+    return USUAL_STIFFNESS * material.youngs_modulus / STEEL * width
+
+
+def usual_torque(teeth: tuple[int, int], module: float, width: float, meshes: int = 1) -> float:
+    """Compute the torque [N m] on gear 1 of external meshes, module and width in m, at the K factor of
+    `USUAL_LOAD`."""
+    diameter, ratio = teeth[0] * module, teeth[1] / teeth[0]
+    return 0.5 * meshes * USUAL_LOAD * width * diameter**2 * ratio / (ratio + 1.0)
+
+
+def estimates(case: Any) -> dict[str, Estimate]:
+    """Estimate the entries of a case that its gears allow, by dotted key.
+
+    Of planetary sets and pairs. GeometryError: gears that cannot be made, see `planetary_set`.
+    """
+    gears, density = planetary_set(case), case.material.density
+    bodies = {gear.name: (gear_cylinder(gear, density), _words(gear)) for gear in gears.gears}
+    width, stiffness = case.set.face_width, SUPPORT_SHARE * mesh_stiffness(case.material, case.set.face_width)
+    if "ring" in bodies:
+        radius = gears.centre_distance + gears.planet.rim_radius
+        how = "two discs of half the face width, out to the far side of the planets' bores"
+        bodies["carrier"] = cylinder(0.0, radius, width, density), how
+    line = 1e-9 * mesh_stiffness(case.material, 1.0)
+    share = f"{SUPPORT_SHARE:g} of a mesh stiffness of {line:.3g} N/(mm um) times the face width"
+    found = {}
+    for name, ((mass, polar, diametral), how) in bodies.items():
+        own = {"mass": Estimate(mass, MASS, how), "inertia": Estimate(polar, INERTIA, how)}
+        support = "support" if name in ("sun", "ring", "carrier") else "bearing"
+        own[f"{support}_stiffness"] = Estimate(stiffness, STIFFNESS, share)
+        found |= {f"{place}.{key}": one for key, one in own.items() for place in _places(name)}
+        spatial = {
+            "diametral_inertia": Estimate(diametral, INERTIA, how),
+            "axial_stiffness": Estimate(stiffness, STIFFNESS, f"as radially: {share}"),
+            "tilt_stiffness": Estimate(
+                stiffness * width**2 / 12.0, TORSION, "the radial stiffness, even over the face width"
+            ),
+        }
+        found |= {f"helical.{name}.{key}": one for key, one in spatial.items()}
+    if "ring" in bodies:
+        area = 2.0 * math.pi * gears.ring.rim_radius * width
+        how = f"over the outer surface {share}"
+        foundation = Estimate(stiffness / area, FOUNDATION, how)
+        found |= {f"ring.foundation_{name}": foundation for name in ("radial", "tangential")}
+    return found
+
+
+def _places(name: str) -> tuple[str, ...]:
+    """Sections that give the body of a member."""
+    return ("planar.ring", "helical.ring") if name == "ring" else (name,)
+
+
+def _words(gear: Gear) -> str:
+    rim = "outer surface" if gear.internal else "bore"
+    return f"cylinder from the {rim} to the circle on which teeth and spaces are equal"
+
+
+_BODY = ("mass", "inertia", "support_stiffness")
+_KEYS = (
+    *(f"{name}.{key}" for name in ("sun", "carrier", "planar.ring", "helical.ring") for key in _BODY),
+    *(f"planet.{key}" for key in ("mass", "inertia", "bearing_stiffness")),
+    *(f"ring.foundation_{key}" for key in ("radial", "tangential")),
+    *(
+        f"helical.{name}.{key}"
+        for name in ("sun", "ring", "carrier", "planet")
+        for key in ("diametral_inertia", "axial_stiffness", "tilt_stiffness")
+    ),
+)
+"""Entries of planetary sets that may be left out."""
+
+
+def with_estimates(case: Any) -> tuple[Any, tuple[Finding, ...]]:
+    """Put estimates in place of what a planetary set leaves out, and say which (W-ESTIMATED).
+
+    GeometryError: gears that cannot be made, where something is left out.
+    """
+    missing = [key for key in _KEYS if _left_out(case, key.split("."))]
+    if not missing:
+        return case, ()
+    known = estimates(case)
+    for key in missing:
+        case = _with(case, key.split("."), known[key].value)
+    shown = ", ".join(f"{key} = {known[key]}" for key in missing)
+    text = f"left out and estimated from the gears: {shown}"
+    remedy = (
+        "give what is known: modes and vibration depend on it, a static solution of fixed members does not"
+    )
+    return case, (Finding("W-ESTIMATED", missing[0], text, remedy=remedy),)
+
+
+def _left_out(section: Any, path: list[str]) -> bool:
+    """Whether the section of an entry is there and the entry is not."""
+    name, *inner = path
+    value = getattr(section, name, 0.0)
+    return _left_out(value, inner) if inner else value is None or math.isnan(value)
+
+
+def _with(section: Section, path: list[str], value: float) -> Any:
+    """Copy of a section with one entry of it, or of sections in it, changed."""
+    name, *inner = path
+    new = _with(getattr(section, name), inner, value) if inner else value
+    return section.model_copy(update={name: new})
