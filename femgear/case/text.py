@@ -8,7 +8,7 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date, time
 from functools import lru_cache
@@ -45,6 +45,11 @@ def read_text(path: str | os.PathLike) -> str:
     CaseError: missing, unreadable, not a regular file, empty or over 1 MB (E-FILE); not UTF-8, with the
     offset of the first wrong byte (E-FILE-ENC).
     """
+    return decoded(read_bytes(path, _MAX_BYTES, "name a TOML file"), os.fsdecode(path))
+
+
+def read_bytes(path: str | os.PathLike, most: int, remedy: str) -> bytes:
+    """Read a regular file of at most so many bytes; others are refused (E-FILE), with what to do."""
     name = os.fsdecode(path)
     try:
         # O_NONBLOCK: opening a FIFO must not wait for a writer.
@@ -57,20 +62,25 @@ def read_text(path: str | os.PathLike) -> str:
         ) from error  # fmt: skip
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise CaseError("not a regular file", code="E-FILE", file=name, remedy="name a TOML file")
+            raise CaseError("not a regular file", code="E-FILE", file=name, remedy=remedy)
         with open(descriptor, "rb", closefd=False) as stream:
-            data = stream.read(_MAX_BYTES + 1)
+            data = stream.read(most + 1)
     except OSError as error:
         raise CaseError(
-            f"cannot read the file: {error.strerror}", code="E-FILE", file=name, remedy="name a TOML file"
+            f"cannot read the file: {error.strerror}", code="E-FILE", file=name, remedy=remedy
         ) from error
     finally:
         os.close(descriptor)
-    if len(data) > _MAX_BYTES:
-        raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{_MAX_BYTES} bytes")
+    if len(data) > most:
+        raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{most} bytes")
     if not data.strip():
         remedy = "write into it what is needed, or name another file"
         raise CaseError("the file is empty", code="E-FILE", file=name, remedy=remedy)
+    return data
+
+
+def decoded(data: bytes, name: str) -> str:
+    """Decode UTF-8, without its byte-order mark; other bytes are refused (E-FILE-ENC)."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -257,13 +267,13 @@ def _clean(key: str) -> str:
     return ".".join(part.strip().strip("\"'") for part in key.split("."))
 
 
-def write(data: dict) -> str:
+def write(data: dict, remarks: Mapping[str, str] | None = None) -> str:
     """Write nested tables of strings, booleans, integers, floats and lists of these as TOML text.
 
-    ``parse(write(data), "")`` equals ``data``.
+    ``parse(write(data), "")`` equals ``data``; `remarks` by dotted key stand behind their entries.
     """
     lines: list[str] = []
-    _write_table(data, (), lines)
+    _write_table(data, (), lines, remarks or {})
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
@@ -282,14 +292,16 @@ def text_with_points(data: dict, name: str) -> str:
     return text
 
 
-def _write_table(table: dict, path: tuple[str, ...], lines: list[str]) -> None:
+def _write_table(table: dict, path: tuple[str, ...], lines: list[str], remarks: Mapping[str, str]) -> None:
     values = {key: value for key, value in table.items() if not isinstance(value, dict)}
     if path and (values or not table):
         lines += ["", f"[{'.'.join(_key(part) for part in path)}]"]
-    lines += [f"{_key(key)} = {_value(value)}" for key, value in values.items()]
+    for key, value in values.items():
+        remark = remarks.get(".".join((*path, key)))
+        lines.append(f"{_key(key)} = {_value(value)}" + (f"  # {printable(remark)}" if remark else ""))
     for key, value in table.items():
         if isinstance(value, dict):
-            _write_table(value, (*path, key), lines)
+            _write_table(value, (*path, key), lines, remarks)
 
 
 def _key(key: str) -> str:
@@ -300,7 +312,7 @@ def _value(value: object) -> str:
     if isinstance(value, int) and abs(value).bit_length() > 4096:
         raise CaseError("the integer is too long", code="E-RANGE", value=shown(value), limit="4096 bits")
     if isinstance(value, float):
-        return repr(value)
+        return float.__repr__(value)  # NumPy's numbers are floats as well
     if isinstance(value, str | int):
         # as in JSON, but that TOML escapes DEL as well
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

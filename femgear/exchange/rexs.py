@@ -1,0 +1,335 @@
+"""REXS files: components with attributes and units, and relations between them.
+
+REXS is FVA's open exchange format of gear units (versions 1.0 to 2.0, www.rexs.info): XML in ``.rexs``, JSON
+in ``.rexsj``, either of them zipped in ``.rexsz``. What a file holds is told by its first bytes, not by its
+name. Files are not trusted: document types and entities are refused before XML is parsed, sizes are limited
+before and while a zip is unpacked, ids and relations must fit each other.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import re
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from graphlib import CycleError, TopologicalSorter
+from typing import Any, NoReturn
+from xml.etree import ElementTree
+
+from femgear.case.quantities import Dimension, to_si
+from femgear.case.text import decoded, read_bytes
+from femgear.errors import CaseError
+
+MOST_BYTES = 20_000_000
+"""Of a file, and of what a zip holds; those of whole gear units have some hundred kilobytes."""
+_VERSIONS = re.compile(r"(1\.[0-7]|2\.0)(\.\d+)?")
+_EXPORT = "export the gear unit again, or name another file"
+_PLAIN = ("none", "-", "1", "")
+"""Units of numbers without dimension."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """A component; its attributes are texts with their unit, ``{"face_width": ("50.0", "mm")}``.
+
+    The unit is None where the file gives none; arrays and matrices are left out.
+    """
+
+    id: str
+    type: str
+    name: str
+    attributes: Mapping[str, tuple[str, str | None]]
+
+    def __str__(self) -> str:
+        return f"{self.type} {self.id}"
+
+
+@dataclass(frozen=True)
+class Relation:
+    """A relation of a type: pairs of role and component id."""
+
+    type: str
+    refs: tuple[tuple[str, str], ...]
+
+    def of(self, role: str) -> list[str]:
+        """List the ids in a role."""
+        return [id for known, id in self.refs if known == role]
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a REXS file holds.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for messages.
+    version : str
+    components : mapping of str to Component
+        By id.
+    relations : tuple of Relation
+    load_cases : tuple of mapping
+        Attributes by component id that a load case of the first load spectrum gives.
+    used : set of (str, str)
+        Types of components and attributes that were asked for.
+    """
+
+    name: str
+    version: str
+    components: Mapping[str, Component]
+    relations: tuple[Relation, ...]
+    load_cases: tuple[Mapping[str, Mapping[str, tuple[str, str | None]]], ...] = ()
+    used: set[tuple[str, str]] = field(default_factory=set)
+
+    def related(self, kinds: str | tuple[str, ...], to: str, **roles: str) -> list[Component]:
+        """List the components in the role `to` of relations that have an id in each of some roles."""
+        kinds = (kinds,) if isinstance(kinds, str) else kinds
+        found = (
+            id
+            for relation in self.relations
+            if relation.type in kinds and all(id in relation.of(role) for role, id in roles.items())
+            for id in relation.of(to)
+        )
+        return [self.components[id] for id in dict.fromkeys(found)]
+
+    def text(self, component: Component, attribute: str) -> str | None:
+        """Value of an attribute as text, None where it is not given."""
+        self.used.add((component.type, attribute))
+        return component.attributes.get(attribute, ("", None))[0].strip() or None
+
+    def number(self, component: Component, attribute: str, dimension: Dimension | None = None):
+        """Read an attribute in SI units, None where it is not given; without a dimension a plain number.
+
+        CaseError with file, component and attribute: no number, no unit or one of another kind (E-UNIT).
+        """
+        if (text := self.text(component, attribute)) is None:
+            return None
+        unit, key = component.attributes[attribute][1], f"{component}, {attribute}"
+        try:
+            if dimension is not None:
+                return to_si(f"{text} {unit or ''}", dimension)
+            number = float(text)
+        except CaseError as error:
+            error.key, error.file = key, self.name
+            raise
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number) or (unit or "") not in _PLAIN:
+            raise CaseError(
+                "a plain number is needed", code="E-UNIT", key=key, value=f"{text} {unit or ''}",
+                limit='a finite number with the unit "none"', remedy=_EXPORT, file=self.name,
+            )  # fmt: skip
+        return number
+
+    def refuse(self, message: str, key: str, remedy: str = _EXPORT, limit: str | None = None) -> NoReturn:
+        """Refuse what the file says of a component (E-REXS)."""
+        raise CaseError(message, code="E-REXS", key=key, file=self.name, limit=limit, remedy=remedy)
+
+    def unused(self) -> Iterator[str]:
+        """Tell, by type of component, how many there are and which of their attributes nobody asked for."""
+        types: dict[str, list[Component]] = {}
+        for component in self.components.values():
+            types.setdefault(component.type, []).append(component)
+        for kind, members in sorted(types.items()):
+            names = dict.fromkeys(name for one in members for name in one.attributes)
+            left = [name for name in names if (kind, name) not in self.used]
+            if left or not names:
+                yield f"{kind} ({len(members)}): {', '.join(left) or 'no attributes'}"
+
+
+def read_model(path: str | os.PathLike) -> Model:
+    """Read a REXS file of any form and of versions 1.0 to 2.0.
+
+    Raises
+    ------
+    CaseError
+        E-FILE: unreadable, too long, no XML, JSON or zip, or with entities. E-FILE-ENC: not UTF-8. E-FORMAT:
+        another version. E-REXS: ids missing, given twice or unknown, parts that hold each other.
+    """
+    name = os.fsdecode(path)
+    data = read_bytes(path, MOST_BYTES, "name a REXS file: .rexs, .rexsj or .rexsz")
+    text = decoded(_unzipped(data, name) if data[:2] == b"PK" else data, name)
+    return _model((_from_json if text.lstrip()[:1] == "{" else _from_xml)(text, name), name)
+
+
+def _broken(message: str, name: str, remedy: str = _EXPORT, limit: str | None = None) -> CaseError:
+    return CaseError(message, code="E-FILE", file=name, limit=limit, remedy=remedy)
+
+
+def _unzipped(data: bytes, name: str) -> bytes:
+    """Only REXS file in a zip; unpacked as far as it may be long, whatever its header says."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            inside = [one for one in archive.infolist() if one.filename.lower().endswith((".rexs", ".rexsj"))]
+            if len(inside) != 1:
+                raise _broken(f"the zip holds {len(inside)} REXS files", name, limit="one of them")
+            with archive.open(inside[0]) as stream:
+                unpacked = stream.read(MOST_BYTES + 1)
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, EOFError, OSError) as error:
+        raise _broken(f"the zip cannot be unpacked: {error}", name) from error
+    if len(unpacked) > MOST_BYTES:
+        raise _broken("what the zip holds is too long", name, limit=f"{MOST_BYTES} bytes")
+    return unpacked
+
+
+def _from_json(text: str, name: str) -> dict:
+    try:
+        model = json.loads(text)["model"]
+    except (ValueError, RecursionError, KeyError, TypeError) as error:
+        raise _broken(f"no REXS model in JSON: {type(error).__name__}: {error}", name) from error
+    for component in (*_dicts(model, "components"), *_in_load_cases(model)):
+        for one in _dicts(component, "attributes"):
+            values = (one[key] for key in one if key not in ("id", "unit"))
+            one["value"] = next((value for value in values if isinstance(value, str | int | float)), None)
+    return model if isinstance(model, dict) else {}
+
+
+def _from_xml(text: str, name: str) -> dict:
+    """Tables as in JSON of an XML text, in which document types and entities are refused unparsed."""
+    if re.search(r"<!\s*(DOCTYPE|ENTITY)", text, re.IGNORECASE):
+        raise _broken("document types and entities are refused", name, "remove them: REXS has none")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise _broken(f"neither XML nor JSON nor a zip: {error}", name) from error
+    if _tag(root) != "model":
+        raise _broken(f"no REXS file: its root is {_tag(root)!a}", name, limit="model")
+    return {
+        **root.attrib,
+        "components": [_xml_component(one) for one in _below(root, "components", "component")],
+        "relations": [
+            {**one.attrib, "refs": [dict(ref.attrib) for ref in one]}
+            for one in _below(root, "relations", "relation")
+        ],
+        "load_spectrum": [{"load_cases": _xml_cases(one)} for one in root if _tag(one) == "load_spectrum"],
+    }
+
+
+def _xml_cases(spectrum: ElementTree.Element) -> list[dict]:
+    cases = (one for one in spectrum if _tag(one) == "load_case")
+    return [{"components": [_xml_component(one) for one in case]} for case in cases]
+
+
+def _tag(element: ElementTree.Element) -> str:
+    return element.tag.rpartition("}")[2]
+
+
+def _below(root: ElementTree.Element, group: str, tag: str) -> list[ElementTree.Element]:
+    return [one for table in root if _tag(table) == group for one in table if _tag(one) == tag]
+
+
+def _xml_component(element: ElementTree.Element) -> dict:
+    attributes = [{**one.attrib, "value": None if len(one) else one.text} for one in element]
+    return {**element.attrib, "attributes": attributes}
+
+
+def _dicts(table: Any, key: str) -> list[dict]:
+    """Tables in a list of a table, empty where there is none."""
+    found = table.get(key) if isinstance(table, dict) else None
+    return [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+
+
+def _in_load_cases(data: Any) -> list[dict]:
+    """Components in all load cases."""
+    spectra = _dicts(data, "load_spectrum")
+    return [one for s in spectra for case in _dicts(s, "load_cases") for one in _dicts(case, "components")]
+
+
+def _model(data: dict, name: str) -> Model:
+    """Model of the tables of a file; refuses another version, ids and relations that do not fit."""
+    version = str(data.get("version"))
+    if not _VERSIONS.fullmatch(version):
+        raise CaseError(
+            "this version of REXS is not read", code="E-FORMAT", key="version", value=version, file=name,
+            limit="1.0 to 1.7 and 2.0", remedy="export the gear unit in one of these versions",
+        )  # fmt: skip
+    components: dict[str, Component] = {}
+    model = Model(name, version, components, tuple(_relations(_dicts(data, "relations"))), _load_cases(data))
+    for one in _dicts(data, "components"):
+        id, kind = str(one.get("id", "")), str(one.get("type", ""))
+        if not id or not kind or id in components:
+            wrong = "is given twice" if id in components else f"has no {'type' if id else 'id'}"
+            model.refuse(f"the component {str(one.get('name', '')) or kind!a} {wrong}", f"component {id}")
+        components[id] = Component(id, kind, str(one.get("name", "")), _attributes(one))
+    for relation in model.relations:
+        for role, id in relation.refs:
+            if id not in components:
+                key, limit = f"relation {relation.type}, {role}", "ids of components of the file"
+                model.refuse(f"there is no component {id!a}", key, limit=limit)
+    _refuse_loops(model)
+    return model
+
+
+def _relations(tables: Iterable[dict]) -> Iterator[Relation]:
+    for one in tables:
+        refs = ((str(ref.get("role", "")), str(ref.get("id", ""))) for ref in _dicts(one, "refs"))
+        yield Relation(str(one.get("type", "")), tuple(refs))
+
+
+def _attributes(table: dict) -> dict[str, tuple[str, str | None]]:
+    """Values and units of a component; JSON has true and numbers, XML texts."""
+    found = {}
+    for one in _dicts(table, "attributes"):
+        value, unit = one.get("value"), one.get("unit")
+        if value is not None:
+            text = str(value).lower() if isinstance(value, bool) else str(value)
+            found[str(one.get("id", ""))] = text, None if unit is None else str(unit)
+    return found
+
+
+def _load_cases(data: dict) -> tuple[dict, ...]:
+    spectra = _dicts(data, "load_spectrum")
+    cases = _dicts(spectra[0], "load_cases") if spectra else []
+    return tuple(
+        {str(one.get("id")): _attributes(one) for one in _dicts(case, "components")} for case in cases
+    )
+
+
+def _refuse_loops(model: Model) -> None:
+    """Refuse assemblies of which one is part of itself."""
+    parts: dict[str, set[str]] = {}
+    for relation in model.relations:
+        if relation.type in ("assembly", "ordered_assembly"):
+            for whole in relation.of("assembly"):
+                parts.setdefault(whole, set()).update(relation.of("part"))
+    try:
+        TopologicalSorter(parts).prepare()
+    except CycleError as error:
+        loop = " in ".join(map(str, error.args[1][:6]))
+        model.refuse(f"components are parts of each other: {loop}", "relation assembly", limit="no loops")
+
+
+def model_text(model: Model, program: str, version: str) -> str:
+    """Write a model as REXS in XML; `program` and its `version` are those of the writer."""
+    root = ElementTree.Element(
+        "model", applicationId=program, applicationVersion=version, version=model.version,
+        date=datetime.now().astimezone().isoformat(timespec="seconds"),
+    )  # fmt: skip
+    relations = ElementTree.SubElement(root, "relations")
+    for number, relation in enumerate(model.relations, start=1):
+        parent = ElementTree.SubElement(relations, "relation", id=str(number), type=relation.type)
+        for role, id in relation.refs:
+            ElementTree.SubElement(parent, "ref", id=id, role=role, hint=model.components[id].type)
+    components = ElementTree.SubElement(root, "components")
+    for one in model.components.values():
+        _write_component(components, one.id, one.attributes, type=one.type, name=one.name)
+    if model.load_cases:
+        spectrum = ElementTree.SubElement(root, "load_spectrum", id="1")
+        for number, case in enumerate(model.load_cases, start=1):
+            parent = ElementTree.SubElement(spectrum, "load_case", id=str(number))
+            for id, attributes in case.items():
+                _write_component(parent, id, attributes, type=model.components[id].type)
+    ElementTree.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
+
+
+def _write_component(parent: ElementTree.Element, id: str, attributes: Mapping, **more: str) -> None:
+    component = ElementTree.SubElement(parent, "component", id=id, **more)
+    for name, (value, unit) in attributes.items():
+        ElementTree.SubElement(component, "attribute", id=name, unit=unit or "none").text = value
