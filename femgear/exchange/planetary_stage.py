@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 from femgear.case.estimates import usual_rim, usual_torque
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import (
     ANGLE,
     DENSITY,
@@ -28,8 +29,9 @@ from femgear.case.quantities import (
     Dimension,
     to_si,
 )
+from femgear.case.sections import Case
 from femgear.errors import CaseError
-from femgear.exchange.rexs import Component, Model
+from femgear.exchange.rexs import Component, Model, Relation
 from femgear.gears.kinematics import MEMBERS, torque_ratios
 
 _POWER = Dimension("a power", "W", "kW", 1e3)
@@ -435,3 +437,154 @@ def _state(s: _Stage, given: Any) -> tuple[dict[str, float], dict[str, float]]:
                     torque = power / speed
                 loads |= {name: torque} if torque else {}
     return turns, loads
+
+
+class _Writer:
+    """Components and relations of a new model."""
+
+    def __init__(self, name: str):
+        self.name, self.components, self.relations, self.cases = name, {}, [], ()
+
+    def add(self, type: str, name: str = "", **attributes: tuple[object, str] | None) -> str:
+        """Add a component with those attributes that are given, and return its id."""
+        id = str(len(self.components) + 1)
+        given = {key: (str(one[0]), one[1]) for key, one in attributes.items() if one is not None}
+        self.components[id] = Component(id, type, name, given)
+        return id
+
+    def relate(self, type: str, **roles: str) -> None:
+        self.relations.append(Relation(type, tuple(roles.items())))
+
+
+def _attribute(value: float | None, unit: str = "none") -> tuple[object, str] | None:
+    """SI value in a unit of REXS; None stays None."""
+    if value is None:
+        return None
+    scale = {
+        "mm": 1e-3, "deg": math.pi / 180, "1 / min": SPEED.scale, "N / mm^2": 1e6, "kg / dm^3": 1e3
+    }.get(unit, 1.0)  # fmt: skip
+    return float(f"{value / scale:.15g}"), unit
+
+
+def stage_model(case: Case, name: str) -> Model:
+    """Write gears, material, bearings and operation of a planetary set as a REXS model of version 1.4.
+
+    Masses, planet errors, modifications, dynamics and housing have no place in it.
+    """
+    gears, w = planetary_set(case), _Writer(name)
+    unit, casing = w.add("gear_unit", case.title), w.add("gear_casing", "casing")
+    stage, carrier = w.add("planetary_stage", case.title), w.add("planet_carrier", "carrier")
+    for part in (casing, stage):
+        w.relate("assembly", assembly=unit, part=part)
+    w.relate("assembly", assembly=stage, part=carrier)
+    made, shafts = {}, {}
+    made["sun", 0], shafts["sun"] = _add_gear(w, case, "sun", gears.sun)
+    made["ring", 0], shafts["ring"] = _add_gear(w, case, "ring", gears.ring)
+    shafts["carrier"] = w.add("shaft", "carrier shaft")
+    w.relate("planet_carrier_shaft", planetary_stage=stage, shaft=shafts["carrier"])
+    for member in ("sun", "ring"):
+        w.relate("central_shaft", planetary_stage=stage, shaft=shafts[member])
+    for number, angle in enumerate(gears.planet_angles, start=1):
+        planet, shaft = _add_gear(w, case, f"planet {number}", gears.planet)
+        w.relate("planet_shaft", planetary_stage=stage, shaft=shaft)
+        pin = w.add("shaft", f"pin {number}")
+        w.relate("planet_pin", planetary_stage=stage, shaft=pin)
+        stiffness = _attribute(case.planet.bearing_stiffness, "N / m")
+        bearing = w.add("concept_bearing", f"bearing of planet {number}", radial_stiffness=stiffness)
+        w.relate("side", assembly=bearing, outer_part=shaft, inner_part=pin)
+        for mate, turned in (("sun", angle), ("ring", angle + math.pi)):
+            mesh = w.add(
+                "cylindrical_stage", f"{mate} and planet {number}",
+                center_distance=_attribute(gears.centre_distance, "mm"),
+                rotating_angle_around_neg_u_axis=_attribute(turned % math.tau, "deg"),
+            )  # fmt: skip
+            w.relate("assembly", assembly=stage, part=mesh)
+            pair = (made["sun", 0], planet) if mate == "sun" else (planet, made["ring", 0])
+            w.relate("stage", stage=mesh, gear_1=pair[0], gear_2=pair[1])
+    _add_operation(w, case, shafts, casing)
+    return Model(name, "1.4", w.components, tuple(w.relations), tuple(w.cases))
+
+
+def _add_gear(w: _Writer, case: Case, name: str, gear: Any) -> tuple[str, str]:
+    """Add a gear with shaft, flanks, tool and material; ids of gear and shaft."""
+    section, normal = getattr(case, gear.name), math.cos(case.helix_angle or 0.0)
+    rack, sense = section.rack or case.rack, 1.0 if gear.name == "sun" else -1.0
+    shaft = w.add("shaft", f"{name} shaft")
+    id = w.add(
+        "ring_gear" if gear.internal else "cylindrical_gear", name, number_of_teeth=(gear.teeth, "none"),
+        normal_module=_attribute(case.module, "mm"), face_width=_attribute(case.set.face_width, "mm"),
+        helix_angle_reference_diameter=_attribute(sense * (case.helix_angle or 0.0), "deg"),
+        tip_diameter=_attribute(section.tip_diameter, "mm"),
+        root_diameter=_attribute(section.root_diameter, "mm"), u_coordinate_on_shaft=(0.0, "mm"),
+        inner_diameter=None if gear.internal else _attribute(2.0 * gear.rim_radius, "mm"),
+    )  # fmt: skip
+    w.relate("assembly", assembly=shaft, part=id)
+    if gear.internal:
+        outer = _attribute(2.0 * gear.rim_radius, "mm")
+        part = w.add(
+            "shaft_section", u_coordinate_on_shaft=(0.0, "mm"), length=_attribute(case.set.face_width, "mm"),
+            outer_diameter_begin=outer, outer_diameter_end=outer,
+        )  # fmt: skip
+        w.relate("assembly", assembly=shaft, part=part)
+    material = w.add(
+        "material", "gears", elastic_modulus=_attribute(case.material.youngs_modulus, "N / mm^2"),
+        poisson_ratio=_attribute(case.material.poisson_ratio),
+        density=_attribute(case.material.density, "kg / dm^3"),
+        endurance_limit_root=_attribute(case.material.root_stress_limit, "N / mm^2"),
+        endurance_limit_flank=_attribute(case.material.contact_stress_limit, "N / mm^2"),
+    )  # fmt: skip
+    w.relate("reference", origin=id, referenced=material)
+    cutter = getattr(section, "cutter_teeth", None)
+    more = {} if cutter is None else {
+        "number_of_teeth": (cutter, "none"),
+        "addendum_modification_coefficient": _attribute(section.cutter_profile_shift),
+    }  # fmt: skip
+    tool = w.add(
+        "rack_shaped_tool" if cutter is None else "cutter_wheel_tool", f"tool of {name}",
+        addendum_coefficient_reference_profile=_attribute(rack.dedendum),
+        tip_radius_factor=_attribute(rack.root_radius), **more,
+    )  # fmt: skip
+    settings = w.add("cylindrical_gear_manufacturing_settings")
+    shift = gear.profile_shift / normal * (-1.0 if gear.internal else 1.0)
+    flanks = [
+        w.add(
+            "cylindrical_gear_flank", f"{side} flank of {name}",
+            addendum_modification_coefficient=_attribute(shift),
+            normal_pressure_angle=_attribute(case.pressure_angle, "deg"),
+            addendum_coefficient_basic_profile=_attribute(rack.addendum),
+        )
+        for side in ("left", "right")
+    ]  # fmt: skip
+    w.relate("flank", gear=id, left=flanks[0], right=flanks[1])
+    for flank in flanks:
+        w.relate("manufacturing_step", workpiece=flank, tool=tool, manufacturing_settings=settings)
+    return id, shaft
+
+
+def _add_operation(w: _Writer, case: Case, shafts: dict[str, str], casing: str) -> None:
+    """Add load, speeds, the coupling of the fixed member and the bearings of sun and carrier."""
+    operation = case.operation
+    held = w.add("coupling", f"{operation.fixed} held")
+    w.relate("side", assembly=held, outer_part=casing, inner_part=shafts[operation.fixed])
+    for member in ("sun", "carrier"):
+        stiffness = getattr(case, member).support_stiffness
+        if stiffness:
+            bearing = w.add(
+                "concept_bearing", f"support of the {member}", radial_stiffness=_attribute(stiffness, "N / m")
+            )
+            w.relate("side", assembly=bearing, outer_part=casing, inner_part=shafts[member])
+    load = w.add(
+        "external_load", f"torque on the {operation.input}", defines_torque=("true", "none"),
+        torque_around_u_axis=_attribute(operation.torque, "N m"),
+    )  # fmt: skip
+    shaft = shafts[operation.input]
+    w.relate("assembly", assembly=shaft, part=load)
+    speeds = [{"rotational_speed": _attribute(one, "1 / min")} for one in operation.speeds]
+    old = w.components[shaft]
+    first = {
+        "rotational_speed": (str(speeds[0]["rotational_speed"][0]), "1 / min"),
+        "defines_speed": ("true", "none"),
+    }
+    w.components[shaft] = replace(old, attributes=first)
+    if len(speeds) > 1:
+        w.cases = [{shaft: {key: (str(v[0]), v[1]) for key, v in one.items()}} for one in speeds]

@@ -313,7 +313,7 @@ def model_text(model: Model, program: str, version: str) -> str:
     )  # fmt: skip
     relations = ElementTree.SubElement(root, "relations")
     for number, relation in enumerate(model.relations, start=1):
-        parent = ElementTree.SubElement(relations, "relation", id=str(number), type=relation.type)
+        parent = ElementTree.SubElement(relations, "relation", id=str(number), type=relation.type, order="1")
         for role, id in relation.refs:
             ElementTree.SubElement(parent, "ref", id=id, role=role, hint=model.components[id].type)
     components = ElementTree.SubElement(root, "components")
