@@ -1,4 +1,4 @@
-"""The command line: ``femgear`` check, run, report, export, sweep, samples and schema."""
+"""The command line: ``femgear`` new, import, check, run, report, export, rexs, sweep, samples, schema."""
 
 from __future__ import annotations
 
@@ -410,6 +410,132 @@ def export(
         with Progress() as progress:
             names = export_results(results, output, *wanted, progress=progress)
     _say(f"files in {output or folder / EXPORTED}: {', '.join(names)}")
+    return 0
+
+
+def _write_case(text: str, path: Path, *, force: bool) -> None:
+    """Write a file that no other one is lost for."""
+    from femgear.storage.files import write_text
+
+    if path.exists() and not force:
+        raise CaseError(
+            "the file is there already", code="E-OUTPUT", file=str(path), limit="a new file",
+            remedy="name another one, or add --force",
+        )  # fmt: skip
+    write_text(text, path)
+    _say(f"written: {path}")
+
+
+@app.command
+def new(
+    kind: str,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("case.toml"),
+    teeth: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = (),
+    module: str = "2 mm",
+    torque: str | None = None,
+    speed: str = "1000 rpm",
+    planets: int | None = None,
+    face_width: str | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write a commented case from a few numbers; masses, inertias and stiffnesses are estimated.
+
+    Parameters
+    ----------
+    kind
+        planetary, pair, planar, helical or drivetrain.
+    output
+        Case file to write.
+    teeth
+        Of sun, planet and ring, or of both gears.
+    module
+        Of helical teeth the normal one.
+    torque, speed
+        Of sun or pinion. Default torque: that of a K factor of 1 N/mm^2.
+    planets
+        Default: as many as equal spacing allows, three if it can be.
+    face_width
+        Default: twelve modules.
+    force
+        Replace the file.
+    """
+    from femgear.trains.drafts import new_case
+
+    numbers: dict[str, Any] = {"teeth": teeth, "module": module, "torque": torque, "speed": speed}
+    _write_case(new_case(kind, **numbers, planets=planets, face_width=face_width), output, force=force)
+    return 0
+
+
+@app.command(name="import")
+def import_rexs(
+    file: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("case.toml"),
+    stage: str | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write the case of a planetary stage of a REXS file, and say what is assumed and what is not used.
+
+    Parameters
+    ----------
+    file
+        REXS 1.0 to 2.0: .rexs, .rexsj or .rexsz.
+    output
+        Case file to write.
+    stage
+        Id of the planetary stage, where there are several.
+    force
+        Replace the file.
+    """
+    from femgear.exchange.planetary_stage import case_tables
+    from femgear.exchange.rexs import read_model
+    from femgear.trains.drafts import draft_text
+
+    model = read_model(file)
+    tables, remarks = case_tables(model, stage)
+    unused = list(model.unused())
+    head = (
+        f"Written by femgear import {file.name} (REXS {model.version}). What the file does not give says so."
+    )
+    text = draft_text(tables, remarks, word="assumed", head=[head])
+    _write_case(text, output, force=force)
+    _say(f"entries that are assumed: {text.count('# assumed')}")
+    _say("attributes that are not used:")
+    for line in unused:
+        _say(textwrap.shorten(f"  {line}", 110, placeholder=" ..."))
+    return 0
+
+
+@app.command
+def rexs(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write gears, material, bearings and operation of a planetary set as a REXS 1.4 file.
+
+    Parameters
+    ----------
+    case
+        TOML case file.
+    output
+        REXS file to write.
+    force
+        Replace the file.
+    """
+    from femgear.case.gear_set import need_set
+    from femgear.exchange.planetary_stage import stage_model
+    from femgear.exchange.rexs import model_text
+    from femgear.trains.reading import read_case
+
+    data = read_case(case)
+    need_set(data)
+    _write_case(model_text(stage_model(data, output.name), "femgear", __version__), output, force=force)
     return 0
 
 

@@ -270,10 +270,11 @@ def _clean(key: str) -> str:
 def write(data: dict, remarks: Mapping[str, str] | None = None) -> str:
     """Write nested tables of strings, booleans, integers, floats and lists of these as TOML text.
 
-    ``parse(write(data), "")`` equals ``data``; `remarks` by dotted key stand behind their entries.
+    ``parse(write(data), "")`` equals ``data``. `remarks` by dotted key stand behind their entries; with them
+    lists of tables stand under headers of their own.
     """
     lines: list[str] = []
-    _write_table(data, (), lines, remarks or {})
+    _write_table(data, "", lines, remarks)
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
@@ -292,19 +293,30 @@ def text_with_points(data: dict, name: str) -> str:
     return text
 
 
-def _write_table(table: dict, path: tuple[str, ...], lines: list[str], remarks: Mapping[str, str]) -> None:
-    values = {key: value for key, value in table.items() if not isinstance(value, dict)}
-    if path and (values or not table):
-        lines += ["", f"[{'.'.join(_key(part) for part in path)}]"]
+def _write_table(
+    table: dict, header: str, lines: list[str], remarks: Mapping[str, str] | None, path: str = ""
+) -> None:
+    def below(value: object) -> bool:
+        listed = remarks is not None and isinstance(value, list) and bool(value)
+        return isinstance(value, dict) or (listed and all(isinstance(one, dict) for one in value))
+
+    values = {key: value for key, value in table.items() if not below(value)}
+    if header and (values or not table or header.startswith("[[")):
+        lines += ["", header]
     for key, value in values.items():
-        remark = remarks.get(".".join((*path, key)))
+        remark = (remarks or {}).get(f"{path}{key}")
         lines.append(f"{_key(key)} = {_value(value)}" + (f"  # {printable(remark)}" if remark else ""))
     for key, value in table.items():
+        name = f"{header.strip('[]')}.{_key(key)}".lstrip(".")
+        for i, one in enumerate(value if isinstance(value, list) else ()) if below(value) else ():
+            _write_table(one, f"[[{name}]]", lines, remarks, f"{path}{key}[{i}].")
         if isinstance(value, dict):
-            _write_table(value, (*path, key), lines, remarks)
+            _write_table(value, f"[{name}]", lines, remarks, f"{path}{key}.")
 
 
 def _key(key: str) -> str:
+    if not isinstance(key, str):
+        raise CaseError(f"a key is a text, not {described(key)}", code="E-TYPE", value=key, limit="texts")
     return key if _BARE.fullmatch(key) else _value(key)
 
 

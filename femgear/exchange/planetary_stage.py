@@ -80,6 +80,15 @@ def case_tables(model: Model, wanted: str | None = None) -> tuple[dict[str, Any]
         _rim(found, name, tables, remarks)
     _supports(found, tables, remarks)
     tables["operation"] = _operation(found, tables, remarks)
+    if "helix_angle" in tables["set"]:
+        tables["static"] = {"slices": 25}
+        remarks["static.slices"] = "assumed"
+    open_shifts = [name for name in ("sun", "ring") if "profile_shift" not in tables[name]]
+    if open_shifts and "centre_distance" in tables["set"]:
+        of = " and ".join(open_shifts)
+        remarks["set.centre_distance"] = (
+            f"assumed: meshes without play, which gives the profile shift of {of}"
+        )
     return tables, remarks
 
 

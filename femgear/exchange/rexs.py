@@ -139,8 +139,8 @@ class Model:
         for kind, members in sorted(types.items()):
             names = dict.fromkeys(name for one in members for name in one.attributes)
             left = [name for name in names if (kind, name) not in self.used]
-            if left or not names:
-                yield f"{kind} ({len(members)}): {', '.join(left) or 'no attributes'}"
+            if left:
+                yield f"{kind} ({len(members)}): {', '.join(left)}"
 
 
 def read_model(path: str | os.PathLike) -> Model:

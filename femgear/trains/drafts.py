@@ -5,6 +5,7 @@ What is not known is estimated from the gears, and every line that holds an esti
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
@@ -12,8 +13,17 @@ from textwrap import wrap
 from typing import Any
 
 from femgear.case import text as case_text
-from femgear.case.estimates import estimates
-from femgear.errors import GeometryError
+from femgear.case.estimates import (
+    Estimate,
+    cylinder,
+    estimates,
+    mesh_stiffness,
+    usual_rim,
+    usual_torque,
+)
+from femgear.case.gear_set import planetary_set
+from femgear.case.quantities import ANGLE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION, to_si
+from femgear.errors import CaseError, GeometryError
 from femgear.trains.reading import parse_case
 
 _SHORTEST = 0.7
@@ -43,7 +53,7 @@ def draft_text(
     """
     tables, notes = deepcopy(dict(tables)), dict(remarks)
     case = _case_of(tables, notes, word)
-    for key, one in estimates(case).items():
+    for key, one in (estimates(case) if hasattr(case, "gear_names") else {}).items():
         section, last = key.rpartition(".")[::2]
         model = _section(case, section)
         # rigid rings have no foundation
@@ -88,3 +98,120 @@ def _section(case: Any, key: str) -> Any:
     for part in key.split("."):
         case = getattr(case, part, None)
     return case
+
+
+KINDS = {
+    "planetary": (27, 40, 108), "pair": (24, 36), "planar": (27, 40, 108), "helical": (30, 20, 70),
+    "drivetrain": (23, 71),
+}  # fmt: skip
+"""Kinds of cases that `new_case` writes, with the teeth of their gears."""
+_HEAD = "Written by femgear new {}. What is estimated says so: give what is known instead."
+_LEAVE = "Estimated masses, inertias and stiffnesses may also be left out."
+_STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"}
+
+
+def new_case(
+    kind: str, *, teeth: tuple[int, ...] = (), module: str = "2 mm", torque: str | None = None,
+    speed: str = "1000 rpm", planets: int | None = None, face_width: str | None = None,
+) -> str:  # fmt: skip
+    """Write a commented case from a few numbers.
+
+    Parameters
+    ----------
+    kind : str
+        Of `KINDS`.
+    teeth : tuple of int
+        Of sun, planet and ring, or of both gears.
+    torque : str, optional
+        On sun or pinion; by default for a K factor of 1 N/mm^2, see `femgear.case.estimates.usual_torque`.
+    planets : int, optional
+        By default the first of 3, 4, 5, 2 and 1 that equal spacing allows.
+    face_width : str, optional
+        By default twelve modules.
+
+    Raises
+    ------
+    CaseError, GeometryError
+        Another kind (E-CHOICE), other numbers of teeth (E-COUNT), and what makes no case.
+    """
+    if kind not in KINDS:
+        limit = ", ".join(KINDS)
+        raise CaseError("there is no such kind of case", code="E-CHOICE", key="kind", value=kind, limit=limit)
+    usual, teeth = KINDS[kind], teeth or KINDS[kind]
+    if len(teeth) != len(usual) or min(teeth) < 5:
+        raise CaseError(
+            f"a {kind} case needs {len(usual)} numbers of teeth", code="E-COUNT", key="--teeth",
+            value=teeth, limit=f"5 or more each, as in --teeth {' '.join(map(str, usual))}",
+        )  # fmt: skip
+    size, of_set = to_si(module, LENGTH), len(usual) == 3
+    width = to_si(face_width, LENGTH) if face_width else 12.0 * size
+    count = planets or next((n for n in (3, 4, 5, 2) if sum(teeth[::2]) % n == 0), 1)
+    load = torque or f"{usual_torque(teeth[:2], size, width, count if of_set else 1):.3g} N m"
+    helix = math.radians(20.0) if kind == "helical" else 0.0
+    shared = {"module": module, "pressure_angle": "20 deg"}
+    notes = {f"material.{key}": "estimated: steel" for key in _STEEL}
+    notes |= {} if planets or not of_set else {"set.planets": "estimated: as equal spacing allows"}
+    notes |= {} if face_width else {"set.face_width": "estimated: 12 modules"}
+    notes |= {} if torque else {"operation.torque": "estimated: K factor of 1 N/mm^2"}
+    gears: dict[str, dict[str, Any]] = {}
+    for name, z in zip(("sun", "planet", "ring") if of_set else ("gear_1", "gear_2"), teeth, strict=True):
+        radius, key = usual_rim(z, size, 1.25, internal=name == "ring", helix=helix)[0], "bore_radius"
+        key = "outer_radius" if name == "ring" else key
+        notes[f"{name}.{key}"] = f"estimated: a rim of {'four' if name == 'ring' else 'three'} modules"
+        gears[name] = {"teeth": z, "profile_shift": 0.0, key: LENGTH.show(radius)}
+    tables: dict[str, Any] = {"format": 1, "title": f"{kind.capitalize()} {'/'.join(map(str, teeth))}"}
+    tables |= {"set": {"face_width": LENGTH.show(width)}, "material": _STEEL, **gears}
+    tables["operation"] = {"torque": load, "speeds": [speed]}
+    if not of_set:
+        tables |= {"model": "pair", "set": {**shared, **tables["set"]}}
+        if kind == "drivetrain":
+            tables = _chain(tables, notes)
+        return draft_text(tables, notes, word="estimated", head=[_HEAD.format(kind)])
+    gears["sun"] = {"teeth": teeth[0], **shared, **gears["sun"]}
+    tables |= {"sun": gears["sun"], "set": {"planets": count, **tables["set"]}}
+    tables["operation"] = {"input": "sun", "fixed": "ring", **tables["operation"]}
+    # with the other shift the set closes: of the sun where the ring has teeth left over
+    del gears["sun" if teeth[2] >= teeth[0] + 2 * teeth[1] else "ring"]["profile_shift"]
+    more = {"planar": {"response": {}}, "helical": {"helix_angle": ANGLE.show(helix)}}
+    tables |= {kind: more[kind]} if kind in more else {}
+    return draft_text(tables, notes, word="estimated", head=[f"{_HEAD.format(kind)} {_LEAVE}"])
+
+
+def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
+    """Tables of a drivetrain: motor, shaft, the pair, shaft and load."""
+    case = parse_case(case_text.write(pair))
+    gears, known, width = planetary_set(case), estimates(case), case.set.face_width
+    bearing, ratio = known["gear_1.bearing_stiffness"], gears.gear_2.teeth / gears.gear_1.teeth
+    tilt = Estimate(
+        0.75 * bearing.value * width**2, TORSION, "the bearing's stiffness over three face widths"
+    )
+    how = "cylinder of the wheel's radius and four face widths"
+    rotor = cylinder(0.0, gears.gear_2.reference_radius, 4.0 * width, case.material.density)
+    rotors = [Estimate(value, one, how) for value, one in zip(rotor, (MASS, INERTIA, INERTIA), strict=True)]
+    stiffness = Estimate(mesh_stiffness(case.material, width), STIFFNESS, "20 N/(mm um) times the face width")
+    tables: dict[str, Any] = {"format": 1, "model": "drivetrain", "title": pair["title"]}
+    tables |= {"body": [], "shaft": [], "parallel": [], "bearing": []}
+
+    def add(table: str, given: dict[str, Any], **estimated: Estimate) -> None:
+        for key, one in estimated.items():
+            notes[f"{table}[{len(tables[table])}].{key}"] = f"estimated: {one.how}"
+        tables[table].append(given | {key: str(one) for key, one in estimated.items()})
+
+    for name, gear in (("motor", ""), ("pinion", "gear_1"), ("wheel", "gear_2"), ("load", "")):
+        keys = f"{gear}.mass", f"{gear}.inertia", f"helical.{gear}.diametral_inertia"
+        mass, inertia, transverse = [known[key] for key in keys] if gear else rotors
+        add("body", {"name": name}, mass=mass, inertia=inertia, transverse_inertia=transverse)
+        add("bearing", {"body": name}, radial=bearing, tilt=tilt)
+    for ends, torque in ((["motor", "pinion"], 1.0), (["wheel", "load"], ratio)):
+        diameter = (16.0 * abs(torque * case.operation.torque) / (math.pi * 25e6)) ** (1.0 / 3.0)
+        outer = Estimate(diameter, LENGTH, "25 N/mm^2 of torsional stress")
+        length = Estimate(5.0 * diameter, LENGTH, "five diameters")
+        add("shaft", {"between": ends}, length=length, outer_diameter=outer)
+    mesh = {"stiffness": str(stiffness), "contact_ratio": round(gears.contact_ratio, 4)}
+    stage = {"between": ["pinion", "wheel"], "teeth": [gears.gear_1.teeth, gears.gear_2.teeth]}
+    add("parallel", stage | {key: pair["set"][key] for key in ("module", "pressure_angle")} | {"mesh": mesh})
+    notes["parallel[0].mesh.stiffness"] = f"estimated: {stiffness.how}"
+    notes["operation.torque[0].torque"] = notes.pop("operation.torque", "")
+    torques = [{"body": "motor", "torque": pair["operation"]["torque"]}, {"body": "load", "share": 1.0}]
+    tables["operation"] = {"speed": pair["operation"]["speeds"][0], "torque": torques}
+    return tables | {"simulation": {"duration": "1 s", "damping_ratio": 0.03}}
