@@ -71,10 +71,9 @@ def mesh_stiffness(material: MaterialSection, width: float) -> float:
     return USUAL_STIFFNESS * material.youngs_modulus / STEEL * width
 
 
-def usual_torque(teeth: tuple[int, int], module: float, width: float, meshes: int = 1) -> float:
-    """Compute the torque [N m] on gear 1 of external meshes, module and width in m, at the K factor of
-    `USUAL_LOAD`."""
-    diameter, ratio = teeth[0] * module, teeth[1] / teeth[0]
+def usual_torque(teeth: int, mate: int, module: float, width: float, meshes: int = 1) -> float:
+    """Compute the torque [N m] on a gear of external meshes at `USUAL_LOAD`, module and width in m."""
+    diameter, ratio = teeth * module, mate / teeth
     return 0.5 * meshes * USUAL_LOAD * width * diameter**2 * ratio / (ratio + 1.0)
 
 

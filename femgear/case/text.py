@@ -296,11 +296,8 @@ def text_with_points(data: dict, name: str) -> str:
 def _write_table(
     table: dict, header: str, lines: list[str], remarks: Mapping[str, str] | None, path: str = ""
 ) -> None:
-    def below(value: object) -> bool:
-        listed = remarks is not None and isinstance(value, list) and bool(value)
-        return isinstance(value, dict) or (listed and all(isinstance(one, dict) for one in value))
-
-    values = {key: value for key, value in table.items() if not below(value)}
+    listed = {} if remarks is None else {k: v for k, v in table.items() if v and _is_tables(v)}
+    values = {k: v for k, v in table.items() if not isinstance(v, dict) and k not in listed}
     if header and (values or not table or header.startswith("[[")):
         lines += ["", header]
     for key, value in values.items():
@@ -308,10 +305,14 @@ def _write_table(
         lines.append(f"{_key(key)} = {_value(value)}" + (f"  # {printable(remark)}" if remark else ""))
     for key, value in table.items():
         name = f"{header.strip('[]')}.{_key(key)}".lstrip(".")
-        for i, one in enumerate(value if isinstance(value, list) else ()) if below(value) else ():
+        for i, one in enumerate(listed.get(key, ())):
             _write_table(one, f"[[{name}]]", lines, remarks, f"{path}{key}[{i}].")
         if isinstance(value, dict):
             _write_table(value, f"[{name}]", lines, remarks, f"{path}{key}.")
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(one, dict) for one in value)
 
 
 def _key(key: str) -> str:

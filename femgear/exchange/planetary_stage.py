@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 from femgear.case.estimates import STEEL, usual_rim, usual_torque
@@ -54,17 +55,12 @@ class _Stage:
     shafts: dict[str, list[Component]]
 
     def common(
-        self,
-        of: Iterable[Component],
-        attribute: str,
-        dimension: Dimension | None = None,
-        *,
-        sign: bool = True,
-    ) -> float | None:
+        self, of: Iterable[Component], attribute: str, kind: Dimension | None = None, *, sign: bool = True
+    ) -> float | None:  # fmt: skip
         """Value in SI units that all components have which give it, None where none does."""
         found: dict[float, Component] = {}
         for one in of:
-            if (value := self.model.number(one, attribute, dimension)) is not None:
+            if (value := self.model.number(one, attribute, kind)) is not None:
                 found.setdefault(value if sign else abs(value), one)
         if found and max(found) - min(found) > 1e-9 * max(map(abs, found)):
             least, most = found[min(found)], found[max(found)]
@@ -74,12 +70,10 @@ class _Stage:
             )  # fmt: skip
         return next(iter(found), None)
 
-    def needed(self, of: list[Component], attribute: str, dimension: Dimension | None = None) -> float:
+    def needed(self, of: list[Component], attribute: str, kind: Dimension | None = None) -> float:
         """Value that all components have, without sign."""
-        if (value := self.common(of, attribute, dimension, sign=False)) is None:
-            self.model.refuse(
-                "the attribute is missing", f"{of[0]}, {attribute}", "give it, and export again"
-            )
+        if (value := self.common(of, attribute, kind, sign=False)) is None:
+            self.model.refuse("the attribute is missing", f"{of[0]}, {attribute}", "give it in the gear unit")
         return value
 
 
@@ -96,8 +90,8 @@ def case_tables(model: Model, wanted: str | None = None) -> tuple[dict[str, Any]
     CaseError
         E-CHOICE: several stages, or not that one. E-REXS: no planetary stage, or one of another form. E-UNIT.
     """
-    s, remarks = _stage(model, _chosen(model, wanted)), {}
-    title = "".join(c for c in f"{s.stage.name or s.stage} of {model.name}" if c.isprintable())
+    s, remarks = _stage(model, _chosen(model, wanted)), dict[str, str]()
+    title = "".join(c for c in f"{s.stage.name or s.stage} of {Path(model.name).name}" if c.isprintable())
     tables = {"format": 1, "title": title[:200], "set": _set(s, remarks), "material": _material(s, remarks)}
     tables |= {name: _gear(s, name, remarks) for name in _GEARS}
     _racks(s, tables, remarks)
@@ -177,11 +171,11 @@ def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     found: dict[str, Any] = {"planets": len(s.gears["planet"])}
     if (distance := s.common(s.meshes, "center_distance", LENGTH, sign=False)) is not None:
         found["centre_distance"] = _shown(distance, LENGTH)
-    widths = {s.common(s.gears[name], "face_width", LENGTH) for name in _GEARS} - {None}
+    given = [s.common(s.gears[name], "face_width", LENGTH) for name in _GEARS]
+    widths = {one for one in given if one is not None}
     width = s.common(s.meshes, "common_face_width", LENGTH)
-    width = (
-        min(widths) if width is None and widths else width or s.needed(s.gears["sun"], "face_width", LENGTH)
-    )
+    if width is None:
+        width = min(widths) if widths else s.needed(s.gears["sun"], "face_width", LENGTH)
     found["face_width"] = _shown(width, LENGTH)
     if len(widths) > 1:
         remarks["set.face_width"] = f"assumed: of all gears; the widest has {_shown(max(widths), LENGTH)}"
@@ -193,30 +187,21 @@ def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
         steps = [b - a for a, b in pairwise((*angles, angles[0] + math.tau))]
         if max(steps) - min(steps) > 1e-6:
             found["planet_angles"] = [_shown(one - angles[0], ANGLE) for one in angles]
-    sun, *others = (
-        s.common(s.gears[name], "helix_angle_reference_diameter", ANGLE) or 0.0 for name in _GEARS
-    )
+    helix = "helix_angle_reference_diameter"
+    sun, *others = (s.common(s.gears[name], helix, ANGLE) or 0.0 for name in _GEARS)
     if max(abs(sun + one) for one in others) > 1e-9:
-        key = f"{s.gears['sun'][0]}, helix_angle_reference_diameter"
-        s.model.refuse(
-            "helix angles do not match", key, limit="equal ones, that of the sun with the other sign"
-        )
+        limit = "equal ones, that of the sun with the other sign"
+        s.model.refuse("helix angles do not match", f"{s.gears['sun'][0]}, {helix}", limit=limit)
     if sun:
-        found["helix_angle"], remarks["set.helix_angle"] = (
-            _shown(sun, ANGLE),
-            "assumed: positive: right-handed",
-        )
+        found["helix_angle"] = _shown(sun, ANGLE)
+        remarks["set.helix_angle"] = "assumed: a positive one is right-handed"
     return found
 
 
 def _material(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     """Material of the sun for all gears, the lowest strengths of all."""
-    made = {
-        name: [
-            m for m in s.model.related("reference", "referenced", origin=ones[0].id) if m.type == "material"
-        ]
-        for name, ones in s.gears.items()
-    }
+    of = {k: s.model.related("reference", "referenced", origin=ones[0].id) for k, ones in s.gears.items()}
+    made = {name: [one for one in ones if one.type == "material"] for name, ones in of.items()}
     found: dict[str, Any] = {}
     for key, attribute, dimension, usual in (
         ("youngs_modulus", "elastic_modulus", MODULUS, STEEL),
@@ -327,13 +312,11 @@ def _supports(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> Non
     """Radial stiffness of the bearings of a planet on its pin, of sun and carrier in the casing."""
     tables["carrier"] = {}
     bearings = {"planet": _beside(s.model, s.shafts["planet"][:1], "outer_part", "shaft")}
-    bearings |= {
-        name: _beside(s.model, s.shafts[name], "inner_part", "gear_casing") for name in ("sun", "carrier")
-    }
+    for name in ("sun", "carrier"):
+        bearings[name] = _beside(s.model, s.shafts[name], "inner_part", "gear_casing")
     for name, found in bearings.items():
-        values = [
-            s.model.number(b, "radial_stiffness", STIFFNESS) for b in found if b.type.endswith("bearing")
-        ]
+        springs = [one for one in found if one.type.endswith("bearing")]
+        values = [s.model.number(one, "radial_stiffness", STIFFNESS) for one in springs]
         total = sum(one for one in values if one is not None)
         key = "bearing_stiffness" if name == "planet" else "support_stiffness"
         if 1.0 <= total <= _SOFT:
@@ -372,7 +355,7 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> di
     if not torques:
         width, module = to_si(tables["set"]["face_width"], LENGTH), to_si(tables["sun"]["module"], LENGTH)
         teeth = tables["sun"]["teeth"], tables["planet"]["teeth"]
-        on_sun = usual_torque(teeth, module, width, tables["set"]["planets"])
+        on_sun = usual_torque(*teeth, module, width, tables["set"]["planets"])
         torques = [float(f"{on_sun * abs(ratios[member]):.3g}")]
         remarks["operation.torque"] = "assumed: K factor of 1 N/mm^2"
     elif max(torques) - min(torques) > 1e-6 * abs(torques[0]):
@@ -386,7 +369,7 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> di
 def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[str, float], dict[str, float]]:
     """Speeds [rad/s] and torques [N m] of members in a load case; powers give torques at their speed."""
     model, turns, loads = s.model, {}, {}
-    for name, shaft in ((name, one) for name in MEMBERS if name != fixed for one in s.shafts[name]):
+    for name, shaft in ((m, one) for m in MEMBERS if m != fixed for one in s.shafts[m]):
         now = replace(shaft, attributes={**shaft.attributes, **given.get(shaft.id, {})})
         speed = model.number(now, "rotational_speed", SPEED)
         turns |= {name: speed} if speed else {}
@@ -485,8 +468,9 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any) -> tuple[str, str]:
     for part in parts:
         w.relate("assembly", assembly=shaft, part=part)
     made = w.add(
-        "material", elastic_modulus=a(material.youngs_modulus, "N / mm^2"), density=a(material.density, "kg / dm^3"),
-        poisson_ratio=a(material.poisson_ratio), endurance_limit_root=a(material.root_stress_limit, "N / mm^2"),
+        "material", elastic_modulus=a(material.youngs_modulus, "N / mm^2"),
+        density=a(material.density, "kg / dm^3"), poisson_ratio=a(material.poisson_ratio),
+        endurance_limit_root=a(material.root_stress_limit, "N / mm^2"),
         endurance_limit_flank=a(material.contact_stress_limit, "N / mm^2"),
     )  # fmt: skip
     w.relate("reference", origin=id, referenced=made)
@@ -526,7 +510,6 @@ def _add_operation(w: _Writer, case: Case, shafts: dict[str, str], casing: str) 
     load = w.add("external_load", defines_torque=("true", "none"), torque_around_u_axis=torque)
     w.relate("assembly", assembly=shaft, part=load)
     speeds = [{"rotational_speed": (repr(one / SPEED.scale), "1 / min")} for one in operation.speeds]
-    w.components[shaft] = replace(
-        w.components[shaft], attributes=speeds[0] | {"defines_speed": ("true", "none")}
-    )
+    turning = speeds[0] | {"defines_speed": ("true", "none")}
+    w.components[shaft] = replace(w.components[shaft], attributes=turning)
     return tuple({shaft: one} for one in speeds) if len(speeds) > 1 else ()

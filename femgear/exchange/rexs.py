@@ -284,11 +284,11 @@ def _attributes(table: dict) -> dict[str, tuple[str, str | None]]:
 
 
 def _load_cases(data: dict) -> tuple[dict, ...]:
-    spectra = _dicts(data, "load_spectrum")
-    cases = _dicts(spectra[0], "load_cases") if spectra else []
-    return tuple(
-        {str(one.get("id")): _attributes(one) for one in _dicts(case, "components")} for case in cases
-    )
+    """Attributes by component id of every load case of the first load spectrum."""
+    cases = [
+        case for spectrum in _dicts(data, "load_spectrum")[:1] for case in _dicts(spectrum, "load_cases")
+    ]
+    return tuple({str(c.get("id")): _attributes(c) for c in _dicts(case, "components")} for case in cases)
 
 
 def _refuse_loops(model: Model) -> None:
@@ -330,6 +330,6 @@ def model_text(model: Model, program: str, version: str) -> str:
 
 
 def _write_component(parent: ElementTree.Element, id: str, attributes: Mapping, **more: str) -> None:
-    component = ElementTree.SubElement(parent, "component", id=id, **more)
+    component = ElementTree.SubElement(parent, "component", {"id": id, **more})
     for name, (value, unit) in attributes.items():
         ElementTree.SubElement(component, "attribute", id=name, unit=unit or "none").text = value

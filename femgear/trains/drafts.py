@@ -87,9 +87,8 @@ def _case_of(tables: dict[str, Any], notes: dict[str, str], word: str) -> Any:
             if given or "tip_diameter" in tables[name] or addendum < _SHORTEST:
                 raise
             tables[name]["rack"] = {**rack, "addendum": round(addendum - 0.05, 2)}
-            notes |= {
-                f"{name}.rack.{key}": notes[f"{where}.{key}"] for key in rack if f"{where}.{key}" in notes
-            }
+            said = {key: notes[f"{where}.{key}"] for key in rack if f"{where}.{key}" in notes}
+            notes |= {f"{name}.rack.{key}": one for key, one in said.items()}
             notes[f"{name}.rack.addendum"] = f"{word}: tips as long as run free of their mates"
 
 
@@ -146,7 +145,7 @@ def new_case(
     size, of_set = to_si(module, LENGTH), len(usual) == 3
     width = to_si(face_width, LENGTH) if face_width else 12.0 * size
     count = planets or next((n for n in (3, 4, 5, 2) if sum(teeth[::2]) % n == 0), 1)
-    load = torque or f"{usual_torque(teeth[:2], size, width, count if of_set else 1):.3g} N m"
+    load = torque or f"{usual_torque(teeth[0], teeth[1], size, width, count if of_set else 1):.3g} N m"
     helix = math.radians(20.0) if kind == "helical" else 0.0
     shared = {"module": module, "pressure_angle": "20 deg"}
     notes = {f"material.{key}": "estimated: steel" for key in _STEEL}
@@ -180,7 +179,8 @@ def new_case(
 def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     """Tables of a drivetrain: motor, shaft, the pair, shaft and load."""
     case = parse_case(case_text.write(pair))
-    gears, known, width = planetary_set(case), estimates(case), case.set.face_width
+    gears: Any = planetary_set(case)
+    known, width = estimates(case), case.set.face_width
     bearing, ratio = known["gear_1.bearing_stiffness"], gears.gear_2.teeth / gears.gear_1.teeth
     tilt = Estimate(
         0.75 * bearing.value * width**2, TORSION, "the bearing's stiffness over three face widths"

@@ -1,0 +1,336 @@
+"""REXS files: planetary stages in and out, and files that are refused."""
+
+import math
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rexs_stage import DEG, MM, NONE, Gearbox
+from scipy.optimize import brentq
+
+from femgear.case.gear_set import planetary_set
+from femgear.errors import CaseError, GeometryError
+from femgear.exchange.planetary_stage import case_tables, stage_model
+from femgear.exchange.rexs import MOST_BYTES, model_text, read_model
+from femgear.trains.drafts import draft_text
+from femgear.trains.reading import parse_case, read_case, with_values
+
+CASES = Path(__file__).parents[2] / "cases"
+STRENGTH = {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1.4 GPa"}
+OWN = os.environ.get("FEMGEAR_REXS")  # a file of FVA's example, for whoever has it
+
+
+def imported(path, stage=None):
+    """Text and case of the planetary stage of a file."""
+    text = draft_text(*case_tables(read_model(path), stage), word="assumed")
+    return text, parse_case(text)
+
+
+def involute(angle):
+    return math.tan(angle) - angle
+
+
+def check_numbers(case):
+    """What is printed in the file and what follows from it in closed form."""
+    gears, alpha = planetary_set(case), math.radians(20.0)
+    assert (gears.sun.teeth, gears.planet.teeth, gears.ring.teeth, gears.n_planets) == (17, 22, 61, 3)
+    assert case.module == 4e-3 and case.set.face_width == 0.05 and gears.centre_distance == 0.078
+    assert case.pressure_angle == alpha
+    assert [g.profile_shift for g in gears.gears] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert [2e3 * g.reference_radius for g in gears.gears] == pytest.approx([68.0, 88.0, 244.0], rel=1e-14)
+    assert [2e3 * g.rim_radius for g in gears.gears] == pytest.approx([34.0, 58.0, 280.0], rel=1e-14)
+    assert [2e3 * g.root_radius for g in gears.gears[:2]] == pytest.approx([58.0, 78.0], rel=1e-12)
+    # ISO 21771, eq. 74: the sun's flank is undercut by its tool, which takes nothing from this path
+    roll = sum(math.sqrt((r + 4.0) ** 2 - (r * math.cos(alpha)) ** 2) for r in (34.0, 44.0))
+    ratio = (roll - 78.0 * math.sin(alpha)) / (math.pi * 4.0 * math.cos(alpha))
+    assert gears.contact_ratio_sun_planet == pytest.approx(ratio, rel=1e-3)
+    assert case.material.youngs_modulus == 210e9 and case.material.density == pytest.approx(7850.0)
+    operation = case.operation
+    assert (operation.input, operation.fixed) == ("sun", "ring")
+    assert operation.torque * operation.speeds[0] == pytest.approx(250e3, rel=1e-9)  # 250 kW at 1500 rpm
+
+
+@pytest.mark.parametrize(
+    ("suffix", "version", "addendum"),
+    [
+        ("rexs", "1.1", None),
+        ("rexsj", "1.1", 0.9),
+        ("rexsz", "1.1", 0.9),
+        ("rexs", "2.0", 0.9),
+        ("rexs", "1.7", 0.9),
+    ],
+)
+def test_a_stage_of_every_form_and_version(tmp_path, suffix, version, addendum):
+    box = Gearbox(version, addendum=addendum)
+    text, case = imported(box.write(tmp_path / f"stage.{suffix}"))
+    # where nothing gives the height of the ring's teeth, tips of one module would strike the fillets
+    assert case.ring.rack and case.ring.rack.addendum == 0.9
+    assert text.count("tips as long as run free of their mates") == (addendum is None)
+    check_numbers(case)
+    assumed = {line.split(" = ")[0] for line in text.splitlines() if "# assumed" in line}
+    assert {"mass", "inertia", "bearing_stiffness", "support_stiffness", "addendum"} <= assumed
+    assert not {"teeth", "module", "face_width", "dedendum", "torque", "speeds", "bore_radius"} & assumed
+    assert "the 1e+20 N/m of the file stand for a rigid bearing" in text
+
+
+@pytest.mark.skipif(OWN is None, reason="FEMGEAR_REXS names no file of FVA's example")
+def test_the_published_file():
+    check_numbers(imported(OWN)[1])
+
+
+@pytest.mark.slow
+def test_an_imported_stage_runs_through(tmp_path):
+    from femgear import solve
+
+    coarse = {
+        "static.positions": 12,
+        "static.flank_elements": 8,
+        "runup.count": 0,
+        "dynamics.mesh_harmonics": 4,
+    }
+    case = with_values(imported(Gearbox().write(tmp_path / "stage.rexs"))[1], coarse)
+    found = solve(case)
+    assert {"static", "modes", "dynamics", "housing"} <= found.keys()
+    # helical flanks aside, the pitch-point stiffness is what ISO 6336-1 expects within its usual spread
+    k = found["static"].dataset()["mesh_stiffness"].sel(mesh="sun-planet 1").mean()
+    assert 0.7 < float(k) / (20e9 * 0.05) < 1.3
+    assert np.all(found["dynamics"].response.converged)
+
+
+def test_what_is_not_used_is_told(tmp_path):
+    model = read_model(Gearbox().write(tmp_path / "stage.rexs"))
+    case_tables(model)
+    unused = dict(line.split(": ", 1) for line in model.unused())
+    assert unused["lubricant (1)"] == "density_at_15_degree_celsius"
+    assert unused["switchable_coupling (1)"] == "rotational_stiffness"
+    assert not any(line.startswith(("cylindrical_gear ", "material ", "shaft_section ")) for line in unused)
+
+
+def test_the_profile_shift_of_the_ring_has_the_sign_of_iso(tmp_path):
+    """Shifts that close by ISO 21771 with the ring's teeth negative."""
+    box, alpha, x = Gearbox(), math.radians(20.0), {"sun": 0.3, "planet": 0.2}
+    wanted = involute(alpha) + 2.0 * math.tan(alpha) * sum(x.values()) / (17 + 22)
+    working = brentq(lambda angle: involute(angle) - wanted, alpha, 0.5, xtol=1e-15)
+    distance = 0.5 * 4.0 * (17 + 22) * math.cos(alpha) / math.cos(working)
+    inner = math.acos(0.5 * 4.0 * (61 - 22) * math.cos(alpha) / distance)
+    ring = (involute(inner) - involute(alpha)) * (22 - 61) / (2.0 * math.tan(alpha)) - x["planet"]
+    assert ring < -0.5
+    for id, shift in ((53, x["sun"]), (58, ring), *((240 + n, x["planet"]) for n in range(3))):
+        for side in (2000, 3000):
+            box = box.set(side + id, addendum_modification_coefficient=(shift, NONE))
+    for mesh in (*range(210, 213), *range(220, 223)):
+        box = box.set(mesh, center_distance=(distance, MM))
+    case = imported(box.write(tmp_path / "stage.rexs"))[1]
+    gears = planetary_set(case)
+    assert gears.ring.profile_shift == -ring and case.ring.profile_shift == -ring
+    assert [gears.backlash_sun_planet, gears.backlash_planet_ring] == pytest.approx([0.0, 0.0], abs=1e-8)
+    # negative teeth are those of an internal gear
+    minus = imported(box.set(58, number_of_teeth=(-61, NONE)).write(tmp_path / "minus.rexs"))[1]
+    assert planetary_set(minus) == gears
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("planetary_27_40_108", {}),
+        ("planetary_27_40_108", {"planet.rack": {"root_radius": 0.26}, "ring.cutter_profile_shift": 0.1}),
+        ("planetary_27_40_108", {"operation.input": "carrier", "operation.torque": "-80 N m"}),
+        ("planetary_27_40_108", {"operation.input": "ring", "operation.fixed": "carrier"}),
+        ("planetary_27_40_108", {"set.planet_angles": ["0 deg", "120 deg", "245.3333333333333 deg"]}),
+        ("planetary_27_40_108", {"sun.tip_diameter": "44.9 mm", **STRENGTH}),
+        ("helical_30_20_70", {}),
+    ],
+)
+def test_a_case_comes_back(tmp_path, name, changes):
+    case = with_values(read_case(CASES / f"{name}.toml"), changes)
+    path = tmp_path / "stage.rexs"
+    path.write_text(model_text(stage_model(case, path.name), "femgear", "0"), encoding="utf-8")
+    back = imported(path)[1]
+    gears, same = planetary_set(case), planetary_set(back)
+    for one, other in zip(gears.gears, same.gears, strict=True):
+        assert (one.teeth, one.internal, one.cutter is None) == (
+            other.teeth,
+            other.internal,
+            other.cutter is None,
+        )
+        for key in ("module", "profile_shift", "tip_radius", "root_radius", "form_radius", "rim_radius"):
+            assert getattr(one, key) == pytest.approx(getattr(other, key), rel=1e-9, abs=1e-12), key
+    assert same.centre_distance == pytest.approx(gears.centre_distance, rel=1e-11)
+    assert same.planet_angles == pytest.approx(gears.planet_angles, abs=1e-9)
+    assert back.material == case.material and back.set.face_width == case.set.face_width
+    assert (back.operation.input, back.operation.fixed) == (case.operation.input, case.operation.fixed)
+    assert back.operation.torque == pytest.approx(case.operation.torque, rel=1e-11)
+    assert back.operation.speeds == pytest.approx(case.operation.speeds, rel=1e-11)
+    for member, key in (("planet", "bearing"), ("sun", "support"), ("carrier", "support")):
+        given = getattr(getattr(case, member), f"{key}_stiffness")
+        assert getattr(getattr(back, member), f"{key}_stiffness") == pytest.approx(given, rel=1e-9)
+
+
+def test_torque_and_speed_of_other_members_and_powers(tmp_path):
+    box = Gearbox().set(34, rotational_speed=(-1500.0, "1 / min"))
+    assert imported(box.write(tmp_path / "a.rexs"))[1].operation.torque == pytest.approx(-1591.5494309)
+    box = Gearbox().set(38, torque_around_u_axis=None, power=(100.0, "kW"))
+    assert imported(box.write(tmp_path / "b.rexs"))[1].operation.torque == pytest.approx(636.6197724)
+    # the load acts on the carrier: the sun takes z_s / (z_s + z_r) of it, against it
+    box = Gearbox()
+    box.relations = [one for one in box.relations if one != ("assembly", {"assembly": 34, "part": 38})]
+    box.relate("assembly", assembly=4, part=38)
+    operation = imported(box.write(tmp_path / "c.rexs"))[1].operation
+    assert operation.input == "sun"
+    assert operation.torque == pytest.approx(-1591.5494309 * 17 / (17 + 61))
+    bare = Gearbox().set(38, torque_around_u_axis=None).set(34, rotational_speed=None)
+    text = imported(bare.write(tmp_path / "d.rexs"))[0]
+    assert all(any(f"{key} = " in line and "# assumed" in line for line in text.splitlines())
+               for key in ("input", "torque", "speeds"))  # fmt: skip
+
+
+def two_stages():
+    box = Gearbox()
+    box.add(10, "planetary_stage")
+    return box
+
+
+def test_several_stages_are_listed(tmp_path):
+    path = two_stages().write(tmp_path / "two.rexs")
+    with pytest.raises(CaseError, match="2 planetary stages") as caught:
+        imported(path)
+    assert caught.value.code == "E-CHOICE" and "9 (planetary_stage [9]), 10" in caught.value.limit
+    assert "--stage 9" in caught.value.remedy
+    check_numbers(imported(path, "9")[1])
+    for stage, code in (("11", "E-CHOICE"), ("10", "E-REXS")):
+        with pytest.raises(CaseError, match=code):
+            imported(path, stage)
+
+
+def without_stage():
+    box = Gearbox()
+    box.components[9]["type"] = "cylindrical_stage"
+    return box
+
+
+def looped():
+    box = Gearbox()
+    box.relate("assembly", assembly=3, part=1)
+    return box
+
+
+def related_to_nothing():
+    box = Gearbox()
+    box.relate("assembly", assembly=1, part=777)
+    return box
+
+
+def second_sun():
+    box = Gearbox()
+    box.gear(500, 17, "cylindrical_gear", 501, 34.0, 83)
+    box.add(510, "cylindrical_stage", center_distance=(78.0, MM))
+    box.relate("assembly", assembly=9, part=510)
+    box.relate("stage", stage=510, gear_1=500, gear_2=240)
+    return box
+
+
+@pytest.mark.parametrize(
+    ("box", "code", "where"),
+    [
+        (Gearbox().set(53, normal_module=(4.0, None)), "E-UNIT", "cylindrical_gear 53, normal_module"),
+        (Gearbox().set(53, normal_module=(4.0, "kg")), "E-UNIT", "cylindrical_gear 53, normal_module"),
+        (Gearbox().set(53, normal_module=(4.0, "none")), "E-UNIT", "cylindrical_gear 53, normal_module"),
+        (Gearbox().set(53, normal_module=("four", MM)), "E-UNIT", "cylindrical_gear 53, normal_module"),
+        (Gearbox().set(53, normal_module=("nan", MM)), "E-UNIT", "cylindrical_gear 53, normal_module"),
+        (Gearbox().set(53, number_of_teeth=(17, MM)), "E-UNIT", "cylindrical_gear 53, number_of_teeth"),
+        (Gearbox().set(53, number_of_teeth=("inf", NONE)), "E-UNIT", "cylindrical_gear 53, number_of_teeth"),
+        (Gearbox().set(53, number_of_teeth=(17.5, NONE)), "E-REXS", "cylindrical_gear 53, number_of_teeth"),
+        (Gearbox().set(53, number_of_teeth=None), "E-REXS", "cylindrical_gear 53, number_of_teeth"),
+        (Gearbox().set(53, normal_module=(3.0, MM)), "E-REXS", "cylindrical_gear 53, normal_module"),
+        (Gearbox().set(241, number_of_teeth=(23, NONE)), "E-REXS", "cylindrical_gear 240, number_of_teeth"),
+        (Gearbox().set(53, helix_angle_reference_diameter=(9.0, DEG)), "E-REXS", "helix_angle"),
+        (Gearbox().set(34, rotational_speed=(25.0, "Hz")), "E-UNIT", "shaft 34, rotational_speed"),
+        (Gearbox().set(86, elastic_modulus=(210.0, "N / m")), "E-UNIT", "material 86, elastic_modulus"),
+        (Gearbox("3.0"), "E-FORMAT", "version"),
+        (Gearbox("1.8"), "E-FORMAT", "version"),
+        (without_stage(), "E-REXS", "components"),
+        (looped(), "E-REXS", "relation assembly"),
+        (related_to_nothing(), "E-REXS", "relation assembly, part"),
+        (second_sun(), "E-REXS", "planetary_stage 9"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("suffix", ["rexs", "rexsj"])
+def test_files_that_make_no_case(tmp_path, box, code, where, suffix):
+    path = box.write(tmp_path / f"stage.{suffix}")
+    with pytest.raises(CaseError) as caught:
+        imported(path)
+    error = caught.value
+    assert error.code == code and where in error.key and error.file == str(path)
+    assert error.limit or error.remedy
+
+
+GOOD = Gearbox().xml()
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "words"),
+    [
+        ('<!DOCTYPE x [<!ENTITY a "b">]>' + GOOD.split("\n", 1)[1], "E-FILE", "entities"),
+        ('<!doctype model SYSTEM "file:///etc/passwd">' + GOOD.split("\n", 1)[1], "E-FILE", "entities"),
+        (GOOD[:5000], "E-FILE", "neither XML"),
+        ("nonsense", "E-FILE", "neither XML"),
+        ("<html/>", "E-FILE", "html"),
+        ("{}", "E-FILE", "JSON"),
+        ('{"model": [1]}', "E-FORMAT", "version"),
+        ('{"model": {"version": "1.1", "components": [3, {}]}}', "E-REXS", "id"),
+        ("[" * 100_000, "E-FILE", "neither"),
+        ('{"model": ' + "[" * 100_000, "E-FILE", "JSON"),
+        ("<model version='1.1'/>", "E-REXS", "no planetary stage"),
+        (GOOD.replace('<component id="58"', '<component id="53"'), "E-REXS", "twice"),
+        (GOOD.replace('<component id="58"', "<component"), "E-REXS", "has no id"),
+        (GOOD.replace('type="ring_gear"', ""), "E-REXS", "has no type"),
+        ("<model version='1.1'>" + "<a>" * 200_000 + "</a>" * 200_000 + "</model>", "E-REXS", "no planetary"),
+        ("", "E-FILE", "empty"),
+    ],
+)
+def test_hostile_files(tmp_path, text, code, words):
+    path = tmp_path / "stage.rexs"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CaseError) as caught:
+        imported(path)
+    assert caught.value.code == code and words in str(caught.value) and str(path) in str(caught.value)
+
+
+def test_files_that_are_too_long_or_no_text(tmp_path):
+    path = tmp_path / "stage.rexs"
+    with open(path, "wb") as stream:
+        stream.truncate(100_000_000)
+    with pytest.raises(CaseError, match="too long"):
+        read_model(path)
+    path.write_bytes(b"\xff\xfe" + GOOD.encode("utf-16-le"))
+    with pytest.raises(CaseError, match="E-FILE-ENC"):
+        read_model(path)
+    with pytest.raises(CaseError, match="E-FILE"):
+        read_model(tmp_path)
+
+
+def test_zips(tmp_path):
+    path = tmp_path / "stage.rexsz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("bomb.rexs", b" " * (MOST_BYTES + 1000))
+    assert path.stat().st_size < 100_000
+    with pytest.raises(CaseError, match="too long"):
+        read_model(path)
+    for names, words in ((("a.txt",), "0 REXS files"), (("a.rexs", "b.rexsj"), "2 REXS files")):
+        with zipfile.ZipFile(path, "w") as archive:
+            for name in names:
+                archive.writestr(name, GOOD)
+        with pytest.raises(CaseError, match=words):
+            read_model(path)
+    whole = Gearbox().write(path).read_bytes()
+    for broken in (whole[:1000], whole[:200] + b"\0" * 50 + whole[250:]):
+        path.write_bytes(broken)
+        with pytest.raises(CaseError, match="cannot be unpacked"):
+            read_model(path)
+
+
+def test_gears_that_make_no_set_are_refused(tmp_path):
+    with pytest.raises(GeometryError, match="E-ASSEMBLY"):
+        imported(Gearbox(planets=4).write(tmp_path / "stage.rexs"))
