@@ -58,6 +58,9 @@ def read_case(source: str | os.PathLike | Mapping[str, Any]) -> Any:
         return parse_case(case_text.write(dict(source)), numbered=False)
     if isinstance(source, str) and "\n" in source:
         return parse_case(source)
+    if not isinstance(source, str | os.PathLike):
+        limit = "the path of a case file, its text or its tables"
+        raise CaseError(f"a case is read from no {type(source).__name__}", code="E-TYPE", limit=limit)
     return parse_case(case_text.read_text(source), name=os.fsdecode(source))
 
 

@@ -50,7 +50,7 @@ def train_of(case) -> Train:
         if known.name == getattr(case, "train", None):
             return known.train
     raise CaseError(
-        f"a case is needed, not {described(case)}", code="E-TYPE", remedy="femgear.read_case(path) reads one"
+        f"a case is needed, not {described(case)}", code="E-TYPE", remedy="femgear.read_case reads one"
     )
 
 

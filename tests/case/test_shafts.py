@@ -54,7 +54,6 @@ def test_parts_of_a_stepped_shaft_and_what_check_says_of_them():
 @pytest.mark.parametrize(
     ("parts", "error", "code"),
     [
-        ([], CaseError, "E-KEY-MISSING"),
         ([{"length": "60 mm"}], CaseError, "outer_diameter"),
         ([{"length": "0 mm", "outer_diameter": "30 mm"}], CaseError, "E-RANGE"),
         ([{"length": "60 mm", "outer_diameter": "30"}], CaseError, "E-UNIT"),
