@@ -585,3 +585,33 @@ def test_an_interrupt_that_python_drops_comes_once_more(tmp_path, capsys, pipeli
     start = time.monotonic()
     assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out")]) == 130
     assert time.monotonic() - start < 4.0 and "ignored" not in capsys.readouterr().err
+
+
+def test_a_new_case_is_written_once_and_can_be_checked(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    numbers = ["--teeth", "24", "30", "84", "--module", "3 mm", "--torque", "120 Nm"]
+    assert cli.main(["new", "planetary", *numbers]) == 0
+    assert "written: case.toml" in capsys.readouterr().out
+    case = read_case("case.toml")
+    assert case.module == 3e-3 and case.operation.torque == 120.0 and case.ring.teeth == 84
+    assert cli.main(["check", "case.toml"]) == 0
+    before = Path("case.toml").read_bytes()
+    assert cli.main(["new", "pair"]) == 2
+    assert "E-OUTPUT" in capsys.readouterr().err and Path("case.toml").read_bytes() == before
+    assert cli.main(["new", "pair", "--force"]) == 0 and read_case("case.toml").model == "pair"
+    assert cli.main(["new", "bevel", "-o", "b.toml"]) == 2 and not Path("b.toml").exists()
+    assert "drivetrain" in capsys.readouterr().err
+
+
+def test_rexs_in_and_out(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["rexs", str(CASE), "-o", "stage.rexs"]) == 0
+    assert cli.main(["import", "stage.rexs", "-o", "back.toml"]) == 0
+    out = capsys.readouterr().out
+    assert "written: back.toml" in out and "assumed: 8" in out and "not used" in out
+    assert read_case("back.toml").operation == read_case(CASE).operation
+    assert cli.main(["rexs", str(CASE), "-o", "stage.rexs"]) == 2
+    assert cli.main(["import", "stage.rexs", "-o", "back.toml", "--force", "--stage", "99"]) == 2
+    assert "--stage" in capsys.readouterr().err
+    assert cli.main(["rexs", str(CASE.with_name("spur_pair.toml")), "-o", "pair.rexs"]) == 2
+    assert "E-MODEL" in capsys.readouterr().err and not Path("pair.rexs").exists()

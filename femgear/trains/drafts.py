@@ -142,8 +142,8 @@ def new_case(
             f"a {kind} case needs {len(usual)} numbers of teeth", code="E-COUNT", key="--teeth",
             value=teeth, limit=f"5 or more each, as in --teeth {' '.join(map(str, usual))}",
         )  # fmt: skip
-    size, of_set = to_si(module, LENGTH), len(usual) == 3
-    width = to_si(face_width, LENGTH) if face_width else 12.0 * size
+    size, of_set = _length(module, "--module"), len(usual) == 3
+    width = _length(face_width, "--face-width") if face_width else 12.0 * size
     count = planets or next((n for n in (3, 4, 5, 2) if sum(teeth[::2]) % n == 0), 1)
     load = torque or f"{usual_torque(teeth[0], teeth[1], size, width, count if of_set else 1):.3g} N m"
     helix = math.radians(20.0) if kind == "helical" else 0.0
@@ -174,6 +174,14 @@ def new_case(
     more = {"planar": {"response": {}}, "helical": {"helix_angle": ANGLE.show(helix)}}
     tables |= {kind: more[kind]} if kind in more else {}
     return draft_text(tables, notes, word="estimated", head=[f"{_HEAD.format(kind)} {_LEAVE}"])
+
+
+def _length(text: str, key: str) -> float:
+    try:
+        return to_si(text, LENGTH)
+    except CaseError as error:
+        error.key = key
+        raise
 
 
 def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
