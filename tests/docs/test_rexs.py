@@ -1,0 +1,52 @@
+"""docs/rexs.md and the section on new cases in docs/case_file.md print what femgear writes."""
+
+import re
+import tomllib
+from pathlib import Path
+
+from rexs_stage import Gearbox
+
+from femgear import cli
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def blocks(page: str, language: str = "toml") -> list[str]:
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def tables(text: str) -> list[str]:
+    return [part.strip() for part in re.split(r"\n(?=\[)", text)]
+
+
+def test_the_case_of_the_example(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Gearbox(addendum=None).write(Path("stage.rexs"))
+    commands = [line.split()[1:] for line in blocks("rexs.md", "sh")[0].splitlines()]
+    for command in commands[:2]:
+        assert cli.main(command) == 0
+    written = Path("case.toml").read_text(encoding="utf-8")
+    printed = tables(blocks("rexs.md")[0])
+    assert len(printed) == 5 and set(printed) <= set(tables(written))
+    assert "17" in capsys.readouterr().out
+    assert cli.main([*blocks("rexs.md", "sh")[1].split()[1:], "--force"]) == 0
+
+
+def test_attributes_of_the_page_are_those_that_are_read():
+    page, folder = (DOCS / "rexs.md").read_text(encoding="utf-8"), DOCS.parent / "femgear" / "exchange"
+    code = (folder / "planetary_stage.py").read_text(encoding="utf-8")
+    named = re.findall(r"`(\w+)`", "".join(line for line in page.splitlines() if line.startswith("| ")))
+    assert len(named) > 20 and not [name for name in named if f'"{name}"' not in code]
+
+
+def test_the_new_case_of_the_page(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (command,) = [
+        line for one in blocks("case_file.md", "sh") for line in one.splitlines() if " new " in line
+    ]
+    words = re.findall(r'"([^"]*)"|(\S+)', command)
+    assert cli.main([quoted or plain for quoted, plain in words][1:]) == 0
+    written = Path("case.toml").read_text(encoding="utf-8")
+    printed = next(one for one in blocks("case_file.md") if "# estimated" in one)
+    assert printed.strip() in tables(written) and tomllib.loads(printed)["sun"]["teeth"] == 24
