@@ -535,7 +535,9 @@ def rexs(
 
     data = read_case(case)
     need_set(data)
-    _write_case(model_text(stage_model(data, output.name), "femgear", __version__), output, force=force)
+    _write_case(
+        model_text(stage_model(data, output.name), "femgear", femgear.__version__), output, force=force
+    )
     return 0
 
 

@@ -18,6 +18,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, NoReturn
 from xml.etree import ElementTree
@@ -87,16 +88,21 @@ class Model:
     load_cases: tuple[Mapping[str, Mapping[str, tuple[str, str | None]]], ...] = ()
     used: set[tuple[str, str]] = field(default_factory=set)
 
-    def related(self, kinds: str | tuple[str, ...], to: str, **roles: str) -> list[Component]:
-        """List the components in the role `to` of relations that have an id in each of some roles."""
-        kinds = (kinds,) if isinstance(kinds, str) else kinds
-        found = (
-            id
-            for relation in self.relations
-            if relation.type in kinds and all(id in relation.of(role) for role, id in roles.items())
-            for id in relation.of(to)
-        )
+    def related(self, kinds: str | tuple[str, ...], to: str, **role: str) -> list[Component]:
+        """List the components in the role `to` of relations that have an id in another role."""
+        (has,) = role.items()
+        of = [kinds] if isinstance(kinds, str) else kinds
+        found = (id for kind in of for one in self._relations_of.get((kind, *has), ()) for id in one.of(to))
         return [self.components[id] for id in dict.fromkeys(found)]
+
+    @cached_property
+    def _relations_of(self) -> dict[tuple[str, str, str], list[Relation]]:
+        """Relations by type, role and id."""
+        found: dict[tuple[str, str, str], list[Relation]] = {}
+        for relation in self.relations:
+            for role, id in relation.refs:
+                found.setdefault((relation.type, role, id), []).append(relation)
+        return found
 
     def text(self, component: Component, attribute: str) -> str | None:
         """Value of an attribute as text, None where it is not given."""
