@@ -496,15 +496,12 @@ def import_rexs(
 
     model = read_model(file)
     tables, remarks = case_tables(model, stage)
-    unused = list(model.unused())
-    head = (
-        f"Written by femgear import {file.name} (REXS {model.version}). What the file does not give says so."
-    )
+    head = f"Written by femgear import {file.name} (REXS {model.version}). What is assumed says so."
     text = draft_text(tables, remarks, word="assumed", head=[head])
     _write_case(text, output, force=force)
     _say(f"entries that are assumed: {text.count('# assumed')}")
     _say("attributes that are not used:")
-    for line in unused:
+    for line in model.unused():
         _say(textwrap.shorten(f"  {line}", 110, placeholder=" ..."))
     return 0
 
@@ -535,9 +532,8 @@ def rexs(
 
     data = read_case(case)
     need_set(data)
-    _write_case(
-        model_text(stage_model(data, output.name), "femgear", femgear.__version__), output, force=force
-    )
+    text = model_text(stage_model(data, output.name), "femgear", femgear.__version__)
+    _write_case(text, output, force=force)
     return 0
 
 
