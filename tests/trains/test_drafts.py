@@ -99,6 +99,6 @@ def test_remarks_do_not_change_the_tables():
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["planetary", "planar", "helical", "pair"])
 def test_new_cases_have_modes(kind):
-    coarse = {"static.positions": 12, "static.flank_elements": 8}
+    coarse = {"static.positions": 16, "static.flank_elements": 8}
     found = solve(with_values(parse_case(new_case(kind)), coarse), "modes")
     assert found["modes"].modes.frequency.max() > 500.0
