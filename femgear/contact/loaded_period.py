@@ -1,4 +1,6 @@
-"""The loaded state of a set over one mesh period, resolved where tooth pairs begin and cease to carry.
+"""The loaded state of a set over its period, resolved where tooth pairs begin and cease to carry.
+
+The period is that of the mesh, or several of these where errors turn with a body.
 
 The mesh stiffness jumps there, and equidistant positions give every harmonic an error of the size of the jump
 over the number of positions, another one for each planet that meets its jump elsewhere between them. Here
@@ -10,15 +12,21 @@ computed once and the equal planets are equal to rounding.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import gcd
+from fractions import Fraction
 
 import numpy as np
 
 from femgear.contact.bodies import Bodies
-from femgear.contact.cycle import CycleOptions, MeshCycle, planet_symmetry, walk_mesh_cycle
+from femgear.contact.cycle import (
+    CycleOptions,
+    MeshCycle,
+    loaded_image,
+    planet_symmetry,
+    walk_mesh_cycle,
+)
 from femgear.contact.face_width import over_slices
 from femgear.contact.supports import RIGID, Supports
-from femgear.gears.deviations import SetDeviations
+from femgear.gears.deviations import SetDeviations, planet_shift, without_turning
 from femgear.gears.planetary import GearSet
 
 SHORTEST = 2.0**-13
@@ -31,11 +39,13 @@ positions may miss where the stiffness does not jump."""
 _STILL = 1e-3  # peak to peak over the mean below which a deflection counts as constant
 STEEP = 0.02
 """Change of a mesh stiffness between neighbouring positions above which there are more between them."""
+_WALK = 2048
+"""Positions of a walk, whose windows are in memory together."""
 
 
 @dataclass(frozen=True)
 class LoadedPeriod:
-    """Loads and tangent stiffness of all meshes over one mesh period.
+    """Loads and tangent stiffness of all meshes over one mesh period, or over several.
 
     Parameters
     ----------
@@ -46,6 +56,8 @@ class LoadedPeriod:
     held_compliance : (meshes, meshes) array
         Mean over the period of the tangent compliance between the meshes through their common bodies, the
         ring held, supports left out [m/N].
+    periods : int
+        Mesh periods in the record.
     """
 
     position: np.ndarray
@@ -54,6 +66,7 @@ class LoadedPeriod:
     stiffness: np.ndarray
     held_stiffness: np.ndarray
     held_compliance: np.ndarray
+    periods: int = 1
 
     def resampled(self, name: str, count: int) -> np.ndarray:
         """Values (meshes, count) of one of the arrays (meshes, P) at equidistant positions.
@@ -63,27 +76,29 @@ class LoadedPeriod:
         """
         from scipy.interpolate import Akima1DInterpolator
 
-        at, values, tau = np.arange(count) / count, getattr(self, name), self.position
-        found = np.array([np.interp(at, tau, row, period=1.0) for row in values])
+        whole = self.periods
+        at, values, tau = np.arange(count) / count * whole, getattr(self, name), self.position
+        found = np.array([np.interp(at, tau, row, period=whole) for row in values])
         for piece, place in self._smooth_pieces():
             curve = Akima1DInterpolator(place, values[:, piece], axis=1, method="makima")
-            for turn in (-1.0, 0.0, 1.0):
-                inside = (at + turn >= place[0]) & (at + turn <= place[-1])
+            for turn in (-whole, 0, whole):
+                first, last = np.searchsorted(at + turn, place[[0, -1]], side="left")
+                inside = slice(first, last + (last < count and at[last % count] + turn == place[-1]))
                 found[:, inside] = curve(at[inside] + turn)
         return found
 
     def _smooth_pieces(self):
-        """Positions without a jump between them: their numbers, and their places counted on past one."""
-        tau, P = self.position, len(self.position)
-        jumps = np.flatnonzero(np.diff(np.append(tau, tau[0] + 1.0)) <= SHORTEST)
+        """Positions without a jump between them: their numbers, and their places counted on past the end."""
+        tau, P, whole = self.position, len(self.position), self.periods
+        jumps = np.flatnonzero(np.diff(np.append(tau, tau[0] + whole)) <= SHORTEST)
         if not len(jumps):
             around = np.arange(-3, P + 3)
-            yield around % P, tau[around % P] + around // P
+            yield around % P, tau[around % P] + around // P * whole
             return
         for last, jump in zip(np.append(jumps[1:], jumps[0] + P), jumps, strict=True):
             piece = np.arange(jump + 1, last + 1)
             if len(piece) > 2:
-                yield piece % P, tau[piece % P] + piece // P
+                yield piece % P, tau[piece % P] + piece // P * whole
 
 
 def loaded_period(
@@ -96,44 +111,48 @@ def loaded_period(
     contact: str = "profile",
     deviations: SetDeviations | None = None,
     supports: Supports = RIGID,
+    periods: int = 1,
     options: CycleOptions | None = None,
 ) -> LoadedPeriod:
-    """Compute the loaded state over one mesh period for errors that stand still in the carrier's frame.
+    """Compute the loaded state over one mesh period, or over as many as errors that turn need.
 
     Parameters
     ----------
-    planetary_set, bodies, sun_torque, contact, deviations, supports
+    planetary_set, bodies, sun_torque, contact, deviations, supports, periods
         As for `walk_mesh_cycle`.
     held_bodies
         See `CycleOptions`.
     positions : int
-        Positions over the period at least; more come where the stiffness jumps or is steep.
+        Positions over a mesh period at least; more come where the stiffness jumps or is steep.
     options : CycleOptions, optional
         Slices over the width, and who is told of the progress.
     """
     options = replace(options or CycleOptions(), held_bodies=held_bodies)
-    symmetry = planet_symmetry(planetary_set, deviations)
-    parts = symmetry // gcd(symmetry, planetary_set.gears[0].teeth)
-    first = -(-positions // parts)
+    symmetry, shift = _repetition(planetary_set, sun_torque, deviations, periods)
+    parts = (shift / periods).denominator
+    first = -(-positions * periods // parts)
     # the end of the part is there to see jumps before it, and then left out
-    wanted, record = np.arange(first + 1) / (first * parts), {}
+    wanted, record, helical = np.arange(first + 1) / (first * parts) * periods, {}, False
     while len(wanted):
-        cycle = walk_mesh_cycle(
-            planetary_set,
-            bodies,
-            sun_torque=sun_torque,
-            positions=wanted,
-            contact=contact,
-            deviations=deviations,
-            supports=supports,
-            options=options,
-        )
-        found = _record(cycle, planetary_set.base_pitch)
-        if record:
-            found = {name: np.concatenate([record[name], found[name]], axis=-1) for name in found}
-        order = np.argsort(found["position"], kind="stable")
-        record = {name: values[..., order] for name, values in found.items()}
-        if cycle.helical:
+        for some in np.array_split(wanted, -(-len(wanted) // _WALK)):
+            cycle = walk_mesh_cycle(
+                planetary_set,
+                bodies,
+                sun_torque=sun_torque,
+                positions=some,
+                contact=contact,
+                deviations=deviations,
+                supports=supports,
+                periods=periods,
+                options=options,
+            )
+            found = _record(cycle, planetary_set.base_pitch)
+            if record:
+                found = {name: np.concatenate([record[name], found[name]], axis=-1) for name in found}
+            record, helical = found, cycle.helical
+        order = np.argsort(record["position"], kind="stable")
+        record = {name: values[..., order] for name, values in record.items()}
+        if helical:
             # slices of helical teeth come into contact one after the other, with steps of their own size
             break
         smooth, jumps = _unresolved(record)
@@ -141,8 +160,31 @@ def loaded_period(
         # jumps in quarters: half as many walks to enclose them
         shares = (smooth, 0.5), (jumps, 0.25), (jumps, 0.5), (jumps, 0.75)
         wanted = np.concatenate([tau[some] + share * gap[some] for some, share in shares])
-    found = _whole_period(planetary_set, record, symmetry, parts)
-    return found if options.ahead is None else replace(found, **over_slices(found, options.ahead))
+    found = _whole_period(planetary_set, record, symmetry, shift, periods)
+    if options.ahead is None:
+        return found
+    return replace(found, **over_slices(found, options.ahead, periods=periods))
+
+
+def _repetition(
+    planetary_set: GearSet, sun_torque: float, deviations: SetDeviations | None, periods: int
+) -> tuple[int, Fraction]:
+    """Rotations that map planets on one another, and mesh periods until they repeat one another.
+
+    A planet that is ahead by the angle psi goes through the same states ``z_sun psi / 2 pi`` mesh periods
+    later (R. G. Parker and J. Lin, J. Mech. Des. 126, 2004, 365-370); where errors turn, when these repeat.
+    """
+    if periods == 1 or deviations is None:
+        symmetry = planet_symmetry(planetary_set, deviations)
+        return symmetry, Fraction(planetary_set.gears[0].teeth, symmetry) % 1
+    solved, _, turning = loaded_image(planetary_set, sun_torque, deviations)
+    assert turning is not None
+    most = planet_symmetry(solved, without_turning(turning, solved))
+    for symmetry in (g for g in range(most, 1, -1) if most % g == 0):
+        shift = planet_shift(turning, solved, symmetry, periods)
+        if shift is not None:
+            return symmetry, shift
+    return 1, Fraction(0)
 
 
 _OVER_POSITIONS = ("position", "deflection", "force", "stiffness", "held_stiffness", "held_compliance")
@@ -182,19 +224,19 @@ def _unresolved(record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return np.flatnonzero((missed > MISSED) & (gap > SMOOTHEST) & ~jumping), np.flatnonzero(jumping)
 
 
-def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> LoadedPeriod:
-    """The period from one of its `parts`: later parts are the first one with the planets moved on.
+def _whole_period(
+    planetary_set: GearSet, record: dict, symmetry: int, shift: Fraction, periods: int
+) -> LoadedPeriod:
+    """The period from one of its parts: later parts are the first one with the planets moved on.
 
-    A planet that is ahead by the angle psi goes through the same states ``z_sun psi / 2 pi`` mesh periods
-    later (R. G. Parker and J. Lin, J. Mech. Des. 126, 2004, 365-370).
+    Those of ``symmetry`` repeat one another after ``shift`` mesh periods, see `_repetition`.
     """
-    N = planetary_set.n_planets
-    ahead = N // symmetry
-    common = gcd(symmetry, planetary_set.gears[0].teeth)
-    step = pow(planetary_set.gears[0].teeth // common, -1, parts) if parts > 1 else 0
-    shown = record["position"] < (1.0 - 1e-12) / parts
+    N, turn = planetary_set.n_planets, shift / periods
+    ahead, parts = N // symmetry, turn.denominator
+    step = pow(turn.numerator, -1, parts) if parts > 1 else 0
+    shown = record["position"] < (1.0 - 1e-12) / parts * periods
     tau = record["position"][shown]
-    compliance = record["held_compliance"][..., shown] @ _mean_weights(tau, 1.0 / parts)
+    compliance = record["held_compliance"][..., shown] @ _mean_weights(tau, periods / parts)
     names, mean = ("deflection", "force", "stiffness", "held_stiffness"), np.zeros(compliance.shape[:2])
     values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
@@ -204,8 +246,9 @@ def _whole_period(planetary_set, record: dict, symmetry: int, parts: int) -> Loa
             values[name].append(record[name][meshes][:, shown])
         mean += compliance[np.ix_(meshes, meshes)] / parts
     return LoadedPeriod(
-        position=np.concatenate([tau + part / parts for part in range(parts)]),
+        position=np.concatenate([tau + part / parts * periods for part in range(parts)]),
         held_compliance=mean,
+        periods=periods,
         **{name: np.concatenate(parts_of, axis=1) for name, parts_of in values.items()},
     )
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -393,6 +394,44 @@ def _repeat(values: np.ndarray) -> int:
         for step in range(1, count + 1)
         if count % step == 0 and np.array_equal(values, np.roll(values, step))
     )
+
+
+def without_turning(d: SetDeviations, s: GearSet) -> SetDeviations:
+    """Leave out what belongs to teeth or turns with a gear; what stands still in the carrier's frame stays."""
+    even = no_deviations(s)
+    pitches = ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch")
+    names = (*pitches, "sun_runout", "planet_runout", "ring_runout", "ovality")
+    return replace(d, **{name: getattr(even, name) for name in names})
+
+
+def planet_shift(d: SetDeviations, s: GearSet, symmetry: int, periods: int) -> Fraction | None:
+    """Find the mesh periods after which every planet does what the one behind it did, with all errors.
+
+    The planet behind is that at the angle ``2 pi/symmetry``, whose turn maps the planets on one another. Sun
+    and ring come with the same tooth after ``z_sun/symmetry`` and ``-z_ring/symmetry`` mesh periods; planets
+    must bring errors of their own. None: no such time within the common ``periods`` of the errors.
+    """
+    ahead, N = s.n_planets // symmetry, s.n_planets
+    behind, phases = (np.arange(N) - ahead) % N, np.asarray(s.mesh_phases[:N])
+    meshes = np.concatenate([behind + N * kind for kind in range(len(s.kinds))])
+    position, step = np.arange(periods) + 0.25, -s.senses[EACH]
+    there = body_separation(d, s, position)
+    close = 1e-9 * np.abs(there).max(initial=0.0)
+    first, last = Fraction(s.gears[0].teeth, symmetry), Fraction(s.gears[-1].teeth, symmetry)
+    for count in range(periods):
+        shift = first % 1 + count
+        if (shift - first) % _repeat(d.sun_pitch) or (shift + last) % _repeat(d.ring_pitch):
+            continue
+        turned = step * np.rint(float(shift) + phases - phases[behind]).astype(int)
+        pitches = d.planet_pitch, d.planet_ring_side_pitch
+        alike = (
+            np.array_equal(np.roll(one[n], -turned[n]), one[behind[n]]) for one in pitches for n in range(N)
+        )
+        if all(alike):
+            here = body_separation(d, s, position + float(shift))
+            if np.abs(here - there[meshes]).max() <= close:
+                return shift
+    return None
 
 
 def mirrored_deviations(
