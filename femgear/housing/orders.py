@@ -22,13 +22,16 @@ class OrderSpectrum(ReadOnlyArrays):
     Parameters
     ----------
     order : (n_orders,) array
-        Carrier orders from 0 upwards, ascending, whole numbers; others are silent.
+        Carrier orders from 0 upwards, ascending, multiples of 1/turns; others are silent.
     value : (..., n_orders) complex array
         Complex amplitudes in the unit of the signal (peak values, not r.m.s.).
+    turns : int
+        Turns of the carrier after which all repeats.
     """
 
     order: np.ndarray
     value: np.ndarray
+    turns: int = 1
 
     @property
     def amplitude(self) -> np.ndarray:
@@ -47,12 +50,12 @@ class Line:
 
 @dataclass(frozen=True)
 class Lobes(ReadOnlyArrays):
-    """Lobes of an envelope over one carrier revolution.
+    """Lobes of an envelope over one carrier revolution, or the revolutions after which it repeats.
 
     Parameters
     ----------
     position : (n_lobes,) array
-        Places of the maxima as fractions of the revolution, ascending.
+        Places of the maxima as fractions of the record, ascending.
     height : (n_lobes,) array
         Envelope there, in its unit.
     threshold : float
@@ -259,15 +262,15 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
             code="E-RANGE", value=(low, high), limit=f"0 < low <= high, low <= {spectrum.order[-1]}",
             remedy="choose a mesh harmonic that the response contains",
         )  # fmt: skip
-    return OrderSpectrum(spectrum.order, np.where(inside, spectrum.value, 0))
+    return OrderSpectrum(spectrum.order, np.where(inside, spectrum.value, 0), spectrum.turns)
 
 
 def analytic_signal(spectrum: OrderSpectrum) -> np.ndarray:
     """Compute the analytic signal sum_k value[k] exp(i order[k] theta), (..., 4 K + 4) complex samples.
 
-    K is the highest order. Its modulus is the envelope.
+    K is the highest order times the turns of the carrier that the samples span. Its modulus is the envelope.
     """
-    order = spectrum.order.astype(int)
+    order = np.rint(spectrum.order * spectrum.turns).astype(int)
     every = np.zeros((*spectrum.value.shape[:-1], 4 * int(order[-1]) + 4), dtype=complex)
     every[..., order] = spectrum.value
     return np.fft.ifft(every, axis=-1, norm="forward")
@@ -276,7 +279,7 @@ def analytic_signal(spectrum: OrderSpectrum) -> np.ndarray:
 def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
     """Count the maxima of a periodic envelope that stand out by at least `threshold` times its largest value.
 
-    The envelope (n_samples,) spans one carrier revolution. It is turned until it begins and ends at its
+    The envelope (n_samples,) spans one carrier revolution or several. It is turned until it begins and ends at its
     lowest value, so that its seam is no edge and the prominences are those of the endless signal.
 
     CaseError: no envelope of one signal, finite and not negative, or a threshold that is not between 0 and 1

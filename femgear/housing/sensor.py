@@ -6,6 +6,8 @@ The radial displacement of the ring's outer surface is given in the frame of the
 
 and the sensor stands still at the housing angle phi_s, so that it sees phi = phi_s - Omega_c t. With the ring
 fixed omega_m = z_ring |Omega_c|: component (h, n) is heard at the carrier order h z_ring - sign(Omega_c) n.
+Where the field repeats after P mesh periods, by errors that turn, h counts P-ths of a mesh harmonic and orders
+are h z_ring/P - sign(Omega_c) n, multiples of 1/turns: all repeats after so many turns of the carrier.
 Two forms: exact (one line a component) and the Heaviside/linear form, in which the sensor hands over between
 P points of the ring as it passes them: "Vibratory response of planetary gear sets housing by a spectral
 iterative approach - Modulation effects induced by carrier rotation", Eqs. (13)-(16), in closed form
@@ -34,6 +36,7 @@ Kahraman (2009), only the nearest planet of N is heard.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -55,12 +58,13 @@ class ReadOnlyArrays:
 
 @dataclass(frozen=True)
 class SensorLines(ReadOnlyArrays):
-    """Lines that a fixed sensor hears: ``u(t) = Re sum_k displacement[k] exp(i k base_speed t)``.
+    """Lines that a fixed sensor hears: ``u(t) = Re sum_k displacement[k] exp(i order[k] base_speed t)``.
 
     Parameters
     ----------
-    order : (n_orders,) int array
-        Carrier orders, ascending, from 0 upwards; others are silent.
+    order : (n_orders,) array
+        Carrier orders, ascending, from 0 upwards; others are silent. Whole numbers where all repeats with
+        every turn of the carrier, else multiples of 1/turns.
     displacement : (..., n_orders) complex array
         Single-sided complex amplitudes [m].
     carrier_speed : (...) array
@@ -71,7 +75,9 @@ class SensorLines(ReadOnlyArrays):
         Teeth of the ring, the order of the mesh frequency.
     method : str
         ``"exact"``, ``"linear, P points"`` or ``"supports"``, of a structure that stands still: only the
-        first have one nodal diameter a line.
+        first have one nodal diameter a line. Errors that turn have several: ``"exact, P mesh periods"``.
+    turns : int
+        Turns of the carrier after which all repeats.
     """
 
     order: np.ndarray
@@ -80,6 +86,12 @@ class SensorLines(ReadOnlyArrays):
     sensor_angle: float
     z_ring: int
     method: str
+    turns: int = 1
+
+    @property
+    def number(self) -> np.ndarray:
+        """Whole periods of every line in ``turns`` turns of the carrier, (n_orders,) int."""
+        return np.rint(self.order * self.turns).astype(int)
 
     @property
     def base_speed(self) -> np.ndarray:
@@ -108,12 +120,12 @@ class SensorLines(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class HousingSignal(ReadOnlyArrays):
-    """Time signal of a fixed sensor over one revolution of the carrier (end point excluded).
+    """Time signal of a fixed sensor until all repeats, after one revolution of the carrier or several.
 
     Parameters
     ----------
     revolution : (n_times,) array
-        Fraction of the carrier revolution, 0..1.
+        Revolutions of the carrier, from 0, end point excluded.
     seconds : (..., n_times) array
         Time [s].
     displacement : (..., n_times) array
@@ -160,27 +172,52 @@ def fixed_sensor_lines(field, z_ring: int, carrier_speed, sensor_angle: float) -
 
 
 def component_lines(
-    field, z_ring: int, carrier_speed, sensor_angle: float, *, symmetry: int = 1
+    field, z_ring: int, carrier_speed, sensor_angle: float, *, symmetry: int = 1, periods: int = 1
 ) -> SensorLines:
     """Compute the lines of `fixed_sensor_lines` at those orders alone that components reach.
 
     Only multiples of ``symmetry`` are kept: a set that is the same after a turn by ``2 pi/symmetry`` has no
-    others.
+    others. The field repeats after ``periods`` mesh periods, of which its row 1 is the first harmonic.
+    """
+    angle = _checked_angle(sensor_angle)
+    number, n, waves = carrier_components(field, z_ring, carrier_speed, symmetry=symmetry, periods=periods)
+    number, first = np.unique(number, return_index=True)
+    heard = waves * np.exp(1j * n * angle)
+    lines = heard if len(number) == len(n) else np.add.reduceat(heard, first, axis=-1)
+    lines = np.where(number == 0, np.real(lines), lines)
+    turns, method = carrier_turns(z_ring, periods), "exact"
+    order = number if turns == 1 else number / turns
+    if periods > 1:
+        method += f", {periods} mesh periods"
+    speed = np.asarray(carrier_speed, float)
+    return SensorLines(order, lines, speed, angle, int(z_ring), method, turns)
+
+
+def carrier_turns(z_ring: int, periods: int) -> int:
+    """Count the turns of the carrier after which a set repeats that does after so many mesh periods."""
+    return periods // math.gcd(periods, z_ring)
+
+
+def carrier_components(
+    field, z_ring: int, carrier_speed, *, symmetry: int = 1, periods: int = 1
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Order the components of a field by the frequency at which a fixed sensor hears them.
+
+    Arguments are those of `component_lines`. Returned are, ascending, the frequencies (K,) in those of the
+    carrier over `carrier_turns`, not negative, with signed nodal diameters n (K,) and amplitudes (..., K) of
+    ``exp(i n phi)`` on the housing: what is heard at a negative order is its conjugate at the positive one.
     """
     field, n = _checked_field(field)
     direction, speed = _motion(field, z_ring, carrier_speed)
-    signed = np.arange(field.shape[-2])[:, None] * z_ring - direction * n
-    kept = np.flatnonzero(signed % symmetry == 0)
+    turns = carrier_turns(z_ring, periods)
+    signed = np.arange(field.shape[-2])[:, None] * (z_ring * turns // periods) - direction * n * turns
+    kept = np.flatnonzero(signed % (symmetry * turns) == 0) if symmetry > 1 else np.arange(signed.size)
     signed, turned = signed.ravel()[kept], np.broadcast_to(n, signed.shape).ravel()[kept]
     along = np.argsort(np.abs(signed), kind="stable")
     signed, kept, turned = signed[along], kept[along], turned[along]
-    heard = field.reshape(*speed.shape, -1)[..., kept] * np.exp(1j * turned * _checked_angle(sensor_angle))
-    # lines of negative order are heard at positive ones; what falls on one order adds
-    heard = np.where(signed < 0, np.conj(heard), heard)
-    order, first = np.unique(np.abs(signed), return_index=True)
-    lines = heard if len(order) == len(kept) else np.add.reduceat(heard, first, axis=-1)
-    lines = np.where(order == 0, np.real(lines), lines)
-    return SensorLines(order, lines, speed, float(sensor_angle), int(z_ring), "exact")
+    waves = field.reshape(*speed.shape, -1)[..., kept]
+    turned, waves = np.where(signed < 0, -turned, turned), np.where(signed < 0, np.conj(waves), waves)
+    return np.abs(signed), turned, waves
 
 
 def rounded_lines(lines: SensorLines, share: float) -> np.ndarray:
@@ -210,8 +247,9 @@ def stored_lines(housing: Any, *, form: str | None = None) -> SensorLines:
     end = np.flatnonzero(exact.any(axis=tuple(range(exact.ndim - 1)))).max(initial=1) + 1
     place = float(known["sensor_angle"]), int(known["ring_teeth"])
     lines = SensorLines(
-        order[:end], exact[..., :end], housing["carrier_speed"].values, *place, known.get("method", "exact")
-    )
+        order[:end], exact[..., :end], housing["carrier_speed"].values, *place,
+        known.get("method", "exact"), int(known.get("turns", 1)),
+    )  # fmt: skip
     return lines_in_form(lines, form or known["form"], int(known["points"]), round(order[-1] / place[1]))
 
 
@@ -270,16 +308,16 @@ def heaviside_linear_lines(
 
 
 def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
-    """Synthesise motion and acceleration over one carrier revolution by inverse FFT of the lines.
+    """Synthesise motion and acceleration over the carrier revolutions of the lines by inverse FFT.
 
     There are at least four samples a period of the highest order, and a whole number of them a mesh period.
     """
-    count = lines.z_ring * -(-4 * int(lines.order[-1]) // lines.z_ring)
-    revolution = np.arange(count) / count
+    count = lines.turns * lines.z_ring * -(-4 * math.ceil(lines.order[-1]) // lines.z_ring)
+    revolution = np.arange(count) / count * lines.turns
     motion = (lines.displacement, lines.velocity, lines.acceleration)
     return HousingSignal(
         revolution, 2 * np.pi * revolution / lines.base_speed[..., None],
-        *(_synthesised(values, lines.order, count) for values in motion),
+        *(_synthesised(values, lines.number, count) for values in motion),
     )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ from typing import Any, cast
 import numpy as np
 
 from femgear.errors import CaseError, nvh_library
-from femgear.housing.sensor import SensorLines, stored_lines
+from femgear.housing.sensor import SensorLines, carrier_components, carrier_turns, stored_lines
 
 REFERENCE_PRESSURE, REFERENCE_POWER = 20e-6, 1e-12  # 20 uPa and 1 pW (ISO 1683)
 NO_AREAS = "no sound: the file of the casing has no sensor_area, the areas of surface of its sensors"
@@ -258,6 +258,26 @@ def equivalent_sound(
     power = 0.5 * density * sound_speed * np.abs(velocity) ** 2 @ area
     phase = np.exp(1j * (np.angle(velocity @ area) + 0.5 * np.pi))
     return np.sqrt(density * sound_speed * power / (2 * np.pi)) / distance * phase, power
+
+
+def component_sound(
+    field, z_ring: int, carrier_speed, cylinder: Cylinder, microphone: Microphone, *, periods: int
+) -> tuple[np.ndarray, ...]:
+    """Compute the sound of a field that repeats after several mesh periods, at the orders of its lines.
+
+    Arguments as of `femgear.housing.sensor.component_lines`; the three results (..., n_orders) are those of
+    `surface_sound`, of lines to which several components add.
+    """
+    number, n, waves = carrier_components(field, z_ring, carrier_speed, periods=periods)
+    # of the static field two components are one wave
+    (number, n), place = np.unique(np.stack([number, n]), axis=1, return_inverse=True)
+    along = np.argsort(place, kind="stable")
+    waves = np.add.reduceat(waves[..., along], np.searchsorted(place[along], np.arange(len(n))), axis=-1)
+    base = np.abs(np.asarray(carrier_speed, float))[..., None] / (2 * np.pi * carrier_turns(z_ring, periods))
+    velocity = 2j * np.pi * number * base * waves
+    parts = surface_sound(velocity[..., None], n[:, None], number * base, cylinder, microphone)
+    lines = np.unique(number, return_index=True)[1]
+    return tuple(np.add.reduceat(one, lines, axis=-1) for one in parts)
 
 
 def _velocity(lines: SensorLines) -> np.ndarray:

@@ -97,7 +97,9 @@ def unheld_member(case: RigidCase, key: str, remedy: str) -> CaseError:
     )  # fmt: skip
 
 
-def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
+def check_one_period(
+    case: Case, gears: PlanetarySet, takes: str, remedy: str = "run with --only static"
+) -> None:
     """Refuse errors whose static record spans several mesh periods (E-PERIODS).
 
     ``takes`` is "the planar model takes", or whatever takes one period alone.
@@ -108,7 +110,7 @@ def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
         raise CaseError(
             f"the errors of this set span {periods} mesh periods; {takes} one", code="E-PERIODS",
             key="operation.speeds", limit="errors that repeat with every tooth",
-            remedy="run with --only static, or leave pitch errors and runouts out",
+            remedy=f"{remedy}, or leave pitch errors and runouts out",
         )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ afterwards a warning says what the housing would feel beyond the excitation.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,10 +16,11 @@ import numpy as np
 
 from femgear.case.checks import check_floating, runup_range
 from femgear.case.csv_columns import checksum, checksum_of_all
-from femgear.case.gear_set import driving_torque, planetary_set
+from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case, SupportSection, output_member
 from femgear.errors import CaseError, Finding
+from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.housing.casing_files import named_outputs, read_casing
 from femgear.housing.structure import FixedStructure, Support
@@ -50,8 +52,8 @@ MOST_WINDING = 1.0
 def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
     """Refuse what modes, dynamics and housing cannot represent, before anything is computed.
 
-    CaseError: the ring is not the fixed member, there is no torque, the errors span several mesh periods, or
-    the response reaches beyond `HIGHEST_RESPONSE`.
+    CaseError: the ring is not the fixed member, there is no torque, the errors span more mesh periods than
+    the case allows, or what takes one alone, or the response reaches beyond `HIGHEST_RESPONSE`.
     """
     if case.operation.fixed != "ring":
         raise CaseError(
@@ -72,13 +74,44 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             limit="not zero for modes, dynamics and housing",
             remedy="give a torque, or run with --only static",
         )
-    check_one_period(case, gears, "modes, dynamics and housing take")
+    record_periods(case, gears)
+    if case.housing.stands_still:
+        key = "support" if case.housing.support else "structure"
+        takes = f"a housing that stands still (housing.{key}) takes"
+        check_one_period(case, gears, takes, remedy=f"leave housing.{key} out")
+    if case.housing.form == "linear":
+        check_one_period(case, gears, 'housing.form = "linear" takes', remedy='take the form "exact"')
     _check_housing_supports(case)
     if case.housing.structure:
         imported_casing(case, gears)
     fastest_mesh_frequency(case, gears)
     if case.runup.count:
         runup_ends(case)
+
+
+def record_periods(case: Case, gears: PlanetarySet) -> int:
+    """Count the mesh periods after which the set repeats with its errors.
+
+    CaseError: more than ``static.longest_record`` (E-PERIODS).
+    """
+    longest = case.static.longest_record
+    periods, told = common_period(set_deviations(case), gears, limit=sys.maxsize)
+    if periods > longest:
+        raise CaseError(
+            f"modes, dynamics and housing need the whole record: {told}", code="E-PERIODS",
+            key="static.longest_record", value=longest, limit=f"{periods} with these errors",
+            remedy="raise it, which takes time and memory in proportion, run with --only static, or leave the "
+            "errors of a member out",
+        )  # fmt: skip
+    return periods
+
+
+def no_runup(case: Case) -> str:
+    """Say why there is no run-up: it was not asked for, or errors turn; empty where there is one."""
+    if not case.runup.count:
+        return "runup.count is 0"
+    one = common_period(set_deviations(case), planetary_set(case))[0] == 1
+    return "" if one else "errors turn with gears, and the run-up takes one mesh period"
 
 
 def fixed_diameters(case: Case) -> int:

@@ -255,7 +255,15 @@ def body_flexibility(compliance, held_compliance) -> np.ndarray:
 
 
 def mesh_excitation(
-    stiffness, deflection, force, held_compliance, *, ring_compliance=None, flexibility=None, backlash
+    stiffness,
+    deflection,
+    force,
+    held_compliance,
+    *,
+    ring_compliance=None,
+    flexibility=None,
+    backlash,
+    periods: int = 1,
 ) -> MeshExcitation:
     """Make the mesh springs of the dynamic model: static meshes less what other parts keep elastic.
 
@@ -275,6 +283,8 @@ def mesh_excitation(
         See `body_flexibility` [m/N].
     backlash : float or (2N,) array
         [m].
+    periods : int
+        Mesh periods in the record.
 
     Raises
     ------
@@ -302,6 +312,7 @@ def mesh_excitation(
         deflection=spring,
         force=force,
         backlash=np.broadcast_to(np.asarray(backlash, float), (2 * N,)),
+        periods=periods,
     )
 
 

@@ -159,7 +159,7 @@ class ModesResult:
             attrs={
                 "title": "modal basis with mean mesh stiffnesses", "unknowns": len(model.system.M),
                 "planet_angles": model.planet_angles, "excitation_reach": self.reach,
-            },
+            } | ({"periods": state.periods} if state.periods > 1 else {}),
         )  # fmt: skip
 
 
@@ -226,13 +226,15 @@ class DynamicsResult:
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level_change": ("speed", self.level_change, "dB", change),
         }
+        harmonic, periods = np.arange(response.force.shape[-1]), response.periods
         return dataset(
             response_entries(self) | reach | complex_entries(entries, single=True),
             coords=coordinates(
                 speed=self.input_speed / RPM, mesh=mesh_names(self.dte.shape[1] // 2),
-                harmonic=np.arange(response.force.shape[-1]), circumferential=np.arange(-n_max, n_max + 1),
+                harmonic=harmonic if periods == 1 else harmonic / periods,
+                circumferential=np.arange(-n_max, n_max + 1),
             ),
-            attrs={
+            attrs=({"periods": periods} if periods > 1 else {}) | {
                 "title": "periodic response by the spectral method", "message": response.message,
                 "compared_to": self.compared_to, "warnings": " ".join(map(str, self.warnings)),
                 "ring_teeth": self.ring_teeth, "fourier_convention": FOURIER,
@@ -313,7 +315,8 @@ class HousingResult:
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return dataset(
             variables | supported, coords=coordinates(speed=self.input_speed / RPM) | order | names,
-            attrs=({"missing_compliance": self.missing} if self.missing else {}) | {
+            attrs=({"missing_compliance": self.missing} if self.missing else {})
+            | ({"turns": exact.turns} if exact.turns > 1 else {}) | {
                 "title": "what a sensor fixed on the housing hears", "sensor_angle": exact.sensor_angle,
                 "form": self.form, "points": self.points, "method": exact.method, "ring_teeth": exact.z_ring,
                 "symmetry": self.symmetry, "rounding": rounding,
@@ -505,7 +508,7 @@ def describe_housing(data: xr.Dataset) -> Block:
 
 
 def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
-    """Sample accelerometer and microphone of housing.nc at every speed over whole turns of the carrier.
+    """Sample accelerometer and microphone of housing.nc at every speed until all has repeated.
 
     Then those of runup.nc, where the run has it, during a run-up from its first to its last speed.
     """
@@ -557,7 +560,10 @@ def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:
 
 
 def sensor_spectra(results: Results) -> Iterator[Spectrum]:
-    """List the lines of accelerometer and microphone of housing.nc at every speed and every carrier order."""
+    """List the lines of accelerometer and microphone of housing.nc at every speed and at every order.
+
+    Orders are whole, or multiples of the turns after which all repeats.
+    """
     for speed, name, unit, order, values in _recordings(results):
         every = np.zeros(order[-1] + 1, complex)
         every[order] = values
@@ -565,16 +571,19 @@ def sensor_spectra(results: Results) -> Iterator[Spectrum]:
 
 
 def _recordings(results: Results) -> Iterator[tuple[float, str, str, np.ndarray, np.ndarray]]:
-    """Speed of the carrier [rad/s], name, unit, orders and amplitudes of both sensors at every speed."""
+    """Speed [rad/s], name, unit, orders and amplitudes of both sensors at every speed.
+
+    Speeds are those of the carrier over the turns after which all repeats, of which orders are multiples.
+    """
     housing = results.housing
     for s, rpm in enumerate(housing["speed"].values):
         one = housing.isel(speed=s)
         lines, name = stored_lines(one), np.format_float_positional(rpm, 9, fractional=False, trim="-")
-        speed = float(lines.base_speed)
-        yield speed, f"accelerometer_{name}_rpm", "m/s^2", lines.order, lines.acceleration
+        speed = float(lines.base_speed) / lines.turns
+        yield speed, f"accelerometer_{name}_rpm", "m/s^2", lines.number, lines.acceleration
         if "pressure_level" in one:
             exact, pressure = stored_sound(one)
-            yield speed, f"microphone_{name}_rpm", "Pa", exact.order, pressure
+            yield speed, f"microphone_{name}_rpm", "Pa", exact.number, pressure
 
 
 def ring_shapes(results: Results) -> Shapes:
@@ -602,7 +611,7 @@ def _largest_lines(one: xr.Dataset) -> str:
     lines = stored_lines(one)
     amplitude = np.abs(lines.acceleration)
     largest = np.argsort(-amplitude, kind="stable")[:5]
-    return ", ".join(f"{lines.order[j]} ({amplitude[j]:.3g})" for j in largest)
+    return ", ".join(f"{lines.order[j]:.8g} ({amplitude[j]:.3g})" for j in largest)
 
 
 def mesh_bands(results: Results) -> Block:
@@ -612,7 +621,7 @@ def mesh_bands(results: Results) -> Block:
     rows, threshold = [], 0.0
     for s in checked_speeds(housing.sizes["speed"], _FEW):
         lines = stored_lines(housing.isel(speed=s))
-        spectrum = OrderSpectrum(lines.order, lines.acceleration)
+        spectrum, turns = OrderSpectrum(lines.order, lines.acceleration, lines.turns), lines.turns
         windowed = None
         if "dynamics" in results.stages:
             windowed = hanning_spectrum(results.dynamics, housing, planetary_set(case).planet_angles, s)
@@ -622,8 +631,10 @@ def mesh_bands(results: Results) -> Block:
             threshold = found.lobes.threshold
             two = [_line(line, h * teeth) for line in found.lines[:2]] + ["-", "-"]
             third = f"{found.lines[2].level:.1f}" if len(found.lines) > 2 else "-"
-            hanning = "-" if windowed is None else str(len(analyse_band(windowed, teeth, h).lobes.position))
-            lobes = str(len(found.lobes.position))
+            lobes, hanning = (
+                "-" if one is None else f"{len(one.lobes.position) / turns:.4g}"
+                for one in (found, windowed and analyse_band(windowed, teeth, h))
+            )
             published = _published(case, rpm, h)
             rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *two[:2], third, lobes, hanning, published))
     header = (
@@ -658,8 +669,9 @@ def hanning_spectrum(dynamics: xr.Dataset, housing: xr.Dataset, planet_angles, s
     lines = component_lines(
         hanning_model(force, planet_angles), int(housing.attrs["ring_teeth"]),
         float(housing["carrier_speed"][speed]), float(housing.attrs["sensor_angle"]),
+        periods=int(dynamics.attrs.get("periods", 1)),
     )  # fmt: skip
-    return OrderSpectrum(lines.order, lines.acceleration)
+    return OrderSpectrum(lines.order, lines.acceleration, lines.turns)
 
 
 def _published(case, rpm: float, harmonic: int) -> str:
@@ -672,6 +684,6 @@ def _published(case, rpm: float, harmonic: int) -> str:
 
 
 def _line(line, centre: int) -> str:
-    order = round(line.order)
-    offset = f" = {centre} {'+' if order > centre else '−'} {abs(order - centre)}" if order != centre else ""
-    return f"{order}{offset}: {line.amplitude:.3g}"
+    order, sign = line.order, "+" if line.order > centre else "−"
+    offset = f" = {centre} {sign} {abs(order - centre):.5g}" if order != centre else ""
+    return f"{order:.8g}{offset}: {line.amplitude:.3g}"

@@ -40,12 +40,12 @@ from femgear.contact.loaded_period import LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
 from femgear.errors import Finding
 from femgear.fe.elasticity import mass
-from femgear.gears.deviations import rotational_symmetry
+from femgear.gears.deviations import common_period, rotational_symmetry
 from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.casing_files import may_lack_compliance, missing_compliance
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
-from femgear.housing.sound import Cylinder, Microphone, equivalent_sound, surface_sound
+from femgear.housing.sound import Cylinder, Microphone, component_sound, equivalent_sound, surface_sound
 from femgear.housing.structure import FixedStructure, supported_ring
 from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
@@ -78,6 +78,8 @@ from femgear.trains.elastic.checks import (
     imported_casing,
     max_nodal_diameter,
     missing_level,
+    no_runup,
+    record_periods,
     runup_ends,
     slowest_wave,
 )
@@ -258,7 +260,8 @@ def _sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: n
     """Lines of the fixed sensor at speeds of the carrier [rad/s]."""
     field = mesh_and_ring_outputs(modes, response)[1]
     angle = case.housing.sensor_angle
-    return component_lines(field, case.ring.teeth, carrier, angle, symmetry=modes.symmetry)
+    known = {"symmetry": modes.symmetry, "periods": response.periods}
+    return component_lines(field, case.ring.teeth, carrier, angle, **known)
 
 
 def mesh_and_ring_outputs(
@@ -325,10 +328,11 @@ def solve_modes(
             contact=case.static.contact,
             deviations=None if deviations.ideal else deviations,
             supports=linear_supports(case),
+            periods=record_periods(case, gears),
             options=CycleOptions(progress=partial(progress, "modes"), **over_width(case, gears, loaded=True)),
         ),
     )
-    stiffness = state.resampled("held_stiffness", _RECORD).mean(axis=1)
+    stiffness = state.resampled("held_stiffness", _RECORD * state.periods).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
     reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
     ring = _ring_of_case(case, static, bodies, steps, reach)
@@ -402,7 +406,7 @@ def _excitation(
     )
     flexibility = body_flexibility(state.held_compliance, held)
     # equal planets are equal to rounding when their phases are among the positions
-    record = gears.n_planets * -(-_RECORD // gears.n_planets)
+    record = gears.n_planets * -(-_RECORD // gears.n_planets) * state.periods
     excitation = mesh_excitation(
         state.resampled("held_stiffness", record),
         state.resampled("deflection", record),
@@ -411,6 +415,7 @@ def _excitation(
         ring_compliance=compliance,
         flexibility=flexibility,
         backlash=mesh_backlash(gears),
+        periods=state.periods,
     )
     return excitation, flexibility
 
@@ -457,7 +462,7 @@ def dynamics_parts(
         level_change[slow] = _lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
     short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
-    for own, part in parts_of_speeds(case, _HARMONIC * limit.response, memory):
+    for own, part in parts_of_speeds(case, _HARMONIC * limit.response * excitation.periods, memory):
         response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
         pulls.append(pulls_of(response.force))
@@ -564,17 +569,21 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     """Compute the carrier orders that a sensor fixed on the ring hears while the carrier turns past it."""
     check_entries(dynamics, DynamicsResult, dynamic_entries(case), "dynamic response")
     place = dynamics.ring_teeth, np.array([s.carrier for s in dynamics.speeds]), case.housing.sensor_angle
+    known = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
     heard, width = case.housing.microphone, planetary_set(case).ring.face_width
     angle = case.housing.sensor_angle if heard.angle is None else heard.angle
     found = HousingResult(
         input_speed=np.array(case.operation.speeds),
-        exact=component_lines(dynamics.ring_radial, *place, symmetry=dynamics.symmetry),
+        exact=component_lines(dynamics.ring_radial, *place, **known),
         form=case.housing.form, points=case.housing.points, harmonics=dynamics.harmonics,
         symmetry=dynamics.symmetry, excitation_limit=dynamics.excitation_limit,
         cylinder=Cylinder(case.ring.outer_radius, width), microphone=Microphone(heard.distance, angle),
     )  # fmt: skip
     if case.housing.sensor:
         found = replace(found, outputs={"sensor": _named_sensors(case, dynamics)})
+    if (periods := dynamics.response.periods) > 1:
+        radiating = *place[:2], found.cylinder, found.microphone
+        found = replace(found, sound=component_sound(dynamics.ring_radial, *radiating, periods=periods))
     return found if dynamics.fixed is None else _standing_still(case, dynamics, found, dynamics.fixed)
 
 
@@ -586,7 +595,8 @@ def _named_sensors(case: Case, dynamics: DynamicsResult) -> tuple[tuple[str, ...
         if math.sin(one.direction):
             field = field + math.sin(one.direction) * dynamics.ring_tangential
         place = dynamics.ring_teeth, carrier, one.angle
-        lines.append(component_lines(field, *place, symmetry=dynamics.symmetry).displacement)
+        known = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
+        lines.append(component_lines(field, *place, **known).displacement)
     return tuple(one.name for one in case.housing.sensor), np.stack(lines, axis=1)
 
 
@@ -720,6 +730,7 @@ def _warnings(case: Case) -> Iterator[Finding]:
     # whether the excitation is doubled is known with the modes
     up_to = case.dynamics.up_to or 2.0 * highest_excitation(case, 0.0, float(frequency.max()))
     kept = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics).response
+    kept = kept * common_period(set_deviations(case), planetary_set(case))[0]
     most, symmetry = int(kept.max()), rotational_symmetry(set_deviations(case), planetary_set(case))
     # files of speeds that are not in memory together are compressed, and zeros of slow ones with them
     numbers = _PACKED * kept.sum() if _HARMONIC * most * len(kept) > _PART else 8.0 * most * len(kept)
@@ -757,7 +768,7 @@ ELASTIC = Train(
             verdict=lambda result: {"speeds": len(result.input_speed)},
             describe=lambda results: describe_runup(results.runup),
             warnings=runup_warnings,
-            unavailable=lambda case: "" if case.runup.count else "runup.count is 0",
+            unavailable=no_runup,
         ),
         Stage(
             name="dynamics", title="Dynamics", solve=solve_dynamics, parts=dynamics_parts,
