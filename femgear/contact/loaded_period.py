@@ -11,6 +11,7 @@ computed once and the equal planets are equal to rounding.
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -26,7 +27,7 @@ from femgear.contact.cycle import (
 )
 from femgear.contact.face_width import over_slices
 from femgear.contact.supports import RIGID, Supports
-from femgear.gears.deviations import SetDeviations, planet_shift, without_turning
+from femgear.gears.deviations import SetDeviations, common_period, planet_shift, without_turning
 from femgear.gears.planetary import GearSet
 
 SHORTEST = 2.0**-13
@@ -111,14 +112,13 @@ def loaded_period(
     contact: str = "profile",
     deviations: SetDeviations | None = None,
     supports: Supports = RIGID,
-    periods: int = 1,
     options: CycleOptions | None = None,
 ) -> LoadedPeriod:
     """Compute the loaded state over one mesh period, or over as many as errors that turn need.
 
     Parameters
     ----------
-    planetary_set, bodies, sun_torque, contact, deviations, supports, periods
+    planetary_set, bodies, sun_torque, contact, deviations, supports
         As for `walk_mesh_cycle`.
     held_bodies
         See `CycleOptions`.
@@ -128,6 +128,7 @@ def loaded_period(
         Slices over the width, and who is told of the progress.
     """
     options = replace(options or CycleOptions(), held_bodies=held_bodies)
+    periods = common_period(deviations, planetary_set, limit=sys.maxsize)[0] if deviations else 1
     symmetry, shift = _repetition(planetary_set, sun_torque, deviations, periods)
     parts = (shift / periods).denominator
     first = -(-positions * periods // parts)

@@ -397,7 +397,7 @@ def _repeat(values: np.ndarray) -> int:
 
 
 def without_turning(d: SetDeviations, s: GearSet) -> SetDeviations:
-    """Leave out what belongs to teeth or turns with a gear; what stands still in the carrier's frame stays."""
+    """Leave out what belongs to teeth or turns with a gear; the rest stands still in the carrier's frame."""
     even = no_deviations(s)
     pitches = ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch")
     names = (*pitches, "sun_runout", "planet_runout", "ring_runout", "ovality")

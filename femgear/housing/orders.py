@@ -279,8 +279,8 @@ def analytic_signal(spectrum: OrderSpectrum) -> np.ndarray:
 def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
     """Count the maxima of a periodic envelope that stand out by at least `threshold` times its largest value.
 
-    The envelope (n_samples,) spans one carrier revolution or several. It is turned until it begins and ends at its
-    lowest value, so that its seam is no edge and the prominences are those of the endless signal.
+    The envelope (n_samples,) spans one carrier revolution or several. It is turned until it begins and ends
+    at its lowest value, so that its seam is no edge and the prominences are those of the endless signal.
 
     CaseError: no envelope of one signal, finite and not negative, or a threshold that is not between 0 and 1
     (E-SHAPE).

@@ -6,8 +6,8 @@ The radial displacement of the ring's outer surface is given in the frame of the
 
 and the sensor stands still at the housing angle phi_s, so that it sees phi = phi_s - Omega_c t. With the ring
 fixed omega_m = z_ring |Omega_c|: component (h, n) is heard at the carrier order h z_ring - sign(Omega_c) n.
-Where the field repeats after P mesh periods, by errors that turn, h counts P-ths of a mesh harmonic and orders
-are h z_ring/P - sign(Omega_c) n, multiples of 1/turns: all repeats after so many turns of the carrier.
+Where the field repeats after P mesh periods, by errors that turn, h counts P-ths of a mesh harmonic, and
+orders are h z_ring/P - sign(Omega_c) n, multiples of 1/turns: all repeats after so many turns of the carrier.
 Two forms: exact (one line a component) and the Heaviside/linear form, in which the sensor hands over between
 P points of the ring as it passes them: "Vibratory response of planetary gear sets housing by a spectral
 iterative approach - Modulation effects induced by carrier rotation", Eqs. (13)-(16), in closed form

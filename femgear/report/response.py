@@ -35,6 +35,7 @@ from femgear.report.style import (
     stems,
     xy,
 )
+from femgear.system import fourier
 from femgear.system.fourier import fluctuation
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ _DECADES, _MOST_BARS = 1e-5, 60
 """Spectra end so far below their largest line, and have thick lines up to so many."""
 _POINTS = 2048
 """Steps of a mesh period, at most."""
+_FINE = 2**14
+"""Instants of a mesh period from which harmonics of a record are taken."""
 _BEYOND = 1.1
 """Spectra reach so far beyond the end of the excitation, over it."""
 _DYNAMIC, _STATIC = "dynamic", "static, harmonics of the excitation"
@@ -65,17 +68,19 @@ MODE_CAPTIONS = {
 """Of `mode_shapes`."""
 RESPONSE_CAPTIONS = {
     "dynamic_transmission_error": (
-        "Dynamic transmission error over one mesh period beside the static one of the set on its supports, "
-        "both without their mean: what the dynamic curve has more is vibration. The static curve has the "
-        "harmonics of the excitation alone: what rings in both is the cut series."
+        "Dynamic transmission error over the mesh period, or over all until errors that turn repeat, beside "
+        "the static one of the set on its supports, both without their mean: what the dynamic curve has more "
+        "is vibration. The static curve has the harmonics of the excitation alone: what rings in both is the "
+        "cut series."
     ),
     "mesh_forces": (
-        "Mesh forces over one mesh period, and the dynamic factor K_v, largest over mean force: that of the "
-        "mesh of a kind where it is the largest."
+        "Mesh forces over the mesh period, or over all until errors that turn repeat, and the dynamic factor "
+        "K_v, largest over mean force: that of the mesh of a kind where it is the largest."
     ),
     "dynamic_spectrum": (
         "Harmonics of the dynamic transmission error, down to five decades below the largest; dotted: end of "
-        "the excitation. Humps at one frequency at several speeds are resonances."
+        "the excitation. Humps at one frequency at several speeds are resonances. With errors that turn the "
+        "largest of all meshes of a kind."
     ),
     "speed_sweep": (
         "Fluctuation of the transmission error over the speed, and the verdicts on the solution: the fixed "
@@ -257,16 +262,17 @@ def mesh_force_period(dynamics: xr.Dataset, static: tuple[np.ndarray, np.ndarray
 
 
 def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, together: bool = False):
-    """Draw the harmonics of a variable over one mesh period, a row a speed; ``words`` tell the titles.
+    """Draw the harmonics of a variable over its period, a row a speed; ``words`` tell the titles.
 
     The dynamic and static curves of the lines of a panel are given to ``words``, (n, P) each.
     """
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
-    position = np.linspace(0.0, 1.0, min(max(256, 16 * int(h.max())), _POINTS) + 1)
-    wave = np.exp(2j * np.pi * np.outer(h, position))
-    values = unit * np.real(harmonics_of(dynamics.isel(speed=speeds), name) @ wave)
+    periods = int(dynamics.attrs.get("periods", 1))
+    count = periods * min(max(256, 16 * int(h.max())), _POINTS)
+    position = periods * np.linspace(0.0, 1.0, count + 1)
+    values = unit * _closed(harmonics_of(dynamics.isel(speed=speeds), name), h, periods, count)
     cuts = [_excited_harmonics(dynamics, s) for s in speeds] if static is not None else []
-    known = [unit * _cut_series(static, h, cut, position) for cut in cuts]
+    known = [unit * _cut_series(static, h, cut, periods, count) for cut in cuts]
     # what is one line at one speed need not be one at another: the lines are those of all speeds; equal
     # planets that mesh one after the other have equal spectra
     names = [str(name) for name in dynamics["mesh"].values]
@@ -282,7 +288,7 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
         rows = [row for *_, row in own]
         for i, text, row in own:
             style, text = ({"color": BLUE}, _DYNAMIC) if alike else (line_style(i), text)
-            ax.plot(position, values[s][row], label=text, linewidth=2.0, **style)
+            ax.plot(position, values[s][row], label=text, linewidth=2.0 if periods == 1 else 1.0, **style)
             if static is not None:
                 style, text = ({"color": BLACK}, _STATIC) if alike else (style, "_")
                 ax.plot(position, known[s][row], linewidth=0.9, label=text, **style)
@@ -290,9 +296,9 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
         title = [rpm(dynamics["speed"].values[speeds[s]]), *[kind] * bool(kind)]
         quasi = known[s][rows] if static is not None else np.empty(0)
         label(ax, title=f"{', '.join(title)}\n{words(values[s][rows], quasi)}")
-        ax.set_xlim(0.0, 1.0)
+        ax.set_xlim(0.0, periods)
     for ax in axes[-2:]:
-        label(ax, "position in the mesh period [1]")
+        label(ax, "position in the mesh period [1]" if periods == 1 else "position [mesh periods]")
     for ax in axes[::2]:
         label(ax, y=y)
     if static is not None and not alike:
@@ -312,7 +318,8 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     """Draw the amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
 
     The dataset has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m]; a row a speed and a column a
-    kind of mesh. A dotted line marks the end of the excitation.
+    kind of mesh. A dotted line marks the end of the excitation. Where errors turn, which makes many lines,
+    the largest of all meshes of a kind is drawn.
     """
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
     amplitude = np.abs(harmonics_of(dynamics.isel(speed=speeds), "dte"))[:, :, h > 0] * 1e6
@@ -321,13 +328,16 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     floor = _DECADES * (largest or 1.0)
     lines = _told_apart(names, np.hstack([*np.log10(np.maximum(amplitude / floor, 1.0))]))
     kinds = list(dict.fromkeys(family(text) for text, _ in lines))
+    crowded = dynamics.attrs.get("periods", 1) > 1
     figure, axes = _panels(len(speeds) * len(kinds), height=2.9, sharex="row")
     for ax, (s, kind) in zip(axes, product(range(len(speeds)), kinds)):
         step = 1e-3 * float(dynamics["mesh_frequency"].values[speeds[s]]) or 1.0
         own = [(i, *line) for i, line in enumerate(lines) if family(line[0]) == kind]
-        for i, text, row in own:
-            value, shown = amplitude[s, row], amplitude[s, row] > floor
-            if len(own) == 1:
+        for i, text, row in own[:1] if crowded else own:
+            row = [line[-1] for line in own] if crowded else [row]
+            value = amplitude[s, row].max(axis=0)
+            shown = value > floor
+            if len(own) == 1 or crowded:
                 stems(ax, step * h, value, floor, text="_", width=2.0 if shown.sum() <= _MOST_BARS else 0.8)
             else:
                 style = {"color": COLOURS[i % len(COLOURS)], "markersize": 4.0, "label": text}
@@ -348,7 +358,7 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
         label(ax, "frequency [kHz]")
     for ax in axes[::2]:
         label(ax, y="amplitude [µm]")
-    if len(lines) > len(kinds):
+    if len(lines) > len(kinds) and not crowded:
         legend_below(figure)
     return figure
 
@@ -426,20 +436,31 @@ def _excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
     return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
 
 
-def _cut_series(records, h, highest: int, position):
-    """Sum the harmonics ``h`` up to the highest of records of one period at positions (Q,).
+def _closed(lines, h, periods: int, count: int) -> np.ndarray:
+    """Values (..., count + 1) of a period of ``periods`` mesh periods, closed, of mesh harmonics ``h``."""
+    every = np.zeros((*lines.shape[:-1], round(h[-1] * periods) + 1), complex)
+    every[..., np.rint(h * periods).astype(int)] = lines
+    values = fourier.sample(every, count)
+    return np.concatenate([values, values[..., :1]], axis=-1)
+
+
+def _cut_series(records, h, highest: int, periods: int, count: int) -> np.ndarray:
+    """Sum the harmonics ``h`` up to the highest of records of one period, as `_closed` does.
 
     The records (n, P) are linear between their own positions (P,), which stand first and may be closer where
-    they are steep. Harmonics of such a curve are those of its second derivative, jumps of the slope, over
-    ``-(2 pi h)^2``.
+    they are steep. Harmonics of their means over short steps are theirs times sinc(h/steps), with hardly an
+    alias.
     """
     at, value = periodic(*records)
-    slope = np.diff(value) / np.diff(at)
-    jump, above = slope - np.roll(slope, 1, axis=-1), h[(h > 0) & (h <= highest)]
-    line = -2.0 * jump @ np.exp(-2j * np.pi * np.outer(at[:-1], above)) / (2.0 * np.pi * above) ** 2
-    found = np.real(line @ np.exp(2j * np.pi * np.outer(above, position)))
-    # the mean, where it is asked for
-    return found + (h[0] == 0) * np.trapezoid(value, at)[:, None] / (at[-1] - at[0])
+    steps = np.arange(periods * _FINE + 1) / _FINE
+    every = np.union1d(at, steps)
+    dense, ends = np.stack([np.interp(every, at, row) for row in value]), np.searchsorted(every, steps)
+    area = 0.5 * (dense[:, 1:] + dense[:, :-1]) * np.diff(every)
+    means = _FINE * np.add.reduceat(area, ends[:-1], axis=1)
+    h = h[h <= highest]
+    kept = np.rint(h * periods).astype(int)
+    lines = fourier.harmonics_of(means, kept[-1])[:, kept] * np.exp(-1j * np.pi * h / _FINE)
+    return _closed(lines / np.sinc(h / _FINE), h, periods, count)
 
 
 def _panels(count: int, *, above: float = 0.8, height: float = 2.5, sharex: Any = True):

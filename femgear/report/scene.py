@@ -372,7 +372,7 @@ def animate_operating_deflection(
     radial: np.ndarray,
     tangential: np.ndarray,
     sensor_angle: float = 0.0,
-    clockwise: bool = False,
+    order: float | None = None,
     title: str = "",
     frames: int = 48,
     size: int = 480,
@@ -383,10 +383,12 @@ def animate_operating_deflection(
     outer radius. The number of frames, which is returned, is near the wished one and such that the meshes
     pass slowly through a few cycles, as under a stroboscope (see `strobe_frames`). ``radial`` and
     ``tangential`` (H + 1, 2 n_max + 1), complex, are components of the outer surface's displacement [m]:
-    ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier, which turns
-    ``clockwise`` or not; the sensor stands at an angle [rad] on the housing, size is in pixels. StorageError.
+    ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier. ``order`` is
+    that of omega, the teeth of the ring by default, negative where the carrier turns clockwise; the sensor
+    stands at an angle [rad] on the housing, size is in pixels. StorageError.
     """
-    field = _Field(radial, tangential, -1.0 if clockwise else 1.0, planetary_set.ring.teeth)
+    order = planetary_set.ring.teeth if order is None else order
+    field = _Field(radial, tangential, np.sign(order), abs(order))
     count = strobe_frames(planetary_set.ring.teeth, frames)
     carrier = field.turn * 2 * np.pi * np.arange(count) / count
     images = _draw(planetary_set, field, carrier, sensor_angle, title, size)
@@ -414,13 +416,14 @@ class _Field:
     radial: np.ndarray
     tangential: np.ndarray
     turn: float
-    teeth: int
+    teeth: float
 
     def at(self, angle: np.ndarray, carrier: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute radial and tangential displacement (c, a) [m] at housing angles (a,) and carrier angles."""
         h, n_max = np.arange(self.radial.shape[0]), self.radial.shape[1] // 2
         n = np.arange(-n_max, n_max + 1)
-        # the mesh frequency is the ring's number of teeth times the carrier's, whichever way it turns
+        # the mesh frequency is the ring's number of teeth times the carrier's, whichever way it turns;
+        # with errors that turn the first harmonic is a part of that
         time = np.exp(1j * np.outer(carrier, h * self.teeth * self.turn)) * (h > 0)
         back, wave = np.exp(-1j * np.outer(carrier, n)), np.exp(1j * np.outer(n, angle))
         radial, tangential = (((time @ of) * back @ wave).real for of in (self.radial, self.tangential))

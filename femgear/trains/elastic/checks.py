@@ -100,8 +100,8 @@ def record_periods(case: Case, gears: PlanetarySet) -> int:
         raise CaseError(
             f"modes, dynamics and housing need the whole record: {told}", code="E-PERIODS",
             key="static.longest_record", value=longest, limit=f"{periods} with these errors",
-            remedy="raise it, which takes time and memory in proportion, run with --only static, or leave the "
-            "errors of a member out",
+            remedy="raise it, which takes time and memory in proportion, run with --only static, or leave "
+            "the errors of a member out",
         )  # fmt: skip
     return periods
 

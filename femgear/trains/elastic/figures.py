@@ -190,7 +190,7 @@ def _ring_teeth(housing: xr.Dataset) -> int:
 def _spectrum(housing: xr.Dataset, form: str | None = None) -> OrderSpectrum:
     """Lines of the acceleration at the first speed."""
     lines = stored_lines(housing.isel(speed=0), form=form)
-    return OrderSpectrum(lines.order, lines.acceleration)
+    return OrderSpectrum(lines.order, lines.acceleration, lines.turns)
 
 
 def _strongest_bands(housing: xr.Dataset) -> list[int]:
@@ -205,16 +205,16 @@ def _strongest_bands(housing: xr.Dataset) -> list[int]:
 def housing_signal(housing: xr.Dataset) -> Figure:
     """Draw acceleration, velocity and displacement of the sensor of housing.nc at its first speed.
 
-    Over one carrier revolution the largest and smallest value within a mesh period, and the signal itself
-    over four mesh periods about the largest acceleration.
+    Over one carrier revolution, or as many as there are until all repeats, the largest and smallest value
+    within a mesh period, and the signal itself over four mesh periods about the largest acceleration.
     """
     lines = stored_lines(housing.isel(speed=0))
-    signal, teeth = fixed_sensor_signal(lines), lines.z_ring
+    signal, teeth = fixed_sensor_signal(lines), lines.z_ring * lines.turns
     figure, axes = new_figure(rows=3, columns=2, height=6.2, sharex="col")
-    period, turn = len(signal.revolution) // teeth, np.arange(teeth + 1) / teeth
+    period, turn = len(signal.revolution) // teeth, np.arange(teeth + 1) / lines.z_ring
     middle = int(np.abs(signal.acceleration).argmax())
     shown = (middle + np.arange(-2 * period, 2 * period + 1)) % len(signal.revolution)
-    time = 1e3 * 2.0 * np.pi / float(lines.base_speed) * np.arange(len(shown)) / len(signal.revolution)
+    time = 1e3 * float(signal.seconds[1]) * np.arange(len(shown))
     for (left, right), (name, unit, factor) in zip(zip(axes[::2], axes[1::2]), _QUANTITIES):
         values = factor * getattr(signal, name)
         # a period has a whole number of samples; the last value closes the steps
@@ -224,7 +224,7 @@ def housing_signal(housing: xr.Dataset) -> Figure:
         around = values - values.mean()
         size = f"{np.sqrt(np.mean(around**2)):.4g} {unit} r.m.s., {np.ptp(values):.4g} peak to peak"
         label(left, y=f"{name} [{unit}]", title=size)
-        left.set_xlim(0.0, 1.0)
+        left.set_xlim(0.0, lines.turns)
         right.set_xlim(0.0, time[-1])
         right.sharey(left)
     label(axes[-2], "carrier revolutions [1]")
@@ -286,8 +286,8 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
         ax.plot(order[shown], exact[shown], "o", markerfacecolor="none", color=VERMILION, label=_EXACT)
     peak = np.maximum(linear, exact)
     for k in _labelled(order, peak, inside & (peak > floor), spacing=0.025 * len(str(centre)) * reach):
-        beside = round(order[k]) - centre
-        text = f"{order[k]:g}" + (f"\n{'+' if beside > 0 else '−'}{abs(beside)}" if beside else "")
+        beside = order[k] - centre
+        text = f"{order[k]:.6g}" + (f"\n{'+' if beside > 0 else '−'}{abs(beside):.4g}" if beside else "")
         style = {"xytext": (0, 4), "textcoords": "offset points", "ha": "center", "va": "bottom"}
         ax.annotate(text, (order[k], peak[k]), fontsize=SMALL, linespacing=1.0, **style)
     # room above the strongest line for its label on the logarithmic axis
@@ -299,7 +299,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     label(
         ax,
         "carrier order [1]",
-        title=f"{title}: largest line {order[strongest]:g} with {peak[strongest]:.3g} m/s²",
+        title=f"{title}: largest line {order[strongest]:.6g} with {peak[strongest]:.3g} m/s²",
     )
 
 
@@ -334,7 +334,7 @@ def modulation_polar(
     start, turn = float(housing.attrs["sensor_angle"]), np.sign(float(housing["carrier_speed"][0]))
     for ax, harmonic in zip(axes, harmonics):
         found = analyse_band(spectrum, _ring_teeth(housing), harmonic)
-        lobes, (angle, value) = found.lobes, _around_carrier(found.envelope, start, turn)
+        lobes, (angle, value) = found.lobes, _around_carrier(found.envelope, start, turn, spectrum.turns)
         largest = value.max(initial=0.0) or 1.0
         ax.plot(angle, value, color=BLUE, linewidth=2.0, label="envelope")
         # the scale stands where the curve is lowest, so that it hides nothing
@@ -343,7 +343,7 @@ def modulation_polar(
         ax.fill_between(angle, 0.0, value, color=BLUE, alpha=0.15, linewidth=0)
         if windowed is not None and windowed.order[-1] >= (harmonic - 0.5) * _ring_teeth(housing):
             model = analyse_band(windowed, _ring_teeth(housing), harmonic).envelope
-            angle, model = _around_carrier(model, start, turn)
+            angle, model = _around_carrier(model, start, turn, windowed.turns)
             size = model * (largest / (model.max(initial=0.0) or 1.0))
             ax.plot(angle, size, "--", color=BLACK, linewidth=1.1, label="Hanning-window model, scaled")
         for n, psi in enumerate(np.asarray(planet_angles, float)):
@@ -361,20 +361,22 @@ def modulation_polar(
         )
         ax.set_rlabel_position(float(np.degrees(lowest)))
         speed = rpm(housing["speed"].values[0])
-        text = f"{speed}, mesh harmonic {harmonic}: {len(lobes.position)} lobes up to {largest:.3g} m/s²"
+        count = f"{len(lobes.position) / spectrum.turns:.4g} lobes" + " a turn" * (spectrum.turns > 1)
+        text = f"{speed}, mesh harmonic {harmonic}: {count} up to {largest:.3g} m/s²"
         ax.set_title(f"{text}\nenvelope [m/s²] over angle in the carrier frame", fontsize=SMALL, pad=12)
     legend_below(figure, columns=3 if supports else 4)
     return figure
 
 
-def _around_carrier(envelope, start: float, turn: float):
+def _around_carrier(envelope, start: float, turn: float, turns: int):
     """Angles of the sensor in the carrier frame [rad], ascending, and the envelope (n,) there, closed.
 
-    The carrier turns in the sense ``turn`` (+-1) past the sensor, which stands at ``start`` [rad].
+    The carrier turns in the sense ``turn`` (+-1) past the sensor, which stands at ``start`` [rad]; the
+    envelope spans so many ``turns``.
     """
     count = len(envelope)
-    place = np.linspace(0, count, min(count, _ANGLES) + 1).astype(int)[:: -1 if turn > 0 else 1]
-    return start - turn * 2.0 * np.pi * place / count, envelope[place % count]
+    place = np.linspace(0, count, min(count, _ANGLES * turns) + 1).astype(int)[:: -1 if turn > 0 else 1]
+    return start - turn * 2.0 * np.pi * turns * place / count, envelope[place % count]
 
 
 def microphone_spectrum(housing: xr.Dataset) -> Figure:
@@ -503,7 +505,7 @@ def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
         radial=harmonics_of(last, "ring"),
         tangential=harmonics_of(last, "ring_tangential"),
         sensor_angle=case.housing.sensor_angle,
-        clockwise=float(last["carrier_speed"]) < 0,
+        order=np.sign(float(last["carrier_speed"])) * case.ring.teeth / last.attrs.get("periods", 1),
         title=f"{case.operation.input} at {case.operation.speeds[-1] / RPM:.0f} rpm",
     )
     return ["operating_deflection.gif"]
@@ -566,10 +568,10 @@ FIGURES = STATIC | {
     "housing": Figures(
         {
             "housing_signal": (
-                "Acceleration, velocity and displacement of the fixed point during one carrier revolution "
-                "({}): largest and smallest value within a mesh period, and four mesh periods about the "
-                "largest acceleration. The displacement is mostly the static deflection that turns with the "
-                "carrier, the acceleration the meshes."
+                "Acceleration, velocity and displacement of the fixed point until all repeats, as a rule one "
+                "carrier revolution ({}): largest and smallest value within a mesh period, and four mesh "
+                "periods about the largest acceleration. The displacement is mostly the static deflection that "
+                "turns with the carrier, the acceleration the meshes."
             ),
             "order_spectrum": (
                 "Lines at the fixed sensor ({}): a wave of n nodal diameters at mesh harmonic h is heard at "

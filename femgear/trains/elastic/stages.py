@@ -79,7 +79,6 @@ from femgear.trains.elastic.checks import (
     max_nodal_diameter,
     missing_level,
     no_runup,
-    record_periods,
     runup_ends,
     slowest_wave,
 )
@@ -328,7 +327,6 @@ def solve_modes(
             contact=case.static.contact,
             deviations=None if deviations.ideal else deviations,
             supports=linear_supports(case),
-            periods=record_periods(case, gears),
             options=CycleOptions(progress=partial(progress, "modes"), **over_width(case, gears, loaded=True)),
         ),
     )
