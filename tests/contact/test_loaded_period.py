@@ -1,6 +1,7 @@
 """The loaded state over one mesh period: jumps enclosed, equal planets equal, what couples the meshes."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from femgear.contact.cycle import CycleOptions, planet_symmetry, walk_mesh_cycle
 from femgear.contact.loaded_period import SHORTEST, LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
-from femgear.gears.deviations import no_deviations
+from femgear.gears.deviations import Runout, no_deviations, planet_shift
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
@@ -169,3 +170,97 @@ def test_cubics_between_the_positions_keep_enclosed_jumps():
         straight = np.interp(at, tau, values[0], period=1.0)
         assert np.abs(found - exact(at))[inner].max() < 0.4 * np.abs(straight - exact(at))[inner].max()
         assert np.abs(found - exact(at))[at != 0.375].max() < 5e-3
+
+
+# --- errors that turn -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Records of few positions: what is compared here holds for any of them."""
+    for name, value in (("SHORTEST", 0.02), ("SMOOTHEST", 0.05), ("STEEP", 0.2), ("MISSED", 0.05)):
+        monkeypatch.setattr(f"femgear.contact.loaded_period.{name}", value)
+
+
+def _pattern(*values, teeth=21):
+    return np.resize(1e-6 * np.array(values, float), teeth)
+
+
+def _mounted():
+    """One tooth of every planet with an error, so that after 14 1/4 mesh periods the next planet has it."""
+    phases = small_set(equal_planet_angles(4)).mesh_phases[:4]
+    turned = np.rint(14.25 * np.arange(4) + phases - phases[0]).astype(int)
+    return np.array([np.roll(3e-6 * (np.arange(19) == 0), n) for n in turned])
+
+
+MOUNTED = _mounted()
+
+
+@pytest.mark.parametrize(
+    ("torque", "angles", "changes", "periods", "parts"),
+    [
+        (-TORQUE, 4, {"sun_runout": Runout(4e-6, 0.3)}, 21, 4),
+        (TORQUE, 4, {"sun_pitch": _pattern(2, -1, 0)}, 3, 4),
+        (-TORQUE, PAIRS, {"sun_pitch": _pattern(2, -1, 0), "pin_errors": [[0, 3e-6], [0, 0]] * 2}, 3, 2),
+        (TORQUE, 4, {"sun_pitch": _pattern(2, -1, 0), "pin_errors": [[0, 3e-6]] + [[0, 0]] * 3}, 3, 1),
+        (TORQUE, 4, {"planet_pitch": MOUNTED}, 19, 4),
+        (-TORQUE, 4, {"planet_ring_side_pitch": MOUNTED}, 19, 4),
+    ],
+)
+def test_planets_repeat_one_another_where_errors_turn(
+    bodies, coarse, torque, angles, changes, periods, parts
+):
+    """Of the record one part is solved: all of it is what a walk finds at its positions."""
+    gears = small_set(equal_planet_angles(4) if angles == 4 else angles)
+    d = replace(no_deviations(gears), **changes)
+    options = dict(sun_torque=torque, supports=SUPPORTS, deviations=d)
+    found = loaded_period(gears, bodies, bodies, positions=8, **options)
+    assert found.periods == periods and found.position[-1] < periods
+    first = found.position[found.position < periods / parts - 1e-9]
+    assert len(found.position) == parts * len(first)
+    some = np.arange(len(found.position))[1 :: 5 if periods < 10 else 37]
+    walk = walk_mesh_cycle(gears, bodies, positions=found.position[some], periods=periods, **options)
+    for name in ("force", "deflection", "stiffness"):
+        expected = getattr(walk, name)
+        difference = np.abs(getattr(found, name)[:, some] - expected).max()
+        assert difference < 1e-8 * np.abs(expected).max()
+    # between the positions the record goes through its own values
+    again = found.resampled("force", 64 * periods)
+    assert again[:4].sum(axis=0) == pytest.approx(abs(torque) / gears.sun.base_radius, rel=1e-3)
+
+
+def test_planets_alike_but_for_the_tooth_that_begins_do_not_repeat_one_another():
+    """Errors of planets count from tooth 0, which meets the sun at its own time: the mounting decides."""
+    gears = small_set(equal_planet_angles(4))
+    even = no_deviations(gears)
+    alike = replace(even, planet_runout=(Runout(4e-6),) * 4)
+    assert planet_shift(alike, gears, 4, 19) is None
+    assert planet_shift(replace(even, sun_runout=Runout(4e-6)), gears, 4, 21) == Fraction(21, 4)
+    assert planet_shift(replace(even, planet_pitch=MOUNTED), gears, 4, 19) == Fraction(57, 4)
+    assert planet_shift(replace(even, planet_pitch=MOUNTED, sun_runout=Runout(4e-6)), gears, 4, 399)
+    other = MOUNTED.copy()
+    other[2] = np.roll(other[2], 1)
+    assert planet_shift(replace(even, planet_pitch=other), gears, 4, 19) is None
+
+
+def test_runout_of_the_sun_shares_the_load_as_the_meshes_are_soft(bodies, coarse):
+    """Sun on rigid bearings, its runout e small: planets take up ``e cos`` of their angle, in closed form.
+
+    The arcs of all planets behind the sun are one, and runout separates them by ``e cos(a - psi_j)``, whose
+    sum vanishes: to first order the sun keeps its angle and the planets share ``f = -s/c``, with c the
+    compliance of a planet's two meshes to forces that go around like ``exp(i psi_j)``.
+    """
+    gears, size = small_set(equal_planet_angles(4)), 0.05e-6
+    d = replace(no_deviations(gears), sun_runout=Runout(size))
+    options = dict(sun_torque=TORQUE, positions=24)
+    found = loaded_period(gears, bodies, bodies, deviations=d, **options)
+    force = np.fft.rfft(found.resampled("force", 21 * 840), axis=1)[:, 1] * 2 / (21 * 840)
+    position = np.arange(84) / 84
+    one = walk_mesh_cycle(
+        gears, bodies, sun_torque=TORQUE, positions=position, options=CycleOptions(held_bodies=bodies)
+    )
+    C = one.held_compliance.reshape(2, 4, 2, 4, -1).sum(axis=(0, 2))
+    wave = np.exp(1j * np.asarray(gears.planet_angles))
+    expected = size * np.array([np.linalg.solve(C[..., p], wave) for p in range(84)]).mean(axis=0)
+    assert np.abs(force[:4]) == pytest.approx(np.abs(expected), rel=0.02)
+    assert np.abs(force[:4]) == pytest.approx(np.full(4, np.abs(force[0])), rel=1e-9)

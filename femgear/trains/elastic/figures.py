@@ -570,8 +570,8 @@ FIGURES = STATIC | {
             "housing_signal": (
                 "Acceleration, velocity and displacement of the fixed point until all repeats, as a rule one "
                 "carrier revolution ({}): largest and smallest value within a mesh period, and four mesh "
-                "periods about the largest acceleration. The displacement is mostly the static deflection that "
-                "turns with the carrier, the acceleration the meshes."
+                "periods about the largest acceleration. The displacement is mostly the static deflection "
+                "that turns with the carrier, the acceleration the meshes."
             ),
             "order_spectrum": (
                 "Lines at the fixed sensor ({}): a wave of n nodal diameters at mesh harmonic h is heard at "

@@ -236,7 +236,6 @@ def test_what_the_dynamics_cannot_represent_is_refused_before_computing(case):
         ("operation.fixed", "carrier", "E-FIXED-MEMBER"),
         ("operation.torque", "0 N m", "E-NO-LOAD"),
         ("operation.speeds", ["1e6 rpm"], "E-RANGE"),
-        ("sun.errors", {"runout_amplitude": "5 um"}, "E-PERIODS"),
     ):
         changed = with_value(case, key, value)
         with pytest.raises(CaseError, match=code):

@@ -1,0 +1,233 @@
+"""Errors that turn with gears, from the record over several mesh periods to the lines of a fixed sensor."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from validation.dynamics import shooting
+
+from femgear.case.dependencies import Steps
+from femgear.case.gear_set import planetary_set
+from femgear.errors import CaseError
+from femgear.housing.orders import OrderSpectrum, analytic_signal
+from femgear.housing.sensor import component_lines, fixed_sensor_signal, stored_lines
+from femgear.housing.sound import component_sound, sound_power, sound_pressure
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.stability.parametric import stability
+from femgear.system.fourier import harmonics_of, sample
+from femgear.trains.elastic.checks import check_dynamic_case, no_runup
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.reading import read_case, with_values
+from femgear.trains.static.stages import solve_static
+
+pytestmark = pytest.mark.usefixtures("coarse_states")
+ROOT = Path(__file__).parents[3]
+COARSE = {
+    "static.positions": 16,
+    "static.flank_elements": 8,
+    "dynamics.up_to": "6 kHz",
+    "operation.speeds": ["600 rpm", "2000 rpm"],
+    "housing.published": [],
+}
+FOUR = {
+    **COARSE,
+    "set.planets": 4,
+    "set.centre_distance": "40.1 mm",
+    "sun.teeth": 21,
+    "sun.module": "2 mm",
+    "sun.bore_radius": "8 mm",
+    "sun.profile_shift": None,
+    "planet.teeth": 19,
+    "planet.bore_radius": "9 mm",
+    "planet.profile_shift": 0.0,
+    "ring.teeth": 59,
+    "ring.outer_radius": "75 mm",
+    "ring.tip_diameter": "114.6 mm",
+    "ring.profile_shift": None,
+}
+
+
+def pitch(*values, teeth):
+    """Displacements of all teeth in a pattern, as an entry of a case."""
+    return [f"{value} um" for value in np.resize(values, teeth)]
+
+
+@pytest.fixture(scope="module")
+def steps():
+    """Grids, compliances and ring models, which the cases of this file share."""
+    return Steps()
+
+
+@pytest.fixture(scope="module")
+def solved(steps):
+    """A function: modes, dynamics and housing of the reference set, or of four planets, with changes."""
+
+    def solve(changes, base=COARSE):
+        case = with_values(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), {**base, **changes})
+        static = solve_static(case, steps=steps)
+        modes = solve_modes(case, static, steps=steps)
+        dynamics = solve_dynamics(case, static, modes)
+        return case, modes, dynamics, solve_housing(case, dynamics)
+
+    return solve
+
+
+@pytest.fixture(scope="module")
+def three(solved):
+    """A pin error, a planet with an error of every fifth tooth, a sun with one of every third."""
+    return solved(
+        {
+            "set.pin_errors": [{"planet": 1, "tangential": "1 um"}],
+            "sun.errors": {"cumulative_pitch": pitch(2, -1, 0, teeth=27)},
+            "planet.individual": [{"planet": 2, "cumulative_pitch": pitch(2, 0, 0, -1, 0, teeth=40)}],
+        }
+    )
+
+
+def test_at_standstill_the_dynamics_are_the_static_record(three, steps):
+    """Of both the harmonics that excite: at 0.01 rpm the lowest modes are far above them."""
+    modes = three[1]
+    assert modes.state.periods == modes.excitation.periods == 15
+    few = {"dynamics.up_to": None, "dynamics.mesh_harmonics": 40, "dynamics.tolerance": 1e-9}
+    slow = with_values(three[0], {"operation.speeds": ["0.01 rpm"], **few})
+    static = solve_static(slow, steps=steps)
+    result = solve_dynamics(slow, static, solve_modes(slow, static, steps=steps))
+    excited = 15 * round(result.excitation_limit[0] / result.response.mesh_frequency[0])
+    for name, lines in (("deflection", result.dte[0]), ("force", result.response.force[0])):
+        wanted = sample(harmonics_of(modes.state.resampled(name, 15 * 8192), excited), 2**16)
+        found = sample(lines[:, : excited + 1], 2**16)
+        assert np.abs(found - wanted).max() < 1e-3 * np.ptp(wanted, axis=1).max(), name
+
+
+def test_every_line_is_that_of_time_integration_over_the_whole_record(three):
+    """As a record of one long period, by an integrator of its own; multipliers of that period too."""
+    _, modes, *_ = three
+    keep = np.flatnonzero(modes.modes.frequency < 4000.0)
+    basis, excitation = modes.modes, modes.excitation
+    low = basis.frequency < 4000.0
+    rest = (
+        basis.mesh_deflection[:, ~low] / (2 * np.pi * basis.frequency[~low]) ** 2
+    ) @ basis.mesh_deflection[:, ~low].T
+    basis = replace(
+        basis, residual=basis.residual + rest, kind=tuple(basis.kind[i] for i in keep),
+        **{n: getattr(basis, n)[low] for n in ("frequency", "damping_ratio", "nodal_diameter", "modal_load")},
+        **{n: getattr(basis, n)[:, low] for n in ("shape", "mesh_deflection")},
+    )  # fmt: skip
+    found = solve_spectral(
+        basis, excitation, 900.0, excitation_harmonics=1, response_harmonics=4, tolerance=1e-11
+    )
+    whole, multipliers = shooting(basis, replace(excitation, periods=1), 900.0 / 15, harmonics=15, count=1024)
+    ours = sample(found.deflection[0], 1024)
+    assert np.abs(ours - whole).max() < 1e-4 * np.ptp(whole, axis=1).max()
+    verdict = stability(basis, excitation, 900.0, excitation_harmonics=1)
+    assert verdict.modulus[0] == pytest.approx(np.abs(multipliers).max(), rel=1e-3)
+
+
+def test_a_record_over_more_periods_than_it_needs_changes_nothing(three):
+    """Three times over: every third line, and in the housing the same lines, levels and sound."""
+    case, modes, dynamics, housing = three
+    one = modes.excitation
+    tiled = {name: np.tile(getattr(one, name), (1, 3)) for name in ("stiffness", "deflection", "force")}
+    longer = replace(modes, excitation=replace(one, **tiled, periods=3 * one.periods))
+    options = {"excitation_harmonics": 3, "response_harmonics": 6, "method": "direct"}
+    short, long = (solve_spectral(m.modes, m.excitation, [300.0, 900.0], **options) for m in (modes, longer))
+    size = np.abs(short.deflection).max()
+    assert np.abs(long.deflection[..., ::3] - short.deflection).max() < 1e-10 * size
+    others = np.arange(long.deflection.shape[-1]) % 3 > 0
+    assert np.abs(long.deflection[..., others]).max() < 1e-10 * size
+    field = dynamics.ring_radial
+    spread = np.zeros((len(field), 3 * field.shape[1] - 2, field.shape[2]), complex)
+    spread[:, ::3] = field
+    place = case.ring.teeth, housing.exact.carrier_speed
+    again = component_lines(spread, *place, 0.0, periods=45)
+    assert again.turns == housing.exact.turns == 5
+    some = np.searchsorted(again.number, housing.exact.number)
+    assert np.abs(again.displacement[:, some] - housing.exact.displacement).max() < 1e-10 * size
+    heard = housing.cylinder, housing.microphone
+    sound = component_sound(spread, *place, *heard, periods=45)
+    for ours, other in zip(sound, housing.sound):
+        assert np.abs(ours[:, some] - other).max() < 1e-10 * np.abs(other).max()
+
+
+def test_one_component_a_line_sounds_as_the_lines_do(three):
+    case, _, dynamics, housing = three
+    field = dynamics.ring_radial[:, ::15]  # whole mesh harmonics alone
+    place = case.ring.teeth, housing.exact.carrier_speed
+    lines = component_lines(field, *place, 0.0)
+    pressure, power, equivalent = component_sound(
+        field, *place, housing.cylinder, housing.microphone, periods=1
+    )
+    expected = sound_pressure(lines, housing.cylinder, housing.microphone)
+    assert np.abs(pressure - expected).max() < 1e-12 * np.abs(expected).max()
+    for ours, same in ((power, False), (equivalent, True)):
+        expected = sound_power(lines, housing.cylinder, equivalent=same)
+        # the static field, which is hardly heard, has two components a line
+        assert ours[:, 30:] == pytest.approx(expected[:, 30:], rel=1e-9, abs=1e-15 * expected.max())
+
+
+def test_signals_over_several_turns_are_the_sum_of_their_lines(three):
+    *_, housing = three
+    lines = replace(
+        housing.exact,
+        displacement=housing.exact.displacement[0],
+        carrier_speed=housing.exact.carrier_speed[0],
+    )
+    signal = fixed_sensor_signal(lines)
+    assert lines.turns == 5 and signal.revolution[-1] < 5.0
+    some = np.arange(len(signal.revolution))[:: len(signal.revolution) // 40]
+    wave = np.exp(2j * np.pi * np.outer(signal.revolution[some], lines.order))
+    assert signal.acceleration[some] == pytest.approx(
+        np.real(wave @ lines.acceleration), abs=1e-9 * np.abs(signal.acceleration).max()
+    )
+    spectrum = OrderSpectrum(lines.order, lines.acceleration, lines.turns)
+    analytic = analytic_signal(spectrum)
+    at = np.arange(len(analytic))[:: len(analytic) // 40]
+    wave = np.exp(2j * np.pi * np.outer(5.0 * at / len(analytic), lines.order))
+    assert analytic[at].real == pytest.approx(
+        np.real(wave @ lines.acceleration), abs=1e-9 * np.abs(signal.acceleration).max()
+    )
+    stored = stored_lines(housing.dataset().isel(speed=0))
+    assert stored.turns == 5 and np.array_equal(stored.order, lines.order[: len(stored.order)])
+
+
+def test_orders_obey_the_rule_of_turns_in_space(solved):
+    """``L = N q + m S``: four planets, a sun that turns 80/21 times, its error seven waves in a turn."""
+    *_, housing = solved({"sun.errors": {"cumulative_pitch": pitch(3, -1, 0, teeth=21)}}, FOUR)
+    lines = housing.exact
+    assert lines.turns == 3 and not (lines.number != np.rint(3 * lines.order)).any()
+    amplitude = np.abs(lines.acceleration)
+    # 4 q + 80 m/3: multiples of 4/3
+    forbidden = lines.number % 4 != 0
+    assert forbidden.mean() > 0.7
+    assert (amplitude[:, forbidden].max(axis=1) < 1e-10 * amplitude.max(axis=1)).all()
+    third = (lines.number % 4 == 0) & (lines.number % 3 != 0)
+    assert (amplitude[:, third].max(axis=1) > 1e-3 * amplitude.max(axis=1)).all()
+
+
+def test_errors_of_a_ring_that_stands_still_leave_multiples_of_the_planets(solved):
+    """Its teeth turn in the frame of the carrier, not in space."""
+    *_, housing = solved({"ring.errors": {"cumulative_pitch": pitch(3, -1, 0, teeth=108)}})
+    lines = housing.exact
+    amplitude = np.abs(lines.acceleration)
+    assert lines.turns == 1 and lines.method == "exact, 3 mesh periods"
+    forbidden = lines.order % 3 != 0
+    assert (amplitude[:, forbidden].max(axis=1) < 1e-10 * amplitude.max(axis=1)).all()
+
+
+def test_what_takes_one_mesh_period_says_so(three):
+    case = three[0]
+    gears = planetary_set(case)
+    support = {"angle": "0 deg", "radial_stiffness": "1e8 N/m", "tangential_stiffness": "1e8 N/m"}
+    for changes, words in (
+        ({"housing.form": "linear"}, 'housing.form = "linear" takes one'),
+        ({"housing.support": [support]}, "leave housing.support out"),
+        ({"static.longest_record": 14}, "15 mesh periods, after which all repeats .sun 3, planets 5."),
+    ):
+        changed = with_values(case, changes)
+        with pytest.raises(CaseError, match="E-PERIODS") as refused:
+            check_dynamic_case(changed, gears)
+        assert re.search(words, str(refused.value))
+    assert "turn" in no_runup(case)
+    assert no_runup(with_values(case, {"sun.errors": {}, "planet.individual": []})) == ""
