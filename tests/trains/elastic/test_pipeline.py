@@ -83,6 +83,24 @@ def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_
     assert force == pytest.approx(abs(static.sun_torque) / static.planetary_set.sun.base_radius / 3, rel=1e-3)
 
 
+def test_at_standstill_errors_that_turn_are_those_of_the_static_record(case, steps):
+    """0.01 rpm, the harmonics that excite: of deflections and forces, a thousandth of their fluctuation."""
+    errors = {
+        "sun.errors": {"cumulative_pitch": ["4 um", "-2 um", "0 um"] * 9},
+        "set.pin_errors": [{"planet": 1, "tangential": "2 um"}],
+    }
+    slow = {"operation.speeds": ["0.01 rpm"], "dynamics.mesh_harmonics": 40, "dynamics.tolerance": 1e-9}
+    case = with_values(case, {**errors, **slow})
+    static = solve_static(case, steps=steps)
+    modes = solve_modes(case, static, steps=steps)
+    result = solve_dynamics(case, static, modes)
+    assert modes.state.periods == 3
+    for name, lines in (("deflection", result.dte[0]), ("force", result.response.force[0])):
+        wanted = sample(harmonics_of(modes.state.resampled(name, 3 * 8192), 3 * 40), 2048)
+        found = sample(lines[:, : 3 * 40 + 1], 2048)
+        assert np.abs(found - wanted).max() < 1e-3 * np.ptp(wanted, axis=1).max(), name
+
+
 def every_diameter(modes, response):
     """Radial field of the ring at all nodal diameters."""
     return mesh_and_ring_outputs(replace(modes, symmetry=1), response)[1]

@@ -16,7 +16,7 @@ from femgear.housing.sensor import component_lines, fixed_sensor_signal, stored_
 from femgear.housing.sound import component_sound, sound_power, sound_pressure
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import stability
-from femgear.system.fourier import harmonics_of, sample
+from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import check_dynamic_case, no_runup
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_values
@@ -84,21 +84,6 @@ def three(solved):
             "planet.individual": [{"planet": 2, "cumulative_pitch": pitch(2, 0, 0, -1, 0, teeth=40)}],
         }
     )
-
-
-def test_at_standstill_the_dynamics_are_the_static_record(three, steps):
-    """Of both the harmonics that excite: at 0.01 rpm the lowest modes are far above them."""
-    modes = three[1]
-    assert modes.state.periods == modes.excitation.periods == 15
-    few = {"dynamics.up_to": None, "dynamics.mesh_harmonics": 40, "dynamics.tolerance": 1e-9}
-    slow = with_values(three[0], {"operation.speeds": ["0.01 rpm"], **few})
-    static = solve_static(slow, steps=steps)
-    result = solve_dynamics(slow, static, solve_modes(slow, static, steps=steps))
-    excited = 15 * round(result.excitation_limit[0] / result.response.mesh_frequency[0])
-    for name, lines in (("deflection", result.dte[0]), ("force", result.response.force[0])):
-        wanted = sample(harmonics_of(modes.state.resampled(name, 15 * 8192), excited), 2**16)
-        found = sample(lines[:, : excited + 1], 2**16)
-        assert np.abs(found - wanted).max() < 1e-3 * np.ptp(wanted, axis=1).max(), name
 
 
 def test_every_line_is_that_of_time_integration_over_the_whole_record(three):
