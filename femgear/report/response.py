@@ -68,18 +68,19 @@ MODE_CAPTIONS = {
 """Of `mode_shapes`."""
 RESPONSE_CAPTIONS = {
     "dynamic_transmission_error": (
-        "Dynamic transmission error over the mesh period, or over all until errors that turn repeat, beside "
-        "the static one of the set on its supports, both without their mean: what the dynamic curve has more "
-        "is vibration. The static curve has the harmonics of the excitation alone: what rings in both is the "
-        "cut series."
+        "Dynamic transmission error over one mesh period beside the static one of the set on its supports, "
+        "both without their mean: what the dynamic curve has more is vibration. The static curve has the "
+        "harmonics of the excitation alone: what rings in both is the cut series. With errors that turn, "
+        "over all mesh periods until these repeat."
     ),
     "mesh_forces": (
-        "Mesh forces over the mesh period, or over all until errors that turn repeat, and the dynamic factor "
-        "K_v, largest over mean force: that of the mesh of a kind where it is the largest."
+        "Mesh forces over one mesh period, and the dynamic factor K_v, largest over mean force: that of the "
+        "mesh of a kind where it is the largest. With errors that turn, over all mesh periods until these "
+        "repeat."
     ),
     "dynamic_spectrum": (
         "Harmonics of the dynamic transmission error, down to five decades below the largest; dotted: end of "
-        "the excitation. Humps at one frequency at several speeds are resonances. With errors that turn the "
+        "the excitation. Humps at one frequency at several speeds are resonances. With errors that turn, the "
         "largest of all meshes of a kind."
     ),
     "speed_sweep": (

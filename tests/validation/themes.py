@@ -43,6 +43,7 @@ from validation import (
     stress,
     support_stiffness,
     torque_rotation,
+    turning,
     two_body,
     vibration,
 )
@@ -307,7 +308,7 @@ THEMES = (
         "6 mesh harmonics of the excitation, 5 % modal damping. Differences are those of the mesh "
         "deflections.",
         (dynamics.fixed_point, dynamics.harmonics_kept, dynamics.modes_kept, dynamics.time_integration),
-        (dynamics.more_time_integration,),
+        (dynamics.more_time_integration, turning.time_integration, turning.standstill),
     ),
     Theme(
         "levels",
@@ -408,6 +409,7 @@ THEMES = (
             housing.higher_harmonics,
             housing.resonances,
         ),
+        (turning.orders,),
     ),
     Theme(
         "fixed_housing",

@@ -568,10 +568,10 @@ FIGURES = STATIC | {
     "housing": Figures(
         {
             "housing_signal": (
-                "Acceleration, velocity and displacement of the fixed point until all repeats, as a rule one "
-                "carrier revolution ({}): largest and smallest value within a mesh period, and four mesh "
-                "periods about the largest acceleration. The displacement is mostly the static deflection "
-                "that turns with the carrier, the acceleration the meshes."
+                "Acceleration, velocity and displacement of the fixed point during one carrier revolution "
+                "({}): largest and smallest value within a mesh period, and four mesh periods about the "
+                "largest acceleration. The displacement is mostly the static deflection that turns with the "
+                "carrier, the acceleration the meshes. With errors that turn, until all repeats."
             ),
             "order_spectrum": (
                 "Lines at the fixed sensor ({}): a wave of n nodal diameters at mesh harmonic h is heard at "
