@@ -242,9 +242,13 @@ def _whole_period(
     values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
         moved = (np.arange(N) - ahead * (step * part % parts)) % N
-        meshes = np.concatenate([moved + first for first in range(0, len(mean), N)])
+        meshes, own = (
+            np.concatenate([planets + first for first in range(0, len(mean), N)])
+            # planets that are alike at all times are one
+            for planets in (moved, moved % (ahead * parts))
+        )
         for name in names:
-            values[name].append(record[name][meshes][:, shown])
+            values[name].append(record[name][own][:, shown])
         mean += compliance[np.ix_(meshes, meshes)] / parts
     return LoadedPeriod(
         position=np.concatenate([tau + part / parts * periods for part in range(parts)]),

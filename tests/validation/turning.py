@@ -88,7 +88,7 @@ def _solved(which: str):
         "ring": {"ring.errors": {"cumulative_pitch": pitch(4, -2, 0, teeth=108)}},
         "four": FOUR_PLANETS | {"sun.errors": {"cumulative_pitch": pitch(4, -2, 0, teeth=21)}},
     }
-    run = {"housing.form": "exact", "dynamics.tolerance": 1e-9, "operation.speeds": ["600 rpm", "2000 rpm"]}
+    run = {"housing.form": "exact", "dynamics.tolerance": 1e-9, "operation.speeds": ["2000 rpm", "3100 rpm"]}
     if which == "sun and pin":
         run["operation.speeds"] = ["0.01 rpm"]
     return solve(with_values(reference_case(), run | changes[which]), "housing")
@@ -121,7 +121,7 @@ def standstill() -> tuple[Row, ...]:
 
 def orders() -> tuple[Row, ...]:
     """Orders ``N q + m S``: only those of the error's turns in space."""
-    rule = "order rule L = N q + m S"
+    rule = "order rule L = N q + m S, at 2000 and 3100 rpm"
     four, ring = (_solved(name)["housing"].exact for name in ("four", "ring"))
     words = (
         "21/19/59, pattern of three teeth of the sun: largest line off the multiples of 4/3 over the largest"
