@@ -102,10 +102,13 @@ class Heard:
 
 def _solve(case, progress):
     """Static, dynamic and housing results of the case."""
+    from femgear.case.gear_set import planetary_set
     from femgear.run import grid_cache
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.rigid import check_one_period
     from femgear.trains.static.stages import solve_static
 
+    check_one_period(case, planetary_set(case), "this script takes")
     static = solve_static(case, cache=grid_cache(), progress=progress)
     progress("modes", 0, 1)
     modes = solve_modes(case, static)

@@ -14,7 +14,10 @@ from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, analytic_signal
 from femgear.housing.sensor import component_lines, fixed_sensor_signal, stored_lines
 from femgear.housing.sound import component_sound, sound_power, sound_pressure
+from femgear.report import response
 from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.system.fourier import harmonics_of, sample
+from femgear.trains.elastic import figures
 from femgear.trains.elastic.checks import check_dynamic_case, no_runup
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_values
@@ -136,6 +139,32 @@ def test_signals_over_several_turns_are_the_sum_of_their_lines(three):
     )
     stored = stored_lines(housing.dataset().isel(speed=0))
     assert stored.turns == 5 and np.array_equal(stored.order, lines.order[: len(stored.order)])
+
+
+def test_pictures_span_what_repeats(three):
+    """Fifteen mesh periods, five turns; the thin static curve is the record up to the excitation."""
+    _, modes, dynamics, housing = three
+    data, heard = dynamics.dataset(), housing.dataset().isel(speed=[1])
+    assert data.attrs["periods"] == 15 and heard.attrs["turns"] == 5
+    assert data["harmonic"].values[[1, 15]] == pytest.approx([1 / 15, 1.0])
+    rest = modes.dataset()
+    static = rest[["supported_ste"]].rename(supported_ste="ste", supported_position="position")
+    figure = response.transmission_error_period(data, static)
+    thin = next(one for one in figure.axes[0].get_lines() if one.get_linewidth() == 0.9)
+    count = len(thin.get_xdata()) - 1
+    assert figure.axes[0].get_xlim() == (0.0, 15.0) and thin.get_xdata()[-1] == 15.0
+    excited = 15 * round(dynamics.excitation_limit[0] / dynamics.response.mesh_frequency[0])
+    dense = np.arange(15 * 2**13) / 2**13
+    record = np.interp(dense, modes.state.position, modes.state.deflection[0], period=15.0)
+    wanted = 1e6 * (sample(harmonics_of(record, excited), count) - record.mean())
+    assert thin.get_ydata()[:-1] == pytest.approx(wanted, abs=2e-3 * np.ptp(wanted))
+    signal = figures.housing_signal(heard)
+    assert signal.axes[0].get_xlim() == (0.0, 5.0)
+    lobes = figures.modulation_polar(heard, [0.0, 2.1, 4.2])
+    angle = lobes.axes[0].get_lines()[0].get_xdata()
+    assert np.ptp(angle) == pytest.approx(10 * np.pi) and "a turn" in lobes.axes[0].get_title()
+    figures.order_spectrum(heard), figures.microphone_spectrum(heard)
+    response.transmission_error_spectrum(data), response.mesh_force_period(data)
 
 
 def test_orders_obey_the_rule_of_turns_in_space(solved):
