@@ -361,8 +361,10 @@ def modulation_polar(
         )
         ax.set_rlabel_position(float(np.degrees(lowest)))
         speed = rpm(housing["speed"].values[0])
-        count = f"{len(lobes.position) / spectrum.turns:.4g} lobes" + " a turn" * (spectrum.turns > 1)
-        text = f"{speed}, mesh harmonic {harmonic}: {count} up to {largest:.3g} m/s²"
+        text = f"{speed}, mesh harmonic {harmonic}: {len(lobes.position)} lobes up to {largest:.3g} m/s²"
+        if (turns := spectrum.turns) > 1:
+            count = f"{len(lobes.position) / turns:.4g} lobes/turn"
+            text = f"{speed}, harmonic {harmonic}: {count} up to {largest:.3g} m/s²"
         ax.set_title(f"{text}\nenvelope [m/s²] over angle in the carrier frame", fontsize=SMALL, pad=12)
     legend_below(figure, columns=3 if supports else 4)
     return figure

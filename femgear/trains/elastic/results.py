@@ -657,8 +657,9 @@ def _shown_harmonics(spectrum, teeth: int, given: int | None) -> list[int]:
     highest = round(float(spectrum.order[-1]) / teeth)
     if given is not None:
         return list(range(1, min(given, highest) + 1))
-    bands = np.abs(spectrum.order[None] / teeth - np.arange(1, highest + 1)[:, None]) <= 0.5
-    strongest = np.where(bands, spectrum.amplitude[None], 0.0).max(axis=1).argsort()[::-1][:_STRONGEST] + 1
+    bands = np.zeros(highest + 1)
+    np.maximum.at(bands, np.rint(spectrum.order / teeth).astype(int), spectrum.amplitude)
+    strongest = bands[1:].argsort()[::-1][:_STRONGEST] + 1
     return sorted({*range(1, min(_FIRST, highest) + 1), *strongest.tolist()})
 
 

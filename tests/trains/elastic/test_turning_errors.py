@@ -162,7 +162,7 @@ def test_pictures_span_what_repeats(three):
     assert signal.axes[0].get_xlim() == (0.0, 5.0)
     lobes = figures.modulation_polar(heard, [0.0, 2.1, 4.2])
     angle = lobes.axes[0].get_lines()[0].get_xdata()
-    assert np.ptp(angle) == pytest.approx(10 * np.pi) and "a turn" in lobes.axes[0].get_title()
+    assert np.ptp(angle) == pytest.approx(10 * np.pi) and "lobes/turn" in lobes.axes[0].get_title()
     figures.order_spectrum(heard), figures.microphone_spectrum(heard)
     response.transmission_error_spectrum(data), response.mesh_force_period(data)
 
