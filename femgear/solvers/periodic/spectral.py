@@ -27,7 +27,8 @@ _STILL = 1e-12
 _UNDAMPED = 1e-10
 # Harmonics of speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 4000
-# Krylov steps of the first cycle at most, twice as many of each one after it; cycles, their residual, and that which single precision reaches.
+# Krylov steps of the first cycle at most, of each one after it twice as many; cycles, their residual, and
+# that which single precision reaches.
 _KRYLOV, _CYCLES, _ROUNDING, _SINGLE = 250, 4, 1e-13, 1e-7
 # Unknowns of one speed up to which the spectral radius is exact.
 _FEW = 60
