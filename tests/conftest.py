@@ -33,13 +33,52 @@ if pytest.approx(1e-20) == 2e-20:
 
 TESTS = Path(__file__).parent
 
+
+def pytest_collection_finish():
+    """Test modules stay: no collection need walk them again."""
+    gc.freeze()
+
+
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "scripts")]
 
+from computed_once import kept  # noqa: E402
 from small_systems import chain_excitation, geared_chain, planet_excitation, planet_set  # noqa: E402, F401
 
 
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory):
+    """Folder of what the workers of one session compute once for both, or None in a session of one process.
+
+    Nothing is shared there, so that tests/tools/mutation.py sees which test runs which line.
+    """
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return None
+    # the folder of a worker stands in that of the session
+    folder = tmp_path_factory.getbasetemp().parent / "computed_once"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 @pytest.fixture(scope="session", autouse=True)
-def gmsh_is_loaded_once():
+def bodies_are_computed_once(shared):
+    """A third of these are computed for several tests. What a test itself imports is as it is."""
+    from femgear.contact import bodies, width_waves
+    from femgear.trains.static import stages
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name in (
+            (bodies, "stiffness"),
+            (bodies, "flank_compliance"),
+            (width_waves, "_wave_compliance"),
+            (stages, "root_stress"),
+            (stages, "root_waves"),
+        ):
+            patch.setattr(module, name, kept(getattr(module, name), shared))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def gmsh_is_loaded_once(shared):
     """The worker of Gmsh runs within the tests: to start a process takes ten times as long as a grid.
 
     tests/fe/test_meshing.py has the process back.
@@ -52,17 +91,22 @@ def gmsh_is_loaded_once():
     # Gmsh has one global model
     one_at_a_time = threading.Lock()
 
+    def answer(words):
+        said, output = io.StringIO(), io.BytesIO()
+        with one_at_a_time, contextlib.redirect_stderr(said):
+            code = worker.main(io.BytesIO(words), output)
+            if hasattr(signal, "alarm"):
+                signal.alarm(0)
+        return code, output.getvalue(), said.getvalue().encode()
+
+    answer = kept(answer, shared)
+
     class Within:
         TimeoutExpired = subprocess.TimeoutExpired
 
         @staticmethod
         def run(command, *, input, **_):
-            said, output = io.StringIO(), io.BytesIO()
-            with one_at_a_time, contextlib.redirect_stderr(said):
-                code = worker.main(io.BytesIO(input), output)
-                if hasattr(signal, "alarm"):
-                    signal.alarm(0)
-            return subprocess.CompletedProcess(command, code, output.getvalue(), said.getvalue().encode())
+            return subprocess.CompletedProcess(command, *answer(input))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(meshing, "subprocess", Within)

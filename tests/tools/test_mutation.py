@@ -133,7 +133,7 @@ def test_weak(triple):
 COMMAND = """
 import sys
 import mutation
-mutation.LIBRARIES, mutation.PATIENCE = ["pytest", "coverage"], 0.5
+mutation.LIBRARIES, mutation.PATIENCE = ["pytest", "coverage", "hypothesis", "_hypothesis_pytestplugin"], 0.5
 sys.exit(mutation.main(["--modules", "gears", "--count", "99", "--jobs", "1"]))
 """
 
