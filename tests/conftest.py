@@ -5,6 +5,7 @@ import gc
 import importlib.util
 import io
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -46,7 +47,7 @@ from small_systems import chain_excitation, geared_chain, planet_excitation, pla
 
 
 @pytest.fixture(scope="session")
-def shared(tmp_path_factory):
+def folder_of_both_workers(tmp_path_factory):
     """Folder of what the workers of one session compute once for both, or None in a session of one process.
 
     Nothing is shared there, so that tests/tools/mutation.py sees which test runs which line.
@@ -59,8 +60,16 @@ def shared(tmp_path_factory):
     return folder
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session):
+    """Some hundred megabytes for each of the sessions whose folders pytest keeps would be left."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        base = session.config._tmp_path_factory.getbasetemp()
+        shutil.rmtree(base / "computed_once", ignore_errors=True)
+
+
 @pytest.fixture(scope="session", autouse=True)
-def bodies_are_computed_once(shared):
+def bodies_are_computed_once(folder_of_both_workers):
     """A third of these are computed for several tests. What a test itself imports is as it is."""
     from femgear.contact import bodies, width_waves
     from femgear.trains.static import stages
@@ -73,12 +82,12 @@ def bodies_are_computed_once(shared):
             (stages, "root_stress"),
             (stages, "root_waves"),
         ):
-            patch.setattr(module, name, kept(getattr(module, name), shared))
+            patch.setattr(module, name, kept(getattr(module, name), folder_of_both_workers))
         yield
 
 
 @pytest.fixture(scope="session", autouse=True)
-def gmsh_is_loaded_once(shared):
+def gmsh_is_loaded_once(folder_of_both_workers):
     """The worker of Gmsh runs within the tests: to start a process takes ten times as long as a grid.
 
     tests/fe/test_meshing.py has the process back.
@@ -99,7 +108,7 @@ def gmsh_is_loaded_once(shared):
                 signal.alarm(0)
         return code, output.getvalue(), said.getvalue().encode()
 
-    answer = kept(answer, shared)
+    answer = kept(answer, folder_of_both_workers)
 
     class Within:
         TimeoutExpired = subprocess.TimeoutExpired
