@@ -41,6 +41,11 @@ def walk(gears, bodies, waves, overlap, *lead, **options):
     )  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def whole_overlap(gears, bodies, waves):
+    return walk(gears, bodies, waves, 1.0)
+
+
 @pytest.mark.parametrize("lead", [(), (LeadSlope(10e-6), LeadCrowning(3e-6))])
 def test_slices_at_one_position_are_those_of_spur_teeth(gears, bodies, waves, lead):
     """The general solution with laws and compliances of every slice, where they are all the same."""
@@ -72,8 +77,9 @@ def test_meshes_that_only_an_end_of_the_width_loads_are_coupled(gears, bodies, w
     assert np.abs(found - spur).max() < 5e-3 * np.abs(spur).max()
 
 
-def test_a_whole_overlap_ratio_leaves_little_of_the_transmission_error(gears, bodies, waves):
-    ripple = {one: np.ptp(walk(gears, bodies, waves, one).sun_arc) for one in (None, 0.5, 1.0, 2.0)}
+def test_a_whole_overlap_ratio_leaves_little_of_the_transmission_error(gears, bodies, waves, whole_overlap):
+    ripple = {one: np.ptp(walk(gears, bodies, waves, one).sun_arc) for one in (None, 0.5, 2.0)}
+    ripple[1.0] = np.ptp(whole_overlap.sun_arc)
     assert ripple[1.0] < 0.05 * ripple[None] and ripple[2.0] < 0.05 * ripple[None]
     assert 0.3 * ripple[None] < ripple[0.5] < 0.8 * ripple[None]
 
@@ -96,9 +102,9 @@ def test_other_torque_is_the_mirror_image(gears, bodies, waves):
     )
 
 
-def test_loads_balance_the_torque_and_go_over_the_width(gears, bodies, waves):
+def test_loads_balance_the_torque_and_go_over_the_width(gears, whole_overlap):
     """Forces of all slices at every position, and of every slice over a mesh period."""
-    found = walk(gears, bodies, waves, 1.0)
+    found = whole_overlap
     force = found.slice_load.sum(axis=1).mean(axis=1)[:3].sum(axis=0)
     assert force == pytest.approx(TORQUE / gears.sun.base_radius, rel=1e-9)
     assert found.face_load_factor == pytest.approx(1.0, abs=0.02)

@@ -28,6 +28,11 @@ def case():
 
 
 @pytest.fixture(scope="module")
+def straight(case):
+    return solve_static(case)
+
+
+@pytest.fixture(scope="module")
 def misaligned(case):
     case = with_values(case, {"sun.modifications": [SLOPE, {"kind": "lead crowning", "amount": "2 um"}]})
     return case, solve_static(case)
@@ -65,11 +70,10 @@ def test_the_load_over_the_width_is_drawn(misaligned):
     assert pressure.max() <= largest < 1.1 * pressure.max()
 
 
-def test_root_stresses_of_a_load_without_leads_are_those_of_the_plane(case):
+def test_root_stresses_of_a_load_without_leads_are_those_of_the_plane(case, straight):
     """In every slice, over the whole record and in the range over a turn."""
-    plane, sliced = (
-        solve_stress(one, solve_static(one)) for one in (with_values(case, {"static.slices": 0}), case)
-    )
+    plane = with_values(case, {"static.slices": 0})
+    plane, sliced = solve_stress(plane, solve_static(plane)), solve_stress(case, straight)
     for a, b in zip(plane.roots, sliced.roots, strict=True):
         assert b.over_width.shape[-1] == 7 and b.face_load_factor == pytest.approx(1.0, rel=1e-9)
         assert np.abs(b.over_width - a.over_width).max() < 1e-9 * a.over_width.max()
@@ -186,22 +190,22 @@ def test_axes_askew_in_a_case(case):
     assert found == pytest.approx(data["mesh_misalignment"].values[1].mean() * 1e6, abs=0.006)
 
 
-def test_an_offset_of_leads_is_no_deflection(case):
+def test_an_offset_of_leads_is_no_deflection(case, straight):
     """A lead measured 200 um off its datum: flanks approach by that, teeth do not bend by it."""
     line = {"kind": "measured lead", "places": ["-1 mm", "1 mm"], "deviations": ["-200 um", "-200 um"]}
-    plain, offset = (
-        solve_static(with_values(case, {"sun.modifications": lead})).dataset() for lead in ([], [line])
-    )
+    plain = straight.dataset()
+    offset = solve_static(with_values(case, {"sun.modifications": [line]})).dataset()
     rise = offset["ste"].values[:3] - plain["ste"].values[:3]
     assert rise == pytest.approx(np.full(rise.shape, 200e-6), rel=1e-9)
     assert "W-DEFLECTION" not in offset.attrs["warnings"]
 
 
-def test_modes_know_tilts_and_twists(case):
+def test_modes_know_tilts_and_twists(case, straight):
     """Of the loaded state: wind-up and torsion are in series with the meshes."""
     soft = {"sun.torque_end": "front", "planet.tilt_stiffness": "1e4 N m/rad", **WIND_UP}
+    yielding = with_values(case, soft)
     found = [
-        solve_modes(one, solve_static(one)).dataset()["mesh_stiffness"].values
-        for one in (with_values(case, soft), case)
+        solve_modes(*one).dataset()["mesh_stiffness"].values
+        for one in ((yielding, solve_static(yielding)), (case, straight))
     ]
     assert (found[0] < found[1]).all()
