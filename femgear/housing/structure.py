@@ -13,7 +13,7 @@ positive where the ring gives way to the planet. A mesh force f >= 0 at phi does
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -53,6 +53,10 @@ class FixedStructure(ReadOnlyArrays):
         The same from the path to the sensors [m/N], ``sum_m phi_m conj(P[m, n'])/omega_m^2``.
     sensor_area : (n_sensors,) array, optional
         Of the outer surface that moves as the sensor does, across it [m^2]; 0 of sensors that stand for none.
+    wave_shape : (m, n_waves) complex array
+        The modes in the waves of a ring alone, see `ring_waves`; no waves where there is no such ring.
+    wave_order : (n_waves,) int array
+        Circumferential order n of every wave ``exp(i n phi)``.
 
     Raises
     ------
@@ -68,11 +72,15 @@ class FixedStructure(ReadOnlyArrays):
     residual: np.ndarray
     sensor_residual: np.ndarray
     sensor_area: np.ndarray | None = None
+    wave_shape: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    wave_order: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     def __post_init__(self):
         super().__post_init__()
         (m, width), sensors = self.ring_shape.shape, self.sensor_shape.shape[-1]
+        waves = len(self.wave_order)
         shapes = {
+            "wave_shape": (m if waves else 0, waves), "wave_order": (waves,),
             "natural_frequency": (m,), "damping_ratio": (m,), "ring_shape": (m, width),
             "sensor_shape": (m, sensors), "residual": (width, width), "sensor_residual": (sensors, width),
         }  # fmt: skip
@@ -233,14 +241,32 @@ def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
         ``V`` of the value ``sum_n V[i, n] exp(i n phi)`` at the angle phi for the unit coordinate i: cosine
         and, of paired modes, sine of every mode in turn.
     """
-    mode = np.repeat(np.arange(len(ring.paired)), np.where(ring.paired, 2, 1))
-    sine = np.append(False, mode[1:] == mode[:-1])
+    mode, sine = _coordinates(ring)
     n, single = ring.nodal_diameter[mode], ~ring.paired[mode]
     value = np.where(sine, -1j, 1.0) * np.where(single, 1.0, 0.5) * (ring.norm * values)[mode]
     columns = np.zeros((len(mode), 2 * max_diameter + 1), complex)
     for own, sign in ((n <= max_diameter, 1), ((n <= max_diameter) & ~single, -1)):
         columns[own, max_diameter + sign * n[own]] = value[own] if sign > 0 else np.conj(value[own])
     return columns
+
+
+def _coordinates(ring: CyclicModes) -> tuple[np.ndarray, np.ndarray]:
+    """Mode of every coordinate of a ring, int, and whether it is its sine, bool, (n_coordinates,) each."""
+    mode = np.repeat(np.arange(len(ring.paired)), np.where(ring.paired, 2, 1))
+    return mode, np.append(False, mode[1:] == mode[:-1])
+
+
+def ring_waves(order) -> np.ndarray:
+    """Make waves ``(a - i b)/sqrt 2`` of cosine a and sine b of the coordinates of a ring, a unitary matrix.
+
+    (n_waves, n_coordinates) from the orders (n_waves,) int: n and -n of a pair stand together. In a frame
+    that has turned by the angle theta a wave has the factor ``exp(i n theta)``.
+    """
+    first, half = np.flatnonzero(np.asarray(order) < 0) - 1, np.sqrt(0.5)
+    waves = np.eye(len(order), dtype=complex)
+    waves[first, first] = waves[first + 1, first] = half
+    waves[first, first + 1], waves[first + 1, first + 1] = -1j * half, 1j * half
+    return waves
 
 
 def supported_ring(
@@ -282,13 +308,13 @@ def supported_ring(
     path, radial, tangential = (
         circumferential(ring, one, top) for one in (ring.load[:, 0], ring.output[:, 0], ring.output[:, 1])
     )
-    omega = 2 * np.pi * np.repeat(ring.frequency, np.where(ring.paired, 2, 1))
+    omega = 2 * np.pi * ring.frequency[_coordinates(ring)[0]]
     K, M, n = np.diag(omega**2), np.eye(len(omega)), np.arange(-top, top + 1)
     for one in supports:
         apart = n[:, None] - n
         mean = np.exp(1j * apart * one.angle) * np.sinc(apart * one.width / (2 * np.pi))
-        for stiffness, field in ((one.radial_stiffness, radial), (one.tangential_stiffness, tangential)):
-            both = np.real(field @ mean @ field.conj().T)
+        for stiffness, felt in ((one.radial_stiffness, radial), (one.tangential_stiffness, tangential)):
+            both = np.real(felt @ mean @ felt.conj().T)
             K, M = K + stiffness * both, M + one.mass * both
     square, shape = eigh(K, M)
     square = np.where(square < _FREE * square[-1], 0.0, square)
@@ -304,12 +330,11 @@ def supported_ring(
     heard = np.real(sum(felt))
     waves, sensors = shape.T @ path[:, middle], shape.T @ heard
     kept = square <= (2 * np.pi * max_frequency) ** 2
-    left = waves[~kept] / square[~kept, None]
+    left, (mode, sine) = waves[~kept] / square[~kept, None], _coordinates(ring)
+    order = np.where(sine, -1, 1) * ring.nodal_diameter[mode]
     return FixedStructure(
-        natural_frequency=np.sqrt(square[kept]),
-        damping_ratio=np.full(int(kept.sum()), damping_ratio),
-        ring_shape=waves[kept],
-        sensor_shape=sensors[kept],
-        residual=waves[~kept].T @ left.conj(),
-        sensor_residual=sensors[~kept].T @ left.conj(),
-    )
+        natural_frequency=np.sqrt(square[kept]), damping_ratio=np.full(int(kept.sum()), damping_ratio),
+        ring_shape=waves[kept], sensor_shape=sensors[kept],
+        residual=waves[~kept].T @ left.conj(), sensor_residual=sensors[~kept].T @ left.conj(),
+        wave_shape=(ring_waves(order) @ shape[:, kept]).T, wave_order=order,
+    )  # fmt: skip

@@ -426,7 +426,13 @@ THEMES = (
             fixed_housing.axisymmetric,
             fixed_housing.green,
         ),
-        (fixed_housing.in_time, fixed_housing.by_samples, fixed_housing.reference_set_on_supports),
+        (
+            fixed_housing.in_time,
+            fixed_housing.multipliers,
+            fixed_housing.by_samples,
+            fixed_housing.reference_set_in_its_ring,
+            fixed_housing.reference_set_on_supports,
+        ),
     ),
     Theme(
         "sound",

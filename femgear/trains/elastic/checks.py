@@ -24,7 +24,8 @@ from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.housing.casing_files import named_outputs, read_casing
 from femgear.housing.structure import FixedStructure, Support
-from femgear.report.tables import response_warnings
+from femgear.report.tables import first_speeds, remark, response_warnings
+from femgear.solvers.periodic.solution import CIRCLE
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
 from femgear.trains.static.results import set_warnings
@@ -278,13 +279,6 @@ def case_warnings(case: Case) -> Iterator[Finding]:
             "without damping resonances have no limit, and levels depend on how near a line lies to one",
             remedy="0.02 to 0.05 is usual",
         )
-    if case.housing.stands_still:
-        key = "housing.support" if case.housing.support else "housing.structure"
-        if case.runup.count:
-            yield Finding("W-SUPPORT", key, "the run-up takes the ring without its supports or casing")
-        if case.dynamics.mesh_harmonics is None:
-            text = "a fixed housing is excited by six mesh harmonics: slow speeds lack what lies above"
-            yield Finding("W-EXCITATION", key, text, remedy="give dynamics.mesh_harmonics")
     yield from _wound_up(case)
     if case.planet.bearing_clearance and case.operation.fixed == "ring":
         yield Finding(
@@ -371,7 +365,7 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
 
 
 def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """List what housing.nc says: how far two ways change the level, static compliance that a casing lacks."""
+    """List what housing.nc says: what two ways and more harmonics change, instability, missing compliance."""
     if "one_way_difference" in data:
         apart, speeds = data["one_way_difference"].values, data["speed"].values
         size = np.where(np.isfinite(apart), np.abs(apart), 0.0)
@@ -383,6 +377,20 @@ def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
                 f"speeds more than {_FAR:g} dB away: load factors and dynamics.nc are without them"
             )
             yield Finding("W-ONE-WAY", "", text)
+    change = data["harmonics_change"].values if "harmonics_change" in data else np.zeros(1)
+    change = np.where(np.isfinite(change), change, 0.0)
+    if np.abs(change).max() >= NOTICEABLE:
+        worst = int(np.abs(change).argmax())
+        text = (
+            f"at {data['speed'].values[worst]:.6g} rpm the excitation ends at "
+            f"{data['excitation_limit'].values[worst]:.4g} Hz; twice the mesh harmonics change the level of "
+            f"the housing that stands still by {change[worst]:+.1f} dB"
+        )
+        remedy = "give more dynamics.mesh_harmonics before levels are compared"
+        yield Finding("W-EXCITATION", "dynamics.mesh_harmonics", text, remedy=remedy)
+    if "turn_multiplier" in data and (bad := data["turn_multiplier"].values > 1.0 + CIRCLE).any():
+        speeds = first_speeds(data["speed"].values[bad])
+        yield remark(f"in the housing that stands still the periodic solution is unstable at {speeds}")
     if missing := data.attrs.get("missing_compliance"):
         remedy = "export more modes, or residual vectors, or matrices, unless the casing is as stiff as that"
         yield Finding("W-RESIDUAL", "housing.structure.file", missing, remedy=remedy)

@@ -46,6 +46,7 @@ from femgear.housing.sound import (
 )
 from femgear.report.response import harmonics_of
 from femgear.report.tables import MANY, Block, chosen, tabulate
+from femgear.solvers.periodic.solution import CIRCLE
 from femgear.storage.results import (
     FOURIER,
     complex_entries,
@@ -81,6 +82,8 @@ _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimat
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
 _SUPPORTED = {
+    "harmonics_change": ("dB", "change of the level by twice the mesh harmonics, at some speeds"),
+    "turn_multiplier": ("1", "largest Floquet multiplier over a turn of the carrier, at some speeds"),
     "one_way_level": ("m/s^2", "level by the mesh forces of the ring without its supports"),
     "one_way_difference": ("dB", "level over that by the mesh forces of the ring without its supports"),
     "two_way_residual": ("1", "residual of the two-way equations"),
@@ -167,16 +170,22 @@ class ModesResult:
 class FixedHousing:
     """Ring and casing that stand still, the forces in them, and those in the ring on its foundation alone.
 
-    Sensors of the structure: some at equal distances around the outer surface of a ring on supports, then
-    the displacements ``sensors`` and the forces ``forces`` by name; ``missing`` as in `HousingResult`.
+    The latter where they are asked for. Sensors of the structure: some at equal distances around the outer
+    surface of a ring on supports, then the displacements ``sensors`` and the forces ``forces`` by name;
+    ``missing`` as in `HousingResult`. ``wider`` are forces of twice the mesh harmonics at the speeds number
+    ``wider_at``, ``multiplier`` (speeds,) the modulus of the largest Floquet multiplier over a turn of the
+    carrier, nan where none was computed.
     """
 
     structure: FixedStructure
     two_way: TwoWayResponse
-    one_way: TwoWayResponse
+    one_way: TwoWayResponse | None
     sensors: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     missing: str = ""
+    wider: TwoWayResponse | None = None
+    wider_at: Any = ()
+    multiplier: Any = np.nan
 
 
 @dataclass(frozen=True)
@@ -503,6 +512,10 @@ def describe_housing(data: xr.Dataset) -> Block:
         heard = NO_AREAS
     if both:
         heard += f"; one way: {_ONE_WAY}, and how far the level is from it"
+        judged = data["turn_multiplier"].values
+        judged = judged[np.isfinite(judged)]
+        heard += f"; {int((judged <= 1.0 + CIRCLE).sum())} of {len(judged)} speeds looked at are stable: "
+        heard += "largest Floquet multiplier over a turn of the carrier at most 1"
     speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
     return tabulate("Housing", speeds, columns, (note, heard))
 
@@ -518,23 +531,25 @@ def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
         yield Signal(name, unit, rate, sampled_signal(order, values, speed, samples=samples, rate=rate))
     if "runup" in results.stages:
         lines, pressure = run_up_lines(results.runup, results.housing.attrs)
-        heard = lines.acceleration, pressure
-        for name, unit, values in zip(("accelerometer_run_up", "microphone_run_up"), ("m/s^2", "Pa"), heard):
+        heard = [("accelerometer_run_up", "m/s^2", lines.acceleration)]
+        heard += [] if pressure is None else [("microphone_run_up", "Pa", pressure)]
+        for name, unit, values in heard:
             found = run_up_signal(lines.order, values, lines.base_speed, duration=sampling.run_up, rate=rate)
             yield Signal(name, unit, rate, found, steady=False)
 
 
-def run_up_lines(runup: xr.Dataset, known: Mapping[str, Any]) -> tuple[SensorLines, np.ndarray]:
+def run_up_lines(runup: xr.Dataset, known: Mapping[str, Any]) -> tuple[SensorLines, np.ndarray | None]:
     """Read the lines of the sensor from runup.nc, and compute those of the microphone [Pa].
 
-    ``known`` are the attributes of housing.nc: places of both, ring and air.
+    ``known`` are the attributes of housing.nc: places of both, ring and air. A housing that stands still has
+    several nodal diameters a line, and no microphone there.
     """
     order, carrier = runup["order"].values, runup["carrier_speed"].values
     heard = runup["lines_real"].values + 1j * runup["lines_imag"].values
     displacement = -heard / (np.maximum(order, 1) * carrier[:, None]) ** 2
     place = float(known["sensor_angle"]), int(known["ring_teeth"])
-    lines = SensorLines(order, displacement, carrier, *place, "exact")
-    return lines, microphone_lines(lines, known)
+    lines = SensorLines(order, displacement, carrier, *place, runup.attrs.get("method", "exact"))
+    return lines, microphone_lines(lines, known) if lines.method == "exact" else None
 
 
 def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
@@ -543,7 +558,7 @@ def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float
     if "runup" in results.stages:
         lines, pressure = run_up_lines(results.runup, results.housing.attrs)
         heard = ("m/s^2", lines.acceleration), ("Pa", pressure)
-        parts += [(unit, lines.order, lines.base_speed, values) for unit, values in heard]
+        parts += [(unit, lines.order, lines.base_speed, one) for unit, one in heard if one is not None]
     return line_extent(parts, rate)
 
 

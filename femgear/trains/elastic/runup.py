@@ -3,7 +3,8 @@
 The speeds of the case's section `runup` are equally spaced; operating speeds stand among them, and resonances
 whose peaks are narrower than the steps get speeds of their own
 (`femgear.solvers.linear.resonances.refined_speeds`). Lines of the sensor are those of the exact
-circumferential components, whatever form the housing has.
+circumferential components, whatever form the housing has; in a housing that stands still those of its sensor,
+by the forces of the set in it. Modes and what one does alone are always those of the set on its foundation.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ _SILENT = 1e-6
 """Lines below this share of the largest one of all speeds are left out."""
 _SHOWN = 12
 """Rows of the table of resonances."""
+_STANDING_STILL = ("levels and K_v in the housing that stands still; modes, and alone, on the foundation",)
 
 
 @dataclass(frozen=True)
@@ -65,10 +67,14 @@ class HeardSpeeds:
     lines: np.ndarray
 
 
-def heard_speeds(response: Response, lines: SensorLines) -> HeardSpeeds:
-    """Compute levels, mesh forces and lines of some speeds from their response and lines of the sensor."""
-    force, N = response.force, response.force.shape[1] // 2
-    peak = sample(force, 4 * force.shape[-1]).max(axis=-1)
+def heard_speeds(force: np.ndarray, lines: SensorLines, lowest_force=None) -> HeardSpeeds:
+    """Compute levels, mesh forces and lines of some speeds from mesh forces and lines of the sensor.
+
+    Harmonics (s, 2N, H + 1) of sun-planet, then planet-ring forces [N]; the lowest of all meshes (s,) [N]
+    where it is known better than by samples.
+    """
+    N, sampled = force.shape[1] // 2, sample(force, 4 * force.shape[-1])
+    peak = sampled.max(axis=-1)
 
     def largest(values: np.ndarray) -> np.ndarray:
         return np.stack([values[:, :N].max(axis=1), values[:, N:].max(axis=1)], axis=1)
@@ -78,7 +84,7 @@ def heard_speeds(response: Response, lines: SensorLines) -> HeardSpeeds:
         force_rms=largest(fluctuation(force)),
         force_peak=largest(peak),
         dynamic_factor=largest(peak / np.real(force[..., 0])),
-        lowest_force=response.lowest_force,
+        lowest_force=sampled.min(axis=(1, 2)) if lowest_force is None else lowest_force,
         order=lines.order,
         lines=lines.acceleration.astype(np.complex64),
     )
@@ -161,7 +167,8 @@ class RunupResult:
     """Levels, mesh forces and lines over ``input_speed`` (s,) [rad/s], and the resonances between its ends.
 
     Mesh frequency and end of the excitation (s,) [Hz], speed of the carrier (s,) and operating
-    speeds (n,) [rad/s]. ``resonances`` are the variables of runup.nc, (c,) each.
+    speeds (n,) [rad/s]. ``resonances`` are the variables of runup.nc, (c,) each; ``method`` as in
+    `SensorLines`.
     """
 
     input_speed: np.ndarray
@@ -174,6 +181,7 @@ class RunupResult:
     sensor_angle: float
     operating_speeds: np.ndarray
     unresolved: int
+    method: str = "exact"
 
     def at(self, values: np.ndarray) -> np.ndarray:
         """Interpolate values (s, ...) to the speeds of the resonances, (c, ...)."""
@@ -213,6 +221,7 @@ class RunupResult:
             attrs={
                 "title": "run-up: sensor, mesh forces and resonances over the speed",
                 "sensor_angle": self.sensor_angle,
+                "method": self.method,
                 "ring_teeth": self.ring_teeth,
                 "reference_acceleration": REFERENCE_ACCELERATION,
                 "operating_speeds": as_written(self.operating_speeds / RPM),
@@ -252,6 +261,7 @@ def describe_runup(data: xr.Dataset) -> Block:
         f"excited: modal force of {EXCITED:g} or more of the largest of that harmonic (force share)",
         f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; largest level "
         f"{level[worst]:.4g} m/s² at {speed[worst]:.6g} rpm",
+        *_STANDING_STILL[data.attrs.get("method", "exact") == "exact" :],
     )
     return tabulate("Run-up", sorted(strongest), columns, notes)
 

@@ -47,9 +47,10 @@ from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound, equivalent_sound, surface_sound
 from femgear.housing.structure import FixedStructure, supported_ring
+from femgear.housing.turn_stability import turn_stability
 from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
-from femgear.solvers.linear.modal import output_load, output_response, residual_output
+from femgear.solvers.linear.modal import modal_damping, output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.linear.resonances import (
     ONE_FREQUENCY,
@@ -155,6 +156,13 @@ _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
 _LINES_TOGETHER = 8000
 """Harmonics of the run-up's speeds that are in memory at a time."""
+_MOST_ORDERS = 2500
+"""Carrier orders of the forces in a housing that stands still up to which twice the harmonics are looked at:
+0.8 GB."""
+_JUDGED = 6
+"""Mesh harmonics of the stiffness in the verdict of a housing that stands still, at most."""
+_SPEEDS_IN_HOUSING = 40
+"""Speeds of the run-up in a housing that stands still that are in memory at a time."""
 _BELOW_WAVES = 0.9
 """The run-up ends, unless the case says otherwise, so far below the slowest wave around the ring."""
 _NOTICED, _PACKED, _SECONDS = 2e9, 2.5, 1.5e-5
@@ -478,9 +486,21 @@ def dynamics_parts(
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
             warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
             entries=dynamic_entries(part),
-            fixed=fixed_housing(case, modes, carrier[own]) if case.housing.stands_still else None,
+            fixed=_fixed_part(case, modes, carrier, own) if case.housing.stands_still else None,
         )  # fmt: skip
         progress("dynamics", float(own[-1] + 1), float(len(speeds)))
+
+
+def _fixed_part(case: Case, modes: ModesResult, carrier: np.ndarray, own: np.ndarray) -> FixedHousing:
+    """Housing that stands still at some of the speeds (n_speeds,) of the carrier [rad/s].
+
+    The first and the last of all are solved with twice the mesh harmonics too, some get a verdict.
+    """
+    count = len(carrier)
+    wider, judged = (
+        np.flatnonzero(np.isin(own, some)) for some in (checked_speeds(count, 2), checked_speeds(count))
+    )
+    return fixed_housing(case, modes, carrier[own], wider_at=wider, judged_at=judged)
 
 
 def fixed_harmonics(case: Case) -> tuple[int, int]:
@@ -489,20 +509,35 @@ def fixed_harmonics(case: Case) -> tuple[int, int]:
     return excited, case.dynamics.response_harmonics or 2 * excited
 
 
-def fixed_housing(case: Case, modes: ModesResult, carrier: np.ndarray) -> FixedHousing:
+def fixed_housing(
+    case: Case,
+    modes: ModesResult,
+    carrier: np.ndarray,
+    *,
+    both: bool = True,
+    wider_at: Any = (),
+    judged_at: Any = (),
+) -> FixedHousing:
     """Make the structure of ring and casing, and solve for forces at speeds of the carrier [rad/s].
 
-    Of the set in it, and in the ring on its foundation alone. The meshes keep what higher diameters give.
+    Of the set in it, and if ``both`` in the ring on its foundation alone. The meshes keep what higher
+    diameters give. At the speeds number ``wider_at`` also for forces of twice the mesh harmonics;
+    those number ``judged_at`` get a Floquet verdict.
+    Supports damp nothing: gears and ring have the damping of the set without them. Gears in a casing of a
+    file, which brings its own, have modal damping against a rigid ring.
     """
     gears, ring, n_max = planetary_set(case), modes.ring, fixed_diameters(case)
     low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
     excitation, flexibility = _excitation(gears, replace(ring, **low), modes.state)
     harmonics, damping = fixed_harmonics(case), case.dynamics.damping_ratio
     highest = _MODES_ABOVE * max(modes.reach, harmonics[1] * fastest_mesh_frequency(case, gears))
+    mean, directions = excitation.stiffness.mean(axis=1), modes.model.system.W.copy()
     alone = solve_eigenproblem(
-        gears_alone(modes.model, flexibility), excitation.stiffness.mean(axis=1), damping_ratio=damping,
-        max_frequency=highest,
-    )  # fmt: skip
+        gears_alone(modes.model, flexibility), mean, damping_ratio=damping, max_frequency=highest
+    )
+    directions[modes.model.ring_slice][modes.model.ring_diameter > n_max] = 0.0
+    whole = replace(modes.model.system, W=directions, flexibility=flexibility)
+    damped = modal_damping(whole, mean, damping)
     known: Any = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
     paths = MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), ring.load_angle, modes.symmetry)
     sensors, forces, missing = (), (), ""
@@ -517,9 +552,25 @@ def fixed_housing(case: Case, modes: ModesResult, carrier: np.ndarray) -> FixedH
     else:
         own, (structure, sensors, forces) = paths, _ring_on_supports(case, modes, known)
     solved = partial(solve_two_way, alone, excitation, carrier_speed=carrier, harmonics=harmonics)
-    one_way = solved(supported_ring(ring.modes, (), **known), paths=paths, side_bands=0)
-    two_way, one_way = solved(structure, paths=own), replace(one_way, paths=own)
-    return FixedHousing(structure, two_way, one_way, sensors, forces, missing)
+    joint = None if case.housing.structure else damped
+    plain, one_way = supported_ring(ring.modes, (), **known), None
+    if both:
+        one_way = replace(solved(plain, paths=paths, side_bands=0, damping=damped), paths=own)
+        drag = None if joint is None else one_way.drag @ (plain.wave_shape @ structure.wave_shape.conj().T)
+        one_way = replace(one_way, drag=drag)
+    two_way, wider = solved(structure, paths=own, damping=joint), None
+    orders = gears.n_planets // modes.symmetry * 2 * harmonics[1] * (4 * n_max + 1)
+    wider_at = np.asarray(wider_at if orders <= _MOST_ORDERS else (), int)
+    if len(wider_at):
+        twice: Any = {"carrier_speed": carrier[wider_at], "harmonics": tuple(2 * h for h in harmonics)}
+        wider = solved(structure, paths=own, damping=joint, **twice)
+    multiplier = np.full(len(carrier), np.nan)
+    if len(judged_at):
+        multiplier[judged_at] = turn_stability(
+            alone, excitation, structure, own, carrier[judged_at], damping=joint,
+            harmonics=min(harmonics[0], _JUDGED),
+        ).modulus  # fmt: skip
+    return FixedHousing(structure, two_way, one_way, sensors, forces, missing, wider, wider_at, multiplier)
 
 
 def _ring_on_supports(
@@ -603,19 +654,23 @@ def _standing_still(
 ) -> HousingResult:
     """What sensors and the microphone hear of the structure, by the forces of both routes."""
     structure, exact, top = fixed.structure, found.exact, dynamics.ring_radial.shape[-1] // 2
-    count = structure.sensor_shape.shape[1]
+    count, first = structure.sensor_shape.shape[1], _radial_sensor(fixed, exact.sensor_angle, top)
     points = count - len(fixed.sensors) - len(fixed.forces)
     n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / max(points, 1)
     wave = np.exp(1j * np.outer(place, n)) / max(points, 1)
-    weights = np.eye(count)[:, [0, *range(points, count)]]  # the sensor, then all that have names
-    if points:
-        weights[:, 0] = 0.0
-        weights[:points, 0] = np.real(wave.conj() @ np.exp(1j * n * exact.sensor_angle))
+    weights = np.column_stack([first, np.eye(count)[:, points:]])  # then all that have names
     named, sound = structure.combined(weights), None
     order, moved = structure_lines(named, fixed.two_way)
-    lines = replace(exact, order=order, displacement=moved[:, 0], method="supports" if points else "casing")
+    lines = replace(exact, order=order, displacement=moved[:, 0], method=fixed_method(case))
     by_kind = moved[:, 1:][:, : len(fixed.sensors)], moved[:, 1 + len(fixed.sensors) :]
     outputs = dict(zip(("sensor", "force"), zip((fixed.sensors, fixed.forces), by_kind)))
+    assert fixed.one_way is not None
+    change = np.full(len(lines.carrier_speed), np.nan)
+    if fixed.wider is not None:
+        at = fixed.wider_at
+        order, wider = structure_lines(structure.combined(weights[:, :1]), fixed.wider)
+        wider = replace(lines, order=order, displacement=wider[:, 0], carrier_speed=lines.carrier_speed[at])
+        change[at] = 20.0 * np.log10(order_level(wider) / order_level(lines)[at])
     order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
     if points:
         around = structure.combined(np.eye(count)[:, :points])
@@ -629,6 +684,7 @@ def _standing_still(
     with np.errstate(divide="ignore", invalid="ignore"):  # of a sensor that stands still
         apart = 20.0 * np.log10(order_level(lines) / level)
     told = {
+        "harmonics_change": change, "turn_multiplier": fixed.multiplier,
         "one_way_level": level, "one_way_difference": apart,
         "two_way_residual": fixed.two_way.residual, "order_tail": fixed.two_way.tail,
     }  # fmt: skip
@@ -640,6 +696,41 @@ def _standing_still(
     )  # fmt: skip
 
 
+def _radial_sensor(fixed: FixedHousing, angle: float, top: int) -> np.ndarray:
+    """Weights (n_sensors, ) of those of a structure that make the radial displacement at an angle [rad].
+
+    Of the sensors around a ring, by waves up to a nodal diameter; of a casing its first sensor.
+    """
+    count = fixed.structure.sensor_shape.shape[1]
+    points, weights = count - len(fixed.sensors) - len(fixed.forces), np.eye(count)[0]
+    if points:
+        n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / points
+        weights[:points] = (
+            np.real(np.exp(1j * np.subtract.outer(angle, place)[:, None] * n).sum(axis=1)) / points
+        )
+    return weights
+
+
+def _heard_in_housing(case: Case, modes: ModesResult, carrier: np.ndarray) -> HeardSpeeds:
+    """What is kept of the run-up at speeds of the carrier [rad/s] in a housing that stands still."""
+    fixed, place = (
+        fixed_housing(case, modes, carrier, both=False),
+        (case.housing.sensor_angle, case.ring.teeth),
+    )
+    first = _radial_sensor(fixed, place[0], modes.max_diameter)[:, None]
+    order, moved = structure_lines(fixed.structure.combined(first), fixed.two_way)
+    lines = SensorLines(order, moved[:, 0], carrier, *place, fixed_method(case))
+    orders, some = fixed.two_way.order, fixed.two_way.force
+    force = np.zeros((*some.shape[:2], orders[-1] + 1), complex)
+    force[..., orders] = some
+    return heard_speeds(force, lines)
+
+
+def fixed_method(case: Case) -> str:
+    """Name how the lines of a sensor are found, see `SensorLines`."""
+    return "casing" if case.housing.structure else "supports" if case.housing.support else "exact"
+
+
 def _sound_around(
     around: FixedStructure, two_way: TwoWayResponse, lines: SensorLines, n, wave, found: HousingResult
 ) -> tuple[np.ndarray, ...]:
@@ -647,7 +738,10 @@ def _sound_around(
     sound = list[tuple[np.ndarray, ...]]()
     speeds = np.arange(len(lines.base_speed))
     for some in np.array_split(speeds, -(-len(speeds) // 20)):  # fit into memory
-        here = replace(two_way, carrier_speed=two_way.carrier_speed[some], force=two_way.force[some])
+        here = replace(
+            two_way, carrier_speed=two_way.carrier_speed[some], force=two_way.force[some],
+            drag=None if two_way.drag is None else two_way.drag[some],
+        )  # fmt: skip
         velocity = 1j * np.outer(lines.base_speed[some], lines.order)[..., None]
         waves = velocity * np.swapaxes(structure_lines(around, here)[1], 1, 2) @ wave.conj()
         sound.append(surface_sound(waves, n, lines.frequency[some], found.cylinder, found.microphone))
@@ -658,7 +752,9 @@ def _sound_around(
 def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) -> RunupResult:
     """Follow sensor and mesh forces over the speeds of the run-up, without stability.
 
-    The excitation ends where that of `solve_dynamics` does. CaseError: E-SPEED as there. ConvergenceError.
+    The excitation ends where that of `solve_dynamics` does. In a housing that stands still level, forces and
+    lines are those of the set in it, while modes, and levels by one of them alone, are those on the
+    foundation. CaseError: E-SPEED as there. ConvergenceError.
     """
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
     one, basis, excitation = member_speeds(case, planetary_set(case)), modes.modes, modes.excitation
@@ -686,13 +782,20 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     cuts = np.flatnonzero(np.diff(np.cumsum(limit.response) // _LINES_TOGETHER)) + 1
     for own in np.split(np.arange(len(speeds)), cuts):
         response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
-        parts.append(heard_speeds(response, _sensor_lines(case, modes, response, carrier[own])))
+        if not case.housing.stands_still:
+            lines = _sensor_lines(case, modes, response, carrier[own])
+            parts.append(heard_speeds(response.force, lines, response.lowest_force))
         order = np.arange(response.force.shape[-1])[:, None] * case.ring.teeth - np.sign(one.carrier) * n
         turning = carrier[own][:, None, None] * order
         for level, at in zip(alone, nearest):
             inside = np.where((at >= own[0]) & (at <= own[-1]), at - own[0], -1)
             level += mode_levels(response, field, alike, met.harmonic, turning, inside)
         progress("runup", float(own[-1] + 1), float(len(speeds)))
+    if case.housing.stands_still:
+        limit = replace(limit, frequency=frequency * fixed_harmonics(case)[0])
+        for own in np.array_split(np.arange(len(speeds)), -(-len(speeds) // _SPEEDS_IN_HOUSING)):
+            parts.append(_heard_in_housing(case, modes, carrier[own]))
+            progress("runup", float(own[-1] + 1), float(len(speeds)))
     return RunupResult(
         input_speed=speeds,
         mesh_frequency=frequency,
@@ -704,6 +807,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         sensor_angle=case.housing.sensor_angle,
         operating_speeds=operating,
         unresolved=unresolved(speeds, resonance, heard, damping),
+        method=fixed_method(case),
     )
 
 

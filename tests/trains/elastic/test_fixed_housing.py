@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 from casing import Casing, write_casing
 
+from femgear.case.quantities import RPM
 from femgear.errors import CaseError
+from femgear.housing.orders import order_level
 from femgear.housing.sensor import stored_lines
 from femgear.housing.sound import pressure_level, stored_sound
-from femgear.trains.elastic.checks import fixed_diameters, housing_warnings
-from femgear.trains.elastic.results import describe_housing
-from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.elastic.checks import case_warnings, fixed_diameters, housing_warnings
+from femgear.trains.elastic.results import describe_housing, run_up_lines
+from femgear.trains.elastic.runup import describe_runup
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import parse_case, read_case, with_values
 from femgear.trains.static.stages import solve_static
 
@@ -26,6 +29,7 @@ SMALL = {
     "static.positions": 8, "static.flank_elements": 6, "static.stresses": False, "housing.published": [],
     "dynamics.mesh_harmonics": 2, "operation.speeds": ["400 rpm", "3100 rpm"], "runup.count": 0,
 }  # fmt: skip
+FOUR = {"dynamics.mesh_harmonics": 4, "dynamics.response_harmonics": 8}
 WEAK = [{"angle": "10 deg", "radial_stiffness": "1 N/m", "tangential_stiffness": "1 N/m", "width": "9 mm"}]
 
 
@@ -48,9 +52,9 @@ def heard(case, static, modes):
     return solve_housing(case, solve_dynamics(case, static, modes))
 
 
-def test_next_to_no_support_is_the_ring_on_its_foundation(before):
-    """Hardly damped: modal damping of the set is not that of gears and ring apart."""
-    present = reference(**{"dynamics.damping_ratio": 1e-4, "operation.speeds": ["400 rpm"]})
+@pytest.mark.parametrize("ratio", [1e-4, 0.05])
+def test_next_to_no_support_is_the_ring_on_its_foundation(before, ratio):
+    present = reference(**{"dynamics.damping_ratio": ratio, "operation.speeds": ["400 rpm"]})
     case = with_values(present, {"housing.support": WEAK})
     modes = solve_modes(case, before[0])
     dynamics = solve_dynamics(case, before[0], modes)
@@ -71,10 +75,48 @@ def test_feet_change_the_level_and_the_file_holds_what_is_heard(before):
     assert abs(data["level"] / data["one_way_level"] - 1.0).max() > 0.2
     assert data["two_way_residual"].max() < 1e-10
     assert data["order_tail"].max() < 0.1
+    assert (data["turn_multiplier"].values < 1.0).all() and "2 of 2 speeds looked at are stable" in " ".join(
+        describe_housing(data).notes
+    )
+    grown = data.assign(turn_multiplier=data["turn_multiplier"] + 2.0)
+    assert any("unstable at 400, 3100" in one.text for one in housing_warnings(grown))
+    # two mesh harmonics are few: the file says what twice as many change, and the next case has them
+    change, wide = data["harmonics_change"].values, reference(**{"housing.support": FEET, **FOUR})
+    again = heard(wide, *before).dataset()["level"].values
+    np.testing.assert_allclose(10 ** (change / 20), again / data["level"].values, rtol=1e-9)
+    (finding,) = (one for one in housing_warnings(data) if one.code == "W-EXCITATION")
+    assert f"{change[np.abs(change).argmax()]:+.1f} dB" in finding.text
     lines, pressure = stored_sound(data)
     assert lines.method == "supports" == stored_lines(data).method
     assert not (lines.order % 3).any()
     np.testing.assert_allclose(pressure_level(pressure, lines.frequency), data["pressure_level"], atol=1e-4)
+
+
+def heard_forces(case, before):
+    """Forces of one mesh of both kinds over a turn at the last speed, line by line."""
+    found = solve_dynamics(case, *before).fixed.two_way
+    turn = np.exp(2j * np.pi * np.outer(found.order, np.arange(5000)) / 5000)
+    return np.real(found.force[-1] @ turn)
+
+
+def test_run_up_is_that_of_the_housing(before):
+    ends = {"runup.from": "2000 rpm", "runup.to": "3100 rpm", "runup.count": 4}
+    case = reference(**{"housing.support": FEET, "housing.sensor_angle": "20 deg"} | ends)
+    found = solve_runup(case, before[1])
+    at = np.flatnonzero(np.isclose(found.input_speed / RPM, 3100.0))
+    result = heard(case, *before)
+    assert found.heard.level[at] == pytest.approx(order_level(result.exact)[1:], rel=1e-9)
+    order, lines = found.heard.order, found.heard.lines[at[0]]
+    same = np.isin(result.exact.order, order)
+    np.testing.assert_allclose(lines, result.exact.acceleration[1, same], atol=1e-6 * np.abs(lines).max())
+    forces = heard_forces(case, before)
+    assert found.heard.force_peak[at[0]] == pytest.approx(forces.max(axis=1), rel=1e-3)
+    assert found.heard.lowest_force[at[0]] == pytest.approx(forces.min(), rel=1e-3)
+    data = found.dataset()
+    assert "in the housing that stands still" in " ".join(describe_runup(data).notes)
+    lines, pressure = run_up_lines(data, result.dataset().attrs)
+    assert (lines.method, pressure) == ("supports", None)
+    assert not [one for one in case_warnings(case) if one.code == "W-SUPPORT"]
 
 
 SENSORS = [
@@ -148,8 +190,13 @@ def checksum_of(case) -> str:
 
 
 def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path):
-    """The ring of a file is loaded where flanks touch, that of the case at the middle of its teeth."""
-    case = reference(**{"housing.support": FEET, "housing.sensor_angle": "20 deg"})
+    """The ring of a file is loaded where flanks touch, that of the case at the middle of its teeth.
+
+    Without damping: the ring of the case and the gears damp each other, a casing has damping of its own.
+    """
+    undamped = {"dynamics.damping_ratio": 0.0}
+    case = reference(**{"housing.support": FEET, "housing.sensor_angle": "20 deg"} | undamped)
+    before = before[0], solve_modes(case, before[0])
     dynamics = solve_dynamics(case, *before)
     assert dynamics.fixed is not None
     one, n_max = dynamics.fixed.structure, fixed_diameters(case)
@@ -167,7 +214,7 @@ def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path):
         "sensor_compliance": (at @ one.sensor_residual @ wave.conj().T).real[None],
     }  # fmt: skip
     np.savez(tmp_path / "ring.npz", **arrays)
-    held = in_casing(tmp_path, {"file": "ring.npz"}, **{"housing.nodal_diameters": n_max})
+    held = in_casing(tmp_path, {"file": "ring.npz"}, **{"housing.nodal_diameters": n_max} | undamped)
     ours, theirs = solve_housing(case, dynamics), heard(held, *before)
     lines, size = theirs.exact.acceleration, np.abs(ours.exact.acceleration).max()
     np.testing.assert_allclose(lines, ours.exact.acceleration, rtol=0, atol=1e-9 * size)

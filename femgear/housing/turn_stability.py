@@ -1,0 +1,186 @@
+"""Stability of a set in a housing that stands still: Floquet multipliers over a turn of the carrier.
+
+The equations of `femgear.housing.two_way` in time, with the modal coordinates p of the gears and q of the
+structure: everything repeats after a turn. Between the kicks of meshes and damping the modes move exactly;
+kicks and motion alternate symmetrically (G. Strang, SIAM J. Numer. Anal. 5, 1968, 506-517), so that errors
+have even powers of the step alone, which halved steps take away one by one (W. Romberg, 1955).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from femgear.errors import ConvergenceError
+from femgear.housing.structure import FixedStructure, ring_waves
+from femgear.housing.two_way import MeshPaths
+from femgear.solvers.stability.parametric import Stability
+from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
+
+_STEP_ANGLE, _STEPS_PER_HARMONIC, _HALVED = 2.0, 4, 5
+"""Angle [rad] that the fastest mode turns in a first step at most, first steps in a period of the highest
+harmonic, and how often steps are halved at most."""
+_TOGETHER = 256
+"""Steps whose matrices are in memory at a time."""
+
+
+def turn_stability(
+    gears: Modes,
+    excitation: MeshExcitation,
+    structure: FixedStructure,
+    paths: MeshPaths,
+    carrier_speed,
+    *,
+    harmonics: int = 6,
+    damping=None,
+    frequency_ratio: float = 2.0,
+    tolerance: float = 1e-3,
+) -> Stability:
+    """Judge small motions of the set at some speeds of the carrier (n_speeds,) [rad/s], by their multipliers.
+
+    Parameters
+    ----------
+    gears, excitation, structure, paths, damping
+        As for `femgear.housing.two_way.solve_two_way`.
+    harmonics : int
+        Mesh harmonics of the stiffness.
+    frequency_ratio : float
+        Modes above this many times the highest excitation frequency are static flexibility, as in
+        `femgear.solvers.stability.parametric.stability`; they count by ``exp(-zeta omega T)``.
+    tolerance : float
+        Error of the largest modulus, over itself where it is above 0.01.
+
+    Returns
+    -------
+    Stability
+        Its multipliers are those over a turn of the carrier, its steps those of the finest turn.
+
+    Raises
+    ------
+    ConvergenceError
+        Steps that were halved so often that they do not get finer (E-CONVERGENCE).
+    """
+    speeds = np.abs(np.atleast_1d(np.asarray(carrier_speed, float)))
+    stiffness, sense = mesh_harmonics(excitation, harmonics)[0], int(np.sign(np.ravel(carrier_speed)[0]))
+    found, kept, taken = np.empty(len(speeds), complex), *np.empty((2, len(speeds)), int)
+    for i, speed in enumerate(speeds):
+        one = _Turn(gears, structure, paths, stiffness, damping, sense, speed, harmonics * frequency_ratio)
+        fastest = 2 * np.pi * one.natural.max(initial=0.0) / speed
+        least = max(fastest / _STEP_ANGLE, _STEPS_PER_HARMONIC * harmonics * paths.z_ring)
+        matrix, taken[i] = _extrapolated(one, int(np.ceil(least)), tolerance)
+        values, kept[i] = np.append(np.linalg.eigvals(matrix), one.static), len(one.natural)
+        found[i] = values[np.abs(values).argmax()]
+    return Stability(speeds * paths.z_ring / (2 * np.pi), found, kept, taken)
+
+
+def _extrapolated(one: _Turn, steps: int, tolerance: float) -> tuple[np.ndarray, int]:
+    """Transition matrix over a turn whose largest multiplier has an error, and the steps that it takes."""
+    row, change = [one.monodromy(steps)], np.inf
+    for _ in range(_HALVED):
+        before, steps = row, 2 * steps
+        row = [one.monodromy(steps)]
+        for k, coarse in enumerate(before):
+            row.append(row[k] + (row[k] - coarse) / (4.0 ** (k + 1) - 1.0))
+        best, other = (np.abs(np.linalg.eigvals(matrix)).max(initial=0.0) for matrix in (row[-1], row[-2]))
+        change = abs(best - other) / max(best, 0.01)
+        if change <= tolerance:
+            return row[-1], steps
+    raise ConvergenceError(
+        f"the multipliers of a turn in {steps} steps change by {change:.1e}", code="E-CONVERGENCE",
+        limit=f"{tolerance:g}", remedy="take a looser tolerance or fewer harmonics",
+    )  # fmt: skip
+
+
+class _Turn:
+    """Equations of one speed of the carrier [rad/s], the modes up to so many mesh frequencies in time."""
+
+    def __init__(self, gears, structure, paths: MeshPaths, stiffness, damping, sense, speed, reach):
+        cut = reach * paths.z_ring * speed
+        frequencies = 2 * np.pi * gears.frequency, structure.natural_frequency
+        ratios = gears.damping_ratio, structure.damping_ratio
+        moving = [(one > 0.0) & (one <= cut) for one in frequencies]
+        left = [one > cut for one in frequencies]
+        self.natural, self.ratio = (
+            np.concatenate([one[own] for one, own in zip(both, moving)]) for both in (frequencies, ratios)
+        )
+        slowest = min(
+            [(z[o] * w[o]).min() for z, w, o in zip(ratios, frequencies, left) if o.any()] or [np.inf]
+        )
+        self.static, self.speed = np.exp(-slowest * 2 * np.pi / speed), speed
+        self.place, self.sense = np.array(paths.planet_angles) + paths.load_angle, sense
+        self.n = np.arange(-structure.max_diameter, structure.max_diameter + 1)
+        self.stiffness, self.mean, self.teeth = stiffness, gears.mesh_stiffness, paths.z_ring
+        rows, P, (own, others) = gears.mesh_deflection, structure.ring_shape, left
+        self.rows, self.path = rows[:, moving[0]], P[moving[1]]
+        self.flexibility = gears.residual + (rows[:, own] / frequencies[0][own] ** 2) @ rows[:, own].T
+        self.residual = (
+            structure.residual + (P[others] / frequencies[1][others, None] ** 2).T @ P[others].conj()
+        )
+        self.damping: Any = None
+        if damping is not None:
+            order, dofs = structure.wave_order, len(gears.shape)
+            waves, shape = ring_waves(order), structure.wave_shape[moving[1]].T
+            to = np.zeros((dofs + len(order),) * 2, complex)
+            to[:dofs, :dofs], to[dofs:, dofs:] = np.eye(dofs), waves
+            whole = to @ damping @ to.conj().T
+            self.damping = gears.shape[:, moving[0]], shape, order, whole
+
+    def monodromy(self, steps: int) -> np.ndarray:
+        """Transition matrix over a turn, of displacements and velocities over frequencies, (2 m, 2 m)."""
+        m, dt = len(self.natural), 2 * np.pi / (self.speed * steps)
+        state = np.eye(2 * m)
+        state = self._moved(state, 0.5 * dt)
+        for first in range(0, steps, _TOGETHER):
+            theta = 2 * np.pi * (np.arange(first, min(first + _TOGETHER, steps)) + 0.5) / steps
+            for kick, brake in zip(*self._kicks(theta, dt)):
+                state[m:] = brake @ state[m:] + kick @ state[:m]
+                state = self._moved(state, dt)
+        return self._moved(state, -0.5 * dt)
+
+    def _moved(self, state: np.ndarray, dt: float) -> np.ndarray:
+        """Free motion ``q'' + 2 zeta w q' + w^2 q = 0`` of all modes, velocities as ``q'/w``."""
+        m, w, z = len(self.natural), self.natural, self.ratio
+        damped = np.sqrt(1.0 - z**2)
+        c, s, decay = np.cos(damped * w * dt), np.sin(damped * w * dt) / damped, np.exp(-z * w * dt)
+        q, v = state[:m], state[m:]
+        same, other, away = decay * (c + z * s), decay * s, decay * (c - z * s)
+        return np.concatenate([
+            same[:, None] * q + other[:, None] * v, away[:, None] * v - other[:, None] * q
+        ])  # fmt: skip
+
+    def _kicks(self, theta: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity over frequency after a step by displacement and by velocity before, (n, m, m) each."""
+        k = np.real(
+            np.exp(1j * self.teeth * np.outer(theta, np.arange(self.stiffness.shape[1]))) @ self.stiffness.T
+        )
+        wave = np.exp(1j * self.n * (self.place + self.sense * theta[:, None])[..., None])
+        path = np.real(wave @ self.path.T)
+        soft = np.real(wave @ self.residual @ wave.conj().swapaxes(1, 2))
+        (count, N), G, T = path.shape[:2], self.rows.shape[1], self.flexibility
+        # excess forces e on the gears and forces f on the ring by deflections of the modes that move
+        left, right = np.zeros((2, count, 3 * N, 3 * N))
+        change, ring = (k - self.mean)[..., None], np.arange(N)
+        left[:, : 2 * N, : 2 * N] = np.eye(2 * N) + change * T
+        left[:, N : 2 * N, 2 * N :] = k[:, N:, None] * soft
+        left[:, 2 * N :, : 2 * N] = self.mean[N:, None] * T[N:] - np.eye(2 * N)[N:]
+        left[:, 2 * N + ring, 2 * N + ring] = 1.0
+        right[:, : 2 * N, : 2 * N] = change * np.eye(2 * N)
+        right[:, N + ring, 2 * N + ring] = -k[:, N:]
+        right[:, 2 * N + ring, N + ring] = self.mean[N:]
+        law = np.linalg.solve(left, right)
+        shape = np.zeros((count, 3 * N, len(self.natural)))
+        shape[:, : 2 * N, :G], shape[:, 2 * N :, G:] = self.rows, path
+        force = shape.swapaxes(1, 2) @ (np.repeat([-1.0, 1.0], [2 * N, N])[:, None] * law) @ shape
+        scaled, eye = force * dt / self.natural[:, None], np.eye(len(self.natural))
+        if self.damping is None:
+            return scaled, np.broadcast_to(eye, scaled.shape)
+        dof, waves, order, whole = self.damping
+        motion = np.zeros((count, len(whole), len(self.natural)), complex)
+        motion[:, : len(dof), :G] = dof
+        motion[:, len(dof) :, G:] = np.exp(1j * self.sense * theta[:, None] * order)[..., None] * waves
+        drag = np.real(motion.conj().swapaxes(1, 2) @ (whole @ motion))
+        drag = 0.5 * dt * (drag - np.diag(2.0 * self.ratio * self.natural))
+        drag *= self.natural / self.natural[:, None]
+        both = np.linalg.solve(eye + drag, np.concatenate([scaled, eye - drag], axis=-1))
+        return both[..., : len(eye)], both[..., len(eye) :]

@@ -1,0 +1,87 @@
+"""Damping of gears and ring as a whole in a structure, and the stability of a turn."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.housing.structure import circumferential, ring_waves, supported_ring
+from femgear.housing.turn_stability import turn_stability
+from femgear.housing.two_way import MeshPaths, solve_two_way, structure_lines
+from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.stability.parametric import stability
+
+RING = thin_ring(4, foundation=2e10)
+STRUCTURE = supported_ring(
+    RING, FEET, max_diameter=4, max_frequency=1e6, damping_ratio=0.04, sensor_angles=(0.3, 2.0)
+)
+
+
+def solved(symmetry, *, damped=True, structure=STRUCTURE, speeds=(8.0, 30.0), **changed):
+    paths = MeshPaths(97, EQUAL, 0.1, symmetry)
+    drive = excitation(paths)
+    mean = drive.stiffness.mean(axis=1)
+    damping = modal_damping(joined(paths, RING, 4), mean, 0.04) if damped else None
+    modes = solve_modes(gears(EQUAL), mean, damping_ratio=0.04)
+    known = {"harmonics": (2, 4), "damping": damping} | changed
+    return solve_two_way(modes, drive, structure, paths, np.array(speeds), **known)
+
+
+def test_waves_are_those_of_the_circumferential_components():
+    """A wave n has the component n alone."""
+    waves = ring_waves(STRUCTURE.wave_order)
+    np.testing.assert_allclose(waves @ waves.conj().T, np.eye(len(waves)), atol=1e-15)
+    component = waves.conj() @ circumferential(RING, RING.output[:, 1], 4)
+    own = STRUCTURE.wave_order[:, None] == np.arange(-4, 5)
+    assert np.abs(component[own]).min() > 1e-3
+    np.testing.assert_allclose(component[~own], 0.0, atol=1e-15)
+
+
+def test_one_planet_stands_for_three():
+    (order, all_lines), (kept, lines) = (structure_lines(STRUCTURE, solved(n)) for n in (1, 3))
+    size = np.abs(lines).max()
+    np.testing.assert_allclose(all_lines[..., np.isin(order, kept)], lines, rtol=0, atol=1e-9 * size)
+    assert np.abs(all_lines[..., ~np.isin(order, kept)]).max() < 1e-10 * size
+
+
+def test_it_is_not_that_of_gears_and_ring_apart():
+    whole, apart = (structure_lines(STRUCTURE, solved(3, damped=one))[1] for one in (True, False))
+    assert np.abs(whole - apart).max() > 1e-3 * np.abs(apart).max()
+
+
+def test_speeds_do_not_depend_on_one_another():
+    both, alone = solved(3), solved(3, speeds=(30.0,))
+    np.testing.assert_allclose(both.force[1], alone.force[0], atol=1e-11 * np.abs(alone.force).max())
+    assert both.residual.max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"damping": np.eye(3)},
+        {"structure": replace(STRUCTURE, wave_shape=np.zeros((0, 0)), wave_order=np.zeros(0, int))},
+    ],
+)
+def test_refused(changed):
+    with pytest.raises(CaseError) as error:
+        solved(3, **changed)
+    assert error.value.code == "E-SHAPE"
+
+
+@pytest.mark.parametrize(("speed", "depth"), [(100.0, 0.15), (170.0, 0.4)])
+def test_a_ring_that_turns_alone_is_the_same_in_both_frames(speed, depth):
+    paths, ring = MeshPaths(37, EQUAL, 0.1, 3), thin_ring(0, foundation=2e10)
+    structure = supported_ring(ring, (), max_diameter=0, max_frequency=1e6, damping_ratio=2e-4)
+    drive = excitation(paths, depth=depth)
+    mean, whole = drive.stiffness.mean(axis=1), joined(paths, ring, 0)
+    modes, rigid = (solve_modes(one, mean, damping_ratio=2e-4) for one in (whole, gears(EQUAL)))
+    kept = {"excitation_harmonics": 2, "frequency_ratio": 1e3, "steps": 400}
+    present = stability(modes, drive, 37 * speed / (2 * np.pi), **kept).modulus[0]
+    known = {"harmonics": 2, "damping": modal_damping(whole, mean, 2e-4), "frequency_ratio": 1e3}
+    found = turn_stability(rigid, drive, structure, paths, [speed], **known, tolerance=1e-6)
+    assert found.modulus[0] == pytest.approx(present**37, rel=1e-5)
+    assert found.stable[0] == (depth < 0.2)
+    with pytest.raises(ConvergenceError, match="multipliers of a turn"):
+        turn_stability(rigid, drive, structure, paths, [speed], **known, tolerance=-1.0)
