@@ -79,7 +79,7 @@ class SetDamping:
 
 def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Multiply a complex matrix (..., n, k) by a real one (k, m), half the work of a complex one."""
-    return values.real @ real + 1j * (values.imag @ real)
+    return np.real(values) @ real + 1j * (np.imag(values) @ real)
 
 
 def set_damping(

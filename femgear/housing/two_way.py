@@ -313,7 +313,7 @@ class _Orders:
         """Circumferential components (n_K, 2 n_max + 1) of all planets' forces by the leaders' (G, n_L)."""
         wave = self.paths.symmetry * np.exp(-1j * np.outer(place, self.n))
         padded = np.concatenate([ring, np.zeros((len(ring), 1))], axis=1)
-        return sum(one[back] * turned for one, turned in zip(padded, wave))
+        return np.sum([one[back] * turned for one, turned in zip(padded, wave)], axis=0)
 
     def scatter(self, h: int):
         """Side bands r_K of the structure's orders near a harmonic; which r and n stand for ``r_K + s n``."""

@@ -234,7 +234,7 @@ def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path):
     arrays["sensor_area"] = np.append(0.0, np.full(count, surface / count))
     np.savez(tmp_path / "ring.npz", **arrays)
     heard_all = heard(
-        in_casing(tmp_path, {"file": "ring.npz"}, **{"housing.nodal_diameters": n_max}), *before
+        in_casing(tmp_path, {"file": "ring.npz"}, **{"housing.nodal_diameters": n_max} | undamped), *before
     )
     data, ring = heard_all.dataset(), ours.dataset()
     np.testing.assert_allclose(data["equivalent_power_level"], ring["equivalent_power_level"], atol=1e-6)
@@ -271,9 +271,10 @@ def test_both_ways_are_told_beside_one_way(before):
     assert [row[at] for row in table.rows] == [f"{one:.4g} ({two:+.1f} dB)" for one, two in told]
     far = np.flatnonzero(abs(data["one_way_difference"].values) > 3.0)
     assert len(far) == 1
-    (finding,) = housing_warnings(data)
-    assert finding.code == "W-ONE-WAY" and f"{data['speed'].values[far[0]]:g} rpm" in finding.text
-    assert not list(housing_warnings(data.isel(speed=[1 - far[0]])))
+    (finding,) = (one for one in housing_warnings(data) if one.code == "W-ONE-WAY")
+    assert f"{data['speed'].values[far[0]]:g} rpm" in finding.text
+    near = housing_warnings(data.isel(speed=[1 - far[0]]))
+    assert "W-ONE-WAY" not in [one.code for one in near]
 
 
 def test_one_casing_in_three_kinds_of_files(before, folder):
