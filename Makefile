@@ -1,6 +1,6 @@
 # Everything a user or a maintainer does, by name. Needs git, python3 (3.11 or newer) and make.
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-browser lint validate soak bench mutants clean
+.PHONY: help environment demo test test-browser lint docs validate soak bench mutants clean
 
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -22,6 +22,7 @@ help:
 	@echo "make test      run the tests"
 	@echo "make test-browser  open the pages of all trains in Chromium, which must be installed"
 	@echo "make lint      check style and formatting (ruff) and types (basedpyright)"
+	@echo "make docs      build the documentation into out/docs/html"
 	@echo "make validate  recompute docs/validation.md and run the slow verification tests"
 	@echo "make soak      fuzz, damage, kill and starve femgear for MINUTES=60, write docs/reliability.md"
 	@echo "make bench     measure time and memory of every stage"
@@ -48,6 +49,11 @@ lint: environment
 	$(PY) -m ruff format --check .
 	$(PY) -m basedpyright
 
+docs: environment
+	$(PY) -m pip install --quiet --disable-pip-version-check -e ".[docs]"
+	$(PY) -m sphinx -b html -j 2 -W --keep-going docs out/docs/html $(ARGS)
+	@echo "Documentation: out/docs/html/index.html"
+
 validate: environment
 	$(PY) tests/validation -o docs/validation.md
 	$(PY) -m pytest -m slow --benchmark-disable $(ARGS)
@@ -63,7 +69,7 @@ mutants: environment
 	$(PY) tests/tools/mutation.py $(ARGS)
 
 clean:
-	rm -rf out dist .pytest_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf out dist docs/_generated .pytest_cache .ruff_cache .hypothesis .benchmarks
 	find . -name __pycache__ -type d -not -path "./.venv/*" -prune -exec rm -rf {} +
 	@if git rev-parse --is-inside-work-tree >/dev/null 2>&1; then git clean -fdXq meshes; \
 	else find meshes -type f \( -name "*.vtu" -o -name "*.msh" \) -not -name "reference_*" -delete; fi

@@ -87,6 +87,7 @@ def test_this_system_has_what_is_needed():
         ("demo", "femgear run cases/planetary_27_40_108.toml -o out/demo"),
         ("test", "-m pytest"),
         ("lint", "-m ruff check"),
+        ("docs", "-m sphinx -b html -j 2 -W --keep-going docs out/docs/html"),
         ("validate", "python tests/validation -o docs/validation.md"),
         ("soak", "python tests/soak --minutes 60 --page docs/reliability.md"),
         ("bench", "-m pytest benchmarks"),

@@ -13,6 +13,8 @@ from femgear.trains.reading import every_section
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = [ROOT / "README.md", ROOT / "meshes" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+COMMANDS = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
+FOLDERS = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 
 
 def blocks(language: str) -> list[str]:
@@ -38,6 +40,32 @@ def test_the_example_is_short():
     assert len([line for line in example.splitlines() if line.strip()]) <= 12
 
 
+def test_the_readme_is_a_front_page():
+    """A screen and a half of text; what is longer stands in docs/."""
+    prose = re.sub(r"(?ms)^```.*?^```|<[^>]+>|\]\([^)]*\)", "", README)
+    assert len(prose.split()) < 450 and README.count("\n") < 110
+
+
+def test_what_the_readme_says_of_its_checks():
+    """Numbers of the section on verification: no more than the pages have."""
+    pages = {
+        name: (ROOT / "docs" / f"{name}.md").read_text("utf-8")
+        for name in ("validation", "reliability", "benchmarks")
+    }
+    claimed = README.split("## How it is verified")[1].split("\n## ")[0]
+    rows, changes, trials = (
+        int(one.replace(",", "")) for one in re.findall(r"[Mm]ore than ([\d,]+)", claimed)
+    )
+    passes = re.findall(r"(\d+) rows: (\d+) passes", pages["validation"])[0][1]
+    assert 0 <= int(passes) - rows < 300
+    mutants = re.findall(r"\*\*all\*\* \| (\d+) \| (\d+) \| \d+ \| (\d+) \| (\d+)", pages["reliability"])[0]
+    assert int(mutants[1]) > changes and int(mutants[3]) == 0
+    table = re.findall(r"(?m)^\| [A-Z][\w ]+ \| \d+ \| (\d+) \| (\d+) \|", pages["reliability"])
+    assert sum(int(one) for one, _ in table) > trials and not sum(int(failures) for _, failures in table)
+    whole = re.findall(r"whole computation, grids cached \|  \| (\d+)", pages["benchmarks"])[0]
+    assert 700 < int(whole) < 1300 and "about a second" in claimed
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_to_files(page):
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
@@ -52,13 +80,14 @@ def test_no_page_names_this_machine_or_unfinished_work(page):
 
 
 def test_pictures_are_small():
-    sizes = {path: path.stat().st_size for path in (ROOT / "docs" / "images").rglob("*.*")}
+    folders = (ROOT / "docs" / name for name in ("images", "front", "_static"))
+    sizes = {path: path.stat().st_size for folder in folders for path in folder.rglob("*.*")}
     assert max(sizes.values()) < 300_000 and sum(sizes.values()) < 6e6
 
 
 def test_module_table_names_every_module():
     """One row a folder, every module once, in the row of its folder; ``__init__`` files go without saying."""
-    rows = re.findall(r"^\| `(femgear/[\w/]*)` \| ([^|]+) \|", README, flags=re.MULTILINE)
+    rows = re.findall(r"^\| `(femgear/[\w/]*)` \| ([^|]+) \|", FOLDERS, flags=re.MULTILINE)
     named = [folder + name for folder, names in rows for name in re.findall(r"`(\w+)`", names)]
     paths = [path for path in (ROOT / "femgear").rglob("*.py") if path.stem != "__init__"]
     modules = [path.relative_to(ROOT).with_suffix("").as_posix() for path in paths]
@@ -97,11 +126,11 @@ def test_command_table_names_every_command_and_script():
 
     commands = {name for name in app if not name.startswith("-")}
     assert commands >= {"check", "run", "report", "sweep", "schema"}
-    assert commands <= set(re.findall(r"`femgear (\w+)", README))
-    assert "| `python tests/validation " in README
+    assert commands <= set(re.findall(r"`femgear (\w+)", COMMANDS))
+    assert "| `python tests/validation " in COMMANDS
     helpers = {"script_tools.py", "drivetrain_figures.py"}
     scripts = {path.name for path in (ROOT / "scripts").glob("*.py")} - helpers
-    assert scripts <= set(re.findall(r"scripts/(\w+\.py)", README))
+    assert scripts <= set(re.findall(r"scripts/(\w+\.py)", COMMANDS))
 
 
 def documented(page: str) -> set[str]:

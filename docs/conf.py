@@ -1,0 +1,133 @@
+"""Sphinx settings of the documentation; `make docs` builds it into out/docs/html."""
+
+import os
+import re
+import sys
+from pathlib import Path
+
+os.environ.setdefault("MPLBACKEND", "agg")
+DOCS = Path(__file__).resolve().parent
+ROOT = DOCS.parent
+sys.path.insert(0, str(ROOT))
+
+import femgear  # noqa: E402
+
+project = "femgear"
+author = "the femgear developers"
+copyright = author
+version = release = femgear.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx_design",
+]
+exclude_patterns = ["_build", "_templates"]
+templates_path = ["_templates"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+highlight_language = "none"
+
+myst_enable_extensions = ["attrs_block", "colon_fence", "deflist"]
+myst_heading_anchors = 4
+# programs may be shown cut short; annotations have short names, and two classes are called Block
+suppress_warnings = ["misc.highlighting_failure", "config.cache", "ref.python"]
+
+# single backquotes in docstrings are names; those of femgear become links below
+default_role = "literal"
+autosummary_generate = True
+autosummary_ignore_module_all = False
+autodoc_default_options = {"members": True, "member-order": "bysource"}
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+python_maximum_signature_line_length = 88
+napoleon_google_docstring = False
+# shapes such as (meshes, positions) are no names to link
+napoleon_use_param = napoleon_use_rtype = False
+napoleon_use_ivar = True
+
+# scripts that draw: one page and one thumbnail each
+EXAMPLES = ROOT / "scripts" / "examples"
+if any(EXAMPLES.glob("*.py")):
+    extensions.append("sphinx_gallery.gen_gallery")
+    sphinx_gallery_conf = {
+        "examples_dirs": str(EXAMPLES),
+        "gallery_dirs": "_generated/examples",
+        "filename_pattern": r"\.py$",
+        "within_subsection_order": "FileNameSortKey",
+        "download_all_examples": False,
+        "show_memory": False,
+        "show_signature": False,
+        "min_reported_time": 1e6,
+        "abort_on_example_error": True,
+        "matplotlib_animations": False,
+    }
+
+html_theme = "furo"
+html_title = "femgear"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_favicon = html_logo = "_static/femgear.svg"
+html_show_sourcelink = False
+html_copy_source = False
+html_show_copyright = False
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#0b5e8a", "color-brand-content": "#0b5e8a"},
+    "dark_css_variables": {"color-brand-primary": "#6cc0ee", "color-brand-content": "#6cc0ee"},
+}
+
+
+def slug(heading: str) -> str:
+    """Anchor of a heading, as GitHub and MyST make it."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+def split_validation() -> tuple[str, dict[str, int]]:
+    """Write one page a theme of docs/validation.md; its introduction, and the rows of every theme."""
+    head, *themes = re.split(r"(?m)^## ", (DOCS / "validation.md").read_text(encoding="utf-8"))
+    folder, rows = DOCS / "_generated" / "validation", {}
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = {}
+    for theme in themes:
+        title, text = theme.split("\n", 1)
+        rows[title] = len(re.findall(r"(?m)^\| (?!case \|)[^-]", text))
+        wanted[folder / f"{slug(title)}.md"] = f"# {title}\n{text}"
+    for stale in set(folder.glob("*.md")) - set(wanted):
+        stale.unlink()
+    for path, text in wanted.items():
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+    return head, rows
+
+
+VALIDATION, ROWS = split_validation()
+
+
+def read_source(app, docname: str, source: list[str]) -> None:
+    """Put the list of themes for docs/validation.md, and lead links to its headings to their pages."""
+    if docname == "validation":
+        places = {title: f"_generated/validation/{slug(title)}" for title in ROWS}
+        table = "\n".join(f"| [{title}]({places[title]}.md) | {rows} |" for title, rows in ROWS.items())
+        tree = "\n".join(places.values())
+        tree = f"```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
+        source[0] = f"{VALIDATION}\n## Themes\n\n| theme | rows |\n|---|---:|\n{table}\n\n{tree}"
+    elif docname.startswith("_generated/validation/"):
+        source[0] = re.sub(r"\]\((?=[\w./]+\.md)", "](../../", source[0])
+    source[0] = re.sub(r"\(validation\.md#([\w-]+)\)", r"(_generated/validation/\1.md)", source[0])
+
+
+def read_docstring(app, what: str, name: str, obj, options, lines: list[str]) -> None:
+    """Link names of femgear, and let bars be those of absolute values."""
+    for number, line in enumerate(lines):
+        parts = re.split(r"(``.*?``)", line)
+        parts[::2] = (
+            re.sub(r"`(femgear[\w.]+)`", r":py:obj:`\1`", part).replace("|", r"\|") for part in parts[::2]
+        )
+        lines[number] = "".join(parts)
+
+
+def setup(app) -> None:
+    """Connect what changes the sources."""
+    app.connect("source-read", read_source)
+    app.connect("autodoc-process-docstring", read_docstring)
