@@ -32,7 +32,7 @@ highlight_language = "none"
 myst_enable_extensions = ["attrs_block", "colon_fence", "deflist"]
 myst_heading_anchors = 4
 # programs may be shown cut short; annotations have short names, and two classes are called Block
-suppress_warnings = ["misc.highlighting_failure", "config.cache", "ref.python"]
+suppress_warnings = ["misc.highlighting_failure", "config.cache", "ref.python", "toc.empty_glob"]
 
 # single backquotes in docstrings are names; those of femgear become links below
 default_role = "literal"
@@ -47,6 +47,14 @@ napoleon_google_docstring = False
 napoleon_use_param = napoleon_use_rtype = False
 napoleon_use_ivar = True
 
+
+def shown_figures(block: tuple, block_vars: dict, gallery_conf: dict) -> str:
+    """Take the figures of an example where it shows them: a cell may draw on what an earlier one began."""
+    from sphinx_gallery.scrapers import matplotlib_scraper
+
+    return matplotlib_scraper(block, block_vars, gallery_conf) if "plt.show()" in block[1] else ""
+
+
 # scripts that draw: one page and one thumbnail each
 EXAMPLES = ROOT / "scripts" / "examples"
 if any(EXAMPLES.glob("*.py")):
@@ -55,8 +63,10 @@ if any(EXAMPLES.glob("*.py")):
         "examples_dirs": str(EXAMPLES),
         "gallery_dirs": "_generated/examples",
         "filename_pattern": r"\.py$",
+        "image_scrapers": (shown_figures,),
         "within_subsection_order": "FileNameSortKey",
         "download_all_examples": False,
+        "write_computation_times": False,
         "show_memory": False,
         "show_signature": False,
         "min_reported_time": 1e6,
@@ -105,7 +115,10 @@ VALIDATION, ROWS = split_validation()
 
 
 def read_source(app, docname: str, source: list[str]) -> None:
-    """Put the list of themes for docs/validation.md, and lead links to its headings to their pages."""
+    """Put the list of themes for docs/validation.md, lead links to its headings to their pages, say titles.
+
+    A link whose text is the name of a file, as it is read on a disk, gets the title of the page.
+    """
     if docname == "validation":
         places = {title: f"_generated/validation/{slug(title)}" for title in ROWS}
         table = "\n".join(f"| [{title}]({places[title]}.md) | {rows} |" for title, rows in ROWS.items())
@@ -114,6 +127,7 @@ def read_source(app, docname: str, source: list[str]) -> None:
         source[0] = f"{VALIDATION}\n## Themes\n\n| theme | rows |\n|---|---:|\n{table}\n\n{tree}"
     elif docname.startswith("_generated/validation/"):
         source[0] = re.sub(r"\]\((?=[\w./]+\.md)", "](../../", source[0])
+    source[0] = re.sub(r"\[(\w+\.md)\](?=\(\1)", "[]", source[0])
     source[0] = re.sub(r"\(validation\.md#([\w-]+)\)", r"(_generated/validation/\1.md)", source[0])
 
 

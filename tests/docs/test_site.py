@@ -1,0 +1,79 @@
+"""The documentation as a site: every page is in it, links lead to headings, nothing comes from outside."""
+
+import fnmatch
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.glob("*.md"))
+
+
+def words(path: Path) -> str:
+    """Text of a page without its blocks of code."""
+    return re.sub(r"(?ms)^```.*?^```", "", path.read_text(encoding="utf-8"))
+
+
+def anchors(path: Path) -> set[str]:
+    """Anchors of the headings of a page, as GitHub and MyST make them."""
+    headings = re.findall(r"(?m)^#+ (.+)$", words(path))
+    plain = [re.sub(r"\[([^\]]*)\]\([^)]*\)|[*]", r"\1", heading).lower() for heading in headings]
+    return {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.name)
+def test_links_lead_to_headings(page):
+    missing = []
+    for name, anchor in re.findall(r"\]\(([^)#\s]*\.md)?#([^)\s]+)\)", words(page)):
+        target = page.parent / name if name else page
+        missing += [] if anchor in anchors(target) else [f"{name}#{anchor}"]
+    assert missing == []
+
+
+def test_every_page_is_in_the_index():
+    trees = re.findall(r"(?ms)^```\{toctree\}\n(.*?)^```", (DOCS / "index.md").read_text(encoding="utf-8"))
+    named = [line for tree in trees for line in tree.splitlines() if line and not line.startswith(":")]
+    pages = {page.stem for page in PAGES} - {"index"}
+    assert [page for page in sorted(pages) if not any(fnmatch.fnmatch(page, one) for one in named)] == []
+    patterns = {one for one in named if "*" in one}
+    assert set(named) - patterns == {page for page in pages if page in named} and len(named) == len(
+        set(named)
+    )
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path):
+    """Without running the examples, which have tests of their own; no file of another host is asked for."""
+    pytest.importorskip("sphinx", reason="make docs installs it")
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-b",
+        "html",
+        "-W",
+        "--keep-going",
+        "-q",
+        "docs",
+        str(tmp_path),
+    ]
+    options = (
+        ["-D", "sphinx_gallery_conf.plot_gallery=0"] if any((ROOT / "scripts/examples").glob("*.py")) else []
+    )
+    done = subprocess.run(
+        [*command, *options], cwd=ROOT, capture_output=True, text=True, timeout=900, check=False
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    for page in tmp_path.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        loaded = re.findall(r"<(?:script|img|iframe|source)[^>]* src=\"([^\"]+)", text)
+        loaded += re.findall(r"<link[^>]* rel=\"(?:stylesheet|preload|icon)\"[^>]* href=\"([^\"]+)", text)
+        assert [one for one in loaded if re.match(r"(https?:)?//", one)] == [], page.name
+    for sheet in tmp_path.rglob("*.css"):
+        assert not re.search(r"url\([\"']?(https?:)?//", sheet.read_text(encoding="utf-8")), sheet.name
+    index = (tmp_path / "searchindex.js").read_text(encoding="utf-8")
+    assert '"validation"' in index and "side band" in index
