@@ -10,6 +10,8 @@ DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
 sys.path.insert(0, str(ROOT))
 
+from sphinx_gallery.scrapers import matplotlib_scraper  # noqa: E402
+
 import femgear  # noqa: E402
 
 project = "femgear"
@@ -50,8 +52,6 @@ napoleon_use_ivar = True
 
 def shown_figures(block: tuple, block_vars: dict, gallery_conf: dict) -> str:
     """Take the figures of an example where it shows them: a cell may draw on what an earlier one began."""
-    from sphinx_gallery.scrapers import matplotlib_scraper
-
     return matplotlib_scraper(block, block_vars, gallery_conf) if "plt.show()" in block[1] else ""
 
 
