@@ -34,7 +34,7 @@ highlight_language = "none"
 myst_enable_extensions = ["attrs_block", "colon_fence", "deflist"]
 myst_heading_anchors = 4
 # programs may be shown cut short; annotations have short names, and two classes are called Block
-suppress_warnings = ["misc.highlighting_failure", "config.cache", "ref.python", "toc.empty_glob"]
+suppress_warnings = ["misc.highlighting_failure", "config.cache", "ref.python"]
 
 # single backquotes in docstrings are names; those of femgear become links below
 default_role = "literal"
@@ -127,6 +127,9 @@ def read_source(app, docname: str, source: list[str]) -> None:
         source[0] = f"{VALIDATION}\n## Themes\n\n| theme | rows |\n|---|---:|\n{table}\n\n{tree}"
     elif docname.startswith("_generated/validation/"):
         source[0] = re.sub(r"\]\((?=[\w./]+\.md)", "](../../", source[0])
+    elif docname == "index":  # pages that there may be
+        found = re.compile(r"(?m)^(\S+\*)\n")
+        source[0] = found.sub(lambda line: line[0] if any(DOCS.glob(line[1] + ".*")) else "", source[0])
     source[0] = re.sub(r"\[(\w+\.md)\](?=\(\1)", "[]", source[0])
     source[0] = re.sub(r"\(validation\.md#([\w-]+)\)", r"(_generated/validation/\1.md)", source[0])
 
