@@ -62,9 +62,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
         "docs",
         str(tmp_path),
     ]
-    options = (
-        ["-D", "plot_gallery=0"] if any((ROOT / "scripts/examples").glob("*.py")) else []
-    )
+    options = ["-D", "plot_gallery=0"] if any((ROOT / "scripts/examples").glob("*.py")) else []
     done = subprocess.run(
         [*command, *options], cwd=ROOT, capture_output=True, text=True, timeout=900, check=False
     )
