@@ -114,6 +114,11 @@ def split_validation() -> tuple[str, dict[str, int]]:
 VALIDATION, ROWS = split_validation()
 
 
+def title_of(name: str) -> str:
+    """First heading of a page of docs/."""
+    return (DOCS / name).read_text(encoding="utf-8").split("\n", 1)[0].removeprefix("# ")
+
+
 def read_source(app, docname: str, source: list[str]) -> None:
     """Put the list of themes for docs/validation.md, lead links to its headings to their pages, say titles.
 
@@ -130,7 +135,7 @@ def read_source(app, docname: str, source: list[str]) -> None:
     elif docname == "index":  # pages that there may be
         found = re.compile(r"(?m)^(\S+\*)\n")
         source[0] = found.sub(lambda line: line[0] if any(DOCS.glob(line[1] + ".*")) else "", source[0])
-    source[0] = re.sub(r"\[(\w+\.md)\](?=\(\1)", "[]", source[0])
+    source[0] = re.sub(r"\[(\w+\.md)\](?=\(\1)", lambda link: f"[{title_of(link[1])}]", source[0])
     source[0] = re.sub(r"\(validation\.md#([\w-]+)\)", r"(_generated/validation/\1.md)", source[0])
 
 
