@@ -314,7 +314,7 @@ def housing() -> xr.Dataset:
             "order": _variable("order", np.arange(top), "1", "carrier order"),
         },
         attrs={
-            **{"sensor_angle": 0.0, "ring_teeth": RING, "form": "linear", "points": 54},
+            **{"sensor_angle": 0.0, "ring_teeth": RING, "form": "linear", "points": 54, "method": "exact"},
             **{"microphone_distance": 1.0, "microphone_angle": 0.0, "air_density": 1.2, "sound_speed": 343.0},
             **{"outer_radius": OUTER, "face_width": FACE_WIDTH},
         },
