@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +20,7 @@ from femgear.report.tables import Block
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+    from threadpoolctl import ThreadpoolController
 
     from femgear.errors import Finding
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
@@ -31,6 +34,14 @@ def silent(stage: str, done: float, total: float) -> None:
     """Tell nobody how far a stage has come."""
 
 
+@lru_cache(maxsize=1)
+def _libraries(modules: int) -> ThreadpoolController:
+    """Find the libraries that have threads: milliseconds, spent again once more modules are loaded."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Limit a block of code, or as ``@one_blas_thread()`` a function, to one BLAS thread.
@@ -38,11 +49,10 @@ def one_blas_thread() -> Iterator[None]:
     Several threads gain nothing on matrices of a few hundred rows, and wait for one another for many times
     the work as soon as other processes want the same cores.
     """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1):  # of the libraries that are loaded: SciPy brings a BLAS of its own
+    solves = (np.linalg.solve, scipy.linalg.solve_triangular)  # SciPy brings a BLAS of its own
+    with _libraries(len(sys.modules)).limit(limits=1):
         # OpenBLAS keeps the buffers that it takes now; where memory is short later, it would try without end
-        for solve in (np.linalg.solve, scipy.linalg.solve_triangular):
+        for solve in solves:
             solve(np.eye(2), np.ones(2))
         yield
 

@@ -1,6 +1,7 @@
 """A train is one folder and one line in the registry: an oscillator with its own case file."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -98,3 +99,34 @@ with one_blas_thread():
     options = {"capture_output": True, "text": True, "timeout": 20, "check": True}
     done = subprocess.run([sys.executable, "-c", program], **options)
     assert done.stdout.split() == ["600.0", "200.0"]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="loads a copy of the BLAS by its name")
+def test_libraries_that_are_loaded_later_have_one_thread_too(tmp_path):
+    """SciPy's BLAS comes with the first limit; a module that comes later may bring another."""
+    program = """
+import ctypes, shutil, sys
+from threadpoolctl import threadpool_info
+from femgear.trains.protocol import one_blas_thread
+
+def libraries():
+    found = [one for one in threadpool_info() if one["user_api"] == "blas"]
+    print(*(one["num_threads"] for one in found))
+    return [one["filepath"] for one in found]
+
+with one_blas_thread():
+    path, *_ = libraries()
+sys.modules["late"] = ctypes.CDLL(shutil.copy(path, sys.argv[1]))
+with one_blas_thread():
+    libraries()
+with one_blas_thread():
+    libraries()
+libraries()
+"""
+    options = {"capture_output": True, "text": True, "timeout": 20, "check": True}
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "2"}
+    command = [sys.executable, "-c", program, str(tmp_path)]
+    first, *limited, free = subprocess.run(command, env=environment, **options).stdout.splitlines()
+    # one of NumPy, one of SciPy
+    assert first == "1 1" and limited == ["1 1 1"] * 2
+    assert free.split() == [str(min(2, os.cpu_count() or 1))] * 3
