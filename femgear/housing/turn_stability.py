@@ -117,37 +117,40 @@ class _Turn:
         self.residual = (
             structure.residual + (P[others] / frequencies[1][others, None] ** 2).T @ P[others].conj()
         )
-        self.damping: Any = None
+        # damping matrix of the modes over the angle: real lines, twice the reach of the waves high
+        self.drag: Any = None
         if damping is not None:
-            order, dofs = structure.wave_order, len(gears.shape)
-            waves, shape = ring_waves(order), structure.wave_shape[moving[1]].T
+            order, dofs, G = structure.wave_order, len(gears.shape), self.rows.shape[1]
             to = np.zeros((dofs + len(order),) * 2, complex)
-            to[:dofs, :dofs], to[dofs:, dofs:] = np.eye(dofs), waves
-            whole = to @ damping @ to.conj().T
-            self.damping = gears.shape[:, moving[0]], shape, order, whole
+            to[:dofs, :dofs], to[dofs:, dofs:] = np.eye(dofs), ring_waves(order)
+            whole, count = to @ damping @ to.conj().T, 2 * int(np.ptp(np.append(order, 0))) + 1
+            motion = np.zeros((count, len(whole), len(self.natural)), complex)
+            motion[:, :dofs, :G] = gears.shape[:, moving[0]]
+            turned = np.exp(2j * np.pi * sense * np.outer(np.arange(count), order) / count)
+            motion[:, dofs:, G:] = turned[..., None] * structure.wave_shape[moving[1]].T
+            drag = np.real(motion.conj().swapaxes(1, 2) @ (whole @ motion))
+            self.drag = np.fft.rfft(drag, axis=0, norm="forward")
+            self.drag[1:] *= 2.0
 
     def monodromy(self, steps: int) -> np.ndarray:
         """Transition matrix over a turn, of displacements and velocities over frequencies, (2 m, 2 m)."""
         m, dt = len(self.natural), 2 * np.pi / (self.speed * steps)
-        state = np.eye(2 * m)
-        state = self._moved(state, 0.5 * dt)
+        move, half, back = (self._free(part * dt) for part in (1.0, 0.5, -0.5))
+        state = _moved(np.eye(2 * m), *half)
         for first in range(0, steps, _TOGETHER):
             theta = 2 * np.pi * (np.arange(first, min(first + _TOGETHER, steps)) + 0.5) / steps
             for kick, brake in zip(*self._kicks(theta, dt)):
                 state[m:] = brake @ state[m:] + kick @ state[:m]
-                state = self._moved(state, dt)
-        return self._moved(state, -0.5 * dt)
+                state = _moved(state, *move)
+        return _moved(state, *back)
 
-    def _moved(self, state: np.ndarray, dt: float) -> np.ndarray:
+    def _free(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Free motion ``q'' + 2 zeta w q' + w^2 q = 0`` of all modes, velocities as ``q'/w``."""
-        m, w, z = len(self.natural), self.natural, self.ratio
+        w, z = self.natural, self.ratio
         damped = np.sqrt(1.0 - z**2)
         c, s, decay = np.cos(damped * w * dt), np.sin(damped * w * dt) / damped, np.exp(-z * w * dt)
-        q, v = state[:m], state[m:]
-        same, other, away = decay * (c + z * s), decay * s, decay * (c - z * s)
-        return np.concatenate([
-            same[:, None] * q + other[:, None] * v, away[:, None] * v - other[:, None] * q
-        ])  # fmt: skip
+        own = np.concatenate([decay * (c + z * s), decay * (c - z * s)])
+        return own[:, None], np.concatenate([decay * s, -decay * s])[:, None]
 
     def _kicks(self, theta: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Velocity over frequency after a step by displacement and by velocity before, (n, m, m) each."""
@@ -173,14 +176,16 @@ class _Turn:
         shape[:, : 2 * N, :G], shape[:, 2 * N :, G:] = self.rows, path
         force = shape.swapaxes(1, 2) @ (np.repeat([-1.0, 1.0], [2 * N, N])[:, None] * law) @ shape
         scaled, eye = force * dt / self.natural[:, None], np.eye(len(self.natural))
-        if self.damping is None:
+        if self.drag is None:
             return scaled, np.broadcast_to(eye, scaled.shape)
-        dof, waves, order, whole = self.damping
-        motion = np.zeros((count, len(whole), len(self.natural)), complex)
-        motion[:, : len(dof), :G] = dof
-        motion[:, len(dof) :, G:] = np.exp(1j * self.sense * theta[:, None] * order)[..., None] * waves
-        drag = np.real(motion.conj().swapaxes(1, 2) @ (whole @ motion))
+        turned = np.exp(1j * np.outer(theta, np.arange(len(self.drag))))
+        drag = np.real(np.tensordot(turned, self.drag, 1))
         drag = 0.5 * dt * (drag - np.diag(2.0 * self.ratio * self.natural))
         drag *= self.natural / self.natural[:, None]
         both = np.linalg.solve(eye + drag, np.concatenate([scaled, eye - drag], axis=-1))
         return both[..., : len(eye)], both[..., len(eye) :]
+
+
+def _moved(state: np.ndarray, own: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Displacements and velocities over frequencies (2 m, n) after a free motion."""
+    return own * state + other * np.roll(state, len(state) // 2, axis=0)
