@@ -63,6 +63,7 @@ def test_relief_lowers_the_level_by_less_than_the_error():
     assert 10 ** (-2 / 20) < levels[1] / levels[0] < 1
 
 
+@pytest.mark.slow
 def test_sound_of_a_run_up(tmp_path, monkeypatch, capsys):
     text, examples, printed = read_page("run_up_sound.md")
     run, export = commands(text)
@@ -73,6 +74,10 @@ def test_sound_of_a_run_up(tmp_path, monkeypatch, capsys):
     assert len(files) == 6 and {"microphone_run_up.wav", "accelerometer_run_up.wav"} <= files
     assert run_examples("run_up_sound.md", examples) == printed
     assert open_results("out/run_up").stages
+
+
+def test_options_of_the_sound_are_those_of_the_page():
+    text, _, _ = read_page("run_up_sound.md")
     for option, default in re.findall(r"^\| `--([\w-]+)` \| ([\d]+)", text, flags=re.MULTILINE):
         from femgear.exchange.formats import Sampling
 

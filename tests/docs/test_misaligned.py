@@ -14,6 +14,7 @@ PAGE = (ROOT / "docs" / "misaligned.md").read_text(encoding="utf-8")
 ROWS = [line.strip("| ").split(" | ") for line in re.findall(r"(?m)^\| \d.*$", PAGE)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [ROWS[1], ROWS[3]], ids=["slope", "crowned"])
 def test_rows_of_the_table(row):
     slope, crowning, *printed = map(float, row)

@@ -47,6 +47,7 @@ def test_the_internal_pair_can_be_solved():
     assert solve_static(with_values(read_case(CASE), changes)).cycle.stiffness.min() > 0.0
 
 
+@pytest.mark.slow
 def test_helical_pair_and_lead_slope():
     rows = re.findall(r"(?m)^\| (?:Overlap|STE|Stiff|Axial).*?\|(.*)\|$", PAGE)
     printed = np.array([[float(one) for one in row.split("|")] for row in rows])
