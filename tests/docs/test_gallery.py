@@ -97,7 +97,7 @@ def test_names_and_sizes_are_checked(gallery, tmp_path):
     with pytest.raises(CaseError, match="no run nothing") as found:
         gallery.main(tmp_path, only=("nothing",))
     assert found.value.code == "E-CHOICE" and not list(tmp_path.iterdir())
-    noise = np.random.default_rng(1).integers(0, 256, (600, 900, 3), dtype=np.uint8)
+    noise = np.random.default_rng(1).integers(0, 256, (400, 500, 3), dtype=np.uint8)
     Image.fromarray(noise).save(tmp_path / "noise.png")
     with pytest.raises(StorageError, match=r"noise\.png takes"):
         gallery.small(tmp_path / "noise.png")
