@@ -61,6 +61,10 @@ app = App(
 )
 
 
+Quantity = Annotated[str, Parameter(allow_leading_hyphen=True)]
+"""A number with its unit, which may be negative."""
+
+
 class Progress:
     """Bars on the terminal, or one line a stage where standard error is a file; called by the stages."""
 
@@ -433,11 +437,11 @@ def new(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("case.toml"),
     teeth: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = (),
-    module: str = "2 mm",
-    torque: str | None = None,
-    speed: str = "1000 rpm",
+    module: Quantity = "2 mm",
+    torque: Quantity | None = None,
+    speed: Quantity = "1000 rpm",
     planets: int | None = None,
-    face_width: str | None = None,
+    face_width: Quantity | None = None,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Write a commented case from a few numbers; masses, inertias and stiffnesses are estimated.

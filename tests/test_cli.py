@@ -600,6 +600,8 @@ def test_a_new_case_is_written_once_and_can_be_checked(tmp_path, capsys, monkeyp
     assert "E-OUTPUT" in capsys.readouterr().err and Path("case.toml").read_bytes() == before
     assert cli.main(["new", "pair", "--force"]) == 0 and read_case("case.toml").model == "pair"
     assert cli.main(["new", "bevel", "-o", "b.toml"]) == 2 and not Path("b.toml").exists()
+    assert cli.main(["new", "planetary", "--torque", "-70 N m", "-o", "c.toml"]) == 0
+    assert read_case("c.toml").operation.torque == -70.0
     assert "drivetrain" in capsys.readouterr().err
 
 

@@ -131,7 +131,8 @@ def new_case(
     Raises
     ------
     CaseError, GeometryError
-        Another kind (E-CHOICE), other numbers of teeth (E-COUNT), and what makes no case.
+        Another kind (E-CHOICE), other numbers of teeth (E-COUNT), planets of two gears
+        (E-ARGUMENTS), and what makes no case.
     """
     if kind not in KINDS:
         limit = ", ".join(KINDS)
@@ -143,13 +144,17 @@ def new_case(
             value=teeth, limit=f"5 or more each, as in --teeth {' '.join(map(str, usual))}",
         )  # fmt: skip
     size, of_set = _length(module, "--module"), len(usual) == 3
+    if planets is not None and not of_set:
+        remedy = "leave it out"
+        raise CaseError(f"a {kind} case has no planets", code="E-ARGUMENTS", key="--planets", remedy=remedy)
     width = _length(face_width, "--face-width") if face_width else 12.0 * size
-    count = planets or next((n for n in (3, 4, 5, 2) if sum(teeth[::2]) % n == 0), 1)
+    fitting = next((n for n in (3, 4, 5, 2) if sum(teeth[::2]) % n == 0), 1)
+    count = fitting if planets is None else planets
     load = torque or f"{usual_torque(teeth[0], teeth[1], size, width, count if of_set else 1):.3g} N m"
     helix = math.radians(20.0) if kind == "helical" else 0.0
     shared = {"module": module, "pressure_angle": "20 deg"}
     notes = {f"material.{key}": "estimated: steel" for key in _STEEL}
-    notes |= {} if planets or not of_set else {"set.planets": "estimated: as equal spacing allows"}
+    notes |= {"set.planets": "estimated: as equal spacing allows"} if planets is None and of_set else {}
     notes |= {} if face_width else {"set.face_width": "estimated: 12 modules"}
     notes |= {} if torque else {"operation.torque": "estimated: K factor of 1 N/mm^2"}
     gears: dict[str, dict[str, Any]] = {}

@@ -79,6 +79,8 @@ def test_sets_close_with_teeth_left_over_or_missing(teeth, planets):
         ("drivetrain", {"module": "2 kg"}, "E-UNIT"),
         ("planetary", {"torque": "12 N"}, "E-UNIT"),
         ("planetary", {"planets": 4}, "E-ASSEMBLY"),
+        ("planetary", {"planets": 0}, "E-RANGE"),
+        ("pair", {"planets": 3}, "E-ARGUMENTS"),
     ],
 )
 def test_numbers_that_make_no_case(kind, numbers, code):
