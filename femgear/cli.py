@@ -265,10 +265,10 @@ def run(
     from femgear.storage.files import resumable
     from femgear.storage.results import completed_since_now, run_folder
     from femgear.trains.reading import open_results, read_case
-    from femgear.trains.registry import TRAINS, check_case, train_of
+    from femgear.trains.registry import check_case, train_of, trains
 
-    known = () if only is None else dict.fromkeys(one.name for known in TRAINS for one in known.train.stages)
-    if only is not None and only not in known:
+    if only is not None and not any(known.train.stage(only) for known in trains()):
+        known = dict.fromkeys(one.name for known in trains() for one in known.train.stages)
         raise CaseError(
             "no train has this stage",
             code="E-ARGUMENTS",

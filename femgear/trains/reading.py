@@ -283,14 +283,13 @@ def _train_of_file(data: dict) -> registry.Known:
             "the file is written for a newer femgear", code="E-FORMAT", key="format",
             value=case_text.found(version), limit=f"up to {FORMAT}", remedy="update femgear",
         )  # fmt: skip
-    own = _own_files()
     if "model" in data:
-        model = data["model"]
+        own, model = _own_files(), data["model"]
         if not isinstance(model, str) or model not in own:
             raise _unknown_model(model)
         return own[model]
     foreign = data.keys() - {*Case.model_fields, *(one.key for one in _sections())}
-    for train in own.values() if foreign else ():
+    for train in [one for one in registry.TRAINS if one.key == "model"] if foreign else ():
         if what := train.file.claims(data):
             raise CaseError(
                 f"a file with {what} needs its model", code="E-KEY-MISSING", key="model",
@@ -301,7 +300,7 @@ def _train_of_file(data: dict) -> registry.Known:
 
 def _own_files() -> dict[str, registry.Known]:
     """Trains with a case file of their own, by the model that the file names."""
-    return {one.name: one for one in registry.TRAINS if one.key == "model"}
+    return {one.name: one for one in registry.trains() if one.key == "model"}
 
 
 def _sections() -> list[registry.Known]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from femgear.case.text import CaseFile, described
-from femgear.errors import CaseError
+from femgear.errors import CaseError, FemgearError
 
 if TYPE_CHECKING:
     from femgear.trains.protocol import Stage, Train
@@ -30,6 +32,9 @@ class Known:
     train = property(lambda self: cast("Train", resolve_name(self.solves)))
 
 
+GROUP = "femgear.trains"
+"""Entry points of other packages; the name is that of the train, the value a module with FILE and TRAIN."""
+
 TRAINS = tuple(
     Known(name, key, f"femgear.{reads}:FILE", f"femgear.trains.{name}.stages:{name.upper()}")
     for name, key, reads in (
@@ -44,9 +49,66 @@ TRAINS = tuple(
 )
 
 
+@dataclass(frozen=True)
+class Installed(Known):
+    """A train of another package, by an entry point of the group `GROUP`."""
+
+    package: str
+
+    file = property(lambda self: self._loaded(self.reads, lambda file: file.model.train))
+    train = property(lambda self: self._loaded(self.solves, lambda train: train.name))
+
+    def _loaded(self, place: str, name_of: Callable[[Any], str]) -> Any:
+        """Load what stands at a place; a package that fails or names it otherwise is refused (E-LIBRARY)."""
+        try:
+            found = resolve_name(place)
+            if (name := name_of(found)) != self.name:
+                raise ValueError(f"{place} is of {name}")
+        except Exception as error:
+            raise FemgearError(
+                f"the train {self.name} of the package {self.package} cannot be loaded: "
+                f"{type(error).__name__}: {' '.join(str(error).split())}",
+                code="E-LIBRARY", remedy=f"update {self.package} or remove it",
+            ) from error  # fmt: skip
+        return found
+
+
+def trains() -> tuple[Known, ...]:
+    """List the trains of femgear and those of other installed packages, none of which is loaded for it.
+
+    Raises
+    ------
+    FemgearError
+        E-DUPLICATE: two have the same name.
+    """
+    known = *TRAINS, *_installed()
+    for one in known:
+        same = next(other for other in known if other.name == one.name)
+        if isinstance(one, Installed) and same is not one:
+            raise FemgearError(
+                f"the package {one.package} has a train {one.name}, "
+                f"and so has {getattr(same, 'package', 'femgear')}",
+                code="E-DUPLICATE", remedy=f"remove {one.package}, or rename its train",
+            )  # fmt: skip
+    return known
+
+
+@cache
+def _installed() -> tuple[Installed, ...]:
+    """Trains of other packages: each entry point of the group is a module with FILE and TRAIN."""
+    from importlib.metadata import entry_points
+
+    return tuple(
+        Installed(
+            one.name, "model", f"{one.module}:FILE", f"{one.module}:TRAIN", one.dist.name if one.dist else ""
+        )
+        for one in sorted(entry_points(group=GROUP))
+    )
+
+
 def train_of(case) -> Train:
     """Find the train that a case is one of; other things are refused (E-TYPE)."""
-    for known in TRAINS:
+    for known in trains():
         if known.name == getattr(case, "train", None):
             return known.train
     raise CaseError(

@@ -7,6 +7,8 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
+from importlib.metadata import EntryPoint, EntryPoints
 from types import SimpleNamespace
 
 import numpy as np
@@ -135,7 +137,7 @@ def test_a_search_over_reliefs(searched, tmp_path):
 
 def test_a_train_of_your_own(tmp_path, monkeypatch, capsys):
     text, (module, program), (printed,) = read_page("plugin.md")
-    (case,) = re.findall(r"(?ms)^```toml\n(.*?)^```", text)
+    case, package = re.findall(r"(?ms)^```toml\n(.*?)^```", text)
     (tmp_path / "two_discs.py").write_text(module, encoding="utf-8")
     (tmp_path / "discs.toml").write_text(case, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -159,6 +161,17 @@ def test_a_train_of_your_own(tmp_path, monkeypatch, capsys):
     (tmp_path / "discs.toml").write_text(case.replace("kN m/rad", "kN m"), encoding="utf-8")
     assert cli.main(["check", "discs.toml"]) == 2
     assert "discs.toml:7" in capsys.readouterr().err
+    sys.modules.pop("two_discs", None)
+    # the package of the page, as installed
+    ((group, entries),) = tomllib.loads(package)["project"]["entry-points"].items()
+    (name, module) = next(iter(entries.items()))
+    (entry,) = EntryPoints([EntryPoint(name, module, group)]).select(group="femgear.trains")
+    monkeypatch.setattr(registry, "TRAINS", registry.TRAINS[1:])
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [entry])
+    registry._installed.cache_clear()
+    (tmp_path / "discs.toml").write_text(case, encoding="utf-8")
+    assert cli.main(["check", "discs.toml"]) == 0
+    registry._installed.cache_clear()
     sys.modules.pop("two_discs", None)
 
 
