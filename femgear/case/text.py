@@ -15,6 +15,7 @@ from functools import lru_cache
 from html import escape
 from typing import Any, ClassVar
 
+import numpy as np
 from pydantic import BaseModel, PrivateAttr
 
 from femgear.errors import MOST_SHOWN, CaseError, Finding, printable
@@ -268,13 +269,16 @@ def _clean(key: str) -> str:
 
 
 def write(data: dict, remarks: Mapping[str, str] | None = None) -> str:
-    """Write nested tables of strings, booleans, integers, floats and lists of these as TOML text.
+    """Write nested tables of strings, booleans, integers, floats, lists and arrays of these as TOML text.
 
     ``parse(write(data), "")`` equals ``data``. `remarks` by dotted key stand behind their entries; with them
     lists of tables stand under headers of their own.
     """
     lines: list[str] = []
-    _write_table(data, "", lines, remarks)
+    try:
+        _write_table(data, "", lines, remarks)
+    except RecursionError:
+        raise _too_deep("") from None
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
@@ -302,7 +306,12 @@ def _write_table(
         lines += ["", header]
     for key, value in values.items():
         remark = (remarks or {}).get(f"{path}{key}")
-        lines.append(f"{_key(key)} = {_value(value)}" + (f"  # {printable(remark)}" if remark else ""))
+        try:
+            written = _value(value)
+        except CaseError as error:
+            error.key = printable(f"{path}{key}")
+            raise
+        lines.append(f"{_key(key)} = {written}" + (f"  # {printable(remark)}" if remark else ""))
     for key, value in table.items():
         name = f"{header.strip('[]')}.{_key(key)}".lstrip(".")
         for i, one in enumerate(listed.get(key, ())):
@@ -333,6 +342,8 @@ def _value(value: object) -> str:
         return "[" + ", ".join(_value(item) for item in value) + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, np.ndarray | np.generic) and not isinstance(plain := value.tolist(), np.generic):
+        return _value(plain)
     raise CaseError(
         f"no TOML form for a {type(value).__name__}", code="E-TYPE", value=value,
         limit="texts, numbers, true or false, lists and tables",

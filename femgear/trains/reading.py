@@ -219,7 +219,7 @@ def _change(data: dict, key: str, value: Any, name: str) -> None:
     if value is None:
         table.pop(last, None)
     else:
-        table[last] = value.tolist() if hasattr(value, "tolist") else value
+        table[last] = value
 
 
 def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type) -> dict | list:

@@ -4,6 +4,7 @@ import os
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from soak.trials import metered
 
@@ -145,3 +146,19 @@ def test_a_system_that_always_waits_for_files_reads_them(tmp_path, monkeypatch):
     path = tmp_path / "case.toml"
     path.write_text("a = 1\n")
     assert read_text(path) == "a = 1\n"
+
+
+def test_tables_without_toml_form_are_refused_by_name():
+    tables = parse(SET, "")
+    number = np.int64(tables["sun"]["teeth"])
+    assert read_case({**tables, "sun": {**tables["sun"], "teeth": number}}) == read_case(SET)
+    for wrong in (None, b"27", {27}, np.complex128(1j), np.array([None]), np.datetime64("2000-01-01")):
+        with pytest.raises(CaseError) as caught:
+            read_case({**tables, "sun": {**tables["sun"], "teeth": wrong}})
+        assert (caught.value.code, caught.value.key) == ("E-TYPE", "sun.teeth")
+    endless: list = []
+    endless.append(endless)
+    for loop in ({"sun": tables}, {"speeds": endless}):
+        tables["sun"] = tables
+        with pytest.raises(CaseError, match="nested too deeply"):
+            read_case(loop)
