@@ -708,6 +708,8 @@ def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> 
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
+    if len(os.environ.get("COLUMNS", "80").lstrip("0")) < 2:  # rich fails or never ends in a few columns
+        del os.environ["COLUMNS"]
     output, errors = _Stream(sys.stdout), _Stream(sys.stderr)
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
         code = _called(program_app, sys.argv[1:] if arguments is None else list(arguments), program)

@@ -617,3 +617,10 @@ def test_rexs_in_and_out(tmp_path, capsys, monkeypatch):
     assert "--stage" in capsys.readouterr().err
     assert cli.main(["rexs", str(CASE.with_name("spur_pair.toml")), "-o", "pair.rexs"]) == 2
     assert "E-MODEL" in capsys.readouterr().err and not Path("pair.rexs").exists()
+
+
+@pytest.mark.parametrize("columns", ["", "0", "1", "02"])
+def test_terminals_without_columns_have_a_help(columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", columns)
+    assert cli.main(["new", "--help"]) == 0
+    assert "--teeth INT" in capsys.readouterr().out
