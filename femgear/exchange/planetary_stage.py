@@ -71,8 +71,8 @@ class _Stage:
         return next(iter(found), None)
 
     def needed(self, of: list[Component], attribute: str, kind: Dimension | None = None) -> float:
-        """Value that all components have, without sign."""
-        if (value := self.common(of, attribute, kind, sign=False)) is None:
+        """Value that all components have; tooth numbers without their sign, which tells internal gears."""
+        if (value := self.common(of, attribute, kind, sign=attribute != "number_of_teeth")) is None:
             self.model.refuse("the attribute is missing", f"{of[0]}, {attribute}", "give it in the gear unit")
         return value
 

@@ -238,6 +238,7 @@ def second_sun():
         (Gearbox().set(53, normal_module=(4.0, "kg")), "E-UNIT", "cylindrical_gear 53, normal_module"),
         (Gearbox().set(53, normal_module=(4.0, "none")), "E-UNIT", "cylindrical_gear 53, normal_module"),
         (Gearbox().set(53, normal_module=("four", MM)), "E-UNIT", "cylindrical_gear 53, normal_module"),
+        (Gearbox().set(53, normal_module=(-4.0, MM)), "E-REXS", "cylindrical_gear 53, normal_module"),
         (Gearbox().set(53, normal_module=("nan", MM)), "E-UNIT", "cylindrical_gear 53, normal_module"),
         (Gearbox().set(53, number_of_teeth=(17, MM)), "E-UNIT", "cylindrical_gear 53, number_of_teeth"),
         (Gearbox().set(53, number_of_teeth=("inf", NONE)), "E-UNIT", "cylindrical_gear 53, number_of_teeth"),
