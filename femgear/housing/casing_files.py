@@ -103,7 +103,7 @@ def read_casing(
     nodes : path, optional
         The table of nodes that matrices and modes need.
     max_frequency : float, optional
-        Modes of matrices and universal files beyond are represented by their static part [Hz].
+        Modes beyond are represented by their static part [Hz].
     expected_stiffness : float, optional
         Static stiffness of the ring along the line of action, one over `mean_compliance` [N/m], roughly: a
         file that is off by a factor of 32 or more has other units.
@@ -141,9 +141,10 @@ def read_casing(
             else:
                 found = dmig_matrices(path) if kind in _PUNCH else _op4(path, table)
                 modes = _modes(*found, table, *UNITS[units])
-            arrays = _arrays(modes, table, direction, pitch_radius, max_diameter, max_frequency, units)
+            arrays = _arrays(modes, table, direction, pitch_radius, max_diameter, units)
         given = {} if damping_ratio is None else {"damping_ratio": damping_ratio}
         structure = from_arrays(arrays | given, direction=direction, max_diameter=max_diameter)
+        structure = structure.below(max_frequency)
         if expected_stiffness is not None:
             _check_units(structure, expected_stiffness, units)
     return structure
@@ -194,10 +195,12 @@ def mean_compliance(structure: FixedStructure) -> float:
     return float((np.abs(shape) ** 2).sum() + np.trace(structure.residual).real)
 
 
-def may_lack_compliance(path: Path, structure: FixedStructure) -> bool:
-    """Tell whether what was read of a file are modes that others are missing of: matrices have them all."""
+def may_lack_compliance(path: Path) -> bool:
+    """Tell whether a file holds modes alone, without the compliance of others: matrices have them all."""
     kind = path.suffix.lower()
-    return kind in _UNIVERSAL or (kind in _ARRAYS and not structure.residual.any())
+    return kind in _UNIVERSAL or (
+        kind in _ARRAYS and not np.any(_stored(path, 1.0, 1.0).get("ring_compliance", 0.0))
+    )
 
 
 def missing_compliance(structure: FixedStructure, expected_stiffness: float) -> tuple[Finding, ...]:
@@ -288,7 +291,7 @@ def _feet(table: Sequence[Node]) -> list[str]:
     return list(dict.fromkeys(one.name for one in table if one.role == "foot"))
 
 
-def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, max_frequency, units) -> dict:
+def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, units) -> dict:
     """The arrays of `from_arrays` of modes in all coordinates of a file."""
     centre = next((UNITS[units][0] * one.position for one in table if one.role == "centre"), np.zeros(3))
     place = {number: position - centre for number, position in modes.position.items()}
@@ -322,16 +325,13 @@ def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, max_fre
     path = np.asarray(direction, float) @ shape
     outputs = np.hstack([modes.shape @ heard.T, modes.foot_force])
     direct = np.vstack([np.zeros_like(heard), modes.foot_direct])
-    kept = modes.frequency <= 2 * np.pi * max_frequency
-    pressed = modes.shape[~kept] @ path.T / modes.frequency[~kept, None]
-    damping = {} if modes.damping is None else {"damping_ratio": modes.damping[kept]}
+    damping = {} if modes.damping is None else {"damping_ratio": modes.damping}
     return damping | {
-        "natural_frequency": modes.frequency[kept],
+        "natural_frequency": modes.frequency,
         "ring_angle": angle,
-        "ring_shape": np.moveaxis(shape @ modes.shape[kept].T, -1, 0),
-        "sensor_shape": outputs[kept],
-        "ring_compliance": pressed.T @ pressed,
-        "sensor_compliance": (outputs[~kept] / modes.frequency[~kept, None]).T @ pressed + direct @ path.T,
+        "ring_shape": np.moveaxis(shape @ modes.shape.T, -1, 0),
+        "sensor_shape": outputs,
+        "sensor_compliance": direct @ path.T,
     }
 
 
@@ -543,6 +543,10 @@ def _universal(path: Path, table: Sequence[Node], length: float, mass: float) ->
     with nvh_library("universal files"):
         import pyuff
     with _foreign("universal file"):
+        # the library reads a file that breaks off up to its last whole dataset
+        ends = sum(line.strip() == "-1" for line in path.read_text(encoding="latin-1").splitlines())
+        if ends % 2:
+            raise ValueError("it breaks off within a dataset")
         sets = pyuff.UFF(str(path)).read_sets()
         sets = sets if isinstance(sets, list) else [sets]
     system = [one["length"] for one in sets if one["type"] == 164]

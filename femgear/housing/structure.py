@@ -130,6 +130,18 @@ class FixedStructure(ReadOnlyArrays):
         shape, residual = self.sensor_shape @ weights, weights.T @ self.sensor_residual
         return replace(self, sensor_shape=shape, sensor_residual=residual, sensor_area=None)
 
+    def below(self, max_frequency: float) -> FixedStructure:
+        """Represent the modes beyond a frequency [Hz] by their static part."""
+        kept = self.natural_frequency <= 2 * np.pi * max_frequency
+        left = self.ring_shape[~kept].conj() / self.natural_frequency[~kept, None] ** 2
+        return replace(
+            self, natural_frequency=self.natural_frequency[kept], damping_ratio=self.damping_ratio[kept],
+            ring_shape=self.ring_shape[kept], sensor_shape=self.sensor_shape[kept],
+            residual=self.residual + self.ring_shape[~kept].T @ left,
+            sensor_residual=self.sensor_residual + self.sensor_shape[~kept].T @ left,
+            wave_shape=self.wave_shape[kept] if len(self.wave_order) else self.wave_shape,
+        )  # fmt: skip
+
 
 _ARRAYS = ("natural_frequency", "damping_ratio", "ring_angle", "ring_shape", "sensor_shape")
 
@@ -156,7 +168,8 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
     ------
     CaseError
         As `FixedStructure`; ``E-KEY-MISSING``: arrays that are missing; ``E-COUNT``: too few points;
-        ``E-RANGE``: points that leave gaps, a direction that is no unit vector.
+        ``E-DUPLICATE``: two at one angle; ``E-RANGE``: points that leave gaps, a direction that is no unit
+        vector.
     """
     missing = [name for name in _ARRAYS if name not in arrays]
     if missing:
@@ -169,6 +182,13 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
         raise CaseError(
             message, code="E-UNITS", key="ring_angle", value=float(np.abs(angle).max()), limit=limit
         )
+    apart = np.diff(around := np.sort(angle.ravel() % (2 * np.pi)), append=around[:1] + 2 * np.pi)
+    if (apart <= 1e-3 * 2 * np.pi / max(angle.size, 1)).any():
+        value, limit = float(around[apart.argmin()]), "one point at an angle, zero and a turn being one"
+        raise CaseError(
+            "two points of the ring stand at the same angle", code="E-DUPLICATE", key="ring_angle",
+            value=value, limit=limit, remedy="keep one of them",
+        )  # fmt: skip
     points, least = angle.size, max(4 * max_diameter, 1)
     if points < least:
         message = f"{points} points of the ring do not resolve {max_diameter} nodal diameters"
@@ -329,12 +349,12 @@ def supported_ring(
     ))  # fmt: skip
     heard = np.real(sum(felt))
     waves, sensors = shape.T @ path[:, middle], shape.T @ heard
-    kept = square <= (2 * np.pi * max_frequency) ** 2
-    left, (mode, sine) = waves[~kept] / square[~kept, None], _coordinates(ring)
-    order = np.where(sine, -1, 1) * ring.nodal_diameter[mode]
-    return FixedStructure(
-        natural_frequency=np.sqrt(square[kept]), damping_ratio=np.full(int(kept.sum()), damping_ratio),
-        ring_shape=waves[kept], sensor_shape=sensors[kept],
-        residual=waves[~kept].T @ left.conj(), sensor_residual=sensors[~kept].T @ left.conj(),
-        wave_shape=(ring_waves(order) @ shape[:, kept]).T, wave_order=order,
+    mode, sine = _coordinates(ring)
+    order, n_waves = np.where(sine, -1, 1) * ring.nodal_diameter[mode], waves.shape[1]
+    every = FixedStructure(
+        natural_frequency=np.sqrt(square), damping_ratio=np.full(len(square), damping_ratio),
+        ring_shape=waves, sensor_shape=sensors, residual=np.zeros((n_waves, n_waves), complex),
+        sensor_residual=np.zeros((sensors.shape[1], n_waves), complex),
+        wave_shape=(ring_waves(order) @ shape).T, wave_order=order,
     )  # fmt: skip
+    return every.below(max_frequency)

@@ -120,7 +120,10 @@ def test_forces_on_the_feet(folder):
     np.testing.assert_allclose(found[:2], moved[[34, 35]], rtol=1e-8)
 
 
-@pytest.mark.parametrize(("name", "nodes"), [("casing.op4", "nodes.csv"), ("casing.uff", "nodes_held.csv")])
+@pytest.mark.parametrize(
+    ("name", "nodes"),
+    [("casing.op4", "nodes.csv"), ("casing.uff", "nodes_held.csv"), ("casing.npz", "nodes_held.csv")],
+)
 def test_modes_beyond_a_frequency_are_static(folder, name, nodes):
     every, few = read(folder, name, nodes), read(folder, name, nodes, max_frequency=6e3)
     assert len(few.natural_frequency) < 0.5 * len(every.natural_frequency)
@@ -389,11 +392,21 @@ def test_damaged_files(kind, content, folder, tmp_path):
     assert error.value.file == str(path)
 
 
+def test_universal_file_that_breaks_off(folder, tmp_path):
+    whole, path = (folder / "casing.uff").read_text(encoding="utf-8"), tmp_path / "a.uff"
+    path.write_text(whole[: int(0.4 * len(whole))], encoding="utf-8")
+    with pytest.raises(CaseError, match="breaks off") as error:
+        read_casing(path, nodes=folder / "nodes_held.csv", max_diameter=4, **KNOWN)
+    assert error.value.code == "E-FILE"
+
+
 @pytest.mark.parametrize(
     ("change", "code", "key"),
     [
         (lambda a: {"ring_shape": a["ring_shape"] * (1 + 0.1j)}, "E-TYPE", "arrays"),
         (lambda a: {"ring_angle": np.degrees(a["ring_angle"])}, "E-UNITS", "ring_angle"),
+        (lambda a: {"ring_angle": np.append(a["ring_angle"][1] - 2 * np.pi, a["ring_angle"][1:])},
+         "E-DUPLICATE", "ring_angle"),
         (lambda a: {"ring_shape": 0 * a["ring_shape"]}, "E-COUNT", "ring_shape"),
         (lambda a: {name: a[name][:0] for name in ("natural_frequency", "ring_shape", "sensor_shape")},
          "E-COUNT", "ring_shape"),

@@ -546,7 +546,7 @@ def fixed_housing(
         structure, sensors, forces = imported_casing(
             case, gears, max_frequency=highest, expected_stiffness=expected
         )
-        if may_lack_compliance(Path(case.housing.structure.file), structure):
+        if may_lack_compliance(Path(case.name).parent / case.housing.structure.file):
             missing = " ".join(one.text for one in missing_compliance(structure, expected))
         own = replace(paths, load_angle=0.0)
     else:
