@@ -21,6 +21,8 @@ from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
 _STEP_ANGLE, _STEPS_PER_HARMONIC, _HALVED = 2.0, 4, 5
 """Angle [rad] that the fastest mode turns in a first step at most, first steps in a period of the highest
 harmonic, and how often steps are halved at most."""
+_FAR = 10.0
+"""Times the largest multiplier of halved steps, beyond which that of the steps before is no approximation."""
 _TOGETHER = 256
 """Steps whose matrices are in memory at a time."""
 
@@ -80,9 +82,11 @@ def _extrapolated(one: _Turn, steps: int, tolerance: float) -> tuple[np.ndarray,
     for _ in range(_HALVED):
         before, steps = row, 2 * steps
         row = [one.monodromy(steps)]
+        if not _largest(before[0]) < _FAR * max(_largest(row[0]), 1.0):
+            continue  # kicks so far apart that the scheme itself grows tell nothing
         for k, coarse in enumerate(before):
             row.append(row[k] + (row[k] - coarse) / (4.0 ** (k + 1) - 1.0))
-        best, other = (np.abs(np.linalg.eigvals(matrix)).max(initial=0.0) for matrix in (row[-1], row[-2]))
+        best, other = _largest(row[-1]), _largest(row[-2])
         change = abs(best - other) / max(best, 0.01)
         if change <= tolerance:
             return row[-1], steps
@@ -90,6 +94,13 @@ def _extrapolated(one: _Turn, steps: int, tolerance: float) -> tuple[np.ndarray,
         f"the multipliers of a turn in {steps} steps change by {change:.1e}", code="E-CONVERGENCE",
         limit=f"{tolerance:g}", remedy="take a looser tolerance or fewer harmonics",
     )  # fmt: skip
+
+
+def _largest(matrix: np.ndarray) -> float:
+    """Modulus of the largest eigenvalue, infinite where the numbers have overflowed."""
+    if not np.isfinite(matrix).all():
+        return np.inf
+    return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
 
 
 class _Turn:
@@ -139,9 +150,12 @@ class _Turn:
         state = _moved(np.eye(2 * m), *half)
         for first in range(0, steps, _TOGETHER):
             theta = 2 * np.pi * (np.arange(first, min(first + _TOGETHER, steps)) + 0.5) / steps
-            for kick, brake in zip(*self._kicks(theta, dt)):
-                state[m:] = brake @ state[m:] + kick @ state[:m]
-                state = _moved(state, *move)
+            with np.errstate(over="ignore", invalid="ignore"):
+                for kick, brake in zip(*self._kicks(theta, dt)):
+                    state[m:] = brake @ state[m:] + kick @ state[:m]
+                    state = _moved(state, *move)
+            if not np.isfinite(state).all():
+                return state
         return _moved(state, *back)
 
     def _free(self, dt: float) -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -51,6 +52,8 @@ def _flat(entries: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 def _differences(first: Block, second: Block) -> Block:
     """Cells of two tables that differ, with the change where both are numbers."""
+    if first.header != second.header:  # as of a set with supports and one without
+        first, second = _shared(first, second.header), _shared(second, first.header)
     names = [name for name in _MEETING if "mesh harmonic" in first.header and name in first.header]
     own = [first.header.index(name) for name in names] or [0]
     a, b = ({tuple(row[i] for i in own): row for row in block.rows} for block in (first, second))
@@ -70,6 +73,13 @@ def _differences(first: Block, second: Block) -> Block:
                 rows.append((what, columns[i], x, y, _change(x, y, decibels="dB" in unit)))
     header = ("row", "column", "first", "second", "change") if rows else ()
     return Block(first.title, header, tuple(rows), () if rows else ("the same",))
+
+
+def _shared(block: Block, header: tuple[str, ...]) -> Block:
+    """The columns of a table that stand in another header too."""
+    kept = [i for i, name in enumerate(block.header) if name in header]
+    rows = tuple(tuple(row[i] for i in kept) for row in block.rows)
+    return replace(block, header=tuple(block.header[i] for i in kept), rows=rows)
 
 
 def _change(first: str, second: str, *, decibels: bool) -> str:

@@ -1,6 +1,7 @@
 """Damping of gears and ring as a whole in a structure, and the stability of a turn."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thi
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.housing.structure import circumferential, ring_waves, supported_ring
-from femgear.housing.turn_stability import turn_stability
+from femgear.housing.turn_stability import _extrapolated, turn_stability
 from femgear.housing.two_way import MeshPaths, solve_two_way, structure_lines
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.stability.parametric import stability
@@ -87,3 +88,16 @@ def test_a_ring_that_turns_alone_is_the_same_in_both_frames(speed, depth, ratio)
     assert found.stable[0] == (depth < 0.2)
     with pytest.raises(ConvergenceError, match="multipliers of a turn"):
         turn_stability(rigid, drive, structure, paths, [speed], **known, tolerance=-1.0)
+
+
+@pytest.mark.parametrize("grown", [np.inf, 1e30])
+def test_steps_in_which_the_scheme_itself_grows_are_left_out(grown):
+    """Of second order in the step from 5000 steps on, nothing of the kind before."""
+
+    class Turn:
+        def monodromy(self, steps):
+            return np.array([[0.5 + 1e6 / steps**2 if steps > 5000 else grown]])
+
+    turn: Any = Turn()
+    matrix, steps = _extrapolated(turn, 3000, 1e-3)
+    assert steps == 24000 and matrix[0, 0] == pytest.approx(0.5, abs=1e-12)

@@ -20,6 +20,9 @@ def test_cells_that_differ_come_with_their_change():
     assert compare._differences(first, first).notes == ("the same",)
     other = Block("Static", ("mesh", "STE"), (("a", "2.0"),))
     assert "other rows" in compare._differences(first, other).notes[0]
+    wider = Block("Static", ("mesh", "one way", "STE"), (("a", "9", "2.5"), ("b", "9", "1.0")))
+    shared = ("mesh a", "STE", "2.0", "2.5", "+25 %")
+    assert compare._differences(first, wider).rows == (shared,)
 
 
 def test_a_table_without_header_is_compared_too():
