@@ -219,7 +219,9 @@ def two_way(reference: Reference, modes=None, *, count: int = 1000, harmonics: i
 
     case = on_feet(reference.case, harmonics, diameters, count)
     carrier = member_speeds(case, reference.gears).carrier * np.array(case.operation.speeds)
-    return fixed_housing(case, modes or reference.modes, carrier)
+    for part in np.array_split(carrier, -(-count // 250)):  # about as many as a run has in memory at a time
+        found = fixed_housing(case, modes or reference.modes, part)
+    return found
 
 
 def whole(reference: Reference):

@@ -98,8 +98,9 @@ def unheld_member(case: RigidCase, key: str, remedy: str) -> CaseError:
 
 
 def check_one_period(
-    case: Case, gears: PlanetarySet, takes: str, remedy: str = "run with --only static"
-) -> None:
+    case: Case, gears: PlanetarySet, takes: str, *, key: str = "operation.speeds",
+    remedy: str = "run with --only static",
+) -> None:  # fmt: skip
     """Refuse errors whose static record spans several mesh periods (E-PERIODS).
 
     ``takes`` is "the planar model takes", or whatever takes one period alone.
@@ -109,7 +110,7 @@ def check_one_period(
     if periods > 1:
         raise CaseError(
             f"the errors of this set span {periods} mesh periods; {takes} one", code="E-PERIODS",
-            key="operation.speeds", limit="errors that repeat with every tooth",
+            key=key, limit="errors that repeat with every tooth",
             remedy=f"{remedy}, or leave pitch errors and runouts out",
         )  # fmt: skip
 

@@ -75,13 +75,14 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             limit="not zero for modes, dynamics and housing",
             remedy="give a torque, or run with --only static",
         )
-    record_periods(case, gears)
     if case.housing.stands_still:
-        key = "support" if case.housing.support else "structure"
-        takes = f"a housing that stands still (housing.{key}) takes"
-        check_one_period(case, gears, takes, remedy=f"leave housing.{key} out")
+        key = "housing.support" if case.housing.support else "housing.structure"
+        takes = f"a housing that stands still ({key}) takes"
+        check_one_period(case, gears, takes, key=key, remedy=f"leave {key} out")
     if case.housing.form == "linear":
-        check_one_period(case, gears, 'housing.form = "linear" takes', remedy='take the form "exact"')
+        takes, remedy = 'housing.form = "linear" takes', 'take the form "exact"'
+        check_one_period(case, gears, takes, key="housing.form", remedy=remedy)
+    record_periods(case, gears)
     _check_housing_supports(case)
     if case.housing.structure:
         imported_casing(case, gears)

@@ -152,8 +152,9 @@ _STEP = 2500.0
 HARMONICS = 512
 """The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide. Slower
 speeds are excited less far, and `_lost_level` tells what they lose."""
-_PART, _HARMONIC = 100e6, 4e3
-"""Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
+_PART, _HARMONIC, _STANDING = 100e6, 4e3, 42e3
+"""Size of the speeds that are in memory at a time, that of a mesh harmonic of one of them, and what it takes
+more for a planet in a housing that stands still [bytes]."""
 _LINES_TOGETHER = 8000
 """Harmonics of the run-up's speeds that are in memory at a time."""
 _MOST_ORDERS = 2500
@@ -468,7 +469,10 @@ def dynamics_parts(
         level_change[slow] = _lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
     short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
-    for own, part in parts_of_speeds(case, _HARMONIC * limit.response * excitation.periods, memory):
+    room = _HARMONIC * limit.response * excitation.periods
+    if case.housing.stands_still:
+        room = room + _STANDING * gears.n_planets / modes.symmetry * (fixed_harmonics(case)[1] + 1)
+    for own, part in parts_of_speeds(case, room, memory):
         response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
         pulls.append(pulls_of(response.force))
