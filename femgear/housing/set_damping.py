@@ -83,8 +83,8 @@ def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:
 
 
 def set_damping(
-    matrix, gears: Modes, structure: FixedStructure, order, structure_order, to, back, *, symmetry: int,
-    sense: int,
+    matrix, gears: Modes, structure: FixedStructure, order, meeting, *, symmetry: int, sense: int,
+    offset: float = 0.0,
 ) -> SetDamping:  # fmt: skip
     """Take the damping of a set apart for the orders of the two-way response.
 
@@ -95,18 +95,22 @@ def set_damping(
         the frame of the carrier [N s/m, ...]. Waves beyond n_max must be damped alone.
     gears, structure
         As for `femgear.housing.two_way.solve_two_way`; the structure knows its waves.
-    order, structure_order : (n_L,), (n_K,) int arrays
-        Orders L of the meshes and K of the structure.
-    to, back : (n_L, 2 n_max + 1), (n_K, 2 n_max + 1) int arrays
-        Places of ``L - s n`` among the K, and of ``K + s n`` among the L; their number where there are none.
+    order : (n_L,) int array
+        Orders L of the meshes.
+    meeting : tuple of (n_K,), (n_L, 2 n_max + 1), (n_K, 2 n_max + 1) int arrays
+        Orders K of the structure, places of ``L - s n`` among them, and of ``K + s n`` among the L; their
+        number where there are none.
     symmetry, sense : int
         Turns that repeat the set, and the sense of the carrier.
+    offset : float
+        What all orders lack: their residues count without it, velocities with it.
 
     Raises
     ------
     CaseError
         A matrix that does not fit, or a structure without waves (E-SHAPE).
     """
+    structure_order, to, back = meeting
     matrix, n, (dofs, modes) = np.asarray(matrix, float), structure.wave_order, gears.shape.shape
     if not len(n) or matrix.shape != (dofs + len(n),) * 2:
         message = f"damping of shape {matrix.shape} for {dofs} coordinates of gears and {len(n)} of a ring"
@@ -127,10 +131,12 @@ def set_damping(
     for c in range(symmetry):
         rows, met = np.flatnonzero(order % symmetry == c), np.flatnonzero((c - sense * n) % symmetry == 0)
         own = np.append(np.arange(modes), modes + met)
-        velocity = np.hstack([np.repeat(order[rows, None], modes, 1), order[rows, None] - sense * n[met]])
+        turning = order[rows, None] + offset
+        velocity = np.hstack([np.repeat(turning, modes, 1), turning - sense * n[met]])
         place = to[rows[:, None], column[met]]
         residues.append(_Residue(rows, met, place, velocity, whole[np.ix_(own, own)]))
     own = np.real((shape.conj() * mean) @ shape.T) - np.diag(modal)
     coordinates = np.real(shape[:, near] @ ring_waves(n).conj())
     first = np.flatnonzero(n < 0) - 1
-    return SetDamping(tuple(residues), first, back[:, column], structure_order, np.hstack([coordinates, own]))
+    own = np.hstack([coordinates, own])
+    return SetDamping(tuple(residues), first, back[:, column], structure_order + offset, own)

@@ -1,9 +1,10 @@
 """Stability of a set in a housing that stands still: Floquet multipliers over a turn of the carrier.
 
 The equations of `femgear.housing.two_way` in time, with the modal coordinates p of the gears and q of the
-structure: everything repeats after a turn. Between the kicks of meshes and damping the modes move exactly;
-kicks and motion alternate symmetrically (G. Strang, SIAM J. Numer. Anal. 5, 1968, 506-517), so that errors
-have even powers of the step alone, which halved steps take away one by one (W. Romberg, 1955).
+structure: everything repeats after a turn, or after several where errors turn with gears. Between the kicks
+of meshes and damping the modes move exactly; kicks and motion alternate symmetrically (G. Strang, SIAM J.
+Numer. Anal. 5, 1968, 506-517), so that errors have even powers of the step alone, which halved steps take
+away one by one (W. Romberg, 1955).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from femgear.errors import ConvergenceError
+from femgear.housing.sensor import carrier_turns
 from femgear.housing.structure import FixedStructure, ring_waves
 from femgear.housing.two_way import MeshPaths
 from femgear.solvers.stability.parametric import Stability
@@ -56,24 +58,27 @@ def turn_stability(
     Returns
     -------
     Stability
-        Its multipliers are those over a turn of the carrier, its steps those of the finest turn.
+        Its multipliers and the finest steps are those of the turns of the carrier after which all repeats.
 
     Raises
     ------
     ConvergenceError
         Steps that were halved so often that they do not get finer (E-CONVERGENCE).
     """
-    speeds = np.abs(np.atleast_1d(np.asarray(carrier_speed, float)))
-    stiffness, sense = mesh_harmonics(excitation, harmonics)[0], int(np.sign(np.ravel(carrier_speed)[0]))
+    speeds, turns = (
+        np.atleast_1d(np.asarray(carrier_speed, float)),
+        carrier_turns(paths.z_ring, excitation.periods),
+    )
     found, kept, taken = np.empty(len(speeds), complex), *np.empty((2, len(speeds)), int)
     for i, speed in enumerate(speeds):
-        one = _Turn(gears, structure, paths, stiffness, damping, sense, speed, harmonics * frequency_ratio)
-        fastest = 2 * np.pi * one.natural.max(initial=0.0) / speed
+        reach = harmonics * frequency_ratio
+        one = _Turn(gears, structure, paths, excitation, damping, speed, harmonics, reach)
+        fastest = 2 * np.pi * one.natural.max(initial=0.0) / abs(speed)
         least = max(fastest / _STEP_ANGLE, _STEPS_PER_HARMONIC * harmonics * paths.z_ring)
-        matrix, taken[i] = _extrapolated(one, int(np.ceil(least)), tolerance)
+        matrix, taken[i] = _extrapolated(one, int(np.ceil(least * turns)), tolerance)
         values, kept[i] = np.append(np.linalg.eigvals(matrix), one.static), len(one.natural)
         found[i] = values[np.abs(values).argmax()]
-    return Stability(speeds * paths.z_ring / (2 * np.pi), found, kept, taken)
+    return Stability(np.abs(speeds) * paths.z_ring / (2 * np.pi), found, kept, taken)
 
 
 def _extrapolated(one: _Turn, steps: int, tolerance: float) -> tuple[np.ndarray, int]:
@@ -106,7 +111,11 @@ def _largest(matrix: np.ndarray) -> float:
 class _Turn:
     """Equations of one speed of the carrier [rad/s], the modes up to so many mesh frequencies in time."""
 
-    def __init__(self, gears, structure, paths: MeshPaths, stiffness, damping, sense, speed, reach):
+    def __init__(
+        self, gears, structure, paths: MeshPaths, excitation, damping, speed: float, harmonics: int, reach
+    ):
+        sense, speed, teeth = int(np.sign(speed)), abs(speed), paths.z_ring / excitation.periods
+        self.angle = 2 * np.pi * carrier_turns(paths.z_ring, excitation.periods)
         cut = reach * paths.z_ring * speed
         frequencies = 2 * np.pi * gears.frequency, structure.natural_frequency
         ratios = gears.damping_ratio, structure.damping_ratio
@@ -118,10 +127,12 @@ class _Turn:
         slowest = min(
             [(z[o] * w[o]).min() for z, w, o in zip(ratios, frequencies, left) if o.any()] or [np.inf]
         )
-        self.static, self.speed = np.exp(-slowest * 2 * np.pi / speed), speed
+        self.speed = speed
+        self.static = np.exp(-slowest * self.angle / speed)
         self.place, self.sense = np.array(paths.planet_angles) + paths.load_angle, sense
         self.n = np.arange(-structure.max_diameter, structure.max_diameter + 1)
-        self.stiffness, self.mean, self.teeth = stiffness, gears.mesh_stiffness, paths.z_ring
+        self.stiffness, self.mean = mesh_harmonics(excitation, harmonics)[0], gears.mesh_stiffness
+        self.base = teeth
         rows, P, (own, others) = gears.mesh_deflection, structure.ring_shape, left
         self.rows, self.path = rows[:, moving[0]], P[moving[1]]
         self.flexibility = gears.residual + (rows[:, own] / frequencies[0][own] ** 2) @ rows[:, own].T
@@ -144,12 +155,12 @@ class _Turn:
             self.drag[1:] *= 2.0
 
     def monodromy(self, steps: int) -> np.ndarray:
-        """Transition matrix over a turn, of displacements and velocities over frequencies, (2 m, 2 m)."""
-        m, dt = len(self.natural), 2 * np.pi / (self.speed * steps)
+        """Transition matrix until all repeats, of displacements and velocities over frequencies."""
+        m, dt = len(self.natural), self.angle / (self.speed * steps)
         move, half, back = (self._free(part * dt) for part in (1.0, 0.5, -0.5))
         state = _moved(np.eye(2 * m), *half)
         for first in range(0, steps, _TOGETHER):
-            theta = 2 * np.pi * (np.arange(first, min(first + _TOGETHER, steps)) + 0.5) / steps
+            theta = self.angle * (np.arange(first, min(first + _TOGETHER, steps)) + 0.5) / steps
             with np.errstate(over="ignore", invalid="ignore"):
                 for kick, brake in zip(*self._kicks(theta, dt)):
                     state[m:] = brake @ state[m:] + kick @ state[:m]
@@ -169,7 +180,7 @@ class _Turn:
     def _kicks(self, theta: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Velocity over frequency after a step by displacement and by velocity before, (n, m, m) each."""
         k = np.real(
-            np.exp(1j * self.teeth * np.outer(theta, np.arange(self.stiffness.shape[1]))) @ self.stiffness.T
+            np.exp(1j * self.base * np.outer(theta, np.arange(self.stiffness.shape[1]))) @ self.stiffness.T
         )
         wave = np.exp(1j * self.n * (self.place + self.sense * theta[:, None])[..., None])
         path = np.real(wave @ self.path.T)

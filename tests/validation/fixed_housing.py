@@ -24,7 +24,7 @@ from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.periodic.spectral import HarmonicProblem, solve_direct, solve_spectral
 from femgear.solvers.stability.parametric import stability
 from femgear.system.fourier import Product, harmonics_of, pad
-from femgear.system.system import MechanicalSystem, MeshExcitation
+from femgear.system.system import MechanicalSystem, MeshExcitation, Modes
 from femgear.trains.elastic import stages as elastic
 from femgear.trains.elastic.model import gears_alone
 from femgear.trains.reading import with_values
@@ -123,6 +123,29 @@ def excitation(paths: MeshPaths, sense: int = 1, depth: float = 0.15) -> MeshExc
     deflection = 1e-5 * np.concatenate([1 + 0.3 * wave(0.2), 2 + 0.4 * wave(0.1)])
     force = 100 + 10 * np.concatenate([wave(0.5), wave(0.5)])
     return MeshExcitation(stiffness, deflection, force, np.zeros(len(force)))
+
+
+def shaken(paths: MeshPaths, periods: int, *, planet: int | None = None, sense: int = 1) -> MeshExcitation:
+    """The excitation with errors that turn, of all planets one after the other or of one planet alone."""
+    drive, N = excitation(paths, sense), len(paths.planet_angles)
+    tau = 2 * np.pi * np.arange(64 * periods) / (64 * periods)
+    error = np.cos(tau + 5 * np.array(paths.planet_angles)[:, None])
+    if planet is not None:
+        error[np.arange(N) != planet] = 0.0
+    error = 0.08 * np.concatenate([error, 1.2 * error])
+    stiffness, deflection, force = (
+        np.tile(one, (1, periods)) for one in (drive.stiffness, drive.deflection, drive.force)
+    )
+    return MeshExcitation(
+        stiffness * (1 + error), deflection * (1 + 0.5 * error), force, np.zeros(2 * N), periods=periods
+    )
+
+
+def rigid_modes(paths: MeshPaths, drive: MeshExcitation, ratio: float = 0.04) -> Modes:
+    """Modes of sun and planets with the mean stiffness of all planets."""
+    mean, N = drive.stiffness.mean(axis=1), len(paths.planet_angles)
+    equal = np.repeat([mean[:N].mean(), mean[N:].mean()], N)
+    return solve_modes(gears(paths.planet_angles), equal, damping_ratio=ratio)
 
 
 def feet(max_diameter: int, highest: int = 20) -> FixedStructure:
@@ -307,6 +330,14 @@ def in_time() -> tuple[Row, ...]:
     return (
         *_in_time("ten degrees of freedom", paths, _short(feet(6), 4, 2), None),
         *_in_time("damping of gears and ring as a whole", paths, supported_ring(ring, FEET, **known), joint),
+        *_in_time("errors that turn", paths, supported_ring(ring, FEET, **known), joint, shaken(paths, 2)),
+        *_in_time(
+            "an error of one planet",
+            paths,
+            supported_ring(ring, FEET, **known),
+            joint,
+            shaken(paths, 2, planet=1),
+        ),
     )
 
 
@@ -315,12 +346,13 @@ def _equations(paths: MeshPaths, structure: FixedStructure, joint, drive, speed:
     system, mean, own = gears(EQUAL), drive.stiffness.mean(axis=1), structure.natural_frequency
     n, m = len(system.K), len(own)
     alone, size = modal_damping(system, mean, ratio), 2 * (n + m)
-    series = [harmonics_of(one, 2) for one in (drive.stiffness, drive.deflection, drive.force)]
+    P = drive.periods
+    series = [harmonics_of(one, 2 * P) for one in (drive.stiffness, drive.deflection, drive.force)]
     shape = np.zeros((0, m)) if joint is None else _coordinates(structure)
 
     def forces(theta, state):
         """Mesh forces, and the modes' displacement at the meshes, of states (size, ...)."""
-        wave = np.exp(1j * 37 * theta * np.arange(3))
+        wave = np.exp(1j * 37 / P * theta * np.arange(2 * P + 1))
         k, s, F = (np.real(one @ wave)[:, None] for one in series)
         path = _moving(structure, np.array(EQUAL) + 0.1 + theta)
         d = system.W.T @ state[:n]
@@ -353,9 +385,11 @@ def _equations(paths: MeshPaths, structure: FixedStructure, joint, drive, speed:
     return rate, forces, size
 
 
-def _in_time(words: str, paths: MeshPaths, structure: FixedStructure, joint) -> tuple[Row, ...]:
-    speed, drive = 20.0, excitation(paths)
-    modes = solve_modes(gears(EQUAL), drive.stiffness.mean(axis=1), damping_ratio=0.04)
+def _in_time(
+    words: str, paths: MeshPaths, structure: FixedStructure, joint, drive: MeshExcitation | None = None
+) -> tuple[Row, ...]:
+    speed, drive = 20.0, drive or excitation(paths)
+    modes = rigid_modes(paths, drive)
     found = solve_two_way(
         modes, drive, structure, paths, np.array([speed]), harmonics=(2, 12), side_bands=12, damping=joint
     )
@@ -363,7 +397,7 @@ def _in_time(words: str, paths: MeshPaths, structure: FixedStructure, joint) -> 
     n, m = len(modes.shape), len(structure.natural_frequency)
     # the periodic motion by the monodromy matrix: columns of unit starts without load, then the loaded one
     start, constant = np.eye(size, size + 1), np.append(np.zeros(size), 1.0)
-    times = np.linspace(0, 2 * np.pi / speed, 201)
+    times = np.linspace(0, found.turns * 2 * np.pi / speed, 200 * found.turns + 1)
     precise = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-11, "t_eval": times}
     states = solve_ivp(rate, (0, times[-1]), start.ravel(), args=(constant,), **precise).y
     states = states.reshape(size, size + 1, -1)
@@ -374,7 +408,8 @@ def _in_time(words: str, paths: MeshPaths, structure: FixedStructure, joint) -> 
         linear, source, _ = forces(speed * time, motion[:, i : i + 1])
         exact[:, i] = (linear + source)[:, 0]
     ours = _sampled(found, speed * times)
-    apart = np.abs(ours - exact[[0, 3]]).max() / np.ptp(exact)
+    solved_for = [0, 3] if len(ours) == 2 else slice(None)
+    apart = np.abs(ours - exact[solved_for]).max() / np.ptp(exact)
     order, lines = structure_lines(structure, found)
     heard = np.real(lines[0] @ np.exp(1j * np.outer(order, speed * times)))
     expected = structure.sensor_shape.T @ motion[n : n + m]
@@ -390,18 +425,22 @@ def multipliers() -> tuple[Row, ...]:
     paths, ring, rows = MeshPaths(37, EQUAL, 0.1, 3), thin_ring(2, foundation=2e10), list[Row]()
     ratio, known = 2e-4, {"max_diameter": 2, "max_frequency": 1e6, "damping_ratio": 2e-4}
     structure = supported_ring(ring, FEET, **known)
-    for words, speed, depth in (("stable", 100.0, 0.15), ("unstable", 230.0, 0.4)):
-        drive = excitation(paths, depth=depth)
+    drives = {depth: excitation(paths, depth=depth) for depth in (0.15, 0.4)}
+    for words, speed, drive in (
+        ("stable", 100.0, drives[0.15]), ("unstable", 230.0, drives[0.4]),
+        ("an error of one planet", 100.0, shaken(paths, 2, planet=1)),
+    ):  # fmt: skip
         mean = drive.stiffness.mean(axis=1)
         joint = modal_damping(joined(paths, ring, 2), mean, ratio)
         rate, _, size = _equations(paths, structure, joint, drive, speed, ratio)
-        start, end = np.eye(size).ravel(), 2 * np.pi / speed
+        start, end = np.eye(size).ravel(), 2 * np.pi * drive.periods / speed
         turn = solve_ivp(rate, (0, end), start, "DOP853", args=(0.0,), rtol=1e-9, atol=1e-12).y[:, -1]
         reference = np.abs(np.linalg.eigvals(turn.reshape(size, size))).max()
         modes = solve_modes(gears(EQUAL), mean, damping_ratio=ratio)
         kept = {"harmonics": 2, "damping": joint, "frequency_ratio": 1e3, "tolerance": 1e-8}
         found = turn_stability(modes, drive, structure, paths, [speed], **kept)
-        text = f"eleven degrees of freedom, {words}: modulus of the largest multiplier of a turn"
+        turns = "a turn" if drive.periods == 1 else f"{drive.periods} turns"
+        text = f"eleven degrees of freedom, {words}: modulus of the largest multiplier of {turns}"
         rows.append(within("stability", "DOP853", text, reference, found.modulus[0], 1e-6))
         text = f"{words}: 1 where the modulus is at most 1"
         rows.append(counted("stability", "DOP853", text, int(reference <= 1), int(found.stable[0])))

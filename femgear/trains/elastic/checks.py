@@ -75,10 +75,6 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             limit="not zero for modes, dynamics and housing",
             remedy="give a torque, or run with --only static",
         )
-    if case.housing.stands_still:
-        key = "housing.support" if case.housing.support else "housing.structure"
-        takes = f"a housing that stands still ({key}) takes"
-        check_one_period(case, gears, takes, key=key, remedy=f"leave {key} out")
     if case.housing.form == "linear":
         takes, remedy = 'housing.form = "linear" takes', 'take the form "exact"'
         check_one_period(case, gears, takes, key="housing.form", remedy=remedy)

@@ -172,9 +172,9 @@ class FixedHousing:
 
     The latter where they are asked for. Sensors of the structure: some at equal distances around the outer
     surface of a ring on supports, then the displacements ``sensors`` and the forces ``forces`` by name;
-    ``missing`` as in `HousingResult`. ``wider`` are forces of twice the mesh harmonics at the speeds number
-    ``wider_at``, ``multiplier`` (speeds,) the modulus of the largest Floquet multiplier over a turn of the
-    carrier, nan where none was computed.
+    ``missing`` as in `HousingResult`. ``wider`` are forces of the same and of twice the mesh harmonics at the
+    speeds number ``wider_at``, without errors that turn. ``multiplier`` (speeds,) is the modulus of the
+    largest Floquet multiplier over a turn of the carrier, nan where none was computed.
     """
 
     structure: FixedStructure
@@ -183,7 +183,7 @@ class FixedHousing:
     sensors: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     missing: str = ""
-    wider: TwoWayResponse | None = None
+    wider: tuple[TwoWayResponse, ...] = ()
     wider_at: Any = ()
     multiplier: Any = np.nan
 

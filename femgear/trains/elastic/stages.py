@@ -40,15 +40,17 @@ from femgear.contact.loaded_period import LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
 from femgear.errors import Finding
 from femgear.fe.elasticity import mass
-from femgear.gears.deviations import common_period, rotational_symmetry
+from femgear.gears.deviations import common_period, no_deviations, rotational_symmetry
 from femgear.gears.planetary import PlanetarySet, mesh_names
+from femgear.housing.carrier_orders import MeshPaths
 from femgear.housing.casing_files import may_lack_compliance, missing_compliance
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines, component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound, equivalent_sound, surface_sound
 from femgear.housing.structure import FixedStructure, supported_ring
 from femgear.housing.turn_stability import turn_stability
-from femgear.housing.two_way import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
+from femgear.housing.turning_errors import mean_excitation
+from femgear.housing.two_way import TwoWayResponse, solve_two_way, structure_lines
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
 from femgear.solvers.linear.modal import modal_damping, output_load, output_response, residual_output
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
@@ -526,7 +528,8 @@ def fixed_housing(
 
     Of the set in it, and if ``both`` in the ring on its foundation alone. The meshes keep what higher
     diameters give. At the speeds number ``wider_at`` also for forces of twice the mesh harmonics;
-    those number ``judged_at`` get a Floquet verdict.
+    those number ``judged_at`` get a Floquet verdict. With errors that turn twice the mesh harmonics, and
+    damping, are those of the mean of all planets and mesh periods.
     Supports damp nothing: gears and ring have the damping of the set without them. Gears in a casing of a
     file, which brings its own, have modal damping against a rigid ring.
     """
@@ -535,7 +538,12 @@ def fixed_housing(
     excitation, flexibility = _excitation(gears, replace(ring, **low), modes.state)
     harmonics, damping = fixed_harmonics(case), case.dynamics.damping_ratio
     highest = _MODES_ABOVE * max(modes.reach, harmonics[1] * fastest_mesh_frequency(case, gears))
-    mean, directions = excitation.stiffness.mean(axis=1), modes.model.system.W.copy()
+    paths = MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), ring.load_angle, modes.symmetry)
+    even = excitation
+    if excitation.periods > 1:
+        paths = replace(paths, symmetry=rotational_symmetry(no_deviations(gears), gears))
+        even = mean_excitation(excitation, paths, int(np.sign(carrier[0])))
+    mean, directions = even.stiffness.mean(axis=1), modes.model.system.W.copy()
     alone = solve_eigenproblem(
         gears_alone(modes.model, flexibility), mean, damping_ratio=damping, max_frequency=highest
     )
@@ -543,7 +551,6 @@ def fixed_housing(
     whole = replace(modes.model.system, W=directions, flexibility=flexibility)
     damped = modal_damping(whole, mean, damping)
     known: Any = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
-    paths = MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), ring.load_angle, modes.symmetry)
     sensors, forces, missing = (), (), ""
     if case.housing.structure:
         expected = 1.0 / ring_mesh_compliance(low["compliance"], gears.ring.teeth, [0.0])[0, 0]
@@ -555,26 +562,30 @@ def fixed_housing(
         own = replace(paths, load_angle=0.0)
     else:
         own, (structure, sensors, forces) = paths, _ring_on_supports(case, modes, known)
-    solved = partial(solve_two_way, alone, excitation, carrier_speed=carrier, harmonics=harmonics)
+    solved = partial(solve_two_way, alone, carrier_speed=carrier, harmonics=harmonics)
     joint = None if case.housing.structure else damped
     plain, one_way = supported_ring(ring.modes, (), **known), None
     if both:
-        one_way = replace(solved(plain, paths=paths, side_bands=0, damping=damped), paths=own)
+        one_way = solved(excitation, plain, paths=paths, side_bands=0, damping=damped)
+        one_way = replace(one_way, paths=replace(own, symmetry=one_way.paths.symmetry))
         drag = None if joint is None else one_way.drag @ (plain.wave_shape @ structure.wave_shape.conj().T)
         one_way = replace(one_way, drag=drag)
-    two_way, wider = solved(structure, paths=own, damping=joint), None
-    orders = gears.n_planets // modes.symmetry * 2 * harmonics[1] * (4 * n_max + 1)
+    two_way, wider = solved(excitation, structure, paths=own, damping=joint), list[TwoWayResponse]()
+    orders = gears.n_planets // own.symmetry * 2 * harmonics[1] * (4 * n_max + 1)
     wider_at = np.asarray(wider_at if orders <= _MOST_ORDERS else (), int)
     if len(wider_at):
-        twice: Any = {"carrier_speed": carrier[wider_at], "harmonics": tuple(2 * h for h in harmonics)}
-        wider = solved(structure, paths=own, damping=joint, **twice)
+        for times in (1, 2):
+            more: Any = {"carrier_speed": carrier[wider_at], "harmonics": tuple(times * h for h in harmonics)}
+            wider.append(solved(even, structure, paths=own, damping=joint, **more))
     multiplier = np.full(len(carrier), np.nan)
     if len(judged_at):
         multiplier[judged_at] = turn_stability(
             alone, excitation, structure, own, carrier[judged_at], damping=joint,
             harmonics=min(harmonics[0], _JUDGED),
         ).modulus  # fmt: skip
-    return FixedHousing(structure, two_way, one_way, sensors, forces, missing, wider, wider_at, multiplier)
+    multiplier **= 1.0 / two_way.turns
+    told = sensors, forces, missing, tuple(wider), wider_at, multiplier
+    return FixedHousing(structure, two_way, one_way, *told)
 
 
 def _ring_on_supports(
@@ -670,11 +681,13 @@ def _standing_still(
     outputs = dict(zip(("sensor", "force"), zip((fixed.sensors, fixed.forces), by_kind)))
     assert fixed.one_way is not None
     change = np.full(len(lines.carrier_speed), np.nan)
-    if fixed.wider is not None:
-        at = fixed.wider_at
-        order, wider = structure_lines(structure.combined(weights[:, :1]), fixed.wider)
-        wider = replace(lines, order=order, displacement=wider[:, 0], carrier_speed=lines.carrier_speed[at])
-        change[at] = 20.0 * np.log10(order_level(wider) / order_level(lines)[at])
+    if fixed.wider:
+        at, levels = fixed.wider_at, list[np.ndarray]()
+        for one in fixed.wider:
+            order, wider = structure_lines(structure.combined(weights[:, :1]), one)
+            here = replace(lines, order=order, displacement=wider[:, 0], turns=one.turns)
+            levels.append(order_level(replace(here, carrier_speed=lines.carrier_speed[at])))
+        change[at] = 20.0 * np.log10(levels[1] / levels[0])
     order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
     if points:
         around = structure.combined(np.eye(count)[:, :points])

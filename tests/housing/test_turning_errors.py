@@ -1,0 +1,84 @@
+"""Errors that turn, in a housing that stands still; against time integration in tests/validation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from validation.fixed_housing import EQUAL, excitation, feet, gears, rigid_modes, shaken
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.housing.carrier_orders import MeshPaths
+from femgear.housing.turning_errors import mean_excitation
+from femgear.housing.two_way import solve_two_way, structure_lines
+from femgear.solvers.linear.modal import solve_modes
+from femgear.trains.protocol import one_blas_thread
+
+SPEEDS = np.array([-40.0, -70.0])
+STRUCTURE = feet(6)
+FEW = {"harmonics": (2, 4)}
+
+
+def paths(symmetry: int) -> MeshPaths:
+    return MeshPaths(97, EQUAL, 0.1, symmetry)
+
+
+def tiled(drive, periods: int):
+    arrays = {name: getattr(drive, name) for name in ("stiffness", "deflection", "force")}
+    return replace(
+        drive, periods=periods, **{name: np.tile(one, (1, periods)) for name, one in arrays.items()}
+    )
+
+
+@one_blas_thread()
+def lines(drive, symmetry: int):
+    found = solve_two_way(rigid_modes(paths(1), drive), drive, STRUCTURE, paths(symmetry), SPEEDS, **FEW)
+    return found, *structure_lines(STRUCTURE, found)
+
+
+@pytest.mark.parametrize("symmetry", [3, 1])
+def test_a_record_over_more_periods_than_it_needs_changes_nothing(symmetry):
+    drive = excitation(paths(1), -1)
+    (once, order, expected), (thrice, more, found) = (
+        lines(one, symmetry) for one in (drive, tiled(drive, 3))
+    )
+    assert (once.turns, thrice.turns) == (1, 3)
+    at = np.searchsorted(more, order)
+    size = np.abs(expected).max()
+    assert np.abs(found[..., at] - expected).max() < 1e-12 * size
+    assert np.abs(np.delete(found, at, axis=-1)).max(initial=0.0) < 1e-12 * size
+    assert thrice.tail == pytest.approx(once.tail, rel=1e-10)
+
+
+@pytest.mark.parametrize(("periods", "planet"), [(3, None), (4, 1)])
+def test_patterns_of_planets_are_all_planets_at_once(periods, planet):
+    """One planet at a time in three patterns, against the equations of three planets."""
+    drive = shaken(paths(1), periods, planet=planet, sense=-1)
+    (one, order, expected), (all_planets, same, found) = (lines(drive, symmetry) for symmetry in (3, 1))
+    assert np.array_equal(order, same)
+    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+    assert np.abs(one.force - all_planets.force).max() < 1e-9 * np.abs(one.force).max()
+    assert max(one.residual.max(), all_planets.residual.max()) < 1e-7
+
+
+def test_the_mean_of_periods_and_planets_repeats_from_planet_to_planet():
+    drive = shaken(paths(1), 4, planet=1, sense=-1)
+    mean = mean_excitation(drive, paths(3), -1)
+    assert mean.periods == 1 and mean.stiffness.shape == (6, 64)
+    for name in ("stiffness", "deflection", "force"):
+        ours, whole = getattr(mean, name), getattr(drive, name)
+        for mesh in (slice(0, 3), slice(3, 6)):
+            assert ours[mesh].mean() == pytest.approx(whole[mesh].mean(), rel=1e-12)
+    assert solve_two_way(rigid_modes(paths(3), drive), mean, STRUCTURE, paths(3), SPEEDS, **FEW).turns == 1
+
+
+def test_refusals():
+    drive = shaken(paths(1), 3, planet=1, sense=-1)
+    unequal = solve_modes(gears(EQUAL), [5e6, 5.1e6, *[5e6] * 4], damping_ratio=0.04)
+    with pytest.raises(CaseError, match=r"E-SYMMETRY.*mean stiffness"):
+        solve_two_way(unequal, drive, STRUCTURE, paths(3), SPEEDS, **FEW)
+    # a mesh that is gone for half of the turns of a gear, hardly damped
+    half = np.repeat([1.9, 0.1, 1.0], 64)
+    wild = replace(drive, stiffness=5e6 * np.tile(half, (6, 1)))
+    modes = solve_modes(gears(EQUAL), np.full(6, 5e6), damping_ratio=1e-3)
+    with pytest.raises(ConvergenceError, match=r"E-CONVERGENCE.*not small"):
+        solve_two_way(modes, wild, STRUCTURE, paths(3), SPEEDS, **FEW)
