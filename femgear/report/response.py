@@ -31,6 +31,7 @@ from femgear.report.style import (
     mesh_harmonics,
     new_figure,
     periodic,
+    position_words,
     rpm,
     stems,
     xy,
@@ -299,7 +300,7 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
         label(ax, title=f"{', '.join(title)}\n{words(values[s][rows], quasi)}")
         ax.set_xlim(0.0, periods)
     for ax in axes[-2:]:
-        label(ax, "position in the mesh period [1]" if periods == 1 else "position [mesh periods]")
+        label(ax, position_words([periods]))
     for ax in axes[::2]:
         label(ax, y=y)
     if static is not None and not alike:

@@ -253,6 +253,11 @@ def periodic(position, values):
     return np.append(position, length + position[0]), np.concatenate([values, values[..., :1]], axis=-1)
 
 
+def position_words(position) -> str:
+    """Name the axis of positions (n,) in mesh periods, which end with one period or with several."""
+    return "position in the mesh period [1]" if position[-1] <= 1.0 else "position [mesh periods]"
+
+
 def runs(chosen) -> list[slice]:
     """Find runs of chosen segments (n - 1,) of a curve, bool, as slices of its n points."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))

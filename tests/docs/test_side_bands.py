@@ -39,7 +39,7 @@ def test_command_gives_the_table_of_the_page(tmp_path):
 
 @pytest.mark.slow
 def test_errors_that_turn_make_the_orders_that_the_page_says():
-    assert len(EXAMPLES) == 2 and run_examples("side_bands.md", EXAMPLES) == PRINTED
+    assert len(EXAMPLES) == 3 and run_examples("side_bands.md", EXAMPLES) == PRINTED
 
 
 def test_orders_of_the_table_are_those_of_the_reference_set():

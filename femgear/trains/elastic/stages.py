@@ -82,6 +82,7 @@ from femgear.trains.elastic.checks import (
     max_nodal_diameter,
     missing_level,
     no_runup,
+    record_periods,
     runup_ends,
     slowest_wave,
 )
@@ -171,6 +172,8 @@ _BELOW_WAVES = 0.9
 _NOTICED, _PACKED, _SECONDS = 2e9, 2.5, 1.5e-5
 """Size of files that is said before, and that of a number in compressed ones [bytes]; what a harmonic of one
 speed takes (2 GHz, one core) [s]."""
+_TURNING = 0.3
+"""What a thousand unknowns of a seed and pattern take [s]."""
 
 
 @dataclass(frozen=True)
@@ -861,6 +864,18 @@ def _warnings(case: Case) -> Iterator[Finding]:
             f"take about {max(kept.sum() * _SECONDS / 60.0, 1.0):.0f} min of one core",
             remedy="fewer speeds, or a lower dynamics.up_to, if that is too much",
         )  # fmt: skip
+    periods, N = record_periods(case, planetary_set(case)), planetary_set(case).n_planets
+    if case.housing.stands_still and periods > 1:
+        unknowns = (2 * fixed_harmonics(case)[1] + 1) * (4 * fixed_diameters(case) + 1)
+        minutes = len(speeds) * (periods // 2 + 1) * N * (unknowns / 1e3) ** 2 * _TURNING / 60.0
+        if minutes > 1.0:
+            key = "housing.support" if case.housing.support else "housing.structure"
+            yield Finding(
+                "W-SIZE", key,
+                f"errors that turn over {periods} mesh periods may take up to {minutes:.0f} min in a housing "
+                f"that stands still, at {len(speeds)} speeds",
+                remedy="fewer speeds, mesh harmonics or nodal diameters, if that is too much",
+            )  # fmt: skip
 
 
 _FORMATS = {"wav": ("housing",), "uff": ("housing", "modes"), "quality": ("housing",)}

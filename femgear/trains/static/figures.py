@@ -44,6 +44,7 @@ from femgear.report.style import (
     name_curves,
     new_figure,
     periodic,
+    position_words,
 )
 from femgear.storage.files import write_text
 from femgear.trains.protocol import Drawn, Figures
@@ -54,7 +55,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-_POSITION = "position in the mesh period [1]"
 
 _TENSION, _COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
 # tangent of the critical section after ISO 6336-3, external and internal gears
@@ -79,9 +79,9 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     right.set_xlim(0, position[-1])
     size = " and ".join(f"{np.ptp(each[row]):.3g}" for _, row in drawn[:: max(len(drawn) - 1, 1)])
     size = size if len(drawn) == 2 else f"up to {np.ptp(each, axis=1).max():.3g}"
-    label(left, _POSITION, "transmission error [µm]", f"each mesh\npeak to peak {size} µm")
+    label(left, position_words(position), "transmission error [µm]", f"each mesh\npeak to peak {size} µm")
     size = f"{'up to ' * (len(planets) > 1)}{np.ptp(overall, axis=1).max():.3g}"
-    label(right, _POSITION, "sum of both meshes [µm]", f"sun to ring\npeak to peak {size} µm")
+    label(right, position_words(position), "sum of both meshes [µm]", f"sun to ring\npeak to peak {size} µm")
     if len(drawn) == 2 and len(planets) == 1:
         name_curves(left)
     else:
@@ -94,7 +94,12 @@ def _one_error(position: np.ndarray, error: np.ndarray, title: str) -> Figure:
     figure, (ax,) = new_figure(height=3.6)
     ax.plot(position, error, **line_style(0))
     ax.set_xlim(0, position[-1])
-    label(ax, _POSITION, "transmission error [µm]", f"{title}: peak to peak {np.ptp(error):.3g} µm")
+    label(
+        ax,
+        position_words(position),
+        "transmission error [µm]",
+        f"{title}: peak to peak {np.ptp(error):.3g} µm",
+    )
     return figure
 
 
@@ -116,7 +121,7 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
     for kind, width in (("tangent (thick)", 2.2), ("secant (thin)", 0.9)):
         axes[-1].plot([], [], color=BLACK, linewidth=width, label=kind)
     axes[-1].set_xlim(0, position[-1])
-    label(axes[-1], _POSITION)
+    label(axes[-1], position_words(position))
     # N/m over m of width is 1e-9 N/(mm µm)
     factor = 1e-3 / face_width if face_width else 0.0
     for ax, kind in zip(axes, kinds):
@@ -151,7 +156,7 @@ def load_sharing(static: xr.Dataset) -> Figure:
         most = f"planet {static['planet'].values[highest.argmax()]}"
         most = "every planet" if np.ptp(highest) < ALIKE * highest.max() else most
         title = f"{most} carries up to {share.max():.4g} % at a position; mean shares K_γ = {factor:.3f}"
-    label(ax, _POSITION, "share of the torque [%]", title)
+    label(ax, position_words(position), "share of the torque [%]", title)
     if len(names) > 1:
         legend_below(figure, columns=4)
     else:
