@@ -125,8 +125,11 @@ def name_curves(ax, *, at: float = 0.985) -> None:
         height.append(float(np.interp(np.linspace(reach, end, 50), line.get_xdata(), line.get_ydata()).max()))
     for i in np.argsort(height, kind="stable"):
         free = max(height[i], free + step)
+        for other in sorted(height):  # no curve crosses a name
+            free = other if free < other < free + step else free
         look = {"ha": "right", "va": "bottom", "fontsize": SMALL, "color": named[i].get_color()}
         ax.annotate(texts[i], (end, free), xytext=(0, 3), textcoords="offset points", **look)
+    ax.set_ylim(low, max(high, free + step))
 
 
 def stems(ax, x, amplitude, floor: float, *, text: str, colour: str = BLUE, width: float = 1.0) -> None:

@@ -784,6 +784,8 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     first, last = _runup_ends(case, modes)
     slowest, fastest = first * one.mesh_frequency, last * one.mesh_frequency
     count = int(limited(case, [slowest], up_to, given=given).excitation[0])
+    if case.housing.stands_still:
+        count = fixed_harmonics(case)[0]
     motions = basis.shape[modes.model.ring_slice].T
     field = ring_field(modes.ring.modes, motions, RADIAL, modes.max_diameter)
     forces = modal_forces(basis, excitation, count, output=field)
