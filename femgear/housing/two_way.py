@@ -137,13 +137,22 @@ def solve_two_way(
     if excitation.periods > 1:
         known = gears, excitation, harmonics[0], structure, orders, groups
         return _turning(TurningErrors(*known, damping=damping), speeds)
-    one_sided = mesh_harmonics(excitation, harmonics[0])
+    return _one_period(gears, excitation, structure, orders, groups, speeds, harmonics[0], damping)
+
+
+def _one_period(
+    gears: Modes, excitation: MeshExcitation, structure: FixedStructure, orders: CarrierOrders, groups,
+    speeds: np.ndarray, harmonics: int, damping,
+) -> TwoWayResponse:  # fmt: skip
+    """Response of a set without errors that turn, the forces of planets that the others repeat."""
+    paths, n_max, angles = orders.paths, orders.n_max, np.asarray(orders.paths.planet_angles, float)
+    leaders, bands, H = groups[0], orders.side_bands, orders.harmonics
+    one_sided = mesh_harmonics(excitation, harmonics)
     _check_repeated(one_sided, orders, *groups)
-    leaders = groups[0]
     stiffness, deflection, force = (two_sided(one[[*leaders, *(len(angles) + leaders)]]) for one in one_sided)
     known, place = LeadingMeshes.build(gears, stiffness, orders, *groups), angles[leaders] + paths.load_angle
     source = np.zeros((*known.product.shape[:2], 2 * bands + 1), complex)
-    wide = (0, 0), (harmonics[1] - harmonics[0],) * 2
+    wide = (0, 0), (H - harmonics,) * 2
     deflection, force = np.pad(deflection, wide), np.pad(force, wide)
     source[..., bands] = force - np.einsum("mhk,mk->mh", known.product, deflection)
     count, n_orders = len(place), len(orders.positive)
@@ -157,7 +166,7 @@ def solve_two_way(
         drag = np.empty((len(speeds), (order >= 0).sum(), len(structure.natural_frequency)), complex)
     force = np.empty((len(speeds), 2 * count, n_orders), complex)
     residual, tail = np.empty((2, len(speeds)))
-    outer = np.abs(orders.every - np.arange(-harmonics[1], harmonics[1] + 1)[:, None] * paths.z_ring) > n_max
+    outer = np.abs(orders.every - np.arange(-H, H + 1)[:, None] * paths.z_ring) > n_max
 
     def solve(first: int) -> None:
         speed = np.abs(speeds[first : first + step])
@@ -173,7 +182,7 @@ def solve_two_way(
     with ThreadPoolExecutor(workers) as pool:  # BLAS and LAPACK do not hold up one another
         list(pool.map(solve, range(0, len(speeds), step)))
     _check_residual(residual, speeds)
-    return TwoWayResponse(speeds, orders.positive, force, residual, tail, harmonics[1], bands, paths, drag)
+    return TwoWayResponse(speeds, orders.positive, force, residual, tail, H, bands, paths, drag)
 
 
 def _turning(errors: TurningErrors, speeds: np.ndarray) -> TwoWayResponse:

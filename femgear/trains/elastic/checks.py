@@ -378,10 +378,11 @@ def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
     change = np.where(np.isfinite(change), change, 0.0)
     if np.abs(change).max() >= NOTICEABLE:
         worst = int(np.abs(change).argmax())
+        more = f"{data['compared_harmonics'].values[worst]:.0f}"
         text = (
             f"at {data['speed'].values[worst]:.6g} rpm the excitation ends at "
-            f"{data['excitation_limit'].values[worst]:.4g} Hz; twice the mesh harmonics change the level of "
-            f"the housing that stands still by {change[worst]:+.1f} dB"
+            f"{data['excitation_limit'].values[worst]:.4g} Hz; {more} "
+            f"mesh harmonics change the level of the housing that stands still by {change[worst]:+.1f} dB"
         )
         remedy = "give more dynamics.mesh_harmonics before levels are compared"
         yield Finding("W-EXCITATION", "dynamics.mesh_harmonics", text, remedy=remedy)

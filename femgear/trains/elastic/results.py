@@ -82,7 +82,8 @@ _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimat
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
 _SUPPORTED = {
-    "harmonics_change": ("dB", "change of the level by twice the mesh harmonics, at some speeds"),
+    "harmonics_change": ("dB", "change of the level by more mesh harmonics, at some speeds"),
+    "compared_harmonics": ("1", "number of these mesh harmonics"),
     "turn_multiplier": ("1", "largest Floquet multiplier over a turn of the carrier, at some speeds"),
     "one_way_level": ("m/s^2", "level by the mesh forces of the ring without its supports"),
     "one_way_difference": ("dB", "level over that by the mesh forces of the ring without its supports"),
@@ -170,16 +171,17 @@ class ModesResult:
 class FixedHousing:
     """Ring and casing that stand still, the forces in them, and those in the ring on its foundation alone.
 
-    The latter where they are asked for. Sensors of the structure: some at equal distances around the outer
-    surface of a ring on supports, then the displacements ``sensors`` and the forces ``forces`` by name;
-    ``missing`` as in `HousingResult`. ``wider`` are forces of the same and of twice the mesh harmonics at the
-    speeds number ``wider_at``, without errors that turn. ``multiplier`` (speeds,) is the modulus of the
-    largest Floquet multiplier over a turn of the carrier, nan where none was computed.
+    The latter where they are asked for; ``excited`` are the mesh harmonics, and more of them. Sensors of the
+    structure: some at equal distances around the outer surface of a ring on supports, then the displacements
+    ``sensors`` and the forces ``forces`` by name; ``missing`` as in `HousingResult`. ``wider`` are forces of
+    either number at the speeds number ``wider_at``, without errors that turn. ``multiplier`` (speeds,) is the
+    modulus of the largest Floquet multiplier over a turn of the carrier, nan where none was computed.
     """
 
     structure: FixedStructure
     two_way: TwoWayResponse
     one_way: TwoWayResponse | None
+    excited: tuple[int, int]
     sensors: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     missing: str = ""

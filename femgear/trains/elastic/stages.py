@@ -161,8 +161,10 @@ more for a planet in a housing that stands still [bytes]."""
 _LINES_TOGETHER = 8000
 """Harmonics of the run-up's speeds that are in memory at a time."""
 _MOST_ORDERS = 2500
-"""Carrier orders of the forces in a housing that stands still up to which twice the harmonics are looked at:
+"""Carrier orders of the forces in a housing that stands still up to which more harmonics are looked at:
 0.8 GB."""
+_FEW_SPEEDS = 20
+"""Speeds, at most, that are solved with twelve mesh harmonics in a housing that stands still."""
 _JUDGED = 6
 """Mesh harmonics of the stiffness in the verdict of a housing that stands still, at most."""
 _SPEEDS_IN_HOUSING = 40
@@ -503,7 +505,7 @@ def dynamics_parts(
 def _fixed_part(case: Case, modes: ModesResult, carrier: np.ndarray, own: np.ndarray) -> FixedHousing:
     """Housing that stands still at some of the speeds (n_speeds,) of the carrier [rad/s].
 
-    The first and the last of all are solved with twice the mesh harmonics too, some get a verdict.
+    The first and the last of all are solved with more mesh harmonics too, some get a verdict.
     """
     count = len(carrier)
     wider, judged = (
@@ -512,9 +514,16 @@ def _fixed_part(case: Case, modes: ModesResult, carrier: np.ndarray, own: np.nda
     return fixed_housing(case, modes, carrier[own], wider_at=wider, judged_at=judged)
 
 
-def fixed_harmonics(case: Case) -> tuple[int, int]:
-    """Choose the mesh harmonics of excitation and response of a ring on supports, the same at all speeds."""
-    excited = case.dynamics.mesh_harmonics or 6
+def fixed_harmonics(case: Case, speeds: int | None = None) -> tuple[int, int]:
+    """Choose the mesh harmonics of excitation and response of a ring on supports, the same at all speeds.
+
+    Of the speeds of the case unless their number is given: of many, of planets that differ, and with errors
+    that turn fewer harmonics, for the equations take time with their third power.
+    """
+    gears, deviations = planetary_set(case), set_deviations(case)
+    alike = rotational_symmetry(deviations, gears) == gears.n_planets
+    few = alike and (len(case.operation.speeds) if speeds is None else speeds) <= _FEW_SPEEDS
+    excited = case.dynamics.mesh_harmonics or (12 if few else 6)
     return excited, case.dynamics.response_harmonics or 2 * excited
 
 
@@ -526,12 +535,13 @@ def fixed_housing(
     both: bool = True,
     wider_at: Any = (),
     judged_at: Any = (),
+    harmonics: tuple[int, int] | None = None,
 ) -> FixedHousing:
     """Make the structure of ring and casing, and solve for forces at speeds of the carrier [rad/s].
 
     Of the set in it, and if ``both`` in the ring on its foundation alone. The meshes keep what higher
-    diameters give. At the speeds number ``wider_at`` also for forces of twice the mesh harmonics;
-    those number ``judged_at`` get a Floquet verdict. With errors that turn twice the mesh harmonics, and
+    diameters give. At the speeds number ``wider_at`` also for forces of more mesh harmonics;
+    those number ``judged_at`` get a Floquet verdict. With errors that turn the latter, and
     damping, are those of the mean of all planets and mesh periods.
     Supports damp nothing: gears and ring have the damping of the set without them. Gears in a casing of a
     file, which brings its own, have modal damping against a rigid ring.
@@ -539,7 +549,7 @@ def fixed_housing(
     gears, ring, n_max = planetary_set(case), modes.ring, fixed_diameters(case)
     low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
     excitation, flexibility = _excitation(gears, replace(ring, **low), modes.state)
-    harmonics, damping = fixed_harmonics(case), case.dynamics.damping_ratio
+    harmonics, damping = harmonics or fixed_harmonics(case), case.dynamics.damping_ratio
     highest = _MODES_ABOVE * max(modes.reach, harmonics[1] * fastest_mesh_frequency(case, gears))
     paths = MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), ring.load_angle, modes.symmetry)
     even = excitation
@@ -554,17 +564,12 @@ def fixed_housing(
     whole = replace(modes.model.system, W=directions, flexibility=flexibility)
     damped = modal_damping(whole, mean, damping)
     known: Any = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
-    sensors, forces, missing = (), (), ""
+    missing, own = "", paths
     if case.housing.structure:
-        expected = 1.0 / ring_mesh_compliance(low["compliance"], gears.ring.teeth, [0.0])[0, 0]
-        structure, sensors, forces = imported_casing(
-            case, gears, max_frequency=highest, expected_stiffness=expected
-        )
-        if may_lack_compliance(Path(case.name).parent / case.housing.structure.file):
-            missing = " ".join(one.text for one in missing_compliance(structure, expected))
         own = replace(paths, load_angle=0.0)
+        structure, sensors, forces, missing = _casing(case, low["compliance"], highest)
     else:
-        own, (structure, sensors, forces) = paths, _ring_on_supports(case, modes, known)
+        structure, sensors, forces = _ring_on_supports(case, modes, known)
     solved = partial(solve_two_way, alone, carrier_speed=carrier, harmonics=harmonics)
     joint = None if case.housing.structure else damped
     plain, one_way = supported_ring(ring.modes, (), **known), None
@@ -574,11 +579,13 @@ def fixed_housing(
         drag = None if joint is None else one_way.drag @ (plain.wave_shape @ structure.wave_shape.conj().T)
         one_way = replace(one_way, drag=drag)
     two_way, wider = solved(excitation, structure, paths=own, damping=joint), list[TwoWayResponse]()
-    orders = gears.n_planets // own.symmetry * 2 * harmonics[1] * (4 * n_max + 1)
-    wider_at = np.asarray(wider_at if orders <= _MOST_ORDERS else (), int)
+    # twice as many, or half as many again
+    most = _MOST_ORDERS // (gears.n_planets // own.symmetry * (4 * n_max + 1))
+    further: Any = next((more for half in (4, 3) if (more := _times(harmonics, half))[1] <= most), None)
+    wider_at = np.asarray(wider_at if further else (), int)
     if len(wider_at):
-        for times in (1, 2):
-            more: Any = {"carrier_speed": carrier[wider_at], "harmonics": tuple(times * h for h in harmonics)}
+        for count in (harmonics, further):
+            more: Any = {"carrier_speed": carrier[wider_at], "harmonics": count}
             wider.append(solved(even, structure, paths=own, damping=joint, **more))
     multiplier = np.full(len(carrier), np.nan)
     if len(judged_at):
@@ -588,7 +595,28 @@ def fixed_housing(
         ).modulus  # fmt: skip
     multiplier **= 1.0 / two_way.turns
     told = sensors, forces, missing, tuple(wider), wider_at, multiplier
-    return FixedHousing(structure, two_way, one_way, *told)
+    excited = harmonics[0], further[0] if further else 0
+    return FixedHousing(structure, two_way, one_way, excited, *told)
+
+
+def _times(harmonics: tuple[int, int], half: int) -> tuple[int, ...]:
+    return tuple(-(-half * h // 2) for h in harmonics)
+
+
+def _casing(
+    case: Case, compliance: np.ndarray, highest: float
+) -> tuple[FixedStructure, tuple[str, ...], tuple[str, ...], str]:
+    """Structure of a file with modes up to a frequency [Hz], and what static compliance it lacks.
+
+    With the names of its sensors and of forces on the ground; compliance of the ring by nodal diameter.
+    """
+    expected = 1.0 / ring_mesh_compliance(compliance, case.ring.teeth, [0.0])[0, 0]
+    known: Any = {"max_frequency": highest, "expected_stiffness": expected}
+    structure, sensors, forces = imported_casing(case, planetary_set(case), **known)
+    missing, given = "", case.housing.structure
+    if given and may_lack_compliance(Path(case.name).parent / given.file):
+        missing = " ".join(one.text for one in missing_compliance(structure, expected))
+    return structure, sensors, forces, missing
 
 
 def _ring_on_supports(
@@ -683,14 +711,14 @@ def _standing_still(
     by_kind = moved[:, 1:][:, : len(fixed.sensors)], moved[:, 1 + len(fixed.sensors) :]
     outputs = dict(zip(("sensor", "force"), zip((fixed.sensors, fixed.forces), by_kind)))
     assert fixed.one_way is not None
-    change = np.full(len(lines.carrier_speed), np.nan)
+    change, compared = np.full((2, len(lines.carrier_speed)), np.nan)
     if fixed.wider:
         at, levels = fixed.wider_at, list[np.ndarray]()
         for one in fixed.wider:
             order, wider = structure_lines(structure.combined(weights[:, :1]), one)
             here = replace(lines, order=order, displacement=wider[:, 0], turns=one.turns)
             levels.append(order_level(replace(here, carrier_speed=lines.carrier_speed[at])))
-        change[at] = 20.0 * np.log10(levels[1] / levels[0])
+        change[at], compared[at] = 20.0 * np.log10(levels[1] / levels[0]), fixed.excited[1]
     order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
     if points:
         around = structure.combined(np.eye(count)[:, :points])
@@ -704,7 +732,7 @@ def _standing_still(
     with np.errstate(divide="ignore", invalid="ignore"):  # of a sensor that stands still
         apart = 20.0 * np.log10(order_level(lines) / level)
     told = {
-        "harmonics_change": change, "turn_multiplier": fixed.multiplier,
+        "harmonics_change": change, "compared_harmonics": compared, "turn_multiplier": fixed.multiplier,
         "one_way_level": level, "one_way_difference": apart,
         "two_way_residual": fixed.two_way.residual, "order_tail": fixed.two_way.tail,
     }  # fmt: skip
@@ -712,7 +740,7 @@ def _standing_still(
         found, exact=lines, supported=told, missing=fixed.missing,
         outputs={kind: one for kind, one in outputs.items() if one[0]},
         sound=sound,
-        excitation_limit=dynamics.response.mesh_frequency * fixed_harmonics(case)[0],
+        excitation_limit=dynamics.response.mesh_frequency * fixed.excited[0],
     )  # fmt: skip
 
 
@@ -731,10 +759,12 @@ def _radial_sensor(fixed: FixedHousing, angle: float, top: int) -> np.ndarray:
     return weights
 
 
-def _heard_in_housing(case: Case, modes: ModesResult, carrier: np.ndarray) -> HeardSpeeds:
+def _heard_in_housing(
+    case: Case, modes: ModesResult, carrier: np.ndarray, harmonics: tuple[int, int]
+) -> HeardSpeeds:
     """What is kept of the run-up at speeds of the carrier [rad/s] in a housing that stands still."""
     fixed, place = (
-        fixed_housing(case, modes, carrier, both=False),
+        fixed_housing(case, modes, carrier, both=False, harmonics=harmonics),
         (case.housing.sensor_angle, case.ring.teeth),
     )
     first = _radial_sensor(fixed, place[0], modes.max_diameter)[:, None]
@@ -785,7 +815,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     slowest, fastest = first * one.mesh_frequency, last * one.mesh_frequency
     count = int(limited(case, [slowest], up_to, given=given).excitation[0])
     if case.housing.stands_still:
-        count = fixed_harmonics(case)[0]
+        count = fixed_harmonics(case, case.runup.count)[0]
     motions = basis.shape[modes.model.ring_slice].T
     field = ring_field(modes.ring.modes, motions, RADIAL, modes.max_diameter)
     forces = modal_forces(basis, excitation, count, output=field)
@@ -814,9 +844,9 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
             level += mode_levels(response, field, alike, met.harmonic, turning, inside)
         progress("runup", float(own[-1] + 1), float(len(speeds)))
     if case.housing.stands_still:
-        limit = replace(limit, frequency=frequency * fixed_harmonics(case)[0])
+        limit = replace(limit, frequency=frequency * fixed_harmonics(case, len(frequency))[0])
         for own in np.array_split(np.arange(len(speeds)), -(-len(speeds) // _SPEEDS_IN_HOUSING)):
-            parts.append(_heard_in_housing(case, modes, carrier[own]))
+            parts.append(_heard_in_housing(case, modes, carrier[own], fixed_harmonics(case, len(carrier))))
             progress("runup", float(own[-1] + 1), float(len(speeds)))
     return RunupResult(
         input_speed=speeds,
