@@ -6,6 +6,7 @@ import _thread
 import atexit
 import contextlib
 import os
+import shlex
 import signal
 import sys
 import textwrap
@@ -13,6 +14,7 @@ import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 _INTERRUPTED = 130
 _MEMORY = 600_000_000
@@ -236,10 +238,10 @@ def check(case: Path, /, *, neighbours: Annotated[bool, Parameter(negative="")] 
 
 @app.command
 def run(
-    case: Path,
+    case: Path | None = None,
     /,
     *,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     only: str | None = None,
     pictures: bool = True,
     force: bool = False,
@@ -249,9 +251,9 @@ def run(
     Parameters
     ----------
     case
-        TOML case file.
+        TOML case file. Default: the only one in the current folder.
     output
-        Folder of the results.
+        Folder of the results. Default: CASE_results, beside the case.
     only
         Compute this stage and what it needs, no further: "static", "stress" (whatever static.stresses says),
         "modes", "dynamics" or "housing"; "branch" or "response" of planar cases, "transient" or "spectrum" of
@@ -277,8 +279,10 @@ def run(
             limit=", ".join(known),
             remedy="femgear run --help",
         )
+    case = case or _only_case()
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
+    output = output or case.with_name(f"{case.stem}_results")
     train = train_of(data)
     _warn(train.case_warnings(data))
     place = run_folder(output, case=data.source, force=force)
@@ -293,6 +297,19 @@ def run(
         if "report.html" in results.manifest.files:
             _say(f"report:  {output / 'report.html'}")
     return 0
+
+
+def _only_case() -> Path:
+    """Find the one case file of the current folder."""
+    found = sorted(path for path in Path().glob("*.toml") if path.name != "pyproject.toml")
+    if len(found) == 1:
+        return found[0]
+    here = ", ".join(map(str, found or sorted(Path().iterdir())))
+    raise CaseError(
+        f"no case is named, and the current folder holds {len(found) or 'none'}", code="E-ARGUMENTS",
+        value=textwrap.shorten(here, 200, placeholder=" ...") or "an empty folder", limit="one *.toml",
+        remedy="name one" if found else "femgear new planetary writes one; femgear run --help",
+    )  # fmt: skip
 
 
 @app.command
@@ -424,7 +441,7 @@ def _write_case(text: str, path: Path, *, force: bool) -> None:
     if path.exists() and not force:
         raise CaseError(
             "the file is there already", code="E-OUTPUT", file=str(path), limit="a new file",
-            remedy="name another one, or add --force",
+            remedy="name another one with -o, or add --force",
         )  # fmt: skip
     write_text(text, path)
     _say(f"written: {path}")
@@ -435,11 +452,11 @@ def new(
     kind: str,
     /,
     *,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("case.toml"),
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     teeth: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = (),
-    module: Quantity = "2 mm",
+    module: Quantity | None = None,
     torque: Quantity | None = None,
-    speed: Quantity = "1000 rpm",
+    speed: Quantity | None = None,
     planets: int | None = None,
     face_width: Quantity | None = None,
     force: Annotated[bool, Parameter(negative="")] = False,
@@ -451,13 +468,13 @@ def new(
     kind
         planetary, pair, planar, helical or drivetrain.
     output
-        Case file to write.
+        Case file to write. Default: KIND.toml.
     teeth
         Of sun, planet and ring, or of both gears.
     module
-        Of helical teeth the normal one.
+        Of helical teeth the normal one. Default: 2 mm.
     torque, speed
-        Of sun or pinion. Default torque: that of a K factor of 1 N/mm^2.
+        Of sun or pinion. Default: the torque of a K factor of 1 N/mm^2, 1000 rpm.
     planets
         Default: as many as equal spacing allows, three if it can be.
     face_width
@@ -468,7 +485,12 @@ def new(
     from femgear.trains.drafts import new_case
 
     numbers: dict[str, Any] = {"teeth": teeth, "module": module, "torque": torque, "speed": speed}
-    _write_case(new_case(kind, **numbers, planets=planets, face_width=face_width), output, force=force)
+    text = new_case(kind, **numbers, planets=planets, face_width=face_width)
+    output = output or Path(f"{kind}.toml")
+    _write_case(text, output, force=force)
+    for line in takewhile(lambda one: one.startswith("#"), text.splitlines()):
+        _say(f" {line[1:]}")
+    _say(f"next:    femgear run {shlex.quote(str(output))}")
     return 0
 
 

@@ -230,16 +230,17 @@ def test_the_installed_program(tmp_path):
 
 @pytest.mark.parametrize(
     "arguments",
-    [["chek"], ["run"], ["run", "x.toml"], ["run", "x.toml", "-o", "y", "--only", "all"], ["check"]],
+    [["chek"], ["run"], ["compare", "x", "y"], ["run", "x.toml", "-o", "y", "--only", "all"], ["check"]],
 )
-def test_wrong_arguments(arguments, capsys):
+def test_wrong_arguments(arguments, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     assert cli.main(arguments) == 2
     err = capsys.readouterr().err
     assert "[E-ARGUMENTS]" in err and "--help" in err
 
 
 def test_an_argument_that_is_missing_is_named(capsys):
-    cli.main(["run", "x.toml"])
+    cli.main(["compare", "x", "y"])
     assert "--output is required" in capsys.readouterr().err
     cli.main(["run", "x.toml", "-o"])
     assert "-o requires an argument" in capsys.readouterr().err
@@ -591,18 +592,42 @@ def test_a_new_case_is_written_once_and_can_be_checked(tmp_path, capsys, monkeyp
     monkeypatch.chdir(tmp_path)
     numbers = ["--teeth", "24", "30", "84", "--module", "3 mm", "--torque", "120 Nm"]
     assert cli.main(["new", "planetary", *numbers]) == 0
-    assert "written: case.toml" in capsys.readouterr().out
-    case = read_case("case.toml")
+    out = capsys.readouterr().out
+    assert "written: planetary.toml" in out and "next:    femgear run planetary.toml" in out
+    assert "Assumed: --planets 3 --face-width" in out and "--teeth" not in out
+    case = read_case("planetary.toml")
     assert case.module == 3e-3 and case.operation.torque == 120.0 and case.ring.teeth == 84
-    assert cli.main(["check", "case.toml"]) == 0
-    before = Path("case.toml").read_bytes()
-    assert cli.main(["new", "pair"]) == 2
-    assert "E-OUTPUT" in capsys.readouterr().err and Path("case.toml").read_bytes() == before
-    assert cli.main(["new", "pair", "--force"]) == 0 and read_case("case.toml").model == "pair"
+    assert cli.main(["check", "planetary.toml"]) == 0
+    before = Path("planetary.toml").read_bytes()
+    assert cli.main(["new", "planetary"]) == 2
+    err = capsys.readouterr().err
+    assert "E-OUTPUT" in err and "planetary.toml" in err and "--force" in err
+    assert Path("planetary.toml").read_bytes() == before
+    assert cli.main(["new", "pair", "-o", "planetary.toml", "--force"]) == 0
+    assert read_case("planetary.toml").model == "pair"
     assert cli.main(["new", "bevel", "-o", "b.toml"]) == 2 and not Path("b.toml").exists()
     assert cli.main(["new", "planetary", "--torque", "-70 N m", "-o", "c.toml"]) == 0
     assert read_case("c.toml").operation.torque == -70.0
     assert "drivetrain" in capsys.readouterr().err
+
+
+def test_run_takes_the_only_case_and_a_folder_beside_it(tmp_path, capsys, monkeypatch, pipeline):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["run"]) == 2 and "an empty folder" in capsys.readouterr().err
+    Path("notes.txt").touch()
+    Path("pyproject.toml").touch()
+    assert cli.main(["run"]) == 2 and "notes.txt, pyproject.toml" in capsys.readouterr().err
+    Path("own set.toml").write_text(TEXT, encoding="utf-8")
+    assert cli.main(["run"]) == 0 and "results: own set_results" in capsys.readouterr().out
+    assert open_results("own set_results").stages == STAGES
+    assert cli.main(["run"]) == 4 and "--force" in capsys.readouterr().err
+    assert cli.main(["run", "--force"]) == 0
+    Path("other.toml").touch()
+    capsys.readouterr()
+    assert cli.main(["run"]) == 2 and "other.toml, own set.toml" in capsys.readouterr().err
+    monkeypatch.chdir("/")
+    assert cli.main(["run", str(tmp_path / "own set.toml"), "--only", "static", "--force"]) == 0
+    assert open_results(tmp_path / "own set_results").stages == STAGES[:1]
 
 
 def test_rexs_in_and_out(tmp_path, capsys, monkeypatch):

@@ -140,6 +140,7 @@ _BODY = ("mass", "inertia", "support_stiffness")
 _KEYS = (
     *(f"{name}.{key}" for name in ("sun", "carrier", "planar.ring", "helical.ring") for key in _BODY),
     *(f"planet.{key}" for key in ("mass", "inertia", "bearing_stiffness")),
+    *(f"{name}.{key}" for name in ("gear_1", "gear_2") for key in ("mass", "inertia")),
     *(f"ring.foundation_{key}" for key in ("radial", "tangential")),
     *(
         f"helical.{name}.{key}"
@@ -147,11 +148,11 @@ _KEYS = (
         for key in ("diametral_inertia", "axial_stiffness", "tilt_stiffness")
     ),
 )
-"""Entries of planetary sets that may be left out."""
+"""Entries of planetary sets and pairs that may be left out."""
 
 
 def with_estimates(case: Any) -> tuple[Any, tuple[Finding, ...]]:
-    """Put estimates in place of what a planetary set leaves out, and say which (W-ESTIMATED).
+    """Put estimates in place of what a planetary set or pair leaves out, and say which (W-ESTIMATED).
 
     GeometryError: gears that cannot be made, where something is left out.
     """

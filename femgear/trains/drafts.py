@@ -24,6 +24,7 @@ from femgear.case.estimates import (
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import ANGLE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION, to_si
 from femgear.errors import CaseError, GeometryError
+from femgear.gears.phasing import neighbouring_teeth
 from femgear.trains.reading import parse_case
 
 _SHORTEST = 0.7
@@ -110,8 +111,8 @@ _STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "density": "7850 kg
 
 
 def new_case(
-    kind: str, *, teeth: tuple[int, ...] = (), module: str = "2 mm", torque: str | None = None,
-    speed: str = "1000 rpm", planets: int | None = None, face_width: str | None = None,
+    kind: str, *, teeth: tuple[int, ...] = (), module: str | None = None, torque: str | None = None,
+    speed: str | None = None, planets: int | None = None, face_width: str | None = None,
 ) -> str:  # fmt: skip
     """Write a commented case from a few numbers.
 
@@ -121,8 +122,12 @@ def new_case(
         Of `KINDS`.
     teeth : tuple of int
         Of sun, planet and ring, or of both gears.
+    module : str, optional
+        By default 2 mm.
     torque : str, optional
         On sun or pinion; by default for a K factor of 1 N/mm^2, see `femgear.case.estimates.usual_torque`.
+    speed : str, optional
+        By default 1000 rpm.
     planets : int, optional
         By default the first of 3, 4, 5, 2 and 1 that equal spacing allows.
     face_width : str, optional
@@ -132,28 +137,23 @@ def new_case(
     ------
     CaseError, GeometryError
         Another kind (E-CHOICE), other numbers of teeth (E-COUNT), planets of two gears
-        (E-ARGUMENTS), and what makes no case.
+        (E-ARGUMENTS), planets that equal spacing does not allow (E-ASSEMBLY), and what makes no case.
     """
-    if kind not in KINDS:
-        limit = ", ".join(KINDS)
-        raise CaseError("there is no such kind of case", code="E-CHOICE", key="kind", value=kind, limit=limit)
-    usual, teeth = KINDS[kind], teeth or KINDS[kind]
-    if len(teeth) != len(usual) or min(teeth) < 5:
-        raise CaseError(
-            f"a {kind} case needs {len(usual)} numbers of teeth", code="E-COUNT", key="--teeth",
-            value=teeth, limit=f"5 or more each, as in --teeth {' '.join(map(str, usual))}",
-        )  # fmt: skip
-    size, of_set = _length(module, "--module"), len(usual) == 3
-    if planets is not None and not of_set:
-        remedy = "leave it out"
-        raise CaseError(f"a {kind} case has no planets", code="E-ARGUMENTS", key="--planets", remedy=remedy)
+    given = {"teeth": teeth, "module": module, "planets": planets, "face-width": face_width}
+    given |= {"torque": torque, "speed": speed}
+    teeth, count = _teeth_and_planets(kind, teeth, planets)
+    module, speed, of_set = module or "2 mm", speed or "1000 rpm", len(teeth) == 3
+    size = _length(module, "--module")
     width = _length(face_width, "--face-width") if face_width else 12.0 * size
-    fitting = next((n for n in (3, 4, 5, 2) if sum(teeth[::2]) % n == 0), 1)
-    count = fitting if planets is None else planets
-    load = torque or f"{usual_torque(teeth[0], teeth[1], size, width, count if of_set else 1):.3g} N m"
+    load = torque or f"{usual_torque(teeth[0], teeth[1], size, width, count):.3g} N m"
+    taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
+    taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
+    left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
+    assumed = [f"Assumed: {' '.join(left)}"] if left else []
     helix = math.radians(20.0) if kind == "helical" else 0.0
     shared = {"module": module, "pressure_angle": "20 deg"}
     notes = {f"material.{key}": "estimated: steel" for key in _STEEL}
+    notes |= {f"{key}.pressure_angle": "estimated: ISO 53" for key in ("sun", "set", "parallel[0]")}
     notes |= {"set.planets": "estimated: as equal spacing allows"} if planets is None and of_set else {}
     notes |= {} if face_width else {"set.face_width": "estimated: 12 modules"}
     notes |= {} if torque else {"operation.torque": "estimated: K factor of 1 N/mm^2"}
@@ -170,7 +170,7 @@ def new_case(
         tables |= {"model": "pair", "set": {**shared, **tables["set"]}}
         if kind == "drivetrain":
             tables = _chain(tables, notes)
-        return draft_text(tables, notes, word="estimated", head=[_HEAD.format(kind)])
+        return draft_text(tables, notes, word="estimated", head=[_HEAD.format(kind), *assumed])
     gears["sun"] = {"teeth": teeth[0], **shared, **gears["sun"]}
     tables |= {"sun": gears["sun"], "set": {"planets": count, **tables["set"]}}
     tables["operation"] = {"input": "sun", "fixed": "ring", **tables["operation"]}
@@ -178,7 +178,45 @@ def new_case(
     del gears["sun" if teeth[2] >= teeth[0] + 2 * teeth[1] else "ring"]["profile_shift"]
     more = {"planar": {"response": {}}, "helical": {"helix_angle": ANGLE.show(helix)}}
     tables |= {kind: more[kind]} if kind in more else {}
-    return draft_text(tables, notes, word="estimated", head=[f"{_HEAD.format(kind)} {_LEAVE}"])
+    return draft_text(tables, notes, word="estimated", head=[f"{_HEAD.format(kind)} {_LEAVE}", *assumed])
+
+
+def _teeth_and_planets(kind: str, teeth: tuple[int, ...], planets: int | None) -> tuple[tuple[int, ...], int]:
+    """Settle the teeth of a kind of cases and the number of planets, of two gears 1."""
+    if kind not in KINDS:
+        limit = ", ".join(KINDS)
+        raise CaseError("there is no such kind of case", code="E-CHOICE", key="kind", value=kind, limit=limit)
+    usual, teeth = KINDS[kind], teeth or KINDS[kind]
+    if len(teeth) != len(usual) or min(teeth) < 5:
+        raise CaseError(
+            f"a {kind} case needs {len(usual)} numbers of teeth", code="E-COUNT", key="--teeth",
+            value=teeth, limit=f"5 or more each, as in --teeth {' '.join(map(str, usual))}",
+        )  # fmt: skip
+    of_set, total = len(usual) == 3, sum(teeth[::2])
+    if planets is not None and not of_set:
+        remedy = "leave it out"
+        raise CaseError(f"a {kind} case has no planets", code="E-ARGUMENTS", key="--planets", remedy=remedy)
+    if planets is None:
+        return teeth, next((n for n in (3, 4, 5, 2) if total % n == 0), 1) if of_set else 1
+    if planets > 0 and total % planets:
+        raise _unequal(teeth, planets)
+    return teeth, planets
+
+
+def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:
+    """Refuse planets that equal spacing does not allow, with the numbers near them that it does."""
+    (sun, planet, ring), total = teeth, teeth[0] + teeth[2]
+    even = [n for n in range(2, 13) if total % n == 0]
+    counts = [n for n in even if len(neighbouring_teeth(sun, planet, ring, n, distance=0, closure=10))]
+    near = neighbouring_teeth(sun, planet, ring, planets)
+    others = [" ".join(map(str, one)) for one in near.only(near.equally_spaced).teeth[:3]]
+    remedies = [f"with these teeth --planets {' or '.join(map(str, counts))}"] if counts else []
+    remedies += [f"with {planets} planets --teeth {' or '.join(others)}"] if others else []
+    return CaseError(
+        f"{planets} planets cannot be equally spaced: (z_s + z_r)/N = {total / planets:.6g} is not whole",
+        code="E-ASSEMBLY", key="--planets", value=planets, limit=f"divisors of z_s + z_r = {total}",
+        remedy="; ".join(remedies) or "fewer planets, or other teeth",
+    )  # fmt: skip
 
 
 def _length(text: str, key: str) -> float:

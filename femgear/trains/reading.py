@@ -98,8 +98,8 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     said = file.notices(data, case)
     said = (*notices(data, case), *said, *added_material(case)) if of_set else said
     case.read_from(text, lines, name, notices=said, profile_files=files)
-    if of_set:
-        case, estimated = with_estimates(with_shafts(case))
+    if hasattr(case, "gear_names"):
+        case, estimated = with_estimates(with_shafts(case) if of_set else case)
         case._notices += estimated
     return case
 

@@ -1,5 +1,8 @@
 """Cases that ``femgear new`` writes."""
 
+import contextlib
+import re
+
 import pytest
 
 from femgear import solve
@@ -87,6 +90,39 @@ def test_numbers_that_make_no_case(kind, numbers, code):
     with pytest.raises(FemgearError) as caught:
         new_case(kind, **numbers)
     assert caught.value.code == code and (caught.value.limit or caught.value.remedy)
+
+
+@pytest.mark.parametrize("teeth", [(27, 40, 108), (30, 20, 70), (21, 30, 81), (20, 30, 81)])
+def test_planets_that_do_not_assemble_are_told_what_does(teeth):
+    """Numbers of the remedy make cases, and no other number of planets up to twelve does."""
+    sums = teeth[0] + teeth[2]
+    planets = next(n for n in (4, 3, 7) if sums % n)
+    with pytest.raises(CaseError, match="E-ASSEMBLY") as caught:
+        new_case("planetary", teeth=teeth, planets=planets)
+    remedy = caught.value.remedy or ""
+    counts = re.search(r"--planets ([\d or]+)", remedy)
+    known = {int(one) for one in counts[1].split(" or ")} if counts else set()
+    makes = set()
+    for count in range(2, 13):
+        with contextlib.suppress(FemgearError):
+            check_case(read_case(new_case("planetary", teeth=teeth, planets=count)))
+            makes.add(count)
+    assert known == makes
+    others = re.search(r"--teeth ([\d or]+)", remedy)
+    for other in others[1].split(" or ") if others else ():
+        near = tuple(map(int, other.split()))
+        assert max(abs(a - b) for a, b in zip(near, teeth, strict=True)) <= 3 and near != teeth
+        gears = planetary_set(read_case(new_case("planetary", teeth=near, planets=planets)))
+        assert gears.n_planets == planets and (gears.sun.teeth, gears.ring.teeth) == near[::2]
+    assert known or others or teeth == (20, 30, 81)
+
+
+def test_what_was_not_given_heads_the_case():
+    text = new_case("planetary", teeth=(21, 33, 87), torque="300 N m", planets=3)
+    assert '# Assumed: --module "2 mm" --face-width "24 mm" --speed "1000 rpm"\n' in text
+    assert "Assumed" not in new_case(
+        "pair", teeth=(24, 36), module="2 mm", torque="9 N m", speed="1 rpm", face_width="9 mm"
+    )
 
 
 def test_remarks_do_not_change_the_tables():

@@ -26,6 +26,7 @@ from femgear.case.sections import (
     FORMAT,
     LARGEST_HELIX,
     LARGEST_TORQUE,
+    LEFT_OUT,
     DynamicsSection,
     FaceWidth,
     GearErrors,
@@ -71,15 +72,14 @@ class SetSection(Section):
 class GearSection(Section):
     """Gear 1, the driving one.
 
-    Mass and inertia left out are those of a disc from the bore to the root circle, of an internal gear of a
-    ring from the root circle to its outer surface; without a bearing stiffness the axis is held.
+    Mass and inertia left out are estimated; without a bearing stiffness the axis is held.
     """
 
     teeth: Annotated[int, Count(5, 5000)]
     profile_shift: Shift | None = None
     bore_radius: Radius
-    mass: Mass | None = None
-    inertia: Inertia | None = None
+    mass: Mass = LEFT_OUT
+    inertia: Inertia = LEFT_OUT
     bearing_stiffness: Stiffness | None = None
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None

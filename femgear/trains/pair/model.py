@@ -18,18 +18,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from femgear.case.estimates import cylinder
 from femgear.case.gear_set import line_play, set_deviations
-from femgear.case.sections import MaterialSection
 from femgear.contact.cycle import CycleOptions
 from femgear.contact.loaded_period import loaded_period
-from femgear.gears.gear import Gear
 from femgear.gears.kinematics import mesh_normals
 from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
 from femgear.system.mesh_directions import assemble, stiffness_matrix
 from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem, gear_meshes
-from femgear.trains.pair.case_file import GearSection, PairCase
+from femgear.trains.pair.case_file import PairCase
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import over_width, record_positions
 
@@ -82,16 +79,6 @@ class PairModel:
         return np.vstack([self.rotation, self.supported])
 
 
-def body_of(section: GearSection, gear: Gear, material: MaterialSection) -> tuple[float, float]:
-    """Compute mass [kg] and polar inertia [kg m^2] of a gear: as given, else of a disc or ring without teeth.
-
-    Between rim and root circle, see `femgear.case.estimates.cylinder`.
-    """
-    inner, outer = sorted((gear.rim_radius, gear.root_radius))
-    mass, inertia, _ = cylinder(inner, outer, gear.face_width, material.density)
-    return section.mass or mass, section.inertia or inertia
-
-
 def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     """Assemble bodies, bearings, couplings and mesh of a case; the torque loads motor, mesh and brake."""
     machines = [(name, getattr(case, name)) for name in ("motor", "brake")]
@@ -101,8 +88,7 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     normal = mesh_normals(gears)[0] * [1.0, flank]
     turning = flank * np.array([radii[0], -gears.senses[1] * radii[1]])
     mesh = np.concatenate([normal, turning[:1], -normal, turning[1:], np.zeros(len(machines))])
-    bodies = [body_of(one, gear, case.material) for one, gear in zip(sections, gears.gears, strict=True)]
-    mass = np.array([*(value for m, inertia in bodies for value in (m, m, inertia)),
+    mass = np.array([*(value for one in sections for value in (one.mass, one.mass, one.inertia)),
                      *(one.inertia for *_, one in machines)])  # fmt: skip
     bearing = np.repeat([one.bearing_stiffness or np.inf for one in sections], 2)
     lateral, columns, load = [0, 1, 3, 4], np.eye(size)[:, [0, 1, 3, 4]], np.zeros(size)
