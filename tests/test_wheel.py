@@ -103,3 +103,26 @@ def test_a_case_of_the_user_is_checked_and_run(installed, built, tmp_path):
     version, file, *_ = run(installed / "python", "-c", program, folder=tmp_path).split()
     assert version in built[0].name and Path(file).is_relative_to(installed.parent)
     assert [*(tmp_path / "cache" / "femgear" / "meshes").glob("*.msh")]
+
+
+def test_a_set_in_two_commands_without_an_option(installed, tmp_path):
+    """In an empty folder a case is written and computed, and neither replaces what is there."""
+    home = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "HOME": str(tmp_path)}
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    said = run(installed / "femgear", "new", "planetary", folder=folder, **home)
+    assert "Assumed: --teeth" in said and "femgear run planetary.toml" in said
+    said = run(installed / "femgear", "run", folder=folder, **home)
+    assert "planetary_results/report.html" in said
+    assert {one.name for one in folder.iterdir()} == {"planetary.toml", "planetary_results"}
+    manifest = json.loads((folder / "planetary_results" / "manifest.json").read_text())
+    assert manifest["complete"] and "housing.nc" in manifest["files"]
+    for again, code in ((["new", "planetary"], 2), (["run"], 4)):
+        done = subprocess.run(
+            [installed / "femgear", *again],
+            cwd=folder,
+            env=os.environ | home,
+            capture_output=True,
+            check=False,
+        )
+        assert done.returncode == code and b"--force" in done.stderr
