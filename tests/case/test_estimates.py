@@ -32,7 +32,7 @@ def case():
     return read_case(REFERENCE)
 
 
-@pytest.mark.parametrize("name", ["planetary_27_40_108", "nrel_pgb_static"])
+@pytest.mark.parametrize("name", ["planetary_27_40_108", "nrel_pgb_static", "spur_pair"])
 def test_cylinders_are_as_heavy_as_the_teeth_that_they_stand_for(name):
     """Area and second moment of the true outline, by Green's theorem, times density and width."""
     gears = planetary_set(read_case(CASES / f"{name}.toml"))
@@ -128,6 +128,21 @@ def test_rigid_bodies_may_be_left_out_too(name, changes):
     assert all(map(math.isfinite, numbers(bare.model_dump()))) and numbers(bare.model_dump())
     section = next(iter(changes)).partition(".")[0]
     assert any(one.code == "W-ESTIMATED" and f"{section}.ring.mass" in one.text for one in bare.notices)
+
+
+def test_masses_of_a_pair_are_estimated_and_told_too():
+    pair = read_case(CASES / "spur_pair.toml")
+    (said,) = [one for one in pair.notices if one.code == "W-ESTIMATED"]
+    known = estimates(pair)
+    for name in pair.gear_names:
+        for key in ("mass", "inertia"):
+            assert getattr(getattr(pair, name), key) == known[f"{name}.{key}"].value
+            assert f"{name}.{key} = {known[f'{name}.{key}']}" in said.text
+    assert "bearing_stiffness" not in said.text and pair.gear_1.bearing_stiffness is None
+    given = with_values(pair, {"gear_1.mass": "1 kg", "gear_1.inertia": "1e-3 kg m^2"})
+    assert given.gear_1.mass == 1.0 and given.gear_2.mass == pair.gear_2.mass
+    (said,) = [one for one in given.notices if one.code == "W-ESTIMATED"]
+    assert "gear_1" not in said.text
 
 
 def test_gears_that_cannot_be_made_are_refused_where_they_are_needed(case):
