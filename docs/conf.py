@@ -30,6 +30,8 @@ exclude_patterns = ["_build", "_templates"]
 templates_path = ["_templates"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 highlight_language = "none"
+# options such as --force keep their two hyphens
+smartquotes_action = "qe"
 
 myst_enable_extensions = ["attrs_block", "colon_fence", "deflist"]
 myst_heading_anchors = 4
@@ -40,7 +42,7 @@ suppress_warnings = ["misc.highlighting_failure", "config.cache", "ref.python"]
 default_role = "literal"
 autosummary_generate = True
 autosummary_ignore_module_all = False
-autodoc_default_options = {"members": True, "member-order": "bysource"}
+autodoc_default_options = {"members": True, "member-order": "bysource", "exclude-members": "model_config"}
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
 python_maximum_signature_line_length = 88
@@ -149,7 +151,29 @@ def read_docstring(app, what: str, name: str, obj, options, lines: list[str]) ->
         lines[number] = "".join(parts)
 
 
+def keep_colons(app, what: str, name: str, obj, options, lines: list[str]) -> None:
+    """Let a colon in the first line about a value stand: napoleon takes what is before it for a type."""
+    if what in ("attribute", "data", "property"):
+        lines[:0] = ["..", ""]
+
+
+def name_keys(app, what: str, name: str, obj, options, signature: str, returns: str):
+    """Show the keys of a table of the case file, without the windows and units that check them."""
+    if what == "class" and (keys := getattr(obj, "model_fields", None)):
+        return f"(*, {', '.join(keys)})", None
+    return None
+
+
+def drop_readers(app, domain: str, kind: str, content) -> None:
+    """Leave out what a quantity of the case file is an alias of: its reader is no text."""
+    for node in [node for node in content.children if node.astext().startswith("alias of Annotated")]:
+        content.remove(node)
+
+
 def setup(app) -> None:
     """Connect what changes the sources."""
     app.connect("source-read", read_source)
+    app.connect("autodoc-process-docstring", keep_colons, priority=400)
+    app.connect("autodoc-process-signature", name_keys)
+    app.connect("object-description-transform", drop_readers)
     app.connect("autodoc-process-docstring", read_docstring)

@@ -161,7 +161,7 @@ def _kinematics() -> None:
     for text, teeth in (("nearest to the lines", line_teeth()), ("module 5 mm", RADII_TEETH)):
         for stage, printed, line, error in zip(STAGES, PRINTED.lines, teeth.lines(), teeth.mismatch()):
             rows.append((f"{text}: {stage}", f"{printed:g}", f"{line:.2f}", f"{100 * error:+.2f} %"))
-    print_table("Mesh lines [Hz]", ("teeth", "printed", "ours", "mismatch"), rows)
+    print_table("Mesh lines [Hz]", ("teeth", "printed", "femgear", "mismatch"), rows)
     print(f"ratio of the radii {ratio_of_radii():.3f}, printed {PRINTED.ratio}")
 
 

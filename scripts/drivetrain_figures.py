@@ -131,9 +131,10 @@ def input_ratios(names, quantities, *, title: str = ""):
     from femgear.report.style import BLACK, COLOURS, SIZE, label, legend_below, new_figure
 
     count = len(names)
-    figure, axes = new_figure(
-        columns=len(quantities), width=3.6 * len(quantities) + 2.4, height=0.3 * count + 1.8, sharey=True
-    )
+    columns = min(len(quantities), 2)
+    rows = -(-len(quantities) // columns)
+    width, height = 3.4 * columns + 2.4, (0.3 * count + 0.8) * rows + 1.0
+    figure, axes = new_figure(rows=rows, columns=columns, width=width, height=height, sharey=True)
     at = np.arange(count)[::-1]
     for ax, (text, ratio) in zip(axes, quantities):
         ratio = np.asarray(ratio, float)

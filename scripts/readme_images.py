@@ -298,7 +298,8 @@ def _section(run: Run, folder: Path, found: list[tuple[str, str]]) -> str:
     """The part of the page that shows a run."""
     lines = [f"## {run.title}", ""]
     if run.entry is not None:
-        lines += [f"With `{run.entry[1].strip()}` in place of `{run.entry[0].strip()}` in the case file:", ""]
+        old, new = (text.strip() for text in run.entry)
+        lines += [f"In the case file `{old}` becomes", "", "```toml", new, "```", ""]
     lines += [f"`{run.command} -o out/{folder.name}`", ""]
     for stem, link in found:
         words = _sentence(run, stem)

@@ -1,1 +1,1 @@
-
+"""Case file: keys with units and windows, checks, estimates, and messages about mistakes."""

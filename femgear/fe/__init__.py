@@ -1,0 +1,1 @@
+"""Finite elements: grids of tooth sectors, elasticity, compliance of all flanks, and stepped shafts."""

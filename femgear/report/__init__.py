@@ -1,0 +1,1 @@
+"""Report: figures, tables, grids for ParaView, and one page of HTML for a run."""

@@ -1,0 +1,1 @@
+"""Storage: results as xarray datasets, written whole or not at all."""

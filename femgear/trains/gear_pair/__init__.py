@@ -1,1 +1,1 @@
-
+"""Gear pair with backlash and given stiffness: impacts, sweeps and chaos."""

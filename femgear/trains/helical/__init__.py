@@ -1,1 +1,1 @@
-
+"""Helical planetary set of rigid bodies with six motions each."""

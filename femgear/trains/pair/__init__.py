@@ -1,0 +1,1 @@
+"""Two gears from their teeth: static contact, stresses, and vibration with contact loss."""

@@ -1,0 +1,1 @@
+"""Static solution and stresses of any planetary set: transmission error, load sharing, stiffness."""
