@@ -10,6 +10,8 @@ DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
 sys.path.insert(0, str(ROOT))
 
+from docutils import nodes  # noqa: E402
+from sphinx import addnodes  # noqa: E402
 from sphinx_gallery.scrapers import matplotlib_scraper  # noqa: E402
 
 import femgear  # noqa: E402
@@ -42,7 +44,11 @@ suppress_warnings = ["misc.highlighting_failure", "config.cache", "ref.python"]
 default_role = "literal"
 autosummary_generate = True
 autosummary_ignore_module_all = False
-autodoc_default_options = {"members": True, "member-order": "bysource", "exclude-members": "model_config"}
+autodoc_default_options = {
+    "members": True,
+    "member-order": "bysource",
+    "exclude-members": "model_config, model_post_init",
+}
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
 python_maximum_signature_line_length = 88
@@ -170,8 +176,20 @@ def drop_readers(app, domain: str, kind: str, content) -> None:
         content.remove(node)
 
 
+def tidy(app, doctree) -> None:
+    """Put a dash for the two hyphens of napoleon, where words follow; leave out the values of long tables."""
+    for text in list(doctree.findall(nodes.Text)):
+        if " -- " in text and not isinstance(text.parent, nodes.literal | nodes.literal_block):
+            last = text.strip() == "--" and text.parent.children[-1] is text
+            text.parent.replace(text, nodes.Text("" if last else text.replace(" -- ", " – ")))
+    for value in list(doctree.findall(addnodes.desc_annotation)):
+        if value.astext().startswith(" = ") and len(value.astext()) > 300:
+            value.parent.remove(value)
+
+
 def setup(app) -> None:
     """Connect what changes the sources."""
+    app.connect("doctree-read", tidy)
     app.connect("source-read", read_source)
     app.connect("autodoc-process-docstring", keep_colons, priority=400)
     app.connect("autodoc-process-signature", name_keys)
