@@ -34,6 +34,12 @@ def test_links_lead_to_headings(page):
     assert missing == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_no_line_is_a_comment(page):
+    """MyST leaves out lines that begin with a per cent sign, such as "0.2" and "% of it" on the next line."""
+    assert re.findall(r"(?m)^\s*%.*$", words(page)) == []
+
+
 def test_every_page_is_in_the_index():
     trees = re.findall(r"(?ms)^```\{toctree\}\n(.*?)^```", (DOCS / "index.md").read_text(encoding="utf-8"))
     lines = [line for tree in trees for line in tree.splitlines() if line and not line.startswith(":")]
