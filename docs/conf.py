@@ -180,7 +180,7 @@ def tidy(app, doctree) -> None:
     """Put a dash for the two hyphens of napoleon, where words follow; leave out the values of long tables."""
     for text in list(doctree.findall(nodes.Text)):
         if " -- " in text and not isinstance(text.parent, nodes.literal | nodes.literal_block):
-            last = text.strip() == "--" and text.parent.children[-1] is text
+            last = text.strip() == "--" and text.parent.astext().rstrip().endswith("--")
             text.parent.replace(text, nodes.Text("" if last else text.replace(" -- ", " – ")))
     for value in list(doctree.findall(addnodes.desc_annotation)):
         if value.astext().startswith(" = ") and len(value.astext()) > 300:
