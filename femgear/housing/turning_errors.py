@@ -8,8 +8,7 @@ the errors change couples them,
 
     f = F + k0 (d - u) - k ste + (k - k0) (d - u),
 
-and is small, so that the last term is iterated upon: Picard's iteration on a preconditioner of blocks
-(Y. Saad, Iterative Methods for Sparse Linear Systems, SIAM 2003, chapter 4), all orders of k kept.
+and is small, so that the last term is iterated upon, all orders of k kept.
 """
 
 from __future__ import annotations
@@ -36,8 +35,9 @@ from femgear.housing.sensor import carrier_turns
 from femgear.housing.set_damping import set_damping
 from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
 
-_TOLERANCE, _PASSES = 1e-7, 60
-"""Change of the fluctuating deflections, over their norm, in the last pass; passes at most."""
+_TOLERANCE, _PASSES, _TOGETHER, _TINY = 1e-7, 60, 6, np.finfo(float).tiny
+"""Change of the fluctuating deflections, over their norm, in the last pass; passes at most, and those
+that are extrapolated together; what no norm is below."""
 _SILENT = 1e-8
 """Part of the largest source of a pass below which a seed and pattern stay at rest."""
 _KEPT = 1e9
@@ -153,17 +153,20 @@ class TurningErrors:
                     kept[key] = one
             return key, one.solve(source, found.get(key), loose)
 
+        pairs = list[tuple[np.ndarray, np.ndarray]]()  # motions that were put in, and what they change
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
             for number in range(_PASSES):
                 sources = self._sources(moved, self.keys if number else self.keys[:1])
                 found = dict(pool.map(respond, sources))
-                before, moved = moved, self._planets(found, _over_ring, shape)
-                fluctuating, change = moved.copy(), moved - before
+                answer = self._planets(found, _over_ring, shape)
+                fluctuating, change = answer.copy(), answer - moved
                 fluctuating[:, *still] = change[:, *still] = 0.0
-                size = max(float(np.linalg.norm(fluctuating)), np.finfo(float).tiny)
+                size = max(float(np.linalg.norm(fluctuating)), _TINY)
                 if number and (apart := float(np.linalg.norm(change)) / size) <= _TOLERANCE:
                     force = self._planets(found, lambda one: one.force, shape)
                     return force, found, max(apart, *(one.residual for one in found.values()))
+                pairs = [*pairs[-_TOGETHER:], (moved, answer - moved)] if number else pairs
+                moved = _accelerated(pairs, answer)
         raise ConvergenceError(
             f"what the turning errors change is not small: the deflections change by {apart:.1e} in pass "
             f"{_PASSES} at {speed:.6g} rad/s", code="E-CONVERGENCE", limit=f"{_TOLERANCE:g}",
@@ -188,7 +191,7 @@ class TurningErrors:
             found.append((key, source))
         sizes = np.array([np.linalg.norm(source) for _, source in found])
         heard = (sizes > _SILENT * sizes.max()) | (np.arange(len(sizes)) == 0)
-        loose = sizes.max() / np.maximum(sizes, np.finfo(float).tiny)
+        loose = sizes.max() / np.maximum(sizes, _TINY)
         return [(*one, float(times)) for one, own, times in zip(found, heard, loose) if own]
 
     def _planets(self, found: dict[_Key, Motion], values, shape) -> np.ndarray:
@@ -231,6 +234,21 @@ def _meshes(groups) -> tuple[np.ndarray, np.ndarray]:
     return np.tile(turn, 2), np.concatenate([group, len(leaders) + group])
 
 
+def _accelerated(pairs: list[tuple[np.ndarray, np.ndarray]], answer: np.ndarray) -> np.ndarray:
+    """Motions for the next pass: of all that the passes before span those that change least.
+
+    D. G. Anderson, J. ACM 12 (1965) 547-560. The equations are linear over real numbers alone.
+    """
+    if len(pairs) < 2:
+        return answer
+    last, newest = pairs[-1]
+    steps = [(last - moved, newest - change) for moved, change in pairs[:-1]]
+    product = np.array([[np.vdot(one, other).real for _, other in steps] for _, one in steps])
+    wanted = np.array([np.vdot(one, newest).real for _, one in steps])
+    share = np.linalg.lstsq(product, wanted, rcond=1e-13)[0]
+    return answer - sum(times * (moved + change) for times, (moved, change) in zip(share, steps))
+
+
 def _over_ring(one: Motion) -> np.ndarray:
     """Deflections (2 G, 2 H + 1, R) of the meshes [m]."""
     found = one.deflection.copy()
@@ -263,7 +281,7 @@ def solve_turning_errors(errors: TurningErrors, speeds: np.ndarray, heard) -> tu
             np.add.at(force[i, mesh], to[above], 2.0 * every[mesh][above])
             force[i, mesh, 0] = np.real(every[mesh][two == 0].sum())
         energy = np.where(two == 0, 0.0, np.abs(every[planets:]) ** 2).sum(axis=0)
-        tail[i] = np.sqrt(energy[outer].sum() / max(energy.sum(), np.finfo(float).tiny))
+        tail[i] = np.sqrt(energy[outer].sum() / max(energy.sum(), _TINY))
         for key, one in motions.items():
             if drag is None or one.drag is None:
                 continue
