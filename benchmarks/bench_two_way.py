@@ -18,6 +18,9 @@ SPEEDS = "Both ways over the number of speeds (six harmonics, n to 14)"
 DIAMETERS = "Both ways over the nodal diameters (20 speeds, six harmonics)"
 HARMONICS = "Both ways over the harmonics of the response (20 speeds, n to 14)"
 PLANETS = "Both ways: equal planets and planets that differ (5 speeds, three harmonics, n to 8)"
+ERRORS = (
+    "Both ways with errors of the sun that turn, over their mesh periods (two speeds, six harmonics, n to 8)"
+)
 CASINGS = "Reading a casing: 56 points of the ring, 138 modes (scripts/casing.py)"
 TIME, MEMORY = 60.0, 500.0
 """What is promised of 1000 speeds [s], [MB]."""
@@ -80,6 +83,25 @@ def test_unequal_planets(benchmark, reference, rows, planets):
     note = f"{unknowns} real unknowns a speed" + growth(benchmark, rows, PLANETS, planets)
     title = "equal: one is solved for" if planets == 1 else "all three are solved for"
     benchmark.extra_info.update(title=title, note=note)
+
+
+@pytest.mark.parametrize("periods", [3, 9, 27])
+def test_growth_over_mesh_periods(benchmark, reference, rows, periods):
+    from femgear.trains.elastic.stages import solve_modes
+    from femgear.trains.reading import with_values
+    from femgear.trains.static.stages import solve_static
+
+    waves = 2.0 * np.cos(2.0 * np.pi * np.arange(27) / periods)
+    case = with_values(reference.case, {"sun.errors": {"cumulative_pitch": [f"{one} um" for one in waves]}})
+    modes = solve_modes(case, solve_static(case, cache=reference.cache))
+    other = type(reference)()
+    other.case = case
+    benchmark.group = ERRORS
+    known = {"count": 2, "diameters": 8}
+    found = benchmark.pedantic(two_way, args=(other, modes), kwargs=known, rounds=3, warmup_rounds=1)
+    assert found.two_way.residual.max() < 1e-6
+    note = f"{len(found.two_way.order)} carrier orders" + growth(benchmark, rows, ERRORS, periods)
+    benchmark.extra_info.update(title=f"{periods} mesh periods", note=note)
 
 
 @pytest.fixture(scope="module")
