@@ -18,7 +18,8 @@ def test_stage(benchmark, reference, name):
     for need in (*stage.needs, "grids"):
         getattr(reference, need)
     result = benchmark.pedantic(stage.run, args=(reference,), rounds=stage.rounds, warmup_rounds=1)
-    memory = {} if name in {"help", "package"} else peak_memory(name) or {}
+    others = {"demo", "without_pictures", "reading", "help", "package"}  # processes of their own
+    memory = {} if name in others else peak_memory(name) or {}
     if memory:
         benchmark.extra_info.update(peak=memory["peak"], added=memory["peak"] - memory["before"])
     benchmark.extra_info.update(

@@ -287,6 +287,26 @@ def package(_):
     _in_new_process("import femgear")
 
 
+def reading(_):
+    """Import femgear and read the case in a new process."""
+    _in_new_process(f"import femgear; femgear.read_case({str(CASE)!r})")
+
+
+def demo(reference: Reference):
+    """``femgear run`` with all pictures and the report, as `make demo`."""
+    _run(reference)
+
+
+def without_pictures(reference: Reference):
+    """``femgear run --no-pictures``."""
+    _run(reference, "--no-pictures")
+
+
+def _run(reference: Reference, *words: str) -> None:
+    arguments = ["run", str(CASE), "-o", str(reference.cache / "results"), "--force", *words]
+    _in_new_process(f"from femgear.cli import main; main({arguments!r})")
+
+
 def _in_new_process(program: str) -> None:
     subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, env=os.environ)
 
@@ -372,6 +392,9 @@ STAGES = {
     "housing": Stage("housing, 2 speeds", housing, ("dynamics",), lambda _, h: h.lines.displacement.size, 9),
     "whole": Stage("whole computation, grids cached", whole, ("grids",), _none, 3, 3.0),
     "whole_cold": Stage("whole computation, new grids", whole_cold, (), _none, 3),
+    "demo": Stage("femgear run with pictures and report, as make demo", demo, (), _none, 3, 10.0),
+    "without_pictures": Stage("femgear run --no-pictures", without_pictures, (), _none, 3),
+    "reading": Stage("import femgear and read the case", reading, (), _none, 9),
     "help": Stage("femgear --help", help_text, (), _none, 9, 0.3),
     "package": Stage("import femgear, with the start of Python", package, (), _none, 9, 0.1),
 }

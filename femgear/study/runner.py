@@ -296,7 +296,8 @@ class Dask(Runner):
             if address.startswith("tls") and not Security().get_connection_args("client").get("ssl_context"):
                 raise ValueError("no certificates are configured")  # it would wait for 40 s at its end
             # what it has to say of a lost connection is said by E-CLUSTER
-            logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+            for name in ("distributed", "distributed.client"):
+                logging.getLogger(name).setLevel(logging.CRITICAL)
             self._client: Any = Client(address, timeout=_TIMEOUT, set_as_default=False)
             self._client.register_plugin(_one_death())
         except (ImportError, OSError, RuntimeError, TypeError, ValueError) as error:
