@@ -91,6 +91,12 @@ class TwoWayResponse(ReadOnlyArrays):
     drag: np.ndarray | None = None
     turns: int = 1
 
+    def at(self, some) -> TwoWayResponse:
+        """Response at the speeds number ``some`` alone."""
+        names = ("carrier_speed", "force", "residual", "tail")
+        parts = {name: getattr(self, name)[some] for name in names}
+        return replace(self, **parts, drag=None if self.drag is None else self.drag[some])
+
 
 def solve_two_way(
     gears: Modes,

@@ -584,9 +584,9 @@ def fixed_housing(
     further: Any = next((more for half in (4, 3) if (more := _times(harmonics, half))[1] <= most), None)
     wider_at = np.asarray(wider_at if further else (), int)
     if len(wider_at):
-        for count in (harmonics, further):
-            more: Any = {"carrier_speed": carrier[wider_at], "harmonics": count}
-            wider.append(solved(even, structure, paths=own, damping=joint, **more))
+        some: Any = {"carrier_speed": carrier[wider_at], "paths": own, "damping": joint}
+        first = two_way.at(wider_at) if excitation.periods == 1 else solved(even, structure, **some)
+        wider = [first, solved(even, structure, harmonics=further, **some)]
     multiplier = np.full(len(carrier), np.nan)
     if len(judged_at):
         multiplier[judged_at] = turn_stability(
@@ -788,10 +788,7 @@ def _sound_around(
     sound = list[tuple[np.ndarray, ...]]()
     speeds = np.arange(len(lines.base_speed))
     for some in np.array_split(speeds, -(-len(speeds) // 20)):  # fit into memory
-        here = replace(
-            two_way, carrier_speed=two_way.carrier_speed[some], force=two_way.force[some],
-            drag=None if two_way.drag is None else two_way.drag[some],
-        )  # fmt: skip
+        here = two_way.at(some)
         velocity = 1j * np.outer(lines.base_speed[some], lines.order)[..., None]
         waves = velocity * np.swapaxes(structure_lines(around, here)[1], 1, 2) @ wave.conj()
         sound.append(surface_sound(waves, n, lines.frequency[some], found.cylinder, found.microphone))
