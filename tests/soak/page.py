@@ -134,11 +134,11 @@ def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]
 
 
 def _section(kind: str, tally: Tally) -> str:
-    """Describe a kind and list how its trials ended."""
+    """Describe a kind and count how its trials ended."""
     title, words = WORDS[kind]
     common = tally.said.most_common()
-    listed = ", ".join(f"{said} {count}" for said, count in common[:_MOST])
-    rest = sum(count for _, count in common[_MOST:])
-    sums = "; ".join(f"{name}: {count}" for name, count in sorted(tally.counts.items()))
-    more = f", others {rest}" if rest else ""
-    return f"## {title}\n\n{words}\n\n{listed}{more}.{f' Altogether {sums}.' if sums else ''}\n"
+    rows = [f"| {said} | {count} |" for said, count in common[:_MOST]]
+    if rest := sum(count for _, count in common[_MOST:]):
+        rows.append(f"| others | {rest} |")
+    rows += [f"| **{name}, altogether** | {count} |" for name, count in sorted(tally.counts.items())]
+    return "\n".join([f"## {title}\n\n{words}\n", "| outcome | trials |", "|---|---:|", *rows]) + "\n"
