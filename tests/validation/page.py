@@ -15,6 +15,7 @@ from validation.run import Validation
 FAR_BELOW = 0.01  # of its gate: an error below is not shown in figures
 ROOM = 1e-6  # gates up to here leave room for rounding: nothing within is shown in figures
 UNCERTAIN = 1e-9  # without a gate
+SMALL = {"femgear", "scipy", "daqp", "ross-rotordynamics", "pi", "cos", "sin", "tan", "exp", "sqrt", "sinc"}
 
 INTRODUCTION = """\
 # Validation
@@ -126,6 +127,10 @@ def _cell(text: str) -> str:
 
 
 def _sentence(text: str) -> str:
+    """A remark as a sentence with a capital; symbols and names, such as ``k_n`` and ``femgear``, keep small ones."""
+    first = text.split()[0].rstrip(",.:;")
+    if re.fullmatch(r"a|[a-z][a-z-]+", first) and first not in SMALL:
+        text = text[0].upper() + text[1:]
     return text if text.endswith((".", "!", "?")) else text + "."
 
 

@@ -58,9 +58,9 @@ def test_page_shows_every_row_and_its_verdict():
     differs = within("B|1", "paper", "height [m]", 1.0, 1.5, 0.1, explanation="the paper has a misprint")
     text = markdown(validation(GOOD, BAD, differs, at_most("C", "s", "rest", 1e-6, 3e-8)))
     assert "4 rows: 2 passes, 1 FAILS, 1 differs." in text
-    assert "| A1 | length [m] | 2 | 2.0002 | +0.01 % | 0.1 % | passes | closed form. |" in text
+    assert "| A1 | length [m] | 2 | 2.0002 | +0.01 % | 0.1 % | passes | Closed form. |" in text
     assert (
-        "| B\\|1 | height [m] | 1 | 1.5 | +50 % | 10 % | differs | paper. the paper has a misprint. |" in text
+        "| B\\|1 | height [m] | 1 | 1.5 | +50 % | 10 % | differs | Paper. The paper has a misprint. |" in text
     )
     assert "| C | rest | 0 | < 1e-06 |  | <= 1e-06 | passes | s. |" in text
 
