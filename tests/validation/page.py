@@ -127,7 +127,7 @@ def _cell(text: str) -> str:
 
 
 def _sentence(text: str) -> str:
-    """A remark as a sentence with a capital; symbols and names, such as ``k_n`` and ``femgear``, keep small ones."""
+    """A remark as a sentence; symbols and names, such as ``k_n`` and ``femgear``, keep small letters."""
     first = text.split()[0].rstrip(",.:;")
     if re.fullmatch(r"a|[a-z][a-z-]+", first) and first not in SMALL:
         text = text[0].upper() + text[1:]
