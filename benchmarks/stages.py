@@ -214,7 +214,7 @@ def on_feet(case, harmonics: int, diameters: int, count: int):
 
 def two_way(reference: Reference, modes=None, *, count: int = 1000, harmonics: int = 6, diameters: int = 14):
     """Mesh forces of the set on four feet both ways, and of the ring without them."""
-    from femgear.trains.elastic.stages import fixed_housing
+    from femgear.trains.elastic.fixed_housing import fixed_housing
     from femgear.trains.rigid import member_speeds
 
     case = on_feet(reference.case, harmonics, diameters, count)

@@ -17,8 +17,9 @@ from femgear.gears.kinematics import torques
 from femgear.housing.orders import OrderSpectrum, order_level
 from femgear.housing.sensor import fixed_sensor_lines
 from femgear.system.fourier import harmonics_of, sample
+from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
-from femgear.trains.elastic.stages import mesh_and_ring_outputs, solve_dynamics, solve_housing, solve_modes
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import with_value
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import solve_static

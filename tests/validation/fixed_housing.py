@@ -26,7 +26,7 @@ from femgear.solvers.stability.parametric import stability
 from femgear.system.fourier import Product, harmonics_of, pad
 from femgear.system.system import MechanicalSystem, MeshExcitation, Modes
 from femgear.trains.elastic import stages as elastic
-from femgear.trains.elastic.model import gears_alone
+from femgear.trains.elastic.model import gears_alone, mesh_springs
 from femgear.trains.reading import with_values
 from femgear.trains.static.stages import solve_static
 from validation.cases import reference_case
@@ -686,7 +686,7 @@ def reference_set_in_its_ring() -> tuple[Row, ...]:
     modes = elastic.solve_modes(case, solve_static(case))
     ring, model = modes.ring, modes.model
     low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
-    drive, flexibility = elastic._excitation(planetary_set(case), replace(ring, **low), modes.state)
+    drive, flexibility = mesh_springs(planetary_set(case), replace(ring, **low), modes.state)
     W, mean = model.system.W.copy(), drive.stiffness.mean(axis=1)
     W[model.ring_slice][model.ring_diameter > n_max] = 0.0
     whole = replace(model.system, W=W, flexibility=flexibility)

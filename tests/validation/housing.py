@@ -39,7 +39,7 @@ def _strongest(band: BandAnalysis) -> tuple[float, float]:
 
 def _every_line() -> dict[str, SensorLines]:
     """Lines at all orders, of a field with all nodal diameters: housing.nc keeps those of the symmetry."""
-    from femgear.trains.elastic.stages import mesh_and_ring_outputs
+    from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 
     dynamics, housing = reference_dynamics(), reference_housing()
     modes = replace(reference_modes(), symmetry=1)

@@ -177,7 +177,7 @@ def more_torque() -> tuple[Row, ...]:
 def _mean_motion(modes, factor: float):
     """Mean transmission errors [m] and mesh forces [N] of the model at rest under a part of its load."""
     from femgear.solvers.periodic.spectral import solve_spectral
-    from femgear.trains.elastic.stages import mesh_and_ring_outputs
+    from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 
     basis, system = modes.modes, modes.model.system
     basis = replace(

@@ -24,16 +24,20 @@ from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.housing.structure import circumferential
 from femgear.system.system import MechanicalSystem, MeshExcitation
+from femgear.trains.static.stages import mesh_backlash
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
     from femgear.contact.bodies import FlankCompliance, Sector
+    from femgear.contact.loaded_period import LoadedPeriod
     from femgear.fe.grid import Grid
     from femgear.gears.planetary import PlanetarySet
 
 RADIAL, TANGENTIAL = 0, 1
 # nodal diameters of the ring model: their amplitudes fall fast, and 54 points of the housing resolve them
 MAX_DIAMETER = 26
+# positions of the excitation in one mesh period at least
+RECORD = 2**13
 
 
 @dataclass(frozen=True)
@@ -427,3 +431,27 @@ def _outer_surface_outputs(grid: Grid) -> np.ndarray:
     outputs = np.zeros((2 * len(grid.points), 2))
     outputs[2 * node, RADIAL] = outputs[2 * node + 1, TANGENTIAL] = 1.0
     return outputs
+
+
+def mesh_springs(
+    gears: PlanetarySet, ring: RingModel, state: LoadedPeriod
+) -> tuple[MeshExcitation, np.ndarray]:
+    """Mesh springs of the loaded state, and the compliance (2N, 2N) of the bodies between them [m/N]."""
+    held, compliance = (
+        ring_mesh_compliance(values, gears.ring.teeth, gears.planet_angles)
+        for values in (ring.held_compliance, ring.compliance)
+    )
+    flexibility = body_flexibility(state.held_compliance, held)
+    # equal planets are equal to rounding when their phases are among the positions
+    record = gears.n_planets * -(-RECORD // gears.n_planets) * state.periods
+    excitation = mesh_excitation(
+        state.resampled("held_stiffness", record),
+        state.resampled("deflection", record),
+        state.resampled("force", record),
+        held,
+        ring_compliance=compliance,
+        flexibility=flexibility,
+        backlash=mesh_backlash(gears),
+        periods=state.periods,
+    )
+    return excitation, flexibility

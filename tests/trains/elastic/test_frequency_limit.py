@@ -12,16 +12,9 @@ from femgear.housing.sensor import fixed_sensor_lines
 from femgear.report.tables import pulling_meshes, pulls_of
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.checks import dynamics_warnings, missing_level
-from femgear.trains.elastic.stages import (
-    HARMONICS,
-    highest_excitation,
-    limited,
-    mesh_and_ring_outputs,
-    solve_dynamics,
-    solve_housing,
-    solve_modes,
-    solve_response,
-)
+from femgear.trains.elastic.excitation_limit import HARMONICS, highest_excitation, limited
+from femgear.trains.elastic.outputs import mesh_and_ring_outputs
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_response
 from femgear.trains.reading import read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
 

@@ -15,7 +15,8 @@ from femgear.housing.orders import OrderSpectrum, order_level
 from femgear.housing.sensor import fixed_sensor_lines, heaviside_linear_lines, stored_lines
 from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.checks import max_nodal_diameter
-from femgear.trains.elastic.stages import mesh_and_ring_outputs, solve_dynamics, solve_housing, solve_modes
+from femgear.trains.elastic.outputs import mesh_and_ring_outputs
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import parse_case, read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
 

@@ -1,0 +1,66 @@
+"""What is heard of a response of the elastic set: transmission errors, field of the ring, sensors on it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import linalg
+
+from femgear.housing.sensor import SensorLines, component_lines
+from femgear.solvers.linear.modal import output_load, output_response, residual_output
+from femgear.trains.elastic.model import RADIAL, ring_field
+
+if TYPE_CHECKING:
+    from femgear.case.sections import Case
+    from femgear.system.system import Response
+    from femgear.trains.elastic.results import DynamicsResult, ModesResult
+
+
+def sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np.ndarray) -> SensorLines:
+    """Lines of the fixed sensor at speeds of the carrier [rad/s]."""
+    field = mesh_and_ring_outputs(modes, response)[1]
+    angle = case.housing.sensor_angle
+    known = {"symmetry": modes.symmetry, "periods": response.periods}
+    return component_lines(field, case.ring.teeth, carrier, angle, **known)
+
+
+def mesh_and_ring_outputs(
+    result: ModesResult, response: Response, output: int = RADIAL
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the dynamic transmission error of every mesh, and the radial or tangential field of the ring.
+
+    Both complex [m], (S, 2N, H + 1), and (S, H + 1, 2 n_max + 1) of the outer surface, see
+    `femgear.trains.elastic.model.ring_field`, of a response at S speeds with H harmonics.
+    """
+    model, basis, n_max = result.model, result.modes, result.max_diameter
+    ring_rows = np.eye(len(model.system.M))[model.ring_slice]
+    field = ring_field(result.ring.modes, np.eye(len(ring_rows)), output, n_max).T
+    heard, n_meshes = np.ones(2 * n_max + 1, bool), model.rigid_directions.shape[1]
+    if result.ring.modes.count % result.symmetry == 0:
+        # planets in phase, of which one follows the other after a turn
+        heard = np.arange(-n_max, n_max + 1) % result.symmetry == 0
+    rows: Any = linalg.block_diag(np.eye(n_meshes), field[heard])
+    outputs = np.vstack([model.rigid_directions.T, ring_rows])
+    values = output_response(
+        basis, response, rows @ (outputs @ basis.shape),
+        residual=rows @ residual_output(model.system, basis, outputs),
+        load=rows @ output_load(model.system, basis, outputs),
+    )  # fmt: skip
+    found = np.zeros((len(values), values.shape[-1], len(heard)), complex)
+    found[..., heard] = np.swapaxes(values[:, n_meshes:], 1, 2)
+    return values[:, :n_meshes], found
+
+
+def named_sensors(case: Case, dynamics: DynamicsResult) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names and lines (speeds, n_sensors, n_orders) [m] of the sensors of a case on the ring."""
+    carrier, lines = np.array([s.carrier for s in dynamics.speeds]), list[np.ndarray]()
+    for one in case.housing.sensor:
+        field = math.cos(one.direction) * dynamics.ring_radial
+        if math.sin(one.direction):
+            field = field + math.sin(one.direction) * dynamics.ring_tangential
+        place = dynamics.ring_teeth, carrier, one.angle
+        known = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
+        lines.append(component_lines(field, *place, **known).displacement)
+    return tuple(one.name for one in case.housing.sensor), np.stack(lines, axis=1)
