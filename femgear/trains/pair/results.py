@@ -76,7 +76,7 @@ class PairModesResult:
         """Collect the contents of modes.nc."""
         modes, play = self.modes, self.excitation.backlash
         variables = mode_entries(modes) | {
-            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape; kg^-1/2 m^-1 of rotations"),
             "mesh_stiffness": ("mesh", modes.mesh_stiffness, "N/m", "mean mesh stiffness"),
             "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
             "backlash": ("mesh", play, *_PLAY),
