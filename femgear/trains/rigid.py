@@ -552,7 +552,7 @@ def modes_dataset(
         variables["phasing"] = ("mode", list(phasing), "1", "phasing of the planets in the mode")
     variables |= {
         "nodal_diameter": ("mode", modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
-        "shape": ("dof mode", shape, "kg^-1/2", "mass-normalised mode shape; kg^-1/2 m^-1 of rotations"),
+        "shape": ("dof mode", shape, "kg^-1/2", "mode shape of unit mass; rotations in kg^-1/2 m^-1"),
         "mesh_stiffness": ("mesh", stiffness, "N/m", f"mean mesh stiffness{along}"),
         "mesh_deflection": ("mesh mode", deflection, "kg^-1/2", f"mesh deflection of the mode{along}"),
     }

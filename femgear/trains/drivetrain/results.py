@@ -74,7 +74,12 @@ class DrivetrainModesResult:
             "kind": ("mode", _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
             "rotation_share": ("mode", rotation, "1", "share of rotations in the kinetic energy"),
             "energy": ("member mode", energy, "1", "share of the member in the kinetic energy"),
-            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape; kg^-1/2 m^-1 of rotations"),
+            "shape": (
+                "dof mode",
+                modes.shape,
+                "kg^-1/2",
+                "mode shape of unit mass; rotations in kg^-1/2 m^-1",
+            ),
             "mesh_stiffness": ("mesh", model.mean_stiffness, "N/m", "mean mesh stiffness"),
             "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
             "ratio": ("body", list(model.ratio.values()), "1", "speed over that of the first body"),

@@ -136,7 +136,12 @@ class ModesResult:
         between = "compliance between the meshes through their bodies"
         variables = mode_entries(modes) | {
             "nodal_diameter": ("mode", modes.nodal_diameter, "1", "dominant nodal diameter of the ring"),
-            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape; kg^-1/2 m^-1 of rotations"),
+            "shape": (
+                "dof mode",
+                modes.shape,
+                "kg^-1/2",
+                "mode shape of unit mass; rotations in kg^-1/2 m^-1",
+            ),
             "mesh_stiffness": ("mesh", modes.mesh_stiffness, "N/m", "mean mesh stiffness, ring taken out"),
             "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
             "supported_ste": (record, state.deflection, "m", supported),

@@ -82,7 +82,12 @@ class MultistageModes:
             "main_stage": ("mode", self.stage, "1", "stage with most of the kinetic energy"),
             "energy": ("stage mode", self.share, "1", "share of the stage in the kinetic energy"),
             "strain": ("part mode", self.strain, "1", "share in the strain energy"),
-            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape; kg^-1/2 m^-1 of rotations"),
+            "shape": (
+                "dof mode",
+                modes.shape,
+                "kg^-1/2",
+                "mode shape of unit mass; rotations in kg^-1/2 m^-1",
+            ),
             "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
             "mesh_stiffness": ("mesh", mean_mesh_stiffness(self.data), "N/m", "mean mesh stiffness"),
         }

@@ -76,7 +76,12 @@ class PairModesResult:
         """Collect the contents of modes.nc."""
         modes, play = self.modes, self.excitation.backlash
         variables = mode_entries(modes) | {
-            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape; kg^-1/2 m^-1 of rotations"),
+            "shape": (
+                "dof mode",
+                modes.shape,
+                "kg^-1/2",
+                "mode shape of unit mass; rotations in kg^-1/2 m^-1",
+            ),
             "mesh_stiffness": ("mesh", modes.mesh_stiffness, "N/m", "mean mesh stiffness"),
             "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
             "backlash": ("mesh", play, *_PLAY),
