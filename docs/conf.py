@@ -1,5 +1,6 @@
 """Sphinx settings of the documentation; `make docs` builds it into out/docs/html."""
 
+import builtins
 import os
 import re
 import sys
@@ -65,6 +66,13 @@ def shown_figures(block: tuple, block_vars: dict, gallery_conf: dict) -> str:
 
 # scripts that draw: one page and one thumbnail each
 EXAMPLES = ROOT / "scripts" / "examples"
+
+
+def name_script(gallery_conf: dict, name: str, when: str) -> None:
+    """Let an example know its own path, by which it finds the cases; the gallery does not tell it."""
+    builtins.__dict__["__file__"] = str(EXAMPLES / name)
+
+
 if any(EXAMPLES.glob("*.py")):
     extensions.append("sphinx_gallery.gen_gallery")
     sphinx_gallery_conf = {
@@ -72,6 +80,7 @@ if any(EXAMPLES.glob("*.py")):
         "gallery_dirs": "_generated/examples",
         "filename_pattern": r"\.py$",
         "image_scrapers": (shown_figures,),
+        "reset_modules": ("matplotlib", name_script),
         "within_subsection_order": "FileNameSortKey",
         "download_all_examples": False,
         "write_computation_times": False,

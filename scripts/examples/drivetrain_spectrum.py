@@ -11,11 +11,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-import femgear
 from femgear import read_case, solve
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "own_chain.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "own_chain.toml")
 spectrum = solve(case, "spectrum")["spectrum"].dataset().isel(variant=0, mesh=0)
 
 # %%

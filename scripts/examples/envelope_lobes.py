@@ -11,13 +11,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case, solve, with_values
 from femgear.housing.orders import OrderSpectrum, analyse_band
 from femgear.housing.sensor import stored_lines
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 case = with_values(case, {"static.positions": 16, "operation.speeds": ["250 rpm"]})
 places = {"equal": [0, 45, 90], "third planet moved": [0, 45, 95]}  # in 135ths of a turn, where teeth fit
 figure, ax = plt.subplots(subplot_kw={"projection": "polar"}, layout="constrained")

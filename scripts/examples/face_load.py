@@ -12,11 +12,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case, solve_static, with_values
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "spur_pair.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")
 case = with_values(case, {"static.slices": 15, "static.positions": 8})
 slopes = np.array([0.0, 5.0, 10.0])
 figure, ax = plt.subplots(layout="constrained")

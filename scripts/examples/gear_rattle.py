@@ -11,14 +11,13 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case
 from femgear.solvers import periodic_response
 from femgear.trains.gear_pair.case_file import pair_of
 from femgear.trains.gear_pair.model import contact_shares
 
 plt.style.use("tableau-colorblind10")
-pair = pair_of(read_case(Path(femgear.__file__).parents[1] / "cases" / "gear_pair.toml"))
+pair = pair_of(read_case(Path(__file__).parents[2] / "cases" / "gear_pair.toml"))
 figure, ax = plt.subplots(layout="constrained")
 
 # %%

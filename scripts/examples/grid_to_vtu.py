@@ -13,13 +13,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pyvista as pv
 
-import femgear
 from femgear import planetary_set, read_case
 from femgear.fe.grid import mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
 from femgear.gears.tooth import half_sector
 
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 sun = planetary_set(case).sun
 gear = rotated_copies(mirror(mesh_outline(half_sector(sun, flank_elements=8))), sun.teeth)
 

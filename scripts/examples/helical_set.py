@@ -11,11 +11,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case, solve
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "helical_30_20_70.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "helical_30_20_70.toml")
 found = solve(case, "dynamics")["dynamics"].dataset().sel(axis="z")
 thrust = np.abs(found.support_force_real + 1j * found.support_force_imag)  # speed, member, harmonic
 for harmonic in range(4):

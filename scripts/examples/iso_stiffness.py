@@ -11,12 +11,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case, solve_static, with_values
 from femgear.gears.iso6336 import pair_mesh_stiffness
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "spur_pair.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")
 teeth, standard, elements = [20, 26, 36], [], []
 for z in teeth:
     bores = {"gear_1.bore_radius": f"{0.625 * z} mm", "gear_2.bore_radius": f"{1.25 * z} mm"}

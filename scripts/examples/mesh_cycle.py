@@ -11,11 +11,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-import femgear
 from femgear import read_case, solve
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "spur_pair.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")
 found = solve(case, "stress")
 static, stress = found["static"].dataset().isel(mesh=0), found["stress"].dataset().isel(mesh=0)
 

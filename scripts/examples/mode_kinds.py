@@ -11,11 +11,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-import femgear
 from femgear import read_case, solve_modes, solve_static, with_values
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 case = with_values(case, {"static.positions": 16, "static.stresses": False})
 modes = solve_modes(case, solve_static(case)).dataset()
 heard = modes.sel(mode=(modes.frequency > 1) & (modes.frequency < 10e3))

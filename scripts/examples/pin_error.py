@@ -12,13 +12,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case, with_values
 from femgear.gears.deviations import no_deviations
 from femgear.study.relief import design_basis, sun_torque
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 floating = {"static.members": "elastic", "sun.support_stiffness": "0 N/m"}
 errors, figure, ax = np.array([0.0, 2.0, 4.0, 6.0]), *plt.subplots(layout="constrained")
 

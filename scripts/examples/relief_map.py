@@ -12,11 +12,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case
 from femgear.study.relief import design_basis, harris_map, with_tip_relief
 
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "spur_pair.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")
 basis = replace(design_basis(case), positions=12)
 torques, reliefs = np.linspace(50, 350, 7), np.linspace(0, 30e-6, 7)
 variants = [with_tip_relief(None, basis.gears, amount=amount) for amount in reliefs]

@@ -13,12 +13,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case
 from femgear.study.relief import design_basis, harris_map, sun_torque, with_tip_relief
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 basis = replace(design_basis(case), positions=16)
 amounts, torque = np.linspace(0, 12e-6, 7), sun_torque(case, basis.gears)
 figure, ax = plt.subplots(layout="constrained")

@@ -12,14 +12,13 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case, solve, with_values
 from femgear.gears.planetary import equal_planet_angles
 from femgear.housing.orders import array_factor
 from femgear.housing.sensor import stored_lines
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 case = with_values(case, {"static.positions": 16, "static.stresses": False, "runup.count": 0})
 lines = stored_lines(solve(case, "housing")["housing"].dataset().isel(speed=1))
 

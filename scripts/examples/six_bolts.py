@@ -10,11 +10,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-import femgear
 from femgear import read_case, solve, with_values
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 speeds = {"from": "1000 rpm", "to": "3400 rpm", "count": 17}
 coarse = {"static.positions": 16, "static.stresses": False, "runup.count": 0, "dynamics.mesh_harmonics": 4}
 case = with_values(case, coarse | {"operation.speeds": speeds, "housing.published": []})

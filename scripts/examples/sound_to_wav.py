@@ -12,13 +12,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case, solve, with_values
 from femgear.exchange.formats import Signal, write_wav
 from femgear.housing.sound import sampled_signal, stored_sound, whole_turns
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 case = with_values(case, {"static.positions": 16, "static.stresses": False, "runup.count": 0})
 lines, pressure = stored_sound(solve(case, "housing")["housing"].dataset().isel(speed=1))
 

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-import femgear
 from femgear import read_case, solve, with_values
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "spur_pair.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")
 case = with_values(case, {"runup.from": "2000 rpm", "runup.to": "24000 rpm", "static.stresses": False})
 found = solve(case, "runup")["runup"].dataset()
 

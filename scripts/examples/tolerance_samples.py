@@ -12,12 +12,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case
 from femgear.study.samples import prepared, sample_block
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "planetary_27_40_108.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml")
 figure, ax = plt.subplots(layout="constrained")
 law = 'pin_errors.tangential = { distribution = "normal", sigma = "%s um" }\n'
 

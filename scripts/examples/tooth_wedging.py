@@ -12,11 +12,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import femgear
 from femgear import read_case, solve, with_values
 
 plt.style.use("tableau-colorblind10")
-case = read_case(Path(femgear.__file__).parents[1] / "cases" / "nrel_pgb.toml")
+case = read_case(Path(__file__).parents[2] / "cases" / "nrel_pgb.toml")
 plays, touching = np.arange(0.04, 0.13, 0.01), []
 for play in plays:
     changed = with_values(case, {"set.backlash": f"{play:.3f} mm", "operation.speeds": ["30 rpm"]})

@@ -19,6 +19,7 @@ ANSWERS = {
     "mesh_cycle": r"rigid 1\.544, under load 1\.7",
     "mode_kinds": r"rotational: .* 4462.*\ntranslational: 1227, 1227",
     "pin_error": r"sun held: 2\.4\d* at 6 um\nsun floats: 1\.000",
+    "published_table": r"743\.2   743\.164 Hz[\s\S]* 11775\.3 11775\.266 Hz",
     "relief_map": r"200 N m: 15 um",
     "relief_shape": r"linear: 0\.\d+ um at 4 um\nparabolic: 0\.\d+ um at 6 um",
     "root_stress_cycle": r"gear 1: 25\d MPa, ISO 6336-3 290 MPa\ngear 2: 26\d MPa, ISO 6336-3 294 MPa",
@@ -29,6 +30,7 @@ ANSWERS = {
     "tolerance_samples": r"sigma 1\.5 um: .* 1\.9\d\nsigma 3 um: .* 2\.\d+",
     "tooth_number_phasing": r"\['translational', 'planet', 'translational', 'rotational'\]",
     "tooth_wedging": r"free from 0\.09 mm on",
+    "veering": r"\d\d stiffnesses, places left unresolved: 0",
 }
 LONG = {
     "drivetrain_spectrum", "envelope_lobes", "face_load", "iso_stiffness", "six_bolts", "sound_to_wav",
@@ -48,10 +50,10 @@ def pyplot(monkeypatch):
     plt.close("all")
 
 
-def test_there_are_twenty_in_the_form_of_the_gallery():
+def test_each_has_the_form_of_the_gallery():
     """A title underlined as long as it is, a text, cells with words of their own, fewer than 40 lines."""
     paths = sorted(FOLDER.glob("*.py"))
-    assert [path.stem for path in paths] == sorted(ANSWERS) and len(paths) == 20
+    assert [path.stem for path in paths] == sorted(ANSWERS)
     for path in paths:
         text = path.read_text(encoding="utf-8")
         title, line, words = re.match(r'"""\n(.+)\n(=+)\n\n(.+?)\n"""\n', text, re.DOTALL).groups()
