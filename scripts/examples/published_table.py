@@ -2,8 +2,8 @@
 Do the natural frequencies of a paper's table come out?
 =======================================================
 
-Table 1 of Lin and Parker (J. Vib. Acoust. 121, 1999, 316-321) gives masses, stiffnesses and diameters of a set with
-rigid bodies, their Table 2 its natural frequencies. A set from numbers of one's own is made in the same way.
+Lin and Parker (J. Vib. Acoust. 121, 1999, 316-321) print masses, stiffnesses and diameters of a set of rigid
+bodies, and its natural frequencies. A set from numbers of one's own is made in the same way.
 """
 
 from math import cos, pi, radians

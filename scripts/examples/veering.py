@@ -2,8 +2,7 @@
 Where do natural frequencies veer when planet bearings get stiffer?
 ===================================================================
 
-Sorted by frequency, two modes that meet seem to cross. Their shapes tell whether they do, or veer: then they
-exchange their shapes, and a harmless mode can be driven.
+Sorted by frequency, modes that meet seem to cross. Where they veer they exchange shapes: harmless ones get loud.
 """
 
 from dataclasses import replace
@@ -24,8 +23,8 @@ data = planar_data(case, planetary_set(case))
 
 
 def modes(exponent):
-    system = gear_set_system(replace(data, planet_bearing=10**exponent))
-    return oscillating(complex_modes(system, data.mesh_stiffness))
+    stiffer = gear_set_system(replace(data, planet_bearing=10**exponent))
+    return oscillating(complex_modes(stiffer, data.mesh_stiffness))
 
 
 tracked = track_modes(modes, np.linspace(8, 11, 31), gear_set_system(data).M)
@@ -35,6 +34,6 @@ tracked = track_modes(modes, np.linspace(8, 11, 31), gear_set_system(data).M)
 
 print(f"{len(tracked.value)} stiffnesses, places left unresolved: {len(tracked.unresolved)}")
 figure, ax = plt.subplots(layout="constrained")
-ax.loglog(10**tracked.value, tracked.frequency, lw=1)
+ax.loglog(10**tracked.value, tracked.frequency)
 ax.set(xlabel="stiffness of the planet bearings [N/m]", ylabel="natural frequency [Hz]")
 plt.show()
