@@ -20,7 +20,7 @@ from validation.reference.frequency_response import mesh_error_response
 from validation.rows import Row, at_most, counted, information, within
 
 PAPER = "Kahraman, J. Mech. Des. 116, 1994"
-KAHRAMAN = f"{PAPER}, Table 4"
+KAHRAMAN = f"{PAPER}, Table 4, axial and tilt stiffnesses ten times those printed"
 INDEPENDENT = independent.SOURCE
 PHASINGS = {"SP": "sequentially phased 1", "IP": "in phase", "CP": "counter-phased"}
 # printed frequencies [Hz] and those of an independent implementation, by phasing

@@ -106,9 +106,10 @@ def _published(planets: int, name: str, text: str, value: float) -> Row:
     if planets == 4 and text in MISPRINTS:
         # all other entries of the table agree in every digit, and so do those of 3 and 5 planets
         return information("F1", LIN_PARKER, name, float(text), value, note=MISPRINTS[text])
-    row = printed("F1", LIN_PARKER, name, text, value)
-    # five digits where this is less than half a unit of the print
-    return replace(row, gate=min(row.gate, 5e-5 * value)) if planets == 3 else row
+    row, digits = printed("F1", LIN_PARKER, name, text, value), 5e-5 * value
+    if planets == 3 and digits < row.gate:
+        return replace(row, gate=digits, note="gate: five digits, less than half a unit of the print")
+    return row
 
 
 def structure() -> tuple[Row, ...]:
