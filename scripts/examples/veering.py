@@ -2,7 +2,7 @@
 Where do natural frequencies veer when planet bearings get stiffer?
 ===================================================================
 
-Sorted by frequency, modes that meet seem to cross. Where they veer they exchange shapes: harmless ones get loud.
+Sorted by frequency, modes that meet seem to cross. Where they veer they exchange shapes, good ones for bad.
 """
 
 from dataclasses import replace
