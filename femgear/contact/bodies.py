@@ -135,8 +135,8 @@ class Bodies:
     """Flank compliances of the three kinds of gears and their common material.
 
     ``helical`` are the stiffnesses of helical teeth over those of spur teeth of the same transverse section,
-    of every kind of mesh, see `helical_stiffness`. A pair has its gears 1 and 2 in place of sun and planet,
-    and no ring.
+    of every kind of mesh, see `helical_stiffness`, at a base helix angle [rad]. A pair has its gears 1 and 2
+    in place of sun and planet, and no ring.
     """
 
     sun: FlankCompliance
@@ -145,10 +145,19 @@ class Bodies:
     material: Material
     face_width: float
     helical: tuple[float, ...] = (1.0, 1.0)
+    base_helix_angle: float = 0.0
 
     def of_kinds(self, kind) -> np.ndarray:
         """Look up `helical` of kinds of mesh (...)."""
         return np.asarray(self.helical)[kind]
+
+    def normal_pressure(self, kind) -> np.ndarray:
+        """Compute Hertz's pressure of kinds of mesh (...) over that of the softer transverse section.
+
+        The load per length of the oblique contact line is that per face width; flanks are curved less in the
+        normal section, by ``cos beta_b`` (ISO 6336-2, Z_H).
+        """
+        return np.sqrt(math.cos(self.base_helix_angle) / self.of_kinds(kind))
 
     @property
     def gears(self) -> tuple[Any, ...]:

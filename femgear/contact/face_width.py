@@ -155,6 +155,7 @@ def _of_pairs(found: Candidates, state: BatchState, laws: PairLaws, sliced: Slic
     pressure, before = found.equal_cell_pressure(state.loads).max(axis=2), state.loads.sum(axis=-1)
     by_law = laws.pressure_under(before)
     right = np.divide(pressure, by_law, out=np.ones(by_law.shape), where=by_law > 0)
+    right *= found.bodies.normal_pressure(found.setup.kind(found.mesh))
     at_edge, of_rows = sliced.reaches_ends(found, laws), sliced.force.reshape(rows, -1, W)
 
     def pressed(force):

@@ -1,5 +1,7 @@
 """Pairs in slices that carry far more than the plane, or where it does not touch; positions of the helix."""
 
+import math
+
 import numpy as np
 import pytest
 from trains.pair.test_pair import pair_case
@@ -40,6 +42,23 @@ def test_slices_where_the_plane_does_not_touch_have_pressures():
     hertz = np.sqrt(cycle.slice_load[carries] * modulus * (one + two) / (np.pi * width * one * two))
     ratio = cycle.slice_pressure[carries] / hertz
     assert 0.95 < ratio.min() and ratio.max() < 2.0 and np.median(ratio) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("helix", [20, 30])
+def test_pressures_of_helical_teeth_are_those_of_the_normal_section(helix):
+    """Hertz at the pitch point: flanks are curved less by cos(beta_b); the load is that per width."""
+    distance = 91.5 / math.cos(math.radians(helix))
+    changes = {"set.helix_angle": f"{helix} deg", "set.centre_distance": f"{distance:.4f} mm"}
+    static = solve_static(pair_case({**changes, "static.slices": 15, "static.positions": 16}))
+    cycle, (one, two) = static.cycle, static.planetary_set.gears
+    middle = cycle.slice_load[..., 7, :]  # whose path is that of mid-width
+    pitch = (np.abs(cycle.path) < 5e-4) & (middle > 0.2 * cycle.slice_load.max())
+    tangent = np.tan(static.planetary_set.working_pressure_angle)
+    path = cycle.path[pitch]
+    one, two = one.base_radius * tangent + path, two.base_radius * tangent - path
+    modulus, curved = 206e9 / (2.0 * (1.0 - 0.3**2)), (1 / one + 1 / two) * math.cos(static.base_helix_angle)
+    hertz = np.sqrt(middle[pitch] * modulus * curved / (np.pi * 20e-3))
+    assert cycle.slice_pressure[..., 7, :][pitch] == pytest.approx(hertz, rel=3e-3)
 
 
 def test_a_contact_of_one_slice_is_warned_of():

@@ -88,22 +88,22 @@ def walked(*teeth, load=LINE_LOAD, positions=16):
     return walk_mesh_cycle(pair, bodies, sun_torque=load * WIDTH * pair.gear_1.base_radius, positions=at)
 
 
-def in_slices(pair: GearPair, overlap: float, helical: float, *, fine: bool = True, **given):
+def in_slices(pair: GearPair, overlap: float, helical: float, *, fine=True, base=0.0, **given):
     """Mesh cycle in slices, of teeth with a stiffness over that of straight ones, under `LINE_LOAD`."""
     coarse, factor = make_sectors(pair, STEEL, flank_elements=6, refine=0.5), (helical,)
     bodies = make_bodies(make_sectors(pair, STEEL) if fine else coarse, STEEL)
     waves = width_waves(coarse, STEEL, SLICES, None, factor)
     ahead = overlap * ((np.arange(SLICES) + 0.5) / SLICES - 0.5)
     return walk_mesh_cycle(
-        pair, replace(bodies, helical=factor), **given,
+        pair, replace(bodies, helical=factor, base_helix_angle=base), **given,
         sun_torque=LINE_LOAD * pair.gear_1.face_width * pair.gear_1.base_radius,
         options=CycleOptions(waves=waves, slices=SLICES, ahead=ahead),
     )  # fmt: skip
 
 
 def iso_stiffness() -> tuple[Row, ...]:
-    """Mean tangent stiffness of spur and helical pairs against ISO 6336-1, method B."""
-    rows = []
+    """Mean tangent stiffness of spur and helical pairs against ISO 6336-1, pressures of the latter."""
+    rows, pressed = [], []
     for teeth in TEETH:
         standard, k = pair_mesh_stiffness(pair_of(*teeth))[1], walked(*teeth).stiffness.mean() / WIDTH
         name = f"{teeth[0]}/{teeth[1]}, x {teeth[2]:g}, {teeth[3]:g}, 300 N/mm: c_gamma [N/(mm um)]"
@@ -112,12 +112,34 @@ def iso_stiffness() -> tuple[Row, ...]:
         beta, base = np.radians(helix), base_helix_angle(np.radians(20.0), np.radians(helix))
         pair, factor = pair_of(z_1, z_2, x_1, x_2, helix=beta), helical_stiffness(base, internal=z_2 < 0)
         standard = 1e-9 * pair_mesh_stiffness(pair, beta)[1]
-        cycle = in_slices(pair, overlap_ratio(WIDTH, MODULE, beta), factor, positions=16)
+        overlap = overlap_ratio(WIDTH, MODULE, beta)
+        cycle = in_slices(pair, overlap, factor, positions=16, base=base)
+        pressed.append(
+            within(
+                "pairs", "Hertz, normal section (ISO 6336-2, Z_H)",
+                f"{z_1}/{z_2}, {helix:g} degrees, 300 N/mm: pressure over Hertz's, median over slices", 1.0,
+                float(np.median(over_hertz(pair, cycle, overlap, base))), 0.01,
+                note="pairs with a fifth of the largest load, at the curvatures of their places",
+            )
+        )  # fmt: skip
         name = f"{z_1}/{z_2}, x {x_1:g}, {x_2:g}, {helix:g} degrees, 300 N/mm: c_gamma [N/(mm um)]"
         k = 1e-9 * cycle.stiffness.mean() / WIDTH
         rows.append(within("pairs", "ISO 6336-1 method B", name, standard, k, 0.15,
                            explanation=UNCOUPLED if (helix, z_2) == (30.0, -72) else ""))  # fmt: skip
-    return tuple(rows)
+    return *rows, *pressed
+
+
+def over_hertz(pair: GearPair, cycle, overlap: float, base: float) -> np.ndarray:
+    """Pressures of slices over those of Hertz between cylinders in the normal section."""
+    one, two = pair.gear_1, pair.gear_2
+    ahead = overlap * ((np.arange(SLICES) + 0.5) / SLICES - 0.5) * one.pitch_angle * one.base_radius
+    path, tangent = cycle.path[:, :, None] + ahead[:, None], np.tan(pair.working_pressure_angle)
+    sign = -1.0 if two.internal else 1.0
+    curved = 1 / (one.base_radius * tangent + path) + sign / (two.base_radius * tangent - sign * path)
+    carries = (cycle.slice_pressure > 0) & (cycle.slice_load > 0.2 * cycle.slice_load.max())
+    modulus = STEEL.youngs_modulus / (2.0 * (1.0 - STEEL.poisson_ratio**2))
+    hertz = np.sqrt(cycle.slice_load * modulus * curved * np.cos(base) / (np.pi * one.face_width))
+    return cycle.slice_pressure[carries] / hertz[carries]
 
 
 def whole_gear(gear: Gear, fine: tuple[int, ...], flank_elements: int):

@@ -149,15 +149,18 @@ def flank_compliances(
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
     foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
     bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
-    return sectors, replace(bodies, helical=_helical(case, gears))
+    base, softer = _helical(case, gears)
+    return sectors, replace(bodies, helical=softer, base_helix_angle=base)
 
 
-def _helical(case: Case, gears: PlanetarySet) -> tuple[float, ...]:
-    """Stiffness of the teeth over that of their transverse section; plane contact knows no helix."""
-    if case.helix_angle is None or case.static.slices < 2:
-        return (1.0,) * len(gears.kinds)
-    base = base_helix_angle(case.pressure_angle, case.helix_angle)
-    return tuple(helical_stiffness(base, internal=pair.gear_2.internal) for pair in gears.kinds)
+def _helical(case: Case, gears: PlanetarySet) -> tuple[float, tuple[float, ...]]:
+    """Base helix angle [rad], and stiffness of the teeth of every kind of mesh over that of straight ones.
+
+    Plane contact knows no helix.
+    """
+    known = case.helix_angle is not None and case.static.slices > 1
+    base = base_helix_angle(case.pressure_angle, case.helix_angle) if known else 0.0
+    return base, tuple(helical_stiffness(base, internal=pair.gear_2.internal) for pair in gears.kinds)
 
 
 def check_slices(case: Case, gears: PlanetarySet) -> None:
@@ -237,7 +240,7 @@ def over_width(
     sectors = make_sectors(gears, material, flank_elements=6, refine=0.5, cache=cache)
     elastic = static.members == "elastic"
     foundation = ring_foundation(case, sectors.ring) if elastic or loaded else None
-    waves = width_waves(sectors, material, count, foundation, _helical(case, gears))
+    waves = width_waves(sectors, material, count, foundation, _helical(case, gears)[1])
     supports = width_supports(case, gears)
     found: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": supports}
     if overlap := _overlap(case, gears):
