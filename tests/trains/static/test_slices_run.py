@@ -67,7 +67,7 @@ def test_the_load_over_the_width_is_drawn(misaligned):
     assert drawn.max() == pytest.approx(pressure.max() * 1e-6)
     # the largest pressure is that of the load as it goes on to the end of the width
     largest = misaligned[1].cycle.max_pressure[0].max()
-    assert pressure.max() <= largest < 1.1 * pressure.max()
+    assert pressure.max() <= largest * (1 + 1e-12) < 1.1 * pressure.max()  # equal but for rounding
 
 
 def test_root_stresses_of_a_load_without_leads_are_those_of_the_plane(case, straight):
