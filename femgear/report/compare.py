@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _MEETING = ("operating [rpm]", "mode", "kind", "mesh harmonic")
 """Columns that tell which resonance a row is."""
+_EXCITED = "excited up to"
+"""Column of where the excitation ends, on which levels depend."""
 _FADED = 0.55
 """Opacity of the curves of the second run."""
 
@@ -72,7 +74,14 @@ def _differences(first: Block, second: Block) -> Block:
                 unit = f"{first.title} {what} {columns[i]}"
                 rows.append((what, columns[i], x, y, _change(x, y, decibels="dB" in unit)))
     header = ("row", "column", "first", "second", "change") if rows else ()
-    return Block(first.title, header, tuple(rows), () if rows else ("the same",))
+    notes = () if rows else ("the same",)
+    ends = [(float(x), float(y)) for _, column, x, y, _ in rows if column.startswith(_EXCITED)]
+    if any(abs(y - x) > 0.05 * x for x, y in ends):
+        notes = (
+            "NO LIKE LEVELS: their excitation ends at different frequencies; give both cases the same "
+            "dynamics.up_to or dynamics.mesh_harmonics",
+        )
+    return Block(first.title, header, tuple(rows), notes)
 
 
 def _shared(block: Block, header: tuple[str, ...]) -> Block:

@@ -17,7 +17,7 @@ import numpy as np
 from femgear.case.checks import LEAST_TORQUE
 from femgear.case.dependencies import Steps, static_entries
 from femgear.case.gear_set import planetary_set
-from femgear.case.quantities import ACCELERATION, SPEED, TORQUE, Dimension, to_si
+from femgear.case.quantities import ACCELERATION, FREQUENCY, SPEED, TORQUE, Dimension, to_si
 from femgear.case.sections import LARGEST_TORQUE, Case
 from femgear.contact.root_stress import LOADED
 from femgear.errors import CaseError
@@ -43,7 +43,7 @@ _MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 _FORCE = Dimension("a force", "N", "N", 1.0)
 _STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
 NUMBER = Dimension("a number", "1", "1", 1.0)
-STAGES = ("gears", "static", "stress", "dynamics", "housing")
+STAGES = ("gears", "static", "stress", "modes", "dynamics", "housing")
 """In the order of their effort."""
 
 
@@ -93,6 +93,12 @@ class Variant:
     def stress(self) -> StressResult:
         """Compute root stresses [Pa] under the torque of the case."""
         return self._once("stress", compute=lambda: static_stages.solve_stress(self.case, self.static()))
+
+    def modes(self) -> ModesResult:
+        """Solve for the modal basis at the speeds of the case."""
+        return self._once(
+            "modes", compute=lambda: elastic_stages.solve_modes(self.case, self.static(), steps=self._steps)
+        )
 
     def response(self, speeds: Range) -> Response:
         """Compute the periodic response at a range of speeds [rad/s], without verdict on its stability."""
@@ -154,7 +160,7 @@ class Quantity:
     dimension : Dimension
         Its units on disk (SI) and in tables.
     stage : str
-        Last stage that it needs, one of `STAGES`.
+        Last stage that it needs: "gears", "static", "stress", "modes", "dynamics" or "housing".
     compute : callable
         ``(Variant) -> float`` in SI units.
     signal : callable, optional
@@ -169,6 +175,9 @@ class Quantity:
     compute: Callable[[Variant], float]
     signal: Callable | None = None
     torque: float | None = None
+
+    def __post_init__(self):
+        _chosen(self.stage, {name: name for name in STAGES}, "stage")
 
     def show(self, value: float) -> str:
         """Write an SI value in the unit of tables."""
@@ -251,11 +260,34 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     `femgear.housing.sensor.component_lines`.
     """
     at = _range(first, last, speeds)
-    return Quantity(f"housing level, {_words(at)}", ACCELERATION, "housing", partial(_largest_level, at))
+    return Quantity(
+        f"largest carrier order, {_words(at)}", ACCELERATION, "housing", partial(_largest_level, at)
+    )
 
 
 def _largest_level(at: Range, variant: Variant) -> float:
     return float(np.abs(variant.housing(at).exact.acceleration).max())
+
+
+def natural_frequency(mode: int) -> Quantity:
+    """Define a natural frequency of the set [Hz] by its number from 1, as tables have it.
+
+    Modes are counted by frequency in every case: two that meet over a sweep exchange their numbers.
+
+    CaseError: not a number from 1 to 1000 (E-OBJECTIVE); when it is computed, fewer modes (E-MODES).
+    """
+    if not (isinstance(mode, int) and 1 <= mode <= 1000):
+        raise CaseError("no mode", code="E-OBJECTIVE", key="mode", value=mode, limit="1 to 1000")
+    return Quantity(f"natural frequency {mode}", FREQUENCY, "modes", partial(_frequency, mode))
+
+
+def _frequency(mode: int, variant: Variant) -> float:
+    found = variant.modes().modes.frequency
+    if mode > len(found):
+        raise CaseError(
+            "the modal basis ends before this mode", code="E-MODES", key="mode", value=mode, limit=len(found)
+        )
+    return float(found[mode - 1])
 
 
 def contact_ratio(mesh: _MeshKind) -> Quantity:
@@ -358,9 +390,15 @@ def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
     CaseError: no such quantity, or no speeds for one that needs them (E-OBJECTIVE).
     """
     name = " ".join(words.split()).lower()
+    if (mode := name.removeprefix("natural frequency ")) != name and mode.isdecimal():
+        return natural_frequency(int(mode))
     if name not in _WORDS:
         raise CaseError(
-            "no such quantity", code="E-OBJECTIVE", key="objective", value=words, limit=", ".join(NAMES)
+            "no such quantity",
+            code="E-OBJECTIVE",
+            key="objective",
+            value=words,
+            limit=", ".join((*NAMES, "natural frequency N")),
         )
     if name not in _OVER_SPEEDS:
         return _WORDS[name]()

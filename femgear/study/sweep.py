@@ -147,7 +147,7 @@ def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: S
 def _check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str] = ()) -> None:
     """Refuse quantities that the case can never have: without torque, or without an elastic ring."""
     stages = {quantity.stage for quantity in quantities}
-    elastic = [quantity.name for quantity in quantities if quantity.stage in ("dynamics", "housing")]
+    elastic = [quantity.name for quantity in quantities if quantity.stage in ("modes", "dynamics", "housing")]
     if elastic:
         need_elastic_ring(case, f"{elastic[0]} needs")
     # transmission errors may name a torque of their own

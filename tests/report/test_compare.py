@@ -25,6 +25,14 @@ def test_cells_that_differ_come_with_their_change():
     assert compare._differences(first, wider).rows == (shared,)
 
 
+def test_levels_of_unlike_excitation_are_told():
+    def table(end):
+        return Block("Housing", ("speed [rpm]", "excited up to [kHz]"), (("1500", end),))
+
+    assert "NO LIKE LEVELS" in compare._differences(table("19.60"), table("5.60")).notes[0]
+    assert compare._differences(table("19.60"), table("19.50")).notes == ()
+
+
 def test_a_table_without_header_is_compared_too():
     runs = (Block("Verdict", rows=(("K_v", value), ("K_gamma", "1.0"))) for value in ("1.1", "1.2"))
     assert compare._differences(*runs).rows == (("K_v", "", "1.1", "1.2", "+9.09 %"),)

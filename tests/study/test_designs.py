@@ -7,9 +7,10 @@ import pytest
 
 from femgear.case.dependencies import Steps, compliance_entries, fingerprint, ring_entries
 from femgear.case.gear_set import planetary_set
-from femgear.case.quantities import SPEED
+from femgear.case.quantities import FREQUENCY, SPEED
 from femgear.errors import CaseError
 from femgear.study.objectives import (
+    Quantity,
     Variant,
     at_speeds,
     contact_pressure,
@@ -18,6 +19,7 @@ from femgear.study.objectives import (
     housing_level,
     mesh_force,
     named_quantity,
+    natural_frequency,
     root_stress,
     tip_thickness,
     transmission_error,
@@ -107,6 +109,10 @@ def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
     expected = [worst[:3, 0].max(), max(worst[:3, 1].max(), worst[3:, 0].max()), worst[3:, 1].max()]
     np.testing.assert_allclose(stresses, expected, rtol=1e-12)
     assert contact_pressure().compute(variant) == data["max_pressure"].values.max()
+    found = solve_modes(variant.case, static).modes.frequency
+    assert natural_frequency(11).compute(variant) == pytest.approx(found[10], rel=1e-9)
+    with pytest.raises(CaseError, match="ends before this mode"):
+        natural_frequency(999).compute(variant)
 
 
 @pytest.mark.parametrize(
@@ -188,6 +194,7 @@ def test_reliefs_are_on_the_loaded_flanks(coarse):
 def test_words_of_the_command_line():
     assert named_quantity("STE  sun-planet").name == transmission_error("sun-planet").name
     assert transmission_error(torque="50 N m").torque == 50.0
+    assert named_quantity("natural frequency  11").name == natural_frequency(11).name
     limit = parse_limit("root stress sun <= 300 MPa")
     assert limit.high == 300e6 and limit.violation(330e6) == pytest.approx(0.1)
     assert parse_limit("contact ratio planet-ring >= 1.3").low == 1.3
@@ -200,6 +207,8 @@ def test_words_of_the_command_line():
     ("call", "message"),
     [
         (lambda: named_quantity("noise"), "no such quantity"),
+        (lambda: named_quantity("natural frequency 0"), "no mode"),
+        (lambda: Quantity("mine", FREQUENCY, "fe", float), "no such stage"),
         (lambda: named_quantity("mesh force"), "range of speeds"),
         (lambda: transmission_error(torque="0 N m"), "no tooth bends"),
         (lambda: transmission_error(torque="5 mm"), "not a unit of torque"),
