@@ -18,6 +18,7 @@ ARGS :=
 MINUTES := 60
 
 help:
+	@echo "make environment  make .venv and install femgear there, as all others do first"
 	@echo "make demo      run the reference planetary set ($(CASE)) and write its report"
 	@echo "make test      run the tests"
 	@echo "make test-browser  open the pages of all trains in Chromium, which must be installed"

@@ -12,6 +12,7 @@ import argparse
 import ast
 import re
 from collections import defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,15 +42,44 @@ def refusals(folder: Path = ROOT / "femgear") -> dict[str, list[tuple[str, str, 
     found = defaultdict(list)
     for path in sorted(folder.rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Call):
-                words = {word.arg: word.value for word in node.keywords if word.arg}
-                for code in _codes(words.get("code")):
-                    message = _text(node.args[0]) if node.args else ""
-                    entry = (message, _text(words.get("limit")), _text(words.get("remedy")))
+        functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+            words = {word.arg: word.value for word in call.keywords if word.arg}
+            told = [call.args[0] if call.args else None, words.get("limit"), words.get("remedy")]
+            for code in _codes(words.get("code")):
+                within = [f for f in functions if f.lineno <= call.lineno <= (f.end_lineno or 0)]
+                values = [_values(one, call, within[-1] if within else tree) for one in told]
+                for cells in zip(*(one * (len(max(values, key=len)) // len(one)) for one in values)):
+                    entry = tuple(_text(cell) for cell in cells)
                     if entry not in found[code]:
                         found[code].append(entry)
     return dict(found)
+
+
+def _values(node: ast.expr | None, use: ast.Call, scope: ast.AST) -> list[ast.expr | None]:
+    """Values that a name has from the statements last before its use, alone or as one of several names."""
+    if not isinstance(node, ast.Name):
+        return [node]
+    for statement in _before(scope, use):
+        found = []
+        for one in ast.walk(statement):
+            if isinstance(one, ast.Assign):
+                target, value = one.targets[0], one.value
+                both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+                pairs = zip(target.elts, value.elts) if both else [(target, value)]
+                found += [(one.lineno, v) for t, v in pairs if ast.unparse(t) == node.id]
+        if found:
+            return [value for _, value in sorted(found, key=lambda pair: pair[0])]
+    return [node]
+
+
+def _before(scope: ast.AST, use: ast.Call) -> Iterator[ast.stmt]:
+    """Statements before a call, from the last one of its own block to the first one of the function."""
+    for block in (getattr(scope, name, None) for name in ("body", "orelse", "finalbody", "handlers")):
+        for i, statement in enumerate(block if isinstance(block, list) else ()):
+            if statement.lineno <= use.lineno <= (statement.end_lineno or 0):
+                yield from _before(statement, use)
+                yield from reversed(block[:i])
 
 
 def warnings(folder: Path = ROOT / "femgear") -> list[tuple[str, str, str, str]]:
