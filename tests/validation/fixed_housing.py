@@ -44,7 +44,7 @@ PAIR = MeshPaths(97, tuple(2 * np.pi * np.array([0.0, 0.24, 0.5, 0.74])))
 
 
 def thin_ring(highest: int, direction=DIRECTION, *, foundation=0.0, lowest=0) -> CyclicModes:
-    """Closed-form modes of a thin ring's middle line, on a foundation [N/m^3]: w = cos n phi, v = -sin(n phi)/n.
+    """Closed-form modes of a thin middle line on a foundation [N/m^3]: w = cos n phi, v = -sin(n phi)/n.
 
     ``w^2 = EI/(rho A R^4) n^2 (n^2 - 1)^2/(n^2 + 1)`` (W. Soedel, Vibrations of Shells and Plates, 5.3).
     """
