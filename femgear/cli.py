@@ -191,7 +191,8 @@ def _wrong_arguments(error: CycloptsError, program: str) -> CaseError:
     if absent and error.argument is not None and "--" + error.argument.name.lstrip("-") not in _given(error):
         message = f"{error.argument.name} is required"
     command = " ".join((program, *(error.command_chain or ())))
-    return CaseError(message, code="E-ARGUMENTS", remedy=f"{command} --help")
+    remedy = f"{command} --help" + "; other entries are written into the file" * command.endswith(" new")
+    return CaseError(message, code="E-ARGUMENTS", remedy=remedy)
 
 
 def _given(error: CycloptsError) -> list[str]:
@@ -225,14 +226,21 @@ def check(case: Path, /, *, neighbours: Annotated[bool, Parameter(negative="")] 
         Print which neighbouring tooth numbers would fit, too.
     """
     from femgear.trains.reading import read_case
-    from femgear.trains.registry import check_case, train_of
+    from femgear.trains.registry import check_case, stages_of, train_of
 
     data = read_case(case)
     _print(block for block in train_of(data).describe_case(data) if neighbours or not block.beside)
     try:
         check_case(data)
     except FemgearError as error:
-        print(f"\nfemgear run without --only refuses this case:\n{error}")
+        works = []
+        for stage in train_of(data).stages:
+            with contextlib.suppress(FemgearError):
+                check_case(data, stage.name)
+                works.append(stage.name)
+        refused = ", ".join(stage.name for stage in stages_of(data) if stage.name not in works)
+        others = f"; it takes --only {' or '.join(works)}" if works else ""
+        print(f"\nfemgear run without --only refuses this case ({refused}){others}:\n{error}")
     return 0
 
 
@@ -272,13 +280,9 @@ def run(
     if only is not None and not any(known.train.stage(only) for known in trains()):
         known = dict.fromkeys(one.name for known in trains() for one in known.train.stages)
         raise CaseError(
-            "no train has this stage",
-            code="E-ARGUMENTS",
-            key="--only",
-            value=only,
-            limit=", ".join(known),
+            "no train has this stage", code="E-ARGUMENTS", key="--only", value=only, limit=", ".join(known),
             remedy="femgear run --help",
-        )
+        )  # fmt: skip
     case = case or _only_case()
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
@@ -793,13 +797,10 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
     except (MemoryError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and "new thread" not in str(error):
             raise
-        return _fail(
-            FemgearError(
-                f"the memory of this machine does not suffice: {error}".removesuffix(": "),
-                code="E-MEMORY",
-                remedy="ask for fewer speeds, positions, harmonics or elements",
-            )
-        )
+        return _fail(FemgearError(
+            f"the memory of this machine does not suffice: {error}".removesuffix(": "), code="E-MEMORY",
+            remedy="ask for fewer speeds, positions, harmonics or elements",
+        ))  # fmt: skip
     except np.linalg.LinAlgError as error:
         remedy = "look for masses, stiffnesses or dimensions of very different size"
         return _fail(FemgearError(f"equations cannot be solved: {error}", code="E-SOLVE", remedy=remedy))

@@ -6,6 +6,8 @@ count. What is allowed but deserves a look is a `Finding`.
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import KW_ONLY, dataclass
@@ -226,11 +228,12 @@ def nvh_library(words: str) -> Iterator[None]:
     try:
         yield
     except ImportError as error:
-        message, remedy = (
-            f"{words} need a library that is not installed: {error}",
-            'pip install "femgear[nvh]"',
-        )
-        raise FemgearError(message, code="E-LIBRARY", remedy=remedy) from error
+        python = (sys.executable or "python").removeprefix(os.path.join(os.getcwd(), ""))
+        python = f'"{python}"' if " " in python else python
+        raise FemgearError(
+            f"{words} need a library that is not installed: {error}", code="E-LIBRARY",
+            remedy=f'{python} -m pip install "femgear[nvh]"',
+        ) from error  # fmt: skip
 
 
 class CaseError(FemgearError, ValueError):

@@ -239,6 +239,11 @@ def test_wrong_arguments(arguments, capsys, tmp_path, monkeypatch):
     assert "[E-ARGUMENTS]" in err and "--help" in err
 
 
+def test_options_that_new_has_not_are_entries_of_the_file(capsys):
+    assert cli.main(["new", "planetary", "--centre-distance", "51 mm"]) == 2
+    assert "remedy:  femgear new --help; other entries are written into the file" in capsys.readouterr().err
+
+
 def test_an_argument_that_is_missing_is_named(capsys):
     cli.main(["compare", "x", "y"])
     assert "--output is required" in capsys.readouterr().err
@@ -568,7 +573,10 @@ def test_export_writes_every_number_with_its_unit(tmp_path, capsys, pipeline):
 def test_check_says_what_a_run_would_refuse(check):
     swapped = with_values(read_case(CASE), {"operation.input": "ring", "operation.fixed": "sun"})
     code, out, _ = check(to_toml(swapped))
-    assert code == 0 and "femgear run without --only refuses this case" in out and "E-FIXED-MEMBER" in out
+    assert code == 0 and "E-FIXED-MEMBER" in out
+    refused, works = "(modes, runup, dynamics, housing)", "it takes --only static or stress:"
+    assert f"femgear run without --only refuses this case {refused}; {works}" in out
+    assert "refuses" not in check(to_toml(swapped) + "\n[planar]\n")[1]
     assert "refuses" not in check(TEXT)[1]
 
 

@@ -112,17 +112,12 @@ def _check_set(case: Case):
             value=len(angles), limit=f"{count} angles",
             remedy="give one angle a planet, or leave planet_angles out for equal spacing",
         )  # fmt: skip
-    if (
-        case.set.centre_distance is None
-        and case.sun.profile_shift is None
-        and case.ring.profile_shift is None
-    ):
+    if case.set.centre_distance is case.sun.profile_shift is case.ring.profile_shift is None:
         yield CaseError(
-            "neither the centre distance nor a profile shift of sun or ring is given",
-            code="E-KEY-MISSING",
+            "neither the centre distance nor a profile shift of sun or ring is given", code="E-KEY-MISSING",
             key="set.centre_distance",
             remedy="give set.centre_distance, sun.profile_shift or ring.profile_shift; the rest is found",
-        )
+        )  # fmt: skip
 
 
 def _check_supports(case: Case):

@@ -219,7 +219,8 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
     if len(unit) > 60 or not _UNIT.fullmatch(unit):
         raise CaseError(
             f"{unit[:60]!a} is not a product of units", code="E-UNIT", value=text,
-            limit="unit names with * / ^ or blanks, without brackets", remedy=example,
+            limit="unit names with * / ^ or blanks, without brackets",
+            remedy=_near(unit[:60], dimension, example),
         )  # fmt: skip
     usual = re.sub(r" ?/ ?", "/", " ".join(unit.replace("**", "^").translate(_SPELLING).split()))
     known, words = _FACTORS.get(dimension.si, {}), _WORDS.get(dimension.si, {})
@@ -229,14 +230,19 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
     found, expected = _root(usual), _root(dimension.si)
     if found is None or expected is None or found[1] != expected[1]:
         what = f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}"
-        spelt = {one.lower(): one for one in (*words, *known)}
-        near = [spelt[one] for one in difflib.get_close_matches(usual.lower(), spelt, n=2)]
         raise CaseError(
             what if found else f"unknown unit {unit!a}", code="E-UNIT", value=text,
             limit=f"units convertible to {dimension.si}",
-            remedy=f"did you mean {' or '.join(near)}? {example}" if near else example,
+            remedy=_near(usual, dimension, example),
         )  # fmt: skip
     return found[0] / expected[0]
+
+
+def _near(unit: str, dimension: Dimension, example: str) -> str:
+    """How a unit is written that none is read from: units with similar names, an example."""
+    spelt = {one.lower(): one for names in (_WORDS, _FACTORS) for one in names.get(dimension.si, ())}
+    near = [spelt[one] for one in difflib.get_close_matches(unit.lower(), spelt, n=2)]
+    return f"did you mean {' or '.join(near)}? {example}" if near else example
 
 
 @functools.lru_cache(maxsize=256)

@@ -34,6 +34,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _HEADER = re.compile(r"\s*(\[\[?)([^\[\]#]+)\]")
 _ENTRY = re.compile(r"\s*+([A-Za-z0-9_.\"' -]++)\s*+=")
 _KEY = re.compile(r"=+|^[ \t]*\[", re.MULTILINE)
+_TEXT = re.compile(r""""[^"]*"|'[^']*'|#.*""")
 # tomllib needs a time that grows with the square of the parts of a dotted key.
 _LONG_KEY = re.compile(
     r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){7}"
@@ -180,15 +181,19 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
         if len(lines) > 1:
             places = " and ".join(str(number) for number in lines[:MOST_SHOWN])
             return CaseError(
-                f"given twice, in lines {places}",
-                code="E-TOML",
-                key=key,
-                file=name,
+                f"given twice, in lines {places}", code="E-TOML", key=key, file=name,
                 remedy="keep one of them" if "Cannot overwrite" in message
                 else f"keep one of them; tables of a list have double brackets, [[{key}]]",
             )  # fmt: skip
     remedy = 'lines are [section] or key = value; texts and quantities stand in quotation marks, as in "2 mm"'
-    if "octal" in message or re.search(r"=\s*0\d", lines_of_text[min(line, len(lines_of_text)) - 1]):
+    bare = _TEXT.sub("", lines_of_text[min(line, len(lines_of_text)) - 1])
+    if re.search(r"=\s*[+-]?\d+,\d", bare):
+        remedy = "use a decimal point"
+    elif re.search("[‘-‟«»′″]", bare):
+        remedy = 'use straight quotation marks, as in "2 mm"'
+    elif r"Illegal character '\n'" in message:
+        remedy = "close the quotation mark"
+    elif "octal" in message or re.search(r"=\s*0\d", bare):
         remedy = "a number has no leading zeros"
     elif "(at end of document)" in message:
         started = max((number for _, number in _entries(text)), default=1)

@@ -19,12 +19,20 @@ from femgear.gears.gear import (
     tooth_thickness,
     working_half_angles,
 )
-from femgear.gears.pair import EACH, GearPair
-from femgear.gears.planetary import BACKLASH_TOLERANCE, GearSet, PlanetarySet, assembly_positions
+from femgear.gears.pair import EACH, GearPair, zero_backlash_distance, zero_backlash_shift
+from femgear.gears.planetary import (
+    BACKLASH_TOLERANCE,
+    GearSet,
+    PlanetarySet,
+    assembly_positions,
+    feasible_angles,
+)
 from femgear.gears.profile import inv, pressure_angle_at, undercut_shift
 
 FILLET_TOLERANCE = 1e-4
 """Overlap of a tip corner with a root fillet, in modules, that is warned about instead of refused."""
+# backlash of one kind of mesh beyond that of the other, in modules, from which profile shifts do not suit
+_UNEVEN = 0.05
 # overlap [m] below which there is nothing to warn of
 _SEEN = 1e-9
 
@@ -45,7 +53,7 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
         E-CONTACT-RATIO.
     """
     found = [*_planets(planetary), *_neighbours(planetary)]
-    assembly_positions(planetary.sun.teeth, planetary.ring.teeth, planetary.planet_angles)
+    _assembly(planetary)
     return *found, *check_meshes(planetary)
 
 
@@ -66,16 +74,9 @@ def tip_clearances(planetary: GearSet) -> dict[str, float]:
     for pair in planetary.kinds:
         (one, two), a = pair.gears, pair.centre_distance
         inner, outer = f"{one.name} tip to {two.name} root", f"{two.name} tip to {one.name} root"
-        if two.internal:
-            found[inner], found[outer] = (
-                two.root_radius - a - one.tip_radius,
-                two.tip_radius - a - one.root_radius,
-            )
-        else:
-            found[inner], found[outer] = (
-                a - one.tip_radius - two.root_radius,
-                a - two.tip_radius - one.root_radius,
-            )
+        sense = -1.0 if two.internal else 1.0
+        found[inner] = sense * (a - two.root_radius) - one.tip_radius
+        found[outer] = sense * (a - two.tip_radius) - one.root_radius
     return found
 
 
@@ -93,30 +94,54 @@ def _neighbours(s: PlanetarySet):
     """Refuse planets that overlap, and warn where little room is left between them."""
     if s.n_planets == 1:
         return
-    angles = (*s.planet_angles, s.planet_angles[0] + 2.0 * math.pi)
-    gaps = [b - a for a, b in pairwise(angles)]
-    closest = min(gaps)
-    room = 2.0 * s.centre_distance * math.sin(0.5 * min(closest, math.pi)) - 2.0 * s.planet.tip_radius
+    room, gap, pair = _closest(s, s.planet_angles)
     if room <= 0.0:
-        reach = s.planet.tip_radius / s.centre_distance
-        most = math.ceil(math.pi / math.asin(reach)) - 1 if reach < 1.0 else 1
+        least = math.asin(min(s.planet.tip_radius / s.centre_distance, 1.0))
+        most = math.ceil(math.pi / least) - 1
+        uneven = s.n_planets <= most and s.rotations < s.n_planets
         raise GeometryError(
-            f"neighbouring planets {math.degrees(closest):.4f} deg apart overlap by {-room * 1e3:.4f} mm "
+            f"neighbouring planets overlap by {-room * 1e3:.4f} mm: {pair} "
             f"(tip radius {s.planet.tip_radius * 1e3:.4f} mm at {s.centre_distance * 1e3:.4f} mm)",
-            code="E-NEIGHBOURS", key="set.planets", value=s.n_planets,
-            limit=f"at most {most} equally spaced planets",
+            code="E-NEIGHBOURS", key="set.planet_angles" if uneven else "set.planets",
+            value=f"{math.degrees(gap):.4f} deg" if uneven else s.n_planets,
+            limit=f"more than {math.degrees(2.0 * least):.4f} deg between neighbours" if uneven
+            else f"at most {most} equally spaced planets",
             remedy="use fewer planets, or fewer teeth on the planets",
         )  # fmt: skip
     if room < s.planet.module:
         yield GeometryWarning(
             "W-NEIGHBOURS", "set.planets",
-            f"only {room * 1e3:.4f} mm are left between the tips of neighbouring planets", ">= one module",
+            f"only {room * 1e3:.4f} mm are left between neighbouring tips: {pair}", ">= one module",
         )  # fmt: skip
 
 
+def _closest(s: PlanetarySet, angles: tuple[float, ...]) -> tuple[float, float, str]:
+    """Room between the tips of the nearest two planets [m] at some angles, their angle [rad], and words."""
+    around = pairwise((*angles, angles[0] + 2.0 * math.pi))
+    gap, n = min((round(b - a, 12), n) for n, (a, b) in enumerate(around, start=1))
+    room = 2.0 * s.centre_distance * math.sin(0.5 * min(gap, math.pi)) - 2.0 * s.planet.tip_radius
+    return room, gap, f"planets {n} and {n % len(angles) + 1}, {math.degrees(gap):.4f} deg apart"
+
+
+def _assembly(s: PlanetarySet) -> None:
+    """Refuse planets that do not assemble; the angles that the refusal offers leave room between them."""
+    sun, ring = s.sun.teeth, s.ring.teeth
+    try:
+        assembly_positions(sun, ring, s.planet_angles)
+    except GeometryError as error:
+        room, _, pair = _closest(s, feasible_angles(sun + ring, s.planet_angles))
+        if room <= 0.0:
+            error.remedy = (
+                f"use fewer planets, or z_s + z_r a multiple of {s.n_planets}: the nearest angles that "
+                f"assemble overlap by {-room * 1e3:.4f} mm, {pair}"
+            )
+        raise
+
+
 def _backlash(s: GearSet):
-    """Refuse flanks that overlap, and warn of much play."""
+    """Refuse flanks that overlap, and warn of much play, or of more in one kind of mesh than in another."""
     module = s.gears[0].module
+    least = min(pair.backlash - _asked_play(pair) for pair in s.kinds)
     for pair, numbers in zip(s.kinds, s.mates, strict=True):
         mesh, value = f"{pair.gear_1.name}-{pair.gear_2.name}", pair.backlash
         gear = next(gear for gear, number in zip(pair.gears, numbers, strict=True) if number != EACH)
@@ -128,11 +153,34 @@ def _backlash(s: GearSet):
                 limit=f"normal backlash >= -{BACKLASH_TOLERANCE * module * 1e6:.3g} um",
                 remedy=f"let the {gear.name}'s profile shift be found, or give a thickness allowance",
             )  # fmt: skip
-        if value > 0.3 * module:
+        if value - _asked_play(pair) > least + _UNEVEN * module:
+            yield GeometryWarning(
+                "W-BACKLASH", "set.centre_distance",
+                f"{mesh}: normal backlash of {value * 1e3:.4f} mm; {_closing(pair)}",
+                f"that of the other meshes within {_UNEVEN:g} modules",
+            )  # fmt: skip
+        elif value > 0.3 * module:
             yield GeometryWarning(
                 "W-BACKLASH", f"{gear.name}.profile_shift",
                 f"{mesh}: normal backlash of {value * 1e3:.4f} mm", "< 0.3 modules",
             )  # fmt: skip
+
+
+def _asked_play(pair: GearPair) -> float:
+    """Normal play [m] that the thickness allowances of both gears make."""
+    return sum(gear.thickness_allowance * math.cos(gear.pressure_angle) for gear in pair.gears)
+
+
+def _closing(pair: GearPair) -> str:
+    """Centre distance that suits the profile shifts of a mesh, and profile shifts that suit its own."""
+    (one, two), a = pair.gears, pair.centre_distance
+    shifts = f"x_{two.name} - x_{one.name}" if two.internal else f"x_{one.name} + x_{two.name}"
+    needed = f"{shifts} = {zero_backlash_shift(one, two, a):.4f} in modules of {one.module * 1e3:.6g} mm"
+    try:
+        suits = f"a centre distance of {zero_backlash_distance(one, two) * 1e3:.3f} mm"
+    except GeometryError:
+        suits = "no centre distance"
+    return f"the profile shifts suit {suits}; {a * 1e3:.6g} mm needs {needed}"
 
 
 def _clearances(s: GearSet):
@@ -189,12 +237,11 @@ def _single_gears(s: GearSet):
         height = abs(gear.tip_radius - gear.root_radius)
         if rim < 1.2 * height:
             yield GeometryWarning(
-                "W-RIM",
-                f"{gear.name}.{'outer_radius' if gear.internal else 'bore_radius'}",
+                "W-RIM", f"{gear.name}.{'outer_radius' if gear.internal else 'bore_radius'}",
                 f"the {gear.name}'s rim is {rim * 1e3:.4f} mm thick under teeth of {height * 1e3:.4f} mm; "
                 + _rim_held(gear),
                 ">= 1.2 tooth heights (below, ISO 6336-3 raises the root stress by a rim factor)",
-            )
+            )  # fmt: skip
 
 
 def _rim_held(gear: Gear) -> str:

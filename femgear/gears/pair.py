@@ -122,6 +122,27 @@ class GearPair:
         start, end = self.path
         return (end - start) / self.base_pitch
 
+    @property
+    def single_contact(self) -> tuple[tuple[float, float], ...]:
+        """Diameters [m] where one tooth pair alone carries, from root to tip, of both gears; () without any.
+
+        A base pitch before the end and after the start of the path: inner and outer points of single pair
+        contact (ISO 6336-2, B and D), LPSTC and HPSTC.
+        """
+        if not 1.0 <= self.contact_ratio < 2.0:
+            return ()
+        (start, end), pitch = self.path, self.base_pitch
+        sense = 1.0 if self.gear_2.internal else -1.0
+        one, two = (gear.base_radius * math.tan(self.working_pressure_angle) for gear in self.gears)
+        rolls = (
+            (one + end - pitch, one + start + pitch),
+            (two + sense * (start + pitch), two + sense * (end - pitch)),
+        )
+        return tuple(
+            (2.0 * math.hypot(gear.base_radius, low), 2.0 * math.hypot(gear.base_radius, high))
+            for gear, (low, high) in zip(self.gears, rolls, strict=True)
+        )
+
     @cached_property
     def half_angles(self) -> tuple[float, float]:
         """Half-thickness angles [rad] of gear 1 and gear 2 on the working pitch circles."""

@@ -106,7 +106,7 @@ KINDS = {
 }  # fmt: skip
 """Kinds of cases that `new_case` writes, with the teeth of their gears."""
 _HEAD = "Written by femgear new {}. What is estimated says so: give what is known instead."
-_LEAVE = "Estimated masses, inertias and stiffnesses may also be left out."
+_LEAVE = " Masses and inertias stay when teeth change: delete their lines to have them estimated anew."
 _STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"}
 
 
@@ -149,7 +149,8 @@ def new_case(
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
-    assumed = [f"Assumed: {' '.join(left)}"] if left else []
+    head = [_HEAD.format(kind) + ("" if kind == "drivetrain" else _LEAVE)]
+    head += [f"Assumed: {' '.join(left)}"] if left else []
     helix = math.radians(20.0) if kind == "helical" else 0.0
     shared = {"module": module, "pressure_angle": "20 deg"}
     notes = {f"material.{key}": "estimated: steel" for key in _STEEL}
@@ -170,7 +171,7 @@ def new_case(
         tables |= {"model": "pair", "set": {**shared, **tables["set"]}}
         if kind == "drivetrain":
             tables = _chain(tables, notes)
-        return draft_text(tables, notes, word="estimated", head=[_HEAD.format(kind), *assumed])
+        return draft_text(tables, notes, word="estimated", head=head)
     gears["sun"] = {"teeth": teeth[0], **shared, **gears["sun"]}
     tables |= {"sun": gears["sun"], "set": {"planets": count, **tables["set"]}}
     tables["operation"] = {"input": "sun", "fixed": "ring", **tables["operation"]}
@@ -178,7 +179,7 @@ def new_case(
     del gears["sun" if teeth[2] >= teeth[0] + 2 * teeth[1] else "ring"]["profile_shift"]
     more = {"planar": {"response": {}}, "helical": {"helix_angle": ANGLE.show(helix)}}
     tables |= {kind: more[kind]} if kind in more else {}
-    return draft_text(tables, notes, word="estimated", head=[f"{_HEAD.format(kind)} {_LEAVE}", *assumed])
+    return draft_text(tables, notes, word="estimated", head=head)
 
 
 def _teeth_and_planets(kind: str, teeth: tuple[int, ...], planets: int | None) -> tuple[tuple[int, ...], int]:

@@ -324,6 +324,24 @@ def test_leading_zero(tmp_path):  # bad input 8
     assert error.code == "E-TOML" and "leading zeros" in error.remedy
 
 
+@pytest.mark.parametrize(
+    ("written", "remedy"),
+    [
+        ("27,5", "use a decimal point"),
+        ("-0,3  # shift", "use a decimal point"),
+        ("\u201c3 mm\u201d", "straight quotation marks"),
+        ("\u201e3 mm\u201c", "straight quotation marks"),
+        ('"3 mm\u201d', "straight quotation marks"),
+        ('"3 mm', "close the quotation mark"),
+        ('"1,5\u201d" 3', "stand in quotation marks"),
+        ("3 mm  # \u201cnot 1,5\u201d", "stand in quotation marks"),
+    ],
+)
+def test_slips_of_the_keyboard_are_named(written, remedy, tmp_path):
+    error = refused(replaced("teeth = 27", f"teeth = {written}"), tmp_path)
+    assert error.code == "E-TOML" and remedy in error.remedy
+
+
 def test_empty_file(tmp_path):  # bad input 15
     assert "empty" in refused(" \n\n", tmp_path).message
 

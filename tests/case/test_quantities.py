@@ -91,6 +91,22 @@ def test_wrong_units_name_near_ones(text, dimension, near):
     assert error.remedy.startswith("did you mean ") and near in error.remedy.split("?")[0].split()
 
 
+@pytest.mark.parametrize(
+    ("text", "dimension", "near"),
+    [
+        ("400 N/mm2", quantities.STRESS, "N/mm^2"),
+        ("7850 kg/m3", quantities.DENSITY, "kg/m^3"),
+        ("3 kg m2", quantities.INERTIA, "kg m^2"),
+        ("1000 min-1", quantities.SPEED, "min^-1"),
+    ],
+)
+def test_powers_without_their_sign_name_units_that_work(text, dimension, near):
+    with pytest.raises(CaseError, match="not a product of units") as caught:
+        quantities.to_si(text, dimension)
+    assert near in caught.value.remedy.removeprefix("did you mean ").split("?")[0].split(" or ")
+    assert quantities.to_si(f"{text.split()[0]} {near}", dimension) > 0.0
+
+
 def test_absorbed_doses_are_no_angles():
     with pytest.raises(CaseError, match="'rads' is not a unit of angle"):
         quantities.to_si("0.3 rads", quantities.ANGLE)

@@ -8,7 +8,7 @@ import pytest
 from validation.reference.gear_limits import neighbour_limit
 
 from femgear.errors import GeometryError
-from femgear.gears.checks import check_passing_tips, check_set, tip_clearances, tip_margin
+from femgear.gears.checks import _backlash, check_passing_tips, check_set, tip_clearances, tip_margin
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import (
     PlanetarySet,
@@ -32,8 +32,8 @@ def gears(teeth, *, module=1.5e-3, shifts=(0.0, 0.0, 0.0), rack=BasicRack(), tip
     return sun, planet, ring if tip is None else replace(ring, tip_diameter=2 * tip)
 
 
-def standard(teeth, planets=1, **options):
-    return close_set(*gears(teeth, **options), planet_angles=equal_planet_angles(planets))
+def standard(teeth, planets=1, angles=(), **options):
+    return close_set(*gears(teeth, **options), planet_angles=angles or equal_planet_angles(planets))
 
 
 REFERENCE = PlanetarySet(
@@ -85,7 +85,22 @@ def test_overlapping_planets_are_refused():
     assert refusal(replace(REFERENCE, planet_angles=equal_planet_angles(1000))).code == "E-NEIGHBOURS"
     assert refusal(replace(REFERENCE, planet_angles=(0.0, 1.0, 3.0))).code == "E-NEIGHBOURS"
     # the last and the first planet are neighbours too
-    assert refusal(replace(REFERENCE, planet_angles=(0.0, 3.0, 6.0))).code == "E-NEIGHBOURS"
+    error = refusal(replace(REFERENCE, planet_angles=(0.0, 3.0, 6.0)))
+    assert (error.code, error.key, error.value) == ("E-NEIGHBOURS", "set.planet_angles", "16.2253 deg")
+    assert "planets 3 and 1, 16.2253 deg apart" in error.message
+    assert f"{63 - 102 * math.sin(math.pi - 3.0):.4f} mm" in error.message
+    least = math.degrees(2.0 * math.asin(31.5 / 51.0))
+    assert error.limit == f"more than {least:.4f} deg between neighbours"
+
+
+def test_angles_that_are_offered_leave_room_between_the_planets():
+    """Five equal planets clear each other, not so on 74 teeth: 360/74 deg times 14 is less than 72 deg."""
+    rack = BasicRack(root_radius=0.15)
+    error = refusal(standard((18, 19, 56), planets=5, rack=rack))
+    assert error.code == "E-ASSEMBLY" and "a multiple of 5" in error.remedy
+    assert "68.1081 deg apart" in error.remedy and "planet_angles" not in error.remedy
+    offered = feasible_angles(74, equal_planet_angles(5))
+    assert refusal(standard((18, 19, 56), rack=rack, angles=offered)).code == "E-NEIGHBOURS"
 
 
 def test_neighbour_limit_allows_what_the_check_allows():
@@ -106,6 +121,30 @@ def test_shift_that_does_not_close_the_set_is_refused_or_warned_about():
     assert (error.code, error.key) == ("E-BACKLASH", "sun.profile_shift")
     loose = replace(REFERENCE, sun=replace(REFERENCE.sun, profile_shift=0.0))
     assert "W-BACKLASH" in codes(loose)
+
+
+def test_uneven_backlash_names_the_centre_distance_of_the_shifts():
+    """Sun 0.3, planet 0.1 on 82.5 mm, the ring's shift found: zero play at 82.142 mm (ISO 21771, eq. 60)."""
+    made = gears((24, 30, 84), module=3e-3, shifts=(0.3, 0.1, 0.0))
+
+    def closed(allowance, find=("ring",)):
+        thin = [replace(gear, thickness_allowance=allowance) for gear in made]
+        return close_set(*thin, planet_angles=equal_planet_angles(3), centre_distance=82.5e-3, find=find)
+
+    for allowance in (0.0, 50e-6):
+        (found,) = [w for w in check_set(closed(allowance)) if w.code == "W-BACKLASH"]
+        assert found.key == "set.centre_distance" and "82.142 mm" in found.text
+        needed = zero_backlash_shift(made[0], made[1], 82.5e-3)
+        assert f"82.5 mm needs x_sun + x_planet = {needed:.4f}" in found.text
+        assert "W-BACKLASH" not in codes(closed(allowance, find=("sun", "ring")))
+    # the play of thinner teeth of one gear alone is asked for
+    even = closed(0.0, find=("sun", "ring"))
+    assert "W-BACKLASH" not in codes(replace(even, sun=replace(even.sun, thickness_allowance=0.3e-3)))
+    apart = replace(even, sun=replace(even.sun, profile_shift=-1.3))
+    assert any("suit no centre distance" in w.text for w in _backlash(apart))
+
+
+def test_negative_play_names_the_gear_whose_shift_is_wrong():
     assert (
         refusal(replace(REFERENCE, ring=replace(REFERENCE.ring, profile_shift=-0.1))).key
         == "ring.profile_shift"

@@ -198,3 +198,31 @@ def test_mesh_names_follow_the_order_of_the_phases():
         "planet 3-ring",
     )
     assert len(SETS["reference"].mesh_phases) == 6
+
+
+@every_set
+def test_single_contact_is_a_base_pitch_from_the_ends_of_the_path(name):
+    """Closed form: on the tangent of length a sin(aw), p_b = pi m cos(alpha) from what the tips reach."""
+    s = SETS[name]
+    pitch = math.pi * 1.5e-3 * math.cos(ALPHA)
+    sun, planet, ring = (math.sqrt(gear.tip_radius**2 - gear.base_radius**2) for gear in s.gears)
+    for pair, (tip_1, tip_2), sense in zip(s.kinds, ((sun, planet), (planet, ring)), (-1, 1), strict=True):
+        length = s.centre_distance * math.sin(pair.working_pressure_angle)
+        # roll lengths of gear 1 and, from root to tip, of gear 2: their sum or difference is the tangent
+        first = tip_1 - pitch, sense * (tip_2 - length) + pitch
+        second = length + sense * first[1], length + sense * first[0]
+        for gear, rolls, found in zip(pair.gears, (first, second), pair.single_contact, strict=True):
+            assert found == pytest.approx(
+                [2 * math.hypot(gear.base_radius, roll) for roll in rolls], rel=1e-12
+            )
+            assert abs(found[1] - 2 * gear.tip_radius) < abs(found[0] - 2 * gear.tip_radius)
+
+
+def test_there_is_no_single_contact_from_a_contact_ratio_of_two_on():
+    pair = SETS["reference"].kinds[1]
+    assert pair.contact_ratio < 2.0 and pair.single_contact
+    tips = replace(pair.gear_1, rack=replace(RACK, addendum=1.2))
+    longer = replace(pair, gear_1=tips)
+    assert longer.contact_ratio > 2.0 and not longer.single_contact
+    apart = replace(pair, gear_1=replace(pair.gear_1, tip_diameter=2.0 * pair.gear_1.base_radius + 2e-3))
+    assert apart.contact_ratio < 1.0 and not apart.single_contact

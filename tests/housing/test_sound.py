@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from validation.sound import axial_waves, outgoing
 
-from femgear.errors import CaseError, FemgearError
+from femgear.errors import CaseError, FemgearError, nvh_library
 from femgear.housing.sensor import component_lines, lines_in_form
 from femgear.housing.sound import (
     Cylinder,
@@ -289,7 +289,21 @@ def test_an_absent_library_is_named_with_its_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, "mosqito", None)
     with pytest.raises(FemgearError) as caught:
         sound_quality(np.zeros(48_000))
-    assert caught.value.code == "E-LIBRARY" and caught.value.remedy == 'pip install "femgear[nvh]"'
+    assert caught.value.code == "E-LIBRARY"
+    assert caught.value.remedy.endswith(' -m pip install "femgear[nvh]"')
+
+
+@pytest.mark.parametrize(
+    ("place", "shown"),
+    [("here/.venv/bin/python", ".venv/bin/python"), ("my env/bin/python", '"{}/my env/bin/python"')],
+)
+def test_libraries_are_installed_for_the_python_that_lacks_them(tmp_path, monkeypatch, place, shown):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / place))
+    with pytest.raises(FemgearError) as caught, nvh_library("sounds"):
+        raise ImportError("no mosqito")
+    assert caught.value.remedy == f'{shown.format(tmp_path)} -m pip install "femgear[nvh]"'
 
 
 def test_loudness_needs_all_that_is_heard():

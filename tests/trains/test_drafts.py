@@ -125,6 +125,19 @@ def test_what_was_not_given_heads_the_case():
     )
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_masses_follow_other_teeth_once_their_lines_are_deleted(kind):
+    """The head says so of cases for which it is true."""
+    text = new_case(kind)
+    assert ("delete their lines" in text) == (kind != "drivetrain")
+    if kind != "drivetrain":
+        kept = [line for line in text.splitlines() if not line.startswith(("mass =", "inertia ="))]
+        first = "gear_1" if kind == "pair" else "sun"
+        case = read_case("\n".join(kept))
+        assert getattr(case, first).mass > 0.0
+        assert [one.code for one in case.notices if one.code] == ["W-ESTIMATED"]
+
+
 def test_remarks_do_not_change_the_tables():
     tables = {"a": 1, "b": {"c": [1, 2], "d": {"e": "x"}}, "f": [{"g": 1, "h": {"i": 2.5}}, {"g": 3}]}
     text = write(tables, {"b.c": "why\nnot", "f[1].g": "last"})

@@ -768,6 +768,10 @@ def describe_meshes(s: GearSet) -> Block:
     n, phases = s.n_planets, [f"{phase:.4f}" for phase in s.mesh_phases]
     more = ", ..." if n > 6 else ""
     clearance = iter(f"{1e3 * value:.3f}" for value in tip_clearances(s).values())
+    alone = [
+        [f"{1e3 * low:.4f} to {1e3 * high:.4f}" for low, high in pair.single_contact] or ["-"] * 2
+        for pair in s.kinds
+    ]
     of_kinds = [", ".join(phases[i * n : (i + 1) * n][:6]) + more for i in range(len(s.kinds))]
     names = [f"{pair.gear_1.name}-{pair.gear_2.name}" for pair in s.kinds]
     rows = (
@@ -778,9 +782,12 @@ def describe_meshes(s: GearSet) -> Block:
         ("contact ratio", *(f"{pair.contact_ratio:.4f}" for pair in s.kinds)),
         ("normal backlash [um]", *(f"{round(pair.backlash * 1e6, 2) + 0.0:.2f}" for pair in s.kinds)),
         ("tip clearances [mm]", *(f"{next(clearance)}, {next(clearance)}" for _ in s.kinds)),
+        ("single contact, first gear [mm]", *(first for first, _ in alone)),
+        ("single contact, second gear [mm]", *(second for _, second in alone)),
         *[("mesh phases [periods]", *of_kinds)][: len(of_kinds) - 1],
     )
-    return Block("Meshes", ("", *names), rows)
+    note = "single contact: diameters between which one tooth pair carries, from root to tip of a gear"
+    return Block("Meshes", ("", *names), rows, (note,))
 
 
 def _operation(case: Case, s: PlanetarySet) -> Block:
@@ -822,7 +829,7 @@ def _harmonics(s: PlanetarySet) -> Block:
     common = math.gcd(s.sun.teeth, s.planet.teeth), math.gcd(s.planet.teeth, s.ring.teeth)
     notes = (
         "k = mod(h z_sun, N); torque, lateral force: what is left of equal mesh forces on sun, ring, carrier",
-        f"a planet's ring mesh follows its sun mesh by {phasing.lag:.4f} periods",
+        f"phases lead: a planet's ring mesh is {-phasing.lag % 1.0:.4f} periods ahead of its sun mesh",
         f"common divisors of the teeth: sun and planet {common[0]}, planet and ring {common[1]}",
     )
     return tabulate("Mesh phasing", range(_HARMONICS), columns, notes)

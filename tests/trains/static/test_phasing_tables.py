@@ -37,6 +37,12 @@ def test_few_planets(planets):
     assert harmonics.rows[0][5] == "rotational-translational"
 
 
+def test_lead_of_the_ring_meshes_is_that_of_the_phases():
+    _, meshes, harmonics, _, _ = describe_set(read_case(CASES / "planetary_27_40_108.toml"))
+    phase = dict((row[0], row[1:]) for row in meshes.rows)["mesh phases [periods]"][1].split(", ")[0]
+    assert phase == "0.4636" and f"a planet's ring mesh is {phase} periods ahead" in harmonics.notes[1]
+
+
 def test_published_gearbox():
     harmonics, _ = tables(read_case(CASES / "nrel_pgb.toml"))
     assert len(harmonics.rows) == 6
