@@ -206,6 +206,18 @@ def mode_entries(modes: Any) -> dict[str, tuple]:
     }
 
 
+def shape_entries(shape, mesh_stiffness, mesh_deflection, along: str = "") -> dict[str, tuple]:
+    """List shapes (dof, mode), and stiffness (mesh,) [N/m] and deflection (mesh, mode) of meshes in modes.
+
+    ``along`` is what the descriptions of the meshes end with.
+    """
+    return {
+        "shape": ("dof mode", shape, "kg^-1/2", "mode shape of unit mass; rotations in kg^-1/2 m^-1"),
+        "mesh_stiffness": ("mesh", mesh_stiffness, "N/m", f"mean mesh stiffness{along}"),
+        "mesh_deflection": ("mesh mode", mesh_deflection, "kg^-1/2", f"mesh deflection of the mode{along}"),
+    }
+
+
 def response_entries(result: Any) -> dict[str, tuple]:
     """List what is known of a periodic response, (speed,) each: frequency [Hz], convergence, stability.
 
