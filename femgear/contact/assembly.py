@@ -414,6 +414,8 @@ def in_windows(
 ) -> Found:
     """Find something in windows that contain the contact; they are enlarged until they do.
 
+    ContactError: E-CONTACT: no windows contain the contact.
+
     Parameters
     ----------
     attempt : callable
@@ -421,11 +423,6 @@ def in_windows(
         windows to try next; the same ones where they contain the contact.
     share, nearest : float
         Of the first windows, as `mesh_windows` takes them [N], [m].
-
-    Raises
-    ------
-    ContactError
-        E-CONTACT: no windows contain the contact.
     """
     for _ in range(12):
         found, *wider = attempt(share, nearest)

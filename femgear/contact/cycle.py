@@ -336,6 +336,8 @@ def walk_mesh_cycle(
     mirror image, which is solved, turns the other way: its record ends at position zero, so that records
     which do not close hold the same configurations too.
 
+    ContactError where the contact problem cannot be solved or no window size contains the contact.
+
     Parameters
     ----------
     planetary_set : PlanetarySet or GearPair
@@ -355,11 +357,6 @@ def walk_mesh_cycle(
         Mesh periods in the record; errors that belong to teeth or turn with a member need
         `gears.deviations.common_period` of them.
     options : CycleOptions, optional
-
-    Raises
-    ------
-    ContactError
-        When the contact problem cannot be solved or no window size contains the contact.
     """
     options = options or CycleOptions()
     position = cycle_positions(positions, periods=periods)

@@ -243,6 +243,8 @@ def root_stress(
     its elastic constants (Michell's theorem; Timoshenko and Goodier, "Theory of Elasticity", 3rd ed.,
     section 43), and a change of state within the fillet would make a jump that no gear has.
 
+    GridError: E-GRID-FREE: the body can move freely.
+
     Parameters
     ----------
     grid : Grid
@@ -252,11 +254,6 @@ def root_stress(
         Stiffness that supports the rim [N/m], as of `fe.elasticity.foundation`; held without it.
     state : str
         ``"plane strain"`` or ``"plane stress"``.
-
-    Raises
-    ------
-    GridError
-        E-GRID-FREE: the body can move freely.
     """
     along = root_functionals(grid, gear, material, state=state)
     matrix = stiffness(grid, material, state=state, thickness=gear.face_width)

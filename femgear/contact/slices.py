@@ -125,6 +125,8 @@ def solve_slices(
     Newton's method on the pairs as springs (`femgear.contact.batch.PairLaws`). Without separations spur teeth
     have the plane solution that the laws were made of.
 
+    ContactError: E-CONTACT: the iteration does not end.
+
     Parameters
     ----------
     found : Candidates
@@ -138,11 +140,6 @@ def solve_slices(
         `Candidates.images` of other bodies [m/N], for whose tangents the contact is taken too.
     tilting : TiltingMembers, optional
         Motions that differ from slice to slice; they follow the others.
-
-    Raises
-    ------
-    ContactError
-        E-CONTACT: the iteration does not end.
     """
     parts, load, (P, N, _) = [], np.asarray(load, float), separations.shape
     each = len(found.position) // P

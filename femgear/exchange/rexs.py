@@ -152,11 +152,8 @@ class Model:
 def read_model(path: str | os.PathLike) -> Model:
     """Read a REXS file of any form and of versions 1.0 to 2.0.
 
-    Raises
-    ------
-    CaseError
-        E-FILE: unreadable, too long, no XML, JSON or zip, or with entities. E-FILE-ENC: not UTF-8. E-FORMAT:
-        another version. E-REXS: ids missing, given twice or unknown, parts that hold each other.
+    CaseError: E-FILE: unreadable, too long, no XML, JSON or zip, or with entities. E-FILE-ENC: not UTF-8.
+    E-FORMAT: another version. E-REXS: ids missing, given twice or unknown, parts that hold each other.
     """
     name = os.fsdecode(path)
     data = read_bytes(path, MOST_BYTES, "name a REXS file: .rexs, .rexsj or .rexsz")

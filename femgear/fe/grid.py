@@ -222,10 +222,7 @@ def write_grid(path: Path, grid: Grid) -> None:
 
     What dead processes left half written under this name is removed.
 
-    Raises
-    ------
-    StorageError
-        The file cannot be written (E-GRID-FILE); none stands there then, not even a part of it.
+    StorageError: the file cannot be written (E-GRID-FILE); none stands there then, not even a part of it.
     """
     import meshio
 
@@ -267,11 +264,8 @@ def write_grid(path: Path, grid: Grid) -> None:
 def read_grid(path: Path) -> Grid:
     """Read a grid [m] that `write_grid` has written as ``.msh``.
 
-    Raises
-    ------
-    StorageError
-        The file is missing, a link or no regular one, truncated, no such grid, or was changed since it was
-        written (E-GRID-FILE).
+    StorageError: the file is missing, a link or no regular one, truncated, no such grid, or was changed since
+    it was written (E-GRID-FILE).
     """
     import meshio
 

@@ -32,6 +32,8 @@ AXES = ("x", "y", "tilt x", "tilt y", "rotation")
 class RoundSection:
     """Round section and material.
 
+    CaseError: diameters that no shaft has (E-SHAFT).
+
     Parameters
     ----------
     outer_diameter, inner_diameter : float
@@ -41,11 +43,6 @@ class RoundSection:
     poisson : float
     density : float
         [kg/m^3]; zero for a shaft without mass.
-
-    Raises
-    ------
-    CaseError
-        Diameters that no shaft has (E-SHAFT).
     """
 
     outer_diameter: float
@@ -195,15 +192,12 @@ MAX_EDGES = 5000  # around the half section
 class ShaftStep:
     """One part of a stepped shaft.
 
+    GeometryError: numbers that no shaft has (E-SHAFT).
+
     Parameters
     ----------
     length, outer_diameter, inner_diameter : float
         [m]; a bore of zero is a solid shaft.
-
-    Raises
-    ------
-    GeometryError
-        Numbers that no shaft has (E-SHAFT).
     """
 
     length: float
@@ -244,6 +238,8 @@ def timoshenko_flexibility(steps: Sequence[ShaftStep], material) -> np.ndarray:
 def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1.0) -> np.ndarray:
     """Compute what `timoshenko_flexibility` does, of the solid body with its end face rigidly coupled.
 
+    GeometryError: no parts, neighbours that do not touch, or walls too thin for their length (E-SHAFT).
+
     Parameters
     ----------
     steps : sequence of ShaftStep
@@ -255,11 +251,6 @@ def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1
     -------
     (2, 2) array
         Displacement [m] and tilt [rad] of the centre node per unit force [N] and moment [N m].
-
-    Raises
-    ------
-    GeometryError
-        No parts, neighbours that do not touch, or walls too thin for their length (E-SHAFT).
     """
     grid = mesh_outline(_half_section(steps, refine))
     K, size = _stiffness(grid, material), 3 * grid.n_nodes

@@ -111,6 +111,9 @@ def solve_two_way(
 ) -> TwoWayResponse:
     """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
 
+    CaseError: data that do not belong together, planets that do not repeat one another (E-SYMMETRY),
+    E-MEMORY.
+
     Parameters
     ----------
     gears : Modes
@@ -130,11 +133,6 @@ def solve_two_way(
     damping : (n, n) array, optional
         Of gears and ring as a whole, see `femgear.housing.set_damping.set_damping` [N s/m, ...]; without it
         gears and structure have each the modal damping of its own.
-
-    Raises
-    ------
-    CaseError
-        Data that do not belong together, planets that do not repeat one another (E-SYMMETRY), E-MEMORY.
     """
     n_max, angles = structure.max_diameter, np.asarray(paths.planet_angles, float)
     speeds = _checked(gears, excitation, carrier_speed, paths, n_max, harmonics)

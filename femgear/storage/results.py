@@ -364,6 +364,9 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
     A run that replaces results is given a folder inside, whose files take their place at the end; should it
     fail or be interrupted, the old ones are as they were.
 
+    StorageError: E-OUTPUT: the folder holds other people's files (no manifest), complete results, files of an
+    interrupted run of another case, or files that were changed. E-LOCKED: another run writes there.
+
     Parameters
     ----------
     folder : path-like
@@ -372,12 +375,6 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
         Text of the case: what an interrupted run of it left stays, for this one to go on from.
     force : bool
         Replace the results of an earlier run, or what an interrupted one of another case left.
-
-    Raises
-    ------
-    StorageError
-        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, files of an
-        interrupted run of another case, or files that were changed. ``E-LOCKED``: another run writes there.
     """
     folder = Path(folder)
     _make(folder)

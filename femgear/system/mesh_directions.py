@@ -101,6 +101,9 @@ def gear_set_system(
 ) -> MechanicalSystem:
     """Assemble the matrices of a planetary set; the meshes are columns of ``W`` and not in ``K``.
 
+    CaseError: a torque on a held member, a set that cannot move at all (E-MECHANISM), a carrier speed or
+    planet bearings of bodies that move in space (E-RANGE).
+
     Parameters
     ----------
     data : RigidSet
@@ -121,12 +124,6 @@ def gear_set_system(
     -------
     MechanicalSystem
         ``C`` is zero. Columns of ``W``: the slices of mesh 1, of mesh 2 and so on, back flanks, bearings.
-
-    Raises
-    ------
-    CaseError
-        A torque on a held member, a set that cannot move at all (E-MECHANISM), a carrier speed or planet
-        bearings of bodies that move in space (E-RANGE).
     """
     if len(data.axes) > 3 and carrier_speed:
         refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")

@@ -243,10 +243,7 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
     [N/m], [m] and [N], (n_meshes, count periods + 1) complex each: a record of several periods keeps all its
     lines up to that frequency.
 
-    Raises
-    ------
-    CaseError
-        Numbers that are not finite, arrays that do not fit each other, too few positions.
+    CaseError: numbers that are not finite, arrays that do not fit each other, too few positions.
     """
     if count < 1 or int(count) != count:
         raise CaseError("at least one excitation harmonic is needed", code="E-HARMONICS", value=count)
@@ -356,10 +353,7 @@ def damping_matrix(system: MechanicalSystem, speed: float) -> np.ndarray:
 def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
     """Check base frequencies (n_bases,) [rad/s]: finite and no more than elements and forces name.
 
-    Raises
-    ------
-    CaseError
-        Not a list of finite numbers, or one too long (E-RANGE).
+    CaseError: not a list of finite numbers, or one too long (E-RANGE).
     """
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):

@@ -74,10 +74,8 @@ def stiffness_in_series(change: np.ndarray, flexibility: np.ndarray) -> np.ndarr
 
     ``k (1 + T k)^-1`` (..., n_c, n_c) [N/m].
 
-    Raises
-    ------
-    ConvergenceError
-        Elements so much softer than their reference that the flexibility cannot carry them (E-RESIDUAL).
+    ConvergenceError: elements so much softer than their reference that the flexibility cannot carry them
+    (E-RESIDUAL).
     """
     carried = np.eye(len(flexibility)) + flexibility @ change
     if np.linalg.eigvals(carried).real.min() <= 0.0:
@@ -389,6 +387,9 @@ def floquet_verdicts(
     By exact exponentials where the tangents are constant in pieces, otherwise by a splitting, with steps that
     end where contacts open or close.
 
+    CaseError: a tolerance that is not between 0 and 1 (E-RANGE). ConvergenceError: modes left out that are
+    too flexible.
+
     Parameters
     ----------
     problem : NonlinearSystem
@@ -399,13 +400,6 @@ def floquet_verdicts(
         Relative error of the monodromy matrix.
     modes : int
         Largest number of modes followed; the others count as static flexibility.
-
-    Raises
-    ------
-    CaseError
-        A tolerance that is not between 0 and 1 (E-RANGE).
-    ConvergenceError
-        Modes left out that are too flexible.
 
     Notes
     -----

@@ -159,6 +159,9 @@ def step_scheme(
 ) -> tuple[Scheme, int]:
     """Make the scheme of a fixed-step method, factorised, and count its steps in a span [s].
 
+    CaseError: an unknown method (E-CHOICE), a step that is not positive or beyond the stability limit
+    (E-RANGE).
+
     Parameters
     ----------
     problem, frequency, method, step
@@ -171,11 +174,6 @@ def step_scheme(
         Spectral radius at infinite frequency of "generalised alpha".
     count : int, optional
         Modes of "modal"; all when not given.
-
-    Raises
-    ------
-    CaseError
-        An unknown method (E-CHOICE), a step that is not positive or beyond the stability limit (E-RANGE).
     """
     made = {"newmark": lambda: StepRule(gamma, beta), "generalised alpha": lambda: generalised_alpha(radius)}
     if method not in RULES and method not in made and method != "modal":
