@@ -175,7 +175,6 @@ class ContactProblem:
 
     Parameters
     ----------
-    n_planets : int
     H : (n, n) array
         Compliance of the gears [m/N].
     gap, area : (n,) arrays
@@ -185,7 +184,6 @@ class ContactProblem:
     supports : (meshes, meshes) array
         Compliance of sprung members between the meshes [m/N], part of `compliance`.
     mesh, pair, cell : (n,) int arrays
-    position : int
     """
 
     n_planets: int
@@ -364,7 +362,6 @@ def mesh_windows(
     contact : {"profile", "line_of_action"}
     cells : int
         Pressure cells in a window.
-    deviations : SetDeviations, optional
     both_flanks : bool
         Back flanks as well, as the second half of the meshes.
     """
@@ -466,7 +463,6 @@ def windows(
 
     Parameters
     ----------
-    pair : FlankPair
     zeta : (...) array
         Path coordinates [m].
     width : float

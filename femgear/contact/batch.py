@@ -75,7 +75,6 @@ def solve_batch(
 
     Parameters
     ----------
-    found : Candidates
     load : (m,) array
         External load on the motions, the same at all positions [N].
     springs : BearingSprings, optional

@@ -37,7 +37,6 @@ class FaceWidth:
         Of the bodies.
     slices : int
         Their number.
-    tilting : TiltingMembers, optional
     held : Bodies and WidthWaves, optional
         Other bodies with the same flanks, for whose tangents the contact is taken too.
     helical : bool
@@ -64,7 +63,6 @@ def contact_over_width(
 
     Parameters
     ----------
-    over : FaceWidth
     found, state : Candidates, BatchState
         The plane contact at all positions, or, of helical teeth, in all slices at each of them.
     load : (m,) array

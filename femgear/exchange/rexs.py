@@ -71,10 +71,8 @@ class Model:
     ----------
     name : str
         Of the file, for messages.
-    version : str
     components : mapping of str to Component
         By id.
-    relations : tuple of Relation
     load_cases : tuple of mapping
         Attributes by component id that a load case of the first load spectrum gives.
     used : set of (str, str)

@@ -166,19 +166,9 @@ def mirrored_columns(columns: np.ndarray, image: np.ndarray) -> np.ndarray:
 
 
 def interpolation(grid: Grid, points: np.ndarray):
-    """Quadratic interpolation from the grid nodes to interior points.
+    """Quadratic interpolation from the grid nodes to points (m, 2) inside [m], a sparse (m, n) array.
 
     GridError where a point lies outside the grid.
-
-    Parameters
-    ----------
-    grid : Grid
-    points : (m, 2) array
-        Points inside the grid [m].
-
-    Returns
-    -------
-    scipy.sparse.csr_array, shape (m, n)
     """
     nodes, triangles = grid.points, grid.triangles
     corner = nodes[triangles[:, :3]]

@@ -116,19 +116,9 @@ def mirror(grid: Grid) -> Grid:
 
 
 def copy_nodes(grid: Grid, count: int) -> np.ndarray:
-    """Node numbers of every sector in the whole body that `rotated_copies` makes.
+    """Node numbers (count, n) of every sector in the whole body that `rotated_copies` makes.
 
-    Parameters
-    ----------
-    grid : Grid
-        One sector with the boundaries ``cut_right`` and ``cut_left``.
-    count : int
-        Number of sectors in the circle.
-
-    Returns
-    -------
-    (count, n) int array
-        Entry (k, i) is the node of the body that node i of sector k becomes.
+    Entry (k, i) is the node of the body that node i of sector k becomes.
     """
     left, right = ordered_nodes(grid, "cut_left"), ordered_nodes(grid, "cut_right")[::-1]
     free = np.ones(grid.n_nodes, dtype=bool)

@@ -84,15 +84,10 @@ class Plan:
 
 
 def check_outline(outline) -> Plan:
-    """Check an outline and find the parts into which its interfaces split it.
+    """Check an `Outline`, or any object with its fields; find the parts into which its interfaces split it.
 
     GridError: E-GRID: points that are not finite or coincide, curves that cross, no area, a clockwise
     boundary, interfaces that do not divide the body, or too many segments.
-
-    Parameters
-    ----------
-    outline : Outline
-        Or any object with the same fields.
     """
     curves = [(name, _curve(name, points)) for name, points in outline.curves]
     inner = [(name, _curve(name, points)) for name, points in outline.interfaces]

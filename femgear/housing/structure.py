@@ -242,7 +242,6 @@ def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
 
     Parameters
     ----------
-    ring : CyclicModes
     values : (m,) complex array
         What the functional takes from every mode, a column of ``ring.load`` or ``ring.output``.
     max_diameter : int

@@ -72,7 +72,6 @@ class TwoWayResponse(ReadOnlyArrays):
         truncation.
     harmonics, side_bands : int
         Mesh harmonics H, and side bands on either side of each.
-    paths : MeshPaths
     drag : (n_speeds, n_lines, m) complex array, optional
         Two-sided modal forces on the structure [N kg^-1/2] by the damping of the set beyond that of its
         modes, at the orders of `structure_lines`.
@@ -122,8 +121,6 @@ def solve_two_way(
     excitation : MeshExcitation
         Of the 2N meshes; their stiffness without what the structure is elastic. Over several mesh periods
         with errors that turn: then the symmetry is that of the places of the planets and of the modes.
-    structure : FixedStructure
-    paths : MeshPaths
     carrier_speed : (n_speeds,) array
         [rad/s], counter-clockwise positive, all of one direction.
     harmonics : (int, int)

@@ -270,13 +270,7 @@ class Manifest:
 
 @dataclass(frozen=True)
 class Results:
-    """A results folder; every file is read, and its checksum tested, when it is first asked for.
-
-    Parameters
-    ----------
-    read_case : callable
-        ``(path) -> case``.
-    """
+    """A results folder; every file is read, and its checksum tested, when it is first asked for."""
 
     folder: Path
     manifest: Manifest

@@ -93,7 +93,6 @@ def modal_forces(modes: Modes, excitation: MeshExcitation, count: int, output=No
     ----------
     modes : Modes
         Basis with the mean stiffnesses of the excitation.
-    excitation : MeshExcitation
     count : int
         At most half the positions of the record.
     output : (n_modes, L) complex array, optional

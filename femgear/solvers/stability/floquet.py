@@ -164,18 +164,7 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
 
     Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
     positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static
-    flexibility.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    modes : int
-        Most modes kept, lowest first; all where there are no more.
-
-    Returns
-    -------
-    Frame
-        Squared frequencies (n,) [1/s^2], damping (n, n) [1/s] and the rest.
+    flexibility. At most so many ``modes`` are kept, lowest first; all where there are no more.
     """
     system, reference = problem.system, np.maximum(problem.reference, 0.0)
     stiffness = system.K + (system.W * reference) @ system.W.T
@@ -227,7 +216,6 @@ def passage(
 
     Parameters
     ----------
-    frame : Frame
     period : (p,) array
         [s]
     tangents : callable
@@ -392,7 +380,6 @@ def floquet_verdicts(
 
     Parameters
     ----------
-    problem : NonlinearSystem
     solutions : sequence of PeriodicSolution
         All with the same lines. With two base frequencies or the frequency zero the verdict is "not
         covered"; "not determined" where the fastest mode would need more than 20000 steps in a period.
