@@ -294,7 +294,10 @@ def heaviside_linear_lines(
     points = checked_count(points, "points", code="E-SYMMETRY", least=3)
     direction, speed = _motion(field, z_ring, carrier_speed)
     top = _top_order(field, z_ring, max_order)
-    sampled = _sampled_components(field, n, points)
+    # components that the points tell apart: sums over one residue of n, phase at point 0
+    sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
+    for residue in np.unique(n % points):
+        sampled[..., residue] = field[..., n % points == residue].sum(axis=-1)
     two_sided = _interpolated_orders(sampled, z_ring, direction, top, _checked_angle(sensor_angle))
     method = f"linear, {points} points"
     lines = _folded(two_sided)
@@ -412,14 +415,6 @@ def _folded(two_sided: np.ndarray) -> np.ndarray:
     lines = two_sided[..., top:] + np.conj(two_sided[..., top::-1])
     lines[..., 0] = np.real(two_sided[..., top])
     return lines
-
-
-def _sampled_components(field: np.ndarray, n: np.ndarray, points: int) -> np.ndarray:
-    """Find the components that P points tell apart: sums over one residue of n modulo P, phase at point 0."""
-    sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
-    for residue in np.unique(n % points):
-        sampled[..., residue] = field[..., n % points == residue].sum(axis=-1)
-    return sampled
 
 
 def _interpolated_orders(

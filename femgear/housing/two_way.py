@@ -157,7 +157,11 @@ def _one_period(
     deflection, force = np.pad(deflection, wide), np.pad(force, wide)
     source[..., bands] = force - np.einsum("mhk,mk->mh", known.product, deflection)
     count, n_orders = len(place), len(orders.positive)
-    size = _checked_size(count, n_orders)
+    # of one speed [bytes]
+    size = _BYTES * (count * n_orders) ** 2
+    if size > _MOST:
+        message = f"{count} planets with {n_orders} carrier orders need {size / 1e9:.2g} GB"
+        raise CaseError(message, code="E-MEMORY", remedy="take fewer mesh harmonics or nodal diameters")
     # without side bands what the ring gives way takes more than the unknowns
     step = max(int(_MEMORY / (size + _BYTES * (2 * n_max + 1) ** 3)), 1)
     drag, order = None, orders.meeting()[0]
@@ -273,15 +277,6 @@ def _check_residual(residual: np.ndarray, speeds: np.ndarray, limit: float = _RE
         message = f"residual {residual[worst]:.3e} of the two-way equations at {speeds[worst]:.6g} rad/s"
         remedy = "give gears and structure some damping"
         raise ConvergenceError(message, code="E-RESONANCE", limit=f"{limit:g}", remedy=remedy)
-
-
-def _checked_size(planets: int, orders: int) -> float:
-    """Memory of one speed [bytes], refused where it is too much (E-MEMORY)."""
-    size = _BYTES * (planets * orders) ** 2
-    if size > _MOST:
-        message = f"{planets} planets with {orders} carrier orders need {size / 1e9:.2g} GB"
-        raise CaseError(message, code="E-MEMORY", remedy="take fewer mesh harmonics or nodal diameters")
-    return size
 
 
 def _check_repeated(one_sided, orders: CarrierOrders, leaders, group, turn) -> None:

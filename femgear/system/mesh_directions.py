@@ -141,7 +141,10 @@ def gear_set_system(
         columns.append(mesh_directions(data, -flank))
     if planet_bearings:
         columns.append(pin_directions(data)[..., :2].reshape(kept.size, -1))
-    stiffness, load = _linear_stiffness(data, planet_bearings), torque_load(data, torque, kept)
+    stiffness, load = np.diag(support_diagonal(data).ravel()), torque_load(data, torque, kept)
+    if not planet_bearings:
+        pins = pin_directions(data)
+        stiffness += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
     gyroscopic = None
     if carrier_speed:
         # the translational part is the K_Omega of Lin and Parker
@@ -352,12 +355,3 @@ def _gyroscopic(along: np.ndarray) -> np.ndarray:
     first = np.arange(0, len(along), 3)
     G[first, first + 1], G[first + 1, first] = -2.0 * along[first], 2.0 * along[first]
     return G
-
-
-def _linear_stiffness(data: RigidSet, planet_bearings: bool) -> np.ndarray:
-    """Supports, and planet bearings that are not columns, as far as they are finite."""
-    K = np.diag(support_diagonal(data).ravel())
-    if not planet_bearings:
-        pins = pin_directions(data)
-        K += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
-    return K

@@ -395,9 +395,9 @@ def external_force(problem: NonlinearSystem, theta) -> np.ndarray:
 def tabulated_law(problem: NonlinearSystem, theta) -> Law:
     """Tabulate the forces and tangents of all elements beyond the reference stiffness, at known instants.
 
-    These have the phases theta (n_times, n_bases) [rad]. Makes
-    ``law(i, x (n_columns,) [m]) -> (f - c x (n_columns,) [N], df/dx - c [N/m])`` with ``c`` the reference of the
-    problem; the second is (n_columns,) where every element acts on single columns, else (n_columns, n_columns).
+    These have the phases theta (n_times, n_bases) [rad]. The callable ``law(i, x (n_columns,) [m])`` gives
+    ``f - c x`` (n_columns,) [N] and ``df/dx - c`` [N/m] with ``c`` the reference of the problem; the second
+    is (n_columns,) where every element acts on single columns, else (n_columns, n_columns).
     """
     theta, reference = np.asarray(theta, float), problem.reference
     every = np.arange(len(reference))

@@ -304,7 +304,9 @@ def _through(frame: Frame, period, start, duration, tangents, states) -> np.ndar
     gyration = frame.rows @ frame.rows.T
     weight = (2.0 - np.sqrt(3.0)) / 12.0 * dt[..., None, None, None] ** 2
     kicks = 0.5 * dt[..., None, None, None] * (kappa - weight * (kappa @ gyration @ kappa))
-    scale = _scales(frame)
+    # modal velocities over it have the size of the motions
+    natural = np.sqrt(np.abs(frame.square))
+    scale = np.where(natural > 1e-6 * natural.max(), natural, natural.max() or 1.0)
     back = (frame.rows / scale).T
     drift = _modal_drift if frame.diagonal else _coupled_drift
     outer, inner = dt * (0.5 - _GAUSS), dt * (2.0 * _GAUSS)
@@ -323,12 +325,6 @@ def _through(frame: Frame, period, start, duration, tangents, states) -> np.ndar
     while len(state) > m:
         state = state[1::2] @ state[::2]
     return drift(frame, scale, outer[:, -1:])(0, state)
-
-
-def _scales(frame: Frame) -> np.ndarray:
-    """Angular frequencies (n,) that bring modal velocities to the size of the motions."""
-    natural = np.sqrt(np.abs(frame.square))
-    return np.where(natural > 1e-6 * natural.max(), natural, natural.max() or 1.0)
 
 
 def _modal_drift(frame: Frame, scale, durations):

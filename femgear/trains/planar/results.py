@@ -250,7 +250,8 @@ def _coordinates(gears: PlanetarySet) -> dict[str, tuple]:
 def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
     """Tabulate bodies and supports of a planar case, with mesh stiffness, play and weight as notes."""
     planar = case.planar
-    notes = [_stiffness(case), _play(case, planetary)]
+    stiffness = stiffness_text(planar.mesh_stiffness) if planar.mesh_stiffness else "of the static solution"
+    notes = [f"mesh stiffness: {stiffness}", _play(case, planetary)]
     if planar.carrier_bearing is not None:
         one = planar.carrier_bearing
         notes.append(
@@ -273,11 +274,6 @@ def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
     planet = case.planet
     bearing = f"{planet.bearing_stiffness:.6g} (bearing)"
     yield "planet", f"{planet.mass:.6g}", f"{planet.inertia:.6g}", bearing, "0"
-
-
-def _stiffness(case: PlanarCase) -> str:
-    given = case.planar.mesh_stiffness
-    return f"mesh stiffness: {'of the static solution' if given is None else stiffness_text(given)}"
 
 
 def _play(case: PlanarCase, planetary: PlanetarySet) -> str:
