@@ -277,12 +277,8 @@ class _SliceNewton:
         """Compute joint and own tangents, as `SliceState` has them.
 
         ``bodies`` are pairs of compliances between all windows and their images, (I, P, L, W, 3, W, 3) and
-        across the width, (I, P, N, W, N, W) [m/N].
-
-        Returns
-        -------
-        list
-            ``joint`` (H, P, meshes, meshes) of the last bodies, and ``own`` (P, meshes) of each [N/m].
+        across the width, (I, P, N, W, N, W) [m/N]. The list begins with ``joint`` (H, P, meshes, meshes) of
+        the last bodies; ``own`` (P, meshes) of each follow [N/m].
         """
         (P, N, _), meshes = self.shape, np.arange(int(self.laws.mesh[-1]) + 1)
         on, at = _first((self.force > 0.0).reshape(P, self.size))

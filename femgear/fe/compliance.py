@@ -446,12 +446,10 @@ def static_cut_shapes(schur: SectorSchur, harmonics) -> np.ndarray:
 def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     """Compute the compliance [m/N] of each cyclic harmonic.
 
-    GridError: E-GRID-FREE: the body can move freely.
+    It is complex (len(harmonics), 2 n_observations, 2 n_loads): with the images of all observations behind
+    them, and those of all loads.
 
-    Returns
-    -------
-    (len(harmonics), 2 n_observations, 2 n_loads) complex array
-        The images of all observations behind them, and those of all loads.
+    GridError: E-GRID-FREE: the body can move freely.
     """
     observed, loaded = schur.compliance.shape[1:]
     result = np.empty((len(harmonics), 2, observed, 2, loaded), complex)
@@ -487,7 +485,7 @@ def tooth_compliance(schur: SectorSchur) -> np.ndarray:
 
 
 def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str | None) -> np.ndarray:
-    """Static displacement of every sector in its own frame.
+    """Static displacement (count, n, 2) of every sector in its own frame [m].
 
     The loads are transformed over the sectors, each harmonic is solved on the sector with its cuts tied, and
     the solutions are transformed back.
@@ -498,11 +496,6 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
         As for `condense_sector`.
     loads : (count, 2n) array
         Nodal forces of each sector in its own frame [N], none on the cuts.
-
-    Returns
-    -------
-    (count, n, 2) array
-        [m].
     """
     count = len(loads)
     forces = np.fft.rfft(loads, axis=0).T

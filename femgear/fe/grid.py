@@ -56,12 +56,9 @@ class Grid:
 
 
 def ordered_nodes(grid: Grid, name: str) -> np.ndarray:
-    """Nodes along a connected boundary: start, mid, end, mid, ... in the order of its edges.
+    """Nodes (2 k + 1,) along a connected boundary: start, mid, end, mid, ... in the order of its edges.
 
-    Returns
-    -------
-    (2 k + 1,) int array
-        The last node repeats the first one where the boundary is a closed loop.
+    The last node repeats the first one where the boundary is a closed loop.
     """
     edges = boundary_edges(grid, name)
     return np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])

@@ -128,10 +128,7 @@ def joint_deflections(length: float) -> np.ndarray:
 def beam_element(section: RoundSection, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass, stiffness and gyroscopic matrix (10, 10) of an element of a length [m] between two stations.
 
-    Returns
-    -------
-    M, K, G
-        ``G`` multiplies the speed of rotation [rad/s], positive about z.
+    The last one multiplies the speed of rotation [rad/s], positive about z.
     """
     l, phi = length, section.shear_ratio(length)
     springs = joint_springs(section, length)
