@@ -127,7 +127,11 @@ def solve_transient(
     ConvergenceError
         A mass matrix that is not positive definite, an adaptive integrator that gives up.
     """
-    times = _checked_times(times)
+    times = checked_numbers(times, "times", code="E-RANGE", unit="s").copy()
+    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+        raise CaseError(
+            "instants must be finite and ascend", code="E-RANGE", key="times", limit="two instants or more"
+        )
     if tolerance is not None:
         tolerance = checked_tolerance(tolerance)
     start = checked_start(problem, start)
@@ -330,12 +334,3 @@ def _adaptive(problem, frequency, times, start, method, tolerance, events) -> Tr
         times, q, v, x, force, method, True, 0.0, tolerance, steps, 0, 1,
         f"{method} with a relative tolerance of {tolerance:.3g}" + drift_note(problem),
     )  # fmt: skip
-
-
-def _checked_times(times) -> np.ndarray:
-    times = checked_numbers(times, "times", code="E-RANGE", unit="s").copy()
-    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
-        raise CaseError(
-            "instants must be finite and ascend", code="E-RANGE", key="times", limit="two instants or more"
-        )
-    return times

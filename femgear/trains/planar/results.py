@@ -333,16 +333,13 @@ def describe_branch(data: xr.Dataset) -> Block:
     ]
     notes += _verdicts(data) if known else ["stability was not computed"]
     notes += _truncation(data) if known else []
-    notes += [_tails(data), *map(str, tail_warnings(data, "planar.branch.harmonics"))]
-    return tabulate("Response to the weight", sorted(named), columns, notes)
-
-
-def _tails(data: xr.Dataset) -> str:
     tail, force = (float(data[name].max()) for name in ("tail", "force_tail"))
-    return (
+    notes.append(
         f"tail, share of the amplitude in the upper half of the lines: up to {tail:.2g} of the deflections, "
         f"{force:.2g} of the mesh forces"
     )
+    notes += map(str, tail_warnings(data, "planar.branch.harmonics"))
+    return tabulate("Response to the weight", sorted(named), columns, notes)
 
 
 def tail_warnings(data: xr.Dataset, key: str) -> tuple[Finding, ...]:
