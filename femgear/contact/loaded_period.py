@@ -236,7 +236,7 @@ def _whole_period(
     ahead, parts = N // symmetry, turn.denominator
     step = pow(turn.numerator, -1, parts) if parts > 1 else 0
     shown = record["position"] < (1.0 - 1e-12) / parts * periods
-    tau = record["position"][shown]
+    tau: np.ndarray = record["position"][shown]
     gap = np.diff(np.append(tau, tau[0] + periods / parts))
     # the mean of what is linear between the positions
     weights = (gap + np.roll(gap, 1)) / (2 * (periods / parts))
