@@ -90,10 +90,7 @@ class Step:
 def factor(H):
     """Lower Cholesky factor of a symmetric matrix (its strict upper triangle is not used).
 
-    Raises
-    ------
-    ContactError
-        E-CONTACT-COMPLIANCE when the matrix is not positive definite.
+    ContactError: E-CONTACT-COMPLIANCE when the matrix is not positive definite.
     """
     lower, info = dpotrf(H, lower=1, clean=0)
     if info:
@@ -119,10 +116,7 @@ def solve_step(problem: Problem, active: np.ndarray) -> Step:
 
     ``active`` (n,) tells the candidates that carry; pressures are forces [N], motions and gaps [m].
 
-    Raises
-    ------
-    ContactError
-        E-CONTACT-OPEN when no candidate can balance the load.
+    ContactError: E-CONTACT-OPEN when no candidate can balance the load.
     """
     loads, motions, null = _solve_bordered(problem, np.flatnonzero(active))
     elastic, approach = problem.H @ loads, problem.G @ motions
@@ -196,6 +190,8 @@ def _residual(problem: Problem, active, loads, gaps) -> float:
 def settle(G, load, arm, null, gaps, active):
     """Move what no touching candidate restrains: the shift, who cannot be judged, who must touch.
 
+    ContactError: E-CONTACT-OPEN when no candidate can balance the load.
+
     Parameters
     ----------
     G, load, arm : (n, m), (m,), (m,) arrays
@@ -212,11 +208,6 @@ def settle(G, load, arm, null, gaps, active):
         Amounts (k,) along the columns of `null`, the smallest that end all penetration; numbers of the
         candidates whose gaps mean nothing because no shift settles these motions, and of those that must
         touch.
-
-    Raises
-    ------
-    ContactError
-        E-CONTACT-OPEN when no candidate can balance the load.
     """
     arms = G @ null
     moved = np.flatnonzero(~active & (np.abs(arms).max(axis=1) > 1e-9))

@@ -175,7 +175,6 @@ class ContactProblem:
 
     Parameters
     ----------
-    n_planets : int
     H : (n, n) array
         Compliance of the gears [m/N].
     gap, area : (n,) arrays
@@ -185,7 +184,6 @@ class ContactProblem:
     supports : (meshes, meshes) array
         Compliance of sprung members between the meshes [m/N], part of `compliance`.
     mesh, pair, cell : (n,) int arrays
-    position : int
     """
 
     n_planets: int
@@ -364,7 +362,6 @@ def mesh_windows(
     contact : {"profile", "line_of_action"}
     cells : int
         Pressure cells in a window.
-    deviations : SetDeviations, optional
     both_flanks : bool
         Back flanks as well, as the second half of the meshes.
     """
@@ -414,6 +411,8 @@ def in_windows(
 ) -> Found:
     """Find something in windows that contain the contact; they are enlarged until they do.
 
+    ContactError: E-CONTACT: no windows contain the contact.
+
     Parameters
     ----------
     attempt : callable
@@ -421,11 +420,6 @@ def in_windows(
         windows to try next; the same ones where they contain the contact.
     share, nearest : float
         Of the first windows, as `mesh_windows` takes them [N], [m].
-
-    Raises
-    ------
-    ContactError
-        E-CONTACT: no windows contain the contact.
     """
     for _ in range(12):
         found, *wider = attempt(share, nearest)
@@ -469,7 +463,6 @@ def windows(
 
     Parameters
     ----------
-    pair : FlankPair
     zeta : (...) array
         Path coordinates [m].
     width : float

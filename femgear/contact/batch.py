@@ -71,20 +71,16 @@ def solve_batch(
 ) -> BatchState:
     """Solve the contact of all meshes and bearings at all positions.
 
+    ContactError: as `femgear.contact.solve.solve_contact`.
+
     Parameters
     ----------
-    found : Candidates
     load : (m,) array
         External load on the motions, the same at all positions [N].
     springs : BearingSprings, optional
         Of planet bearings with clearance.
     start : (P, W, C) bool array, optional
         Cells thought to touch; guessed for equal mesh forces when left out.
-
-    Raises
-    ------
-    ContactError
-        As `femgear.contact.solve.solve_contact`.
     """
     batch = _ActiveSets(found, np.asarray(load, float), springs)
     if start is not None:
@@ -112,10 +108,7 @@ def check_definite(found: Candidates) -> None:
 
     That of ``L + Pi S Pi^T`` is where ``L`` and ``I + Q^(1/2) S Q^(1/2)`` are, ``Q = Pi^T L^-1 Pi``.
 
-    Raises
-    ------
-    ContactError
-        E-CONTACT-COMPLIANCE.
+    ContactError: E-CONTACT-COMPLIANCE.
     """
     filled = np.flatnonzero(found.candidate[0].any(axis=-1))
     local, some = found.local[0, filled], found.candidate[0, filled]

@@ -260,6 +260,8 @@ def flank_compliance(
 ) -> FlankCompliance:
     """Compute the regular flank compliance of a whole gear from the grid of one sector.
 
+    CaseError where the depth reaches out of the tooth or the sector can move freely.
+
     Parameters
     ----------
     grid : Grid
@@ -273,11 +275,6 @@ def flank_compliance(
         otherwise the displacements of the stations themselves.
     foundation : (2n, 2n) sparse matrix, optional
         Stiffness that supports the rim [N/m], the bore or the outer surface of a ring; held without it.
-
-    Raises
-    ------
-    CaseError
-        When the depth reaches out of the tooth or the sector can move freely.
     """
     stations, depths, loads, observations = observed_flanks(grid, gear, depth)
     along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)

@@ -161,7 +161,6 @@ class MeshCycle:
         ``"profile"`` or ``"line_of_action"``.
     unknowns : int
         Largest number of pressure cells at one position.
-    message : str
     pressure : (M, T, C, P) array, optional
         Pressure in the cells of the drive flanks [Pa], where it was asked for.
     pressure_offset : (M, C) array, optional
@@ -185,7 +184,6 @@ class MeshCycle:
         smallest separation of its flanks by leads and given misalignments [m].
     member_tilt : (k, P) array, optional
         Slope of the axes of members that tilt, and wind-up of the carrier [rad], named by `tilt_names`.
-    tilt_names : tuple of str
     helical : bool
         Whether the slices are those of helical teeth: the path coordinates are those at mid-width.
     """
@@ -336,9 +334,10 @@ def walk_mesh_cycle(
     mirror image, which is solved, turns the other way: its record ends at position zero, so that records
     which do not close hold the same configurations too.
 
+    ContactError where the contact problem cannot be solved or no window size contains the contact.
+
     Parameters
     ----------
-    planetary_set : PlanetarySet or GearPair
     bodies : Bodies
         Flank compliances and material.
     sun_torque : float
@@ -354,12 +353,6 @@ def walk_mesh_cycle(
     periods : int
         Mesh periods in the record; errors that belong to teeth or turn with a member need
         `gears.deviations.common_period` of them.
-    options : CycleOptions, optional
-
-    Raises
-    ------
-    ContactError
-        When the contact problem cannot be solved or no window size contains the contact.
     """
     options = options or CycleOptions()
     position = cycle_positions(positions, periods=periods)

@@ -37,7 +37,6 @@ class FaceWidth:
         Of the bodies.
     slices : int
         Their number.
-    tilting : TiltingMembers, optional
     held : Bodies and WidthWaves, optional
         Other bodies with the same flanks, for whose tangents the contact is taken too.
     helical : bool
@@ -64,7 +63,6 @@ def contact_over_width(
 
     Parameters
     ----------
-    over : FaceWidth
     found, state : Candidates, BatchState
         The plane contact at all positions, or, of helical teeth, in all slices at each of them.
     load : (m,) array
@@ -93,12 +91,15 @@ def contact_over_width(
     motion[sprung] = -pulled / members.stiffness[sprung, None]
     base = turns @ sliced.motions.T[: driver + 1] + members.approach[places[1] == 0] @ motion
     nearest = (apart - np.moveaxis(twisted, -1, 0).swapaxes(1, 2)[..., found.mesh]).min(axis=1)
+    # of the least-squares lines through the slices, from one end of the width to the other
+    place = 2.0 * (np.arange(S) + 0.5) / S - 1.0
+    rise = 2.0 * np.einsum("s,msp->mp", place, twisted - lead[..., None]) / (place @ place)
     values = _of_pairs(found, state, laws, sliced) | {
         "deflection": base + turned.mean(axis=1),
         "sun_arc": sliced.motions[:, driver],
         "force": force,
         "member_motion": motion,
-        "mesh_misalignment": _rise(twisted - lead[..., None]),
+        "mesh_misalignment": rise,
         "lead_offset": apart.reshape(P, -1, len(force), W // len(force)).min(axis=(1, 3)).T,
         "member_tilt": angles,
     }
@@ -214,12 +215,6 @@ def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.
             mean = np.sinc(np.fft.rfftfreq(count, periods / count) * step)
             found[name] = np.fft.irfft(mean * np.fft.rfft(values), n=count)
     return found
-
-
-def _rise(approach: np.ndarray) -> np.ndarray:
-    """Rise over the width of the least-squares lines through values (2N, S, P) in slices."""
-    place = 2.0 * (np.arange(approach.shape[1]) + 0.5) / approach.shape[1] - 1.0
-    return 2.0 * np.einsum("s,msp->mp", place, approach) / (place @ place)
 
 
 def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, slices: int) -> None:

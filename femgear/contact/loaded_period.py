@@ -236,8 +236,11 @@ def _whole_period(
     ahead, parts = N // symmetry, turn.denominator
     step = pow(turn.numerator, -1, parts) if parts > 1 else 0
     shown = record["position"] < (1.0 - 1e-12) / parts * periods
-    tau = record["position"][shown]
-    compliance = record["held_compliance"][..., shown] @ _mean_weights(tau, periods / parts)
+    tau: np.ndarray = record["position"][shown]
+    gap = np.diff(np.append(tau, tau[0] + periods / parts))
+    # the mean of what is linear between the positions
+    weights = (gap + np.roll(gap, 1)) / (2 * (periods / parts))
+    compliance = record["held_compliance"][..., shown] @ weights
     names, mean = ("deflection", "force", "stiffness", "held_stiffness"), np.zeros(compliance.shape[:2])
     values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
@@ -256,9 +259,3 @@ def _whole_period(
         periods=periods,
         **{name: np.concatenate(parts_of, axis=1) for name, parts_of in values.items()},
     )
-
-
-def _mean_weights(position: np.ndarray, period: float) -> np.ndarray:
-    """Weights of the mean of a periodic function that is linear between the positions."""
-    gap = np.diff(np.append(position, position[0] + period))
-    return (gap + np.roll(gap, 1)) / (2 * period)

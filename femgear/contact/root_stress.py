@@ -243,6 +243,8 @@ def root_stress(
     its elastic constants (Michell's theorem; Timoshenko and Goodier, "Theory of Elasticity", 3rd ed.,
     section 43), and a change of state within the fillet would make a jump that no gear has.
 
+    GridError: E-GRID-FREE: the body can move freely.
+
     Parameters
     ----------
     grid : Grid
@@ -252,11 +254,6 @@ def root_stress(
         Stiffness that supports the rim [N/m], as of `fe.elasticity.foundation`; held without it.
     state : str
         ``"plane strain"`` or ``"plane stress"``.
-
-    Raises
-    ------
-    GridError
-        E-GRID-FREE: the body can move freely.
     """
     along = root_functionals(grid, gear, material, state=state)
     matrix = stiffness(grid, material, state=state, thickness=gear.face_width)
@@ -353,7 +350,9 @@ def root_stress_cycle(
     samples = np.arange(len(cycle.position))
     found = {}
     for number, root, acting in roots.of_bodies(s):
-        slots = [_slots(cycle.tooth[gear, mesh], s.senses[number]) for mesh, gear, _ in acting]
+        teeth, step = [cycle.tooth[gear, mesh] for mesh, gear, _ in acting], s.senses[number]
+        # one slot more at either end: the sun's teeth come one after another, the others the other way round
+        slots = [np.concatenate([one[:1] - step, one, one[-1:] + step]) for one in teeth]
         # seen from behind the teeth are counted the other way round
         numbers = np.concatenate(slots) * (-1 if reverse else 1)
         field = body_stress(planetary_set, root, acting, slices, samples, numbers)
@@ -443,12 +442,6 @@ def _root_cycle(planetary_set, kind, root: _RootStress, cycle: MeshCycle, target
     )
 
 
-def _slots(teeth, step: int) -> np.ndarray:
-    """Tooth numbers of the slots of a mesh with one more at either end."""
-    # the sun's teeth come one after another, those of planets and ring the other way round
-    return np.concatenate([teeth[:1] - step, teeth, teeth[-1:] + step])
-
-
 def _body_ranges(planetary_set, number, root: _RootStress, acting, slices: Sequence[LoadedTeeth], closes):
     """Ranges of the roots of the acting flanks of one body."""
     z, m, S = len(root.influence), len(root.arc), len(slices)
@@ -459,7 +452,8 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, slices: Seque
     high, low = np.full((alike, 2 * m, S), -np.inf), np.full((alike, 2 * m, S), np.inf)
     worst = {}
     one = closes and teeth.periods == 1
-    for samples in [_one_turn(teeth)] if one else _by_turn(teeth):
+    by_turn = (np.flatnonzero(teeth.turn == turn) for turn in np.unique(teeth.turn))
+    for samples in [_one_turn(teeth)] if one else by_turn:
         field = body_stress(planetary_set, root, acting, slices, samples, np.arange(z))
         of_tooth = (np.arange(z) - step * teeth.turn[samples[0]]) % alike
         np.maximum.at(high, of_tooth, field.max(axis=-1))
@@ -490,11 +484,6 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, slices: Seque
             worst=worst[target][1:],
             history=_history(field[:, rows][:, point, piece], teeth, start[:2], step) if one else None,
         )
-
-
-def _by_turn(teeth: LoadedTeeth):
-    """Positions of the record, one array a mesh period."""
-    return (np.flatnonzero(teeth.turn == turn) for turn in np.unique(teeth.turn))
 
 
 def _one_turn(teeth: LoadedTeeth) -> np.ndarray:

@@ -125,6 +125,8 @@ def solve_slices(
     Newton's method on the pairs as springs (`femgear.contact.batch.PairLaws`). Without separations spur teeth
     have the plane solution that the laws were made of.
 
+    ContactError: E-CONTACT: the iteration does not end.
+
     Parameters
     ----------
     found : Candidates
@@ -138,11 +140,6 @@ def solve_slices(
         `Candidates.images` of other bodies [m/N], for whose tangents the contact is taken too.
     tilting : TiltingMembers, optional
         Motions that differ from slice to slice; they follow the others.
-
-    Raises
-    ------
-    ContactError
-        E-CONTACT: the iteration does not end.
     """
     parts, load, (P, N, _) = [], np.asarray(load, float), separations.shape
     each = len(found.position) // P
@@ -280,12 +277,8 @@ class _SliceNewton:
         """Compute joint and own tangents, as `SliceState` has them.
 
         ``bodies`` are pairs of compliances between all windows and their images, (I, P, L, W, 3, W, 3) and
-        across the width, (I, P, N, W, N, W) [m/N].
-
-        Returns
-        -------
-        list
-            ``joint`` (H, P, meshes, meshes) of the last bodies, and ``own`` (P, meshes) of each [N/m].
+        across the width, (I, P, N, W, N, W) [m/N]. The list begins with ``joint`` (H, P, meshes, meshes) of
+        the last bodies; ``own`` (P, meshes) of each follow [N/m].
         """
         (P, N, _), meshes = self.shape, np.arange(int(self.laws.mesh[-1]) + 1)
         on, at = _first((self.force > 0.0).reshape(P, self.size))

@@ -64,6 +64,10 @@ class ContactState:
 def solve_contact(H, gap, G, load, *, start=None, max_steps=200) -> ContactState:
     """Contact loads and motions of bodies that touch without pulling or penetrating.
 
+    ContactError: E-SHAPE for wrong shapes or values that are not finite, E-CONTACT-COMPLIANCE for a matrix
+    that is not symmetric positive definite, E-CONTACT-OPEN when no contact can balance the load, E-CONTACT
+    when no method solves the problem.
+
     Parameters
     ----------
     H : (n, n) array
@@ -78,13 +82,6 @@ def solve_contact(H, gap, G, load, *, start=None, max_steps=200) -> ContactState
         Candidates thought to touch, such as those of the neighbouring position; all when not given.
     max_steps : int, optional
         Bound on the steps of each stage, after the last of which the general solver daqp takes over.
-
-    Raises
-    ------
-    ContactError
-        E-SHAPE for wrong shapes or values that are not finite, E-CONTACT-COMPLIANCE for a matrix
-        that is not symmetric positive definite, E-CONTACT-OPEN when no contact can balance the
-        load, E-CONTACT when no method solves the problem.
     """
     problem = _scaled(*_checked(H, gap, G, load))
     n = len(problem.gap)

@@ -180,10 +180,7 @@ def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) ->
     zeta``. The sun turns at the distance ``x`` from the end of its torque, under forces at ``x'``, by
     ``r_b F min(x, x')/(G J)`` (St Venant), here as means over slices.
 
-    Raises
-    ------
-    ContactError
-        E-MECHANISM: free tilts that move no flank.
+    ContactError: E-MECHANISM: free tilts that move no flank.
     """
     if supports == UPRIGHT:
         return None
@@ -221,10 +218,7 @@ def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) ->
 def moving_members(planetary_set: GearSet, supports: Supports, *, both_flanks: bool = False) -> MovingMembers:
     """List the motions that the supports allow, each with its effect on the approach of every mesh.
 
-    Raises
-    ------
-    ContactError
-        E-MECHANISM: members float that the planets cannot hold.
+    ContactError: E-MECHANISM: members float that the planets cannot hold.
     """
     if supports == RIGID:
         sides = 1 + both_flanks

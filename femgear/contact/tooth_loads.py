@@ -142,7 +142,6 @@ def load_spectrum(teeth: LoadedTeeth, mates=PlanetarySet.mates, *, closes: bool 
 
     Parameters
     ----------
-    teeth : LoadedTeeth
     mates : tuple
         Of the set.
     closes : bool

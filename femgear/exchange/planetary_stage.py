@@ -80,15 +80,10 @@ class _Stage:
 def case_tables(model: Model, wanted: str | None = None) -> tuple[dict[str, Any], dict[str, str]]:
     """Read a planetary stage as tables of a case, with remarks by key on what is assumed.
 
-    Parameters
-    ----------
-    wanted : str, optional
-        Id of the stage, needed where there are several.
+    The id of the stage that is ``wanted`` is needed where there are several.
 
-    Raises
-    ------
-    CaseError
-        E-CHOICE: several stages, or not that one. E-REXS: no planetary stage, or one of another form. E-UNIT.
+    CaseError: E-CHOICE: several stages, or not that one. E-REXS: no planetary stage, or one of another form.
+    E-UNIT.
     """
     s, remarks = _stage(model, _chosen(model, wanted)), dict[str, str]()
     title = "".join(c for c in f"{s.stage.name or s.stage} of {Path(model.name).name}" if c.isprintable())

@@ -71,10 +71,8 @@ class Model:
     ----------
     name : str
         Of the file, for messages.
-    version : str
     components : mapping of str to Component
         By id.
-    relations : tuple of Relation
     load_cases : tuple of mapping
         Attributes by component id that a load case of the first load spectrum gives.
     used : set of (str, str)
@@ -152,11 +150,8 @@ class Model:
 def read_model(path: str | os.PathLike) -> Model:
     """Read a REXS file of any form and of versions 1.0 to 2.0.
 
-    Raises
-    ------
-    CaseError
-        E-FILE: unreadable, too long, no XML, JSON or zip, or with entities. E-FILE-ENC: not UTF-8. E-FORMAT:
-        another version. E-REXS: ids missing, given twice or unknown, parts that hold each other.
+    CaseError: E-FILE: unreadable, too long, no XML, JSON or zip, or with entities. E-FILE-ENC: not UTF-8.
+    E-FORMAT: another version. E-REXS: ids missing, given twice or unknown, parts that hold each other.
     """
     name = os.fsdecode(path)
     data = read_bytes(path, MOST_BYTES, "name a REXS file: .rexs, .rexsj or .rexsz")
@@ -189,7 +184,8 @@ def _from_json(text: str, name: str) -> dict:
         model = json.loads(text)["model"]
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise _broken(f"no REXS model in JSON: {type(error).__name__}: {error}", name) from error
-    for component in (*_dicts(model, "components"), *_in_load_cases(model)):
+    cases = [case for one in _dicts(model, "load_spectrum") for case in _dicts(one, "load_cases")]
+    for component in (one for part in (model, *cases) for one in _dicts(part, "components")):
         for one in _dicts(component, "attributes"):
             values = (one[key] for key in one if key not in ("id", "unit"))
             one["value"] = next((value for value in values if isinstance(value, str | int | float)), None)
@@ -239,12 +235,6 @@ def _dicts(table: Any, key: str) -> list[dict]:
     """Tables in a list of a table, empty where there is none."""
     found = table.get(key) if isinstance(table, dict) else None
     return [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
-
-
-def _in_load_cases(data: Any) -> list[dict]:
-    """Components in all load cases."""
-    spectra = _dicts(data, "load_spectrum")
-    return [one for s in spectra for case in _dicts(s, "load_cases") for one in _dicts(case, "components")]
 
 
 def _model(data: dict, name: str) -> Model:

@@ -127,10 +127,7 @@ class FreeSector:
 def symmetric_factor(matrix, *, ordering: str = "MMD_AT_PLUS_A") -> SuperLU:
     """Factor a sparse symmetric stiffness matrix [N/m] (SuperLU in symmetric mode).
 
-    Raises
-    ------
-    GridError
-        When the matrix is singular: the body can move without straining.
+    GridError where the matrix is singular: the body can move without straining.
     """
     options = {"SymmetricMode": True}
     try:
@@ -169,22 +166,9 @@ def mirrored_columns(columns: np.ndarray, image: np.ndarray) -> np.ndarray:
 
 
 def interpolation(grid: Grid, points: np.ndarray):
-    """Quadratic interpolation from the grid nodes to interior points.
+    """Quadratic interpolation from the grid nodes to points (m, 2) inside [m], a sparse (m, n) array.
 
-    Parameters
-    ----------
-    grid : Grid
-    points : (m, 2) array
-        Points inside the grid [m].
-
-    Returns
-    -------
-    scipy.sparse.csr_array, shape (m, n)
-
-    Raises
-    ------
-    GridError
-        When a point lies outside the grid.
+    GridError where a point lies outside the grid.
     """
     nodes, triangles = grid.points, grid.triangles
     corner = nodes[triangles[:, :3]]
@@ -248,6 +232,8 @@ def condense_sector(
     The signs on its diagonal make it quasidefinite, which needs no pivoting (Vanderbei, SIAM J. Optim. 5,
     1995).
 
+    GridError: a load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
+
     Parameters
     ----------
     grid : Grid
@@ -262,11 +248,6 @@ def condense_sector(
         Nodal forces, none on the cuts; the images of these loads are understood.
     observations : (2n, mo) array
         Displacement functionals; the images of these are understood.
-
-    Raises
-    ------
-    GridError
-        A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
     cut = np.concatenate([boundary_nodes(grid, f"cut_{side}") for side in ("right", "left")])
     components = stiffness.shape[0] // grid.n_nodes
@@ -407,10 +388,7 @@ class HalfSector:
     def held(self, forces: np.ndarray) -> np.ndarray:
         """Displacement (inner, k) [m] of the interior under forces (inner, k) [N] on it, the cut held.
 
-        Raises
-        ------
-        GridError
-            E-RESIDUAL: the solution is not finite or misses equilibrium.
+        GridError: E-RESIDUAL: the solution is not finite or misses equilibrium.
         """
         solution = self.factor.solve(forces)
         # column by column: stiffnesses are many powers of ten larger than unit loads
@@ -468,15 +446,10 @@ def static_cut_shapes(schur: SectorSchur, harmonics) -> np.ndarray:
 def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     """Compute the compliance [m/N] of each cyclic harmonic.
 
-    Returns
-    -------
-    (len(harmonics), 2 n_observations, 2 n_loads) complex array
-        The images of all observations behind them, and those of all loads.
+    It is complex (len(harmonics), 2 n_observations, 2 n_loads): with the images of all observations behind
+    them, and those of all loads.
 
-    Raises
-    ------
-    GridError
-        E-GRID-FREE: the body can move freely.
+    GridError: E-GRID-FREE: the body can move freely.
     """
     observed, loaded = schur.compliance.shape[1:]
     result = np.empty((len(harmonics), 2, observed, 2, loaded), complex)
@@ -512,7 +485,7 @@ def tooth_compliance(schur: SectorSchur) -> np.ndarray:
 
 
 def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str | None) -> np.ndarray:
-    """Static displacement of every sector in its own frame.
+    """Static displacement (count, n, 2) of every sector in its own frame [m].
 
     The loads are transformed over the sectors, each harmonic is solved on the sector with its cuts tied, and
     the solutions are transformed back.
@@ -523,11 +496,6 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
         As for `condense_sector`.
     loads : (count, 2n) array
         Nodal forces of each sector in its own frame [N], none on the cuts.
-
-    Returns
-    -------
-    (count, n, 2) array
-        [m].
     """
     count = len(loads)
     forces = np.fft.rfft(loads, axis=0).T

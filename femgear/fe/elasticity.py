@@ -75,19 +75,9 @@ def node_of_dof(grid: Grid, scalar) -> np.ndarray:
 
 
 def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness=1.0):
-    """Assemble the stiffness matrix of a plane body.
+    """Assemble the stiffness matrix of a plane body, sparse and symmetric (2n, 2n) [N/m].
 
-    Parameters
-    ----------
-    state : str or mapping of region to str
-        ``"plane strain"`` or ``"plane stress"``.
-    thickness : float or mapping of region to float
-        [m].
-
-    Returns
-    -------
-    scipy.sparse.csc_array, shape (2n, 2n)
-        [N/m], symmetric.
+    The state is ``"plane strain"`` or ``"plane stress"``, the thickness in m; mappings have them by region.
     """
     scalar, m, size = basis(grid), len(grid.triangles), 2 * grid.n_nodes
     pairs = {name: material.lame(value) for name, value in _by_region(state).items()}
@@ -115,12 +105,8 @@ def wave_stiffness(grid: Grid, material: Material, *, state="plane strain") -> t
 
     Displacements ``(U cos kz, V cos kz, W sin kz)`` of all wave numbers k [1/m] are independent of one
     another; the stiffness of one is ``K0 + k K1 + k^2 K2`` (O. C. Zienkiewicz and R. L. Taylor, "The Finite
-    Element Method", semi-analytical elements).
-
-    Returns
-    -------
-    three scipy.sparse.csc_array, shape (3n, 3n)
-        [N/m^2], [N/m], [N], for degrees of freedom ``3 * node + component``.
+    Element Method", semi-analytical elements). These are three sparse (3n, 3n) matrices [N/m^2], [N/m], [N],
+    for degrees of freedom ``3 * node + component``.
     """
     scalar, m = basis(grid), len(grid.triangles)
     lam, mu = material.lame(state)
@@ -172,17 +158,8 @@ def _per_element(grid: Grid, value) -> np.ndarray:
 def foundation(grid: Grid, boundary: str, radial: float, tangential: float, *, thickness: float):
     """Assemble the stiffness of an elastic (Winkler) foundation along a boundary around the origin.
 
-    Parameters
-    ----------
-    radial, tangential : float
-        Moduli [N/m^3]: traction per displacement towards and around the origin, not negative.
-    thickness : float
-        [m].
-
-    Returns
-    -------
-    scipy.sparse.csc_array, shape (2n, 2n)
-        [N/m].
+    It is a sparse (2n, 2n) matrix [N/m]. ``radial`` and ``tangential`` are moduli [N/m^3]: traction per
+    displacement towards and around the origin, not negative; ``thickness`` is in m.
     """
     edges, shape, x, tangent = edge_quadrature(grid, boundary)
     length = np.hypot(tangent[..., 0], tangent[..., 1])

@@ -56,12 +56,9 @@ class Grid:
 
 
 def ordered_nodes(grid: Grid, name: str) -> np.ndarray:
-    """Nodes along a connected boundary: start, mid, end, mid, ... in the order of its edges.
+    """Nodes (2 k + 1,) along a connected boundary: start, mid, end, mid, ... in the order of its edges.
 
-    Returns
-    -------
-    (2 k + 1,) int array
-        The last node repeats the first one where the boundary is a closed loop.
+    The last node repeats the first one where the boundary is a closed loop.
     """
     edges = boundary_edges(grid, name)
     return np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])
@@ -116,19 +113,9 @@ def mirror(grid: Grid) -> Grid:
 
 
 def copy_nodes(grid: Grid, count: int) -> np.ndarray:
-    """Node numbers of every sector in the whole body that `rotated_copies` makes.
+    """Node numbers (count, n) of every sector in the whole body that `rotated_copies` makes.
 
-    Parameters
-    ----------
-    grid : Grid
-        One sector with the boundaries ``cut_right`` and ``cut_left``.
-    count : int
-        Number of sectors in the circle.
-
-    Returns
-    -------
-    (count, n) int array
-        Entry (k, i) is the node of the body that node i of sector k becomes.
+    Entry (k, i) is the node of the body that node i of sector k becomes.
     """
     left, right = ordered_nodes(grid, "cut_left"), ordered_nodes(grid, "cut_right")[::-1]
     free = np.ones(grid.n_nodes, dtype=bool)
@@ -222,10 +209,7 @@ def write_grid(path: Path, grid: Grid) -> None:
 
     What dead processes left half written under this name is removed.
 
-    Raises
-    ------
-    StorageError
-        The file cannot be written (E-GRID-FILE); none stands there then, not even a part of it.
+    StorageError: the file cannot be written (E-GRID-FILE); none stands there then, not even a part of it.
     """
     import meshio
 
@@ -267,11 +251,8 @@ def write_grid(path: Path, grid: Grid) -> None:
 def read_grid(path: Path) -> Grid:
     """Read a grid [m] that `write_grid` has written as ``.msh``.
 
-    Raises
-    ------
-    StorageError
-        The file is missing, a link or no regular one, truncated, no such grid, or was changed since it was
-        written (E-GRID-FILE).
+    StorageError: the file is missing, a link or no regular one, truncated, no such grid, or was changed since
+    it was written (E-GRID-FILE).
     """
     import meshio
 

@@ -84,18 +84,10 @@ class Plan:
 
 
 def check_outline(outline) -> Plan:
-    """Check an outline and find the parts into which its interfaces split it.
+    """Check an `Outline`, or any object with its fields; find the parts into which its interfaces split it.
 
-    Parameters
-    ----------
-    outline : Outline
-        Or any object with the same fields.
-
-    Raises
-    ------
-    GridError
-        E-GRID: points that are not finite or coincide, curves that cross, no area, a clockwise boundary,
-        interfaces that do not divide the body, or too many segments.
+    GridError: E-GRID: points that are not finite or coincide, curves that cross, no area, a clockwise
+    boundary, interfaces that do not divide the body, or too many segments.
     """
     curves = [(name, _curve(name, points)) for name, points in outline.curves]
     inner = [(name, _curve(name, points)) for name, points in outline.interfaces]
@@ -391,10 +383,7 @@ def _grid_of_plan(plan: Plan, found: Grid, path: Path) -> Grid:
 def mesh_outlines(outlines, *, cache: Path | None = None) -> tuple[Grid, ...]:
     """Mesh several outlines at once, see `mesh_outline`, in as many processes as there are cores.
 
-    Raises
-    ------
-    GridError
-        The first error of any outline, after all processes have ended.
+    GridError: the first error of any outline, after all processes have ended.
     """
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         return tuple(pool.map(lambda outline: mesh_outline(outline, cache=cache), outlines))

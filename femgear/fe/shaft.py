@@ -32,20 +32,16 @@ AXES = ("x", "y", "tilt x", "tilt y", "rotation")
 class RoundSection:
     """Round section and material.
 
+    CaseError: diameters that no shaft has (E-SHAFT).
+
     Parameters
     ----------
     outer_diameter, inner_diameter : float
         [m]
     young : float
         [Pa]
-    poisson : float
     density : float
         [kg/m^3]; zero for a shaft without mass.
-
-    Raises
-    ------
-    CaseError
-        Diameters that no shaft has (E-SHAFT).
     """
 
     outer_diameter: float
@@ -108,13 +104,8 @@ class JointSprings:
 def joint_springs(section: RoundSection, length: float) -> JointSprings:
     """Springs of the joint of two links that have the static stiffness matrix of a Timoshenko shaft.
 
-    ``E I / l`` in bending, ``G J / l`` in torsion, and a joint that shears with ``12 E I / ((1 + Phi) l^3)``.
-
-    Parameters
-    ----------
-    section : RoundSection
-    length : float
-        [m]
+    ``E I / l`` in bending, ``G J / l`` in torsion, and a joint that shears with ``12 E I / ((1 + Phi) l^3)``,
+    at a length l [m].
     """
     bending, phi = section.young * section.second_moment / length, section.shear_ratio(length)
     torsion = 2.0 * section.shear_modulus * section.second_moment / length
@@ -137,10 +128,7 @@ def joint_deflections(length: float) -> np.ndarray:
 def beam_element(section: RoundSection, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass, stiffness and gyroscopic matrix (10, 10) of an element of a length [m] between two stations.
 
-    Returns
-    -------
-    M, K, G
-        ``G`` multiplies the speed of rotation [rad/s], positive about z.
+    The last one multiplies the speed of rotation [rad/s], positive about z.
     """
     l, phi = length, section.shear_ratio(length)
     springs = joint_springs(section, length)
@@ -193,17 +181,9 @@ MAX_EDGES = 5000  # around the half section
 
 @dataclass(frozen=True)
 class ShaftStep:
-    """One part of a stepped shaft.
+    """One part of a stepped shaft, sizes in m; a bore of zero is a solid shaft.
 
-    Parameters
-    ----------
-    length, outer_diameter, inner_diameter : float
-        [m]; a bore of zero is a solid shaft.
-
-    Raises
-    ------
-    GeometryError
-        Numbers that no shaft has (E-SHAFT).
+    GeometryError: numbers that no shaft has (E-SHAFT).
     """
 
     length: float
@@ -244,22 +224,10 @@ def timoshenko_flexibility(steps: Sequence[ShaftStep], material) -> np.ndarray:
 def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1.0) -> np.ndarray:
     """Compute what `timoshenko_flexibility` does, of the solid body with its end face rigidly coupled.
 
-    Parameters
-    ----------
-    steps : sequence of ShaftStep
-        From the held end to the coupled one.
-    refine : float
-        Divides the element size.
+    Steps come from the held end to the coupled one; ``refine`` divides the element size. The (2, 2) array is
+    displacement [m] and tilt [rad] of the centre node per unit force [N] and moment [N m].
 
-    Returns
-    -------
-    (2, 2) array
-        Displacement [m] and tilt [rad] of the centre node per unit force [N] and moment [N m].
-
-    Raises
-    ------
-    GeometryError
-        No parts, neighbours that do not touch, or walls too thin for their length (E-SHAFT).
+    GeometryError: no parts, neighbours that do not touch, or walls too thin for their length (E-SHAFT).
     """
     grid = mesh_outline(_half_section(steps, refine))
     K, size = _stiffness(grid, material), 3 * grid.n_nodes

@@ -422,7 +422,6 @@ class Motion:
         Of the meshes over a ring at rest [m].
     way : (G, 2 H + 1, R) complex array
         What the ring gives way [m].
-    residual : float
     modal : tuple of arrays
         Motions of the modes of gears (n_L, modes) and structure (n_K, modes), without a load [m kg^1/2].
     damped : array, optional

@@ -181,6 +181,8 @@ def classify_line(
     multiples of that to those orders; one of a single planet turns by ``z_ring/z_planet`` against the carrier
     and may stand beside any whole order.
 
+    CaseError: E-RANGE: an order or a tolerance out of range.
+
     Parameters
     ----------
     order : float
@@ -192,11 +194,6 @@ def classify_line(
     tolerance : float
         Distance of orders that are taken as one, below a half: about half the resolution of the spectrum. An
         order without meaning fits one of four turns of a part by chance in ``8 tolerance`` of all cases.
-
-    Raises
-    ------
-    CaseError
-        ``E-RANGE``: an order or a tolerance out of range.
     """
     if not (0 < order < np.inf and 0 < tolerance < 0.5):
         message, limit = "no such line", "a finite order above 0, 0 < tolerance < 0.5"

@@ -149,6 +149,9 @@ def fixed_sensor_lines(field, z_ring: int, carrier_speed, sensor_angle: float) -
     Components that fall on the same order add with their phases; negative orders are folded to
     positive ones (the conjugate). The mesh frequency is that of a fixed ring.
 
+    CaseError: E-SHAPE, E-TEETH, E-SPEED, E-RANGE: data of the wrong shape or not finite, a carrier that
+    stands still, speeds of both directions.
+
     Parameters
     ----------
     field : (..., H + 1, 2 n_max + 1) complex array
@@ -159,12 +162,6 @@ def fixed_sensor_lines(field, z_ring: int, carrier_speed, sensor_angle: float) -
         Speed of the carrier [rad/s], counter-clockwise positive, one a speed; all of one direction.
     sensor_angle : float
         Angle of the sensor on the housing [rad], where the carrier frame is at time zero.
-
-    Raises
-    ------
-    CaseError
-        ``E-SHAPE``, ``E-TEETH``, ``E-SPEED``, ``E-RANGE``: data of the wrong shape or not finite, a carrier
-        that stands still, speeds of both directions.
     """
     heard = component_lines(field, z_ring, carrier_speed, sensor_angle)
     every = np.arange(_top_order(np.asarray(field), z_ring) + 1)
@@ -282,6 +279,8 @@ def heaviside_linear_lines(
     module: the order range is limited. P should be a multiple of the number of planets (or the points break
     the symmetry of the set) and more than twice the largest n that matters.
 
+    CaseError: as `fixed_sensor_lines`, and E-SYMMETRY for less than 3 points, E-HARMONICS for no orders.
+
     Parameters
     ----------
     field, z_ring, carrier_speed, sensor_angle
@@ -290,17 +289,15 @@ def heaviside_linear_lines(
         Number P of equidistant points on the ring.
     max_order : int, optional
         Highest carrier order, by default that of `fixed_sensor_lines`.
-
-    Raises
-    ------
-    CaseError
-        As `fixed_sensor_lines`, and ``E-SYMMETRY`` for less than 3 points, ``E-HARMONICS`` for no orders.
     """
     field, n = _checked_field(field)
     points = checked_count(points, "points", code="E-SYMMETRY", least=3)
     direction, speed = _motion(field, z_ring, carrier_speed)
     top = _top_order(field, z_ring, max_order)
-    sampled = _sampled_components(field, n, points)
+    # components that the points tell apart: sums over one residue of n, phase at point 0
+    sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
+    for residue in np.unique(n % points):
+        sampled[..., residue] = field[..., n % points == residue].sum(axis=-1)
     two_sided = _interpolated_orders(sampled, z_ring, direction, top, _checked_angle(sensor_angle))
     method = f"linear, {points} points"
     lines = _folded(two_sided)
@@ -326,6 +323,8 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
 
     It has the shape (..., H + 1, 2 n_max + 1) and the unit of the harmonics.
 
+    CaseError: E-SHAPE for harmonics that do not fit the planets; E-RANGE for a width out of range.
+
     Parameters
     ----------
     harmonics : (..., N, H + 1) complex array
@@ -336,11 +335,6 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
         Angle over which a planet is heard [rad], 0 < width <= 2 pi; default 2 pi/N.
     n_max : int
         Circumferential orders kept; c_n falls like 1/n^3 (width = 2 pi: nothing beyond n = 1).
-
-    Raises
-    ------
-    CaseError
-        ``E-SHAPE`` for harmonics that do not fit the planets; ``E-RANGE`` for a width out of range.
     """
     harmonics, psi = np.asarray(harmonics, dtype=complex), np.asarray(planet_angles, dtype=float)
     if harmonics.ndim < 2 or psi.shape != harmonics.shape[-2:-1] or not np.all(np.isfinite(harmonics)):
@@ -421,14 +415,6 @@ def _folded(two_sided: np.ndarray) -> np.ndarray:
     lines = two_sided[..., top:] + np.conj(two_sided[..., top::-1])
     lines[..., 0] = np.real(two_sided[..., top])
     return lines
-
-
-def _sampled_components(field: np.ndarray, n: np.ndarray, points: int) -> np.ndarray:
-    """Find the components that P points tell apart: sums over one residue of n modulo P, phase at point 0."""
-    sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
-    for residue in np.unique(n % points):
-        sampled[..., residue] = field[..., n % points == residue].sum(axis=-1)
-    return sampled
 
 
 def _interpolated_orders(

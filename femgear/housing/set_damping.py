@@ -88,6 +88,8 @@ def set_damping(
 ) -> SetDamping:  # fmt: skip
     """Take the damping of a set apart for the orders of the two-way response.
 
+    CaseError: a matrix that does not fit, or a structure without waves (E-SHAPE).
+
     Parameters
     ----------
     matrix : (n_gears + n_waves,) * 2 array
@@ -104,11 +106,6 @@ def set_damping(
         Turns that repeat the set, and the sense of the carrier.
     offset : float
         What all orders lack: their residues count without it, velocities with it.
-
-    Raises
-    ------
-    CaseError
-        A matrix that does not fit, or a structure without waves (E-SHAPE).
     """
     structure_order, to, back = meeting
     matrix, n, (dofs, modes) = np.asarray(matrix, float), structure.wave_order, gears.shape.shape

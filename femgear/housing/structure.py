@@ -35,6 +35,9 @@ _CONDITION = 1e3
 class FixedStructure(ReadOnlyArrays):
     """Linear structure, fixed in space, under loads that run around its ring.
 
+    CaseError: E-SHAPE: arrays that do not fit each other or are not finite. E-MECHANISM: a motion that
+    nothing holds. E-DAMPING. E-SYMMETRY: coefficients that belong to no real displacement.
+
     Parameters
     ----------
     natural_frequency : (m,) array
@@ -57,12 +60,6 @@ class FixedStructure(ReadOnlyArrays):
         The modes in the waves of a ring alone, see `ring_waves`; no waves where there is no such ring.
     wave_order : (n_waves,) int array
         Circumferential order n of every wave ``exp(i n phi)``.
-
-    Raises
-    ------
-    CaseError
-        ``E-SHAPE``: arrays that do not fit each other or are not finite. ``E-MECHANISM``: a motion that
-        nothing holds. ``E-DAMPING``. ``E-SYMMETRY``: coefficients that belong to no real displacement.
     """
 
     natural_frequency: np.ndarray
@@ -149,6 +146,9 @@ _ARRAYS = ("natural_frequency", "damping_ratio", "ring_angle", "ring_shape", "se
 def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> FixedStructure:
     """Make a structure of mode shapes at points of the pitch circle and at sensors.
 
+    CaseError: as `FixedStructure`; E-KEY-MISSING: arrays that are missing; E-COUNT: too few points;
+    E-DUPLICATE: two at one angle; E-RANGE: points that leave gaps, a direction that is no unit vector.
+
     Parameters
     ----------
     arrays : mapping of str to array
@@ -163,13 +163,6 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
         Of the force on the ring along the line of action, a unit vector.
     max_diameter : int
         Largest nodal diameter kept.
-
-    Raises
-    ------
-    CaseError
-        As `FixedStructure`; ``E-KEY-MISSING``: arrays that are missing; ``E-COUNT``: too few points;
-        ``E-DUPLICATE``: two at one angle; ``E-RANGE``: points that leave gaps, a direction that is no unit
-        vector.
     """
     missing = [name for name in _ARRAYS if name not in arrays]
     if missing:
@@ -249,7 +242,6 @@ def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
 
     Parameters
     ----------
-    ring : CyclicModes
     values : (m,) complex array
         What the functional takes from every mode, a column of ``ring.load`` or ``ring.output``.
     max_diameter : int
@@ -300,6 +292,8 @@ def supported_ring(
     at the angle phi_s ``G[n, n'] = exp(i (n - n') phi_s) sin((n - n') b/2)/((n - n') b/2)``, the mean over
     it. Supports couple nodal diameters (X. Wu and R. G. Parker, J. Sound Vib. 295, 2006, 194-213).
 
+    CaseError: as `FixedStructure`: supports that do not hold the ring (E-MECHANISM).
+
     Parameters
     ----------
     ring : CyclicModes
@@ -318,11 +312,6 @@ def supported_ring(
     sensor_directions, sensor_widths : float or (n_sensors,) array
         Directions from outwards, counter-clockwise, and angles over which sensors take the mean [rad]. The
         mean over a support times its stiffness is its force on the ground.
-
-    Raises
-    ------
-    CaseError
-        As `FixedStructure`: supports that do not hold the ring (E-MECHANISM).
     """
     top = max(int(ring.nodal_diameter.max()), max_diameter)
     path, radial, tangential = (

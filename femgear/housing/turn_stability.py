@@ -43,6 +43,8 @@ def turn_stability(
 ) -> Stability:
     """Judge small motions of the set at some speeds of the carrier (n_speeds,) [rad/s], by their multipliers.
 
+    ConvergenceError: steps that were halved so often that they do not get finer (E-CONVERGENCE).
+
     Parameters
     ----------
     gears, excitation, structure, paths, damping
@@ -59,11 +61,6 @@ def turn_stability(
     -------
     Stability
         Its multipliers and the finest steps are those of the turns of the carrier after which all repeats.
-
-    Raises
-    ------
-    ConvergenceError
-        Steps that were halved so often that they do not get finer (E-CONVERGENCE).
     """
     speeds, turns = (
         np.atleast_1d(np.asarray(carrier_speed, float)),

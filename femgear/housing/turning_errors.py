@@ -55,6 +55,8 @@ class _Key:
 class TurningErrors:
     """Set whose meshes repeat after several mesh periods, in a housing that stands still.
 
+    CaseError: mean stiffnesses of the modes that differ between planets of a group (E-SYMMETRY).
+
     Parameters
     ----------
     gears : Modes
@@ -66,11 +68,6 @@ class TurningErrors:
         The structure, orders of a whole seed, and `femgear.housing.two_way.planet_groups`.
     damping : (n, n) array, optional
         Of gears and ring as a whole.
-
-    Raises
-    ------
-    CaseError
-        Mean stiffnesses of the modes that differ between planets of a group (E-SYMMETRY).
     """
 
     def __init__(

@@ -72,7 +72,6 @@ class TwoWayResponse(ReadOnlyArrays):
         truncation.
     harmonics, side_bands : int
         Mesh harmonics H, and side bands on either side of each.
-    paths : MeshPaths
     drag : (n_speeds, n_lines, m) complex array, optional
         Two-sided modal forces on the structure [N kg^-1/2] by the damping of the set beyond that of its
         modes, at the orders of `structure_lines`.
@@ -111,6 +110,9 @@ def solve_two_way(
 ) -> TwoWayResponse:
     """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
 
+    CaseError: data that do not belong together, planets that do not repeat one another (E-SYMMETRY),
+    E-MEMORY.
+
     Parameters
     ----------
     gears : Modes
@@ -119,8 +121,6 @@ def solve_two_way(
     excitation : MeshExcitation
         Of the 2N meshes; their stiffness without what the structure is elastic. Over several mesh periods
         with errors that turn: then the symmetry is that of the places of the planets and of the modes.
-    structure : FixedStructure
-    paths : MeshPaths
     carrier_speed : (n_speeds,) array
         [rad/s], counter-clockwise positive, all of one direction.
     harmonics : (int, int)
@@ -130,11 +130,6 @@ def solve_two_way(
     damping : (n, n) array, optional
         Of gears and ring as a whole, see `femgear.housing.set_damping.set_damping` [N s/m, ...]; without it
         gears and structure have each the modal damping of its own.
-
-    Raises
-    ------
-    CaseError
-        Data that do not belong together, planets that do not repeat one another (E-SYMMETRY), E-MEMORY.
     """
     n_max, angles = structure.max_diameter, np.asarray(paths.planet_angles, float)
     speeds = _checked(gears, excitation, carrier_speed, paths, n_max, harmonics)
@@ -162,7 +157,11 @@ def _one_period(
     deflection, force = np.pad(deflection, wide), np.pad(force, wide)
     source[..., bands] = force - np.einsum("mhk,mk->mh", known.product, deflection)
     count, n_orders = len(place), len(orders.positive)
-    size = _checked_size(count, n_orders)
+    # of one speed [bytes]
+    size = _BYTES * (count * n_orders) ** 2
+    if size > _MOST:
+        message = f"{count} planets with {n_orders} carrier orders need {size / 1e9:.2g} GB"
+        raise CaseError(message, code="E-MEMORY", remedy="take fewer mesh harmonics or nodal diameters")
     # without side bands what the ring gives way takes more than the unknowns
     step = max(int(_MEMORY / (size + _BYTES * (2 * n_max + 1) ** 3)), 1)
     drag, order = None, orders.meeting()[0]
@@ -278,15 +277,6 @@ def _check_residual(residual: np.ndarray, speeds: np.ndarray, limit: float = _RE
         message = f"residual {residual[worst]:.3e} of the two-way equations at {speeds[worst]:.6g} rad/s"
         remedy = "give gears and structure some damping"
         raise ConvergenceError(message, code="E-RESONANCE", limit=f"{limit:g}", remedy=remedy)
-
-
-def _checked_size(planets: int, orders: int) -> float:
-    """Memory of one speed [bytes], refused where it is too much (E-MEMORY)."""
-    size = _BYTES * (planets * orders) ** 2
-    if size > _MOST:
-        message = f"{planets} planets with {orders} carrier orders need {size / 1e9:.2g} GB"
-        raise CaseError(message, code="E-MEMORY", remedy="take fewer mesh harmonics or nodal diameters")
-    return size
 
 
 def _check_repeated(one_sided, orders: CarrierOrders, leaders, group, turn) -> None:

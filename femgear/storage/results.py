@@ -206,6 +206,18 @@ def mode_entries(modes: Any) -> dict[str, tuple]:
     }
 
 
+def shape_entries(shape, mesh_stiffness, mesh_deflection, along: str = "") -> dict[str, tuple]:
+    """List shapes (dof, mode), and stiffness (mesh,) [N/m] and deflection (mesh, mode) of meshes in modes.
+
+    ``along`` is what the descriptions of the meshes end with.
+    """
+    return {
+        "shape": ("dof mode", shape, "kg^-1/2", "mode shape of unit mass; rotations in kg^-1/2 m^-1"),
+        "mesh_stiffness": ("mesh", mesh_stiffness, "N/m", f"mean mesh stiffness{along}"),
+        "mesh_deflection": ("mesh mode", mesh_deflection, "kg^-1/2", f"mesh deflection of the mode{along}"),
+    }
+
+
 def response_entries(result: Any) -> dict[str, tuple]:
     """List what is known of a periodic response, (speed,) each: frequency [Hz], convergence, stability.
 
@@ -258,13 +270,7 @@ class Manifest:
 
 @dataclass(frozen=True)
 class Results:
-    """A results folder; every file is read, and its checksum tested, when it is first asked for.
-
-    Parameters
-    ----------
-    read_case : callable
-        ``(path) -> case``.
-    """
+    """A results folder; every file is read, and its checksum tested, when it is first asked for."""
 
     folder: Path
     manifest: Manifest
@@ -352,6 +358,9 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
     A run that replaces results is given a folder inside, whose files take their place at the end; should it
     fail or be interrupted, the old ones are as they were.
 
+    StorageError: E-OUTPUT: the folder holds other people's files (no manifest), complete results, files of an
+    interrupted run of another case, or files that were changed. E-LOCKED: another run writes there.
+
     Parameters
     ----------
     folder : path-like
@@ -360,12 +369,6 @@ def run_folder(folder: str | os.PathLike, *, case: str | None = None, force: boo
         Text of the case: what an interrupted run of it left stays, for this one to go on from.
     force : bool
         Replace the results of an earlier run, or what an interrupted one of another case left.
-
-    Raises
-    ------
-    StorageError
-        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, files of an
-        interrupted run of another case, or files that were changed. ``E-LOCKED``: another run writes there.
     """
     folder = Path(folder)
     _make(folder)

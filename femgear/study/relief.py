@@ -127,10 +127,7 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
     Its length is along the path of contact, in lengths ``(epsilon - 1) p_b`` of two-pair contact at either
     end: 1 starts at the ends of single-pair contact.
 
-    Raises
-    ------
-    CaseError
-        E-RANGE: a length outside 0.05 to 1.3.
+    CaseError: E-RANGE: a length outside 0.05 to 1.3.
     """
     if not 0.05 <= length <= _LARGEST_LENGTH:
         raise CaseError(

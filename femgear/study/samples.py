@@ -193,10 +193,7 @@ class Tolerances(Section):
 def read_tolerances(path: str | os.PathLike, module: float) -> tuple[Tolerances, str]:
     """Read the tolerances of a TOML file, for gears of a module [m]; the text comes with them.
 
-    Raises
-    ------
-    CaseError
-        Everything that is wrong with the file, as `femgear.trains.reading.read_case`.
+    CaseError: everything that is wrong with the file, as `femgear.trains.reading.read_case`.
     """
     text, name = case_text.read_text(path), os.fsdecode(path)
     try:
@@ -350,11 +347,7 @@ def sample_model(
     number of equidistant ones in one mesh period, more where planets would be met unequally, or the positions
     themselves (P,) [mesh periods].
 
-    Raises
-    ------
-    CaseError
-        E-TORQUE: no torque; E-SUPPORT: bearings with clearance.
-    ContactError
+    CaseError: E-TORQUE: no torque; E-SUPPORT: bearings with clearance. ContactError.
     """
     solved, order = basis.loaded(sun_torque)
     gears, members = solved.gears, moving_members(solved.gears, solved.supports)

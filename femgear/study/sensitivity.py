@@ -130,19 +130,15 @@ def _original_rows(order) -> np.ndarray:
 def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=None) -> LinearContact:
     """Solve the contact of all drive flanks, and what it answers to small separations [m] of any cell.
 
+    CaseError: E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
+    ContactError: as `contact.cycle.walk_mesh_cycle`.
+
     Parameters
     ----------
     sun_torque, periods
         As for `contact.cycle.walk_mesh_cycle`; the torque is not zero.
     only : sequence of int, optional
         Numbers of the positions wanted; all of the record when left out.
-
-    Raises
-    ------
-    CaseError
-        E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
-    ContactError
-        As `contact.cycle.walk_mesh_cycle`.
     """
     solved, order = basis.loaded(sun_torque)
     record = basis.positions * periods
@@ -286,6 +282,8 @@ def sensitivity(
 ) -> Sensitivity:
     """Differentiate transmission errors, mesh forces and shares by one parameter of the deviations.
 
+    CaseError: E-RANGE: a step that is not positive.
+
     Parameters
     ----------
     linear : LinearContact
@@ -295,11 +293,6 @@ def sensitivity(
     step : float
         The separations are differentiated centrally over twice this; exact where they are linear in the
         parameter (amounts, pitch and pin errors).
-
-    Raises
-    ------
-    CaseError
-        E-RANGE: a step that is not positive.
     """
     if not (np.isfinite(step) and step > 0):
         raise CaseError("a derivative needs a step", code="E-RANGE", value=step, limit="over 0")

@@ -216,6 +216,9 @@ def sweep_into(
 ) -> tuple[Sweep, list[str]]:  # fmt: skip
     """Compute a sweep, or what is left of it, and write its table and figure.
 
+    CaseError: E-VARIABLE, E-OBJECTIVE: what cannot be computed; nothing is written then. StorageError:
+    E-OUTPUT: a table or figure that is not that of a sweep, as `own_files`; E-JOURNAL.
+
     Parameters
     ----------
     case, folder : Case, path
@@ -226,13 +229,6 @@ def sweep_into(
         First and last speed of the input, for mesh forces and housing levels.
     cache, progress, runner
         As for `sweep`.
-
-    Raises
-    ------
-    CaseError
-        E-VARIABLE, E-OBJECTIVE: what cannot be computed; nothing is written then.
-    StorageError
-        E-OUTPUT: a table or figure that is not that of a sweep, as `own_files`; E-JOURNAL.
     """
     values = dict(parse_over(text) for text in over)
     if len(values) < len(over):

@@ -310,6 +310,8 @@ class TurningSprings:
     frame seen from the first; the forces are ``k d`` on the first and ``-k d exp(-i phi)`` on the second
     centre, of the energy ``k |d|^2 / 2``.
 
+    CaseError: columns that do not fit (E-SHAPE), stiffnesses out of range (E-RANGE).
+
     Parameters
     ----------
     columns : (g, 4) int array
@@ -318,11 +320,6 @@ class TurningSprings:
         [N/m]
     wave : FourierSeries
         ``cos phi`` and ``sin phi``, from `turning_wave`.
-
-    Raises
-    ------
-    CaseError
-        Columns that do not fit (E-SHAPE), stiffnesses out of range (E-RANGE).
     """
 
     columns: np.ndarray

@@ -25,6 +25,8 @@ _COINCIDE = 1e-9
 def harmonics_of(samples, count: int) -> np.ndarray:
     """Compute harmonics 0 to ``count`` of equidistant samples of one period (end point excluded).
 
+    CaseError with fewer than ``2 count + 1`` samples, which cannot tell the harmonics apart (Nyquist).
+
     Parameters
     ----------
     samples : (..., n_positions) array
@@ -36,11 +38,6 @@ def harmonics_of(samples, count: int) -> np.ndarray:
     -------
     (..., count + 1) complex array
         One-sided amplitudes in that unit: the mean, then twice the discrete Fourier coefficients.
-
-    Raises
-    ------
-    CaseError
-        With fewer than ``2 count + 1`` samples, which cannot tell the harmonics apart (Nyquist).
     """
     samples = np.asarray(samples, dtype=float)
     positions = samples.shape[-1]
@@ -367,10 +364,8 @@ def _mirror_sign(orders: np.ndarray) -> np.ndarray:
 def checked_lines(orders) -> np.ndarray:
     """Check lines, and return their orders (L, n_bases) as whole numbers.
 
-    Raises
-    ------
-    CaseError
-        Orders that are not whole numbers, a first line that is not the mean, a line that is there twice.
+    CaseError: orders that are not whole numbers, a first line that is not the mean, a line that is there
+    twice.
     """
     array = np.array(orders)
     array = array[:, None] if array.ndim == 1 else array

@@ -101,6 +101,9 @@ def gear_set_system(
 ) -> MechanicalSystem:
     """Assemble the matrices of a planetary set; the meshes are columns of ``W`` and not in ``K``.
 
+    CaseError: a torque on a held member, a set that cannot move at all (E-MECHANISM), a carrier speed or
+    planet bearings of bodies that move in space (E-RANGE).
+
     Parameters
     ----------
     data : RigidSet
@@ -121,12 +124,6 @@ def gear_set_system(
     -------
     MechanicalSystem
         ``C`` is zero. Columns of ``W``: the slices of mesh 1, of mesh 2 and so on, back flanks, bearings.
-
-    Raises
-    ------
-    CaseError
-        A torque on a held member, a set that cannot move at all (E-MECHANISM), a carrier speed or planet
-        bearings of bodies that move in space (E-RANGE).
     """
     if len(data.axes) > 3 and carrier_speed:
         refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")
@@ -144,7 +141,10 @@ def gear_set_system(
         columns.append(mesh_directions(data, -flank))
     if planet_bearings:
         columns.append(pin_directions(data)[..., :2].reshape(kept.size, -1))
-    stiffness, load = _linear_stiffness(data, planet_bearings), torque_load(data, torque, kept)
+    stiffness, load = np.diag(support_diagonal(data).ravel()), torque_load(data, torque, kept)
+    if not planet_bearings:
+        pins = pin_directions(data)
+        stiffness += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
     gyroscopic = None
     if carrier_speed:
         # the translational part is the K_Omega of Lin and Parker
@@ -355,12 +355,3 @@ def _gyroscopic(along: np.ndarray) -> np.ndarray:
     first = np.arange(0, len(along), 3)
     G[first, first + 1], G[first + 1, first] = -2.0 * along[first], 2.0 * along[first]
     return G
-
-
-def _linear_stiffness(data: RigidSet, planet_bearings: bool) -> np.ndarray:
-    """Supports, and planet bearings that are not columns, as far as they are finite."""
-    K = np.diag(support_diagonal(data).ravel())
-    if not planet_bearings:
-        pins = pin_directions(data)
-        K += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
-    return K

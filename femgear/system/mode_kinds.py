@@ -324,6 +324,8 @@ def gear_set_kinds(data: RigidSet, shape, *, frequency) -> tuple[str, ...]:
     rest. With four planets these are the modes that Kahraman (1994) calls in-phase, sequentially phased and
     counter-phased; the phasing itself comes from `phasing` of `gear_set_motions`.
 
+    CaseError: shapes of another system (E-SHAPE).
+
     Parameters
     ----------
     shape : (n, m) array
@@ -337,11 +339,6 @@ def gear_set_kinds(data: RigidSet, shape, *, frequency) -> tuple[str, ...]:
         ``rigid``; ``rotational``, ``translational`` or ``planet``, in space ``rotational-axial``,
         ``translational-tilting`` or ``planet``, where at least 99 % of the kinetic energy belongs to that
         class; else ``mixed``, as for most modes of unequally spaced planets.
-
-    Raises
-    ------
-    CaseError
-        Shapes of another system (E-SHAPE).
     """
     kinds = named_kinds(class_shares(data, shape), frequency)
     return tuple(_IN_SPACE.get(kind, kind) for kind in kinds) if len(data.axes) > 3 else kinds

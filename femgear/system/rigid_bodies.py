@@ -80,6 +80,9 @@ class RigidSet(ABC):
     A kind of set says which of the six motions its bodies have (``axes``); ``meshes_optional`` allows meshes
     without stiffness.
 
+    CaseError: numbers that no set can have, planet angles that are none, unordered or span more than a turn
+    (E-RANGE).
+
     Parameters
     ----------
     planet : PlanarBody or HelicalBody
@@ -94,12 +97,6 @@ class RigidSet(ABC):
         Working pressure angles in the transverse section [rad].
     stiffness_sun_planet, stiffness_planet_ring : float or (N,) array
         Mean stiffnesses of the whole meshes along the tooth normals [N/m].
-
-    Raises
-    ------
-    CaseError
-        Numbers that no set can have, planet angles that are none, unordered or span more than a turn
-        (E-RANGE).
     """
 
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
@@ -256,10 +253,7 @@ class HelicalSupport:
     Radial and axial [N/m], against tilts about the two axes in the plane and against rotation about the axis
     of the body [N m/rad]; as `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
 
-    Raises
-    ------
-    CaseError
-        Stiffnesses that are no numbers, negative or NaN (E-RANGE).
+    CaseError: stiffnesses that are no numbers, negative or NaN (E-RANGE).
     """
 
     radial: float | np.ndarray = 0.0
@@ -281,6 +275,8 @@ class HelicalSupport:
 class HelicalBody:
     """A rigid body.
 
+    CaseError: mass or inertias that are not finite and above 0 (E-RANGE).
+
     Parameters
     ----------
     mass : float
@@ -291,11 +287,6 @@ class HelicalBody:
         About the axes in the plane through its centre [kg m^2].
     support : HelicalSupport
         To the housing.
-
-    Raises
-    ------
-    CaseError
-        Mass or inertias that are not finite and above 0 (E-RANGE).
     """
 
     mass: float

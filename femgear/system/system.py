@@ -243,10 +243,7 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
     [N/m], [m] and [N], (n_meshes, count periods + 1) complex each: a record of several periods keeps all its
     lines up to that frequency.
 
-    Raises
-    ------
-    CaseError
-        Numbers that are not finite, arrays that do not fit each other, too few positions.
+    CaseError: numbers that are not finite, arrays that do not fit each other, too few positions.
     """
     if count < 1 or int(count) != count:
         raise CaseError("at least one excitation harmonic is needed", code="E-HARMONICS", value=count)
@@ -356,10 +353,7 @@ def damping_matrix(system: MechanicalSystem, speed: float) -> np.ndarray:
 def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
     """Check base frequencies (n_bases,) [rad/s]: finite and no more than elements and forces name.
 
-    Raises
-    ------
-    CaseError
-        Not a list of finite numbers, or one too long (E-RANGE).
+    CaseError: not a list of finite numbers, or one too long (E-RANGE).
     """
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
@@ -401,17 +395,9 @@ def external_force(problem: NonlinearSystem, theta) -> np.ndarray:
 def tabulated_law(problem: NonlinearSystem, theta) -> Law:
     """Tabulate the forces and tangents of all elements beyond the reference stiffness, at known instants.
 
-    Parameters
-    ----------
-    theta : (n_times, n_bases) array
-        Phases of the instants [rad].
-
-    Returns
-    -------
-    callable
-        ``law(i, x (n_columns,) [m]) -> (f - c x (n_columns,) [N], df/dx - c [N/m])`` with ``c`` the reference
-        of the problem; the second is (n_columns,) where every element acts on single columns, else
-        (n_columns, n_columns).
+    These have the phases theta (n_times, n_bases) [rad]. The callable ``law(i, x (n_columns,) [m])`` gives
+    ``f - c x`` (n_columns,) [N] and ``df/dx - c`` [N/m] with ``c`` the reference of the problem; the second
+    is (n_columns,) where every element acts on single columns, else (n_columns, n_columns).
     """
     theta, reference = np.asarray(theta, float), problem.reference
     every = np.arange(len(reference))

@@ -22,7 +22,7 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
-from femgear.storage.results import coordinates, dataset, mode_entries
+from femgear.storage.results import coordinates, dataset, mode_entries, shape_entries
 from femgear.system.force_laws import GearMeshes, RadialBearings
 from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of, tooth_lines
 from femgear.system.mesh_directions import (
@@ -550,12 +550,9 @@ def modes_dataset(
     variables = mode_entries(modes)
     if phasing:
         variables["phasing"] = ("mode", list(phasing), "1", "phasing of the planets in the mode")
-    variables |= {
-        "nodal_diameter": ("mode", modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
-        "shape": ("dof mode", shape, "kg^-1/2", "mode shape of unit mass; rotations in kg^-1/2 m^-1"),
-        "mesh_stiffness": ("mesh", stiffness, "N/m", f"mean mesh stiffness{along}"),
-        "mesh_deflection": ("mesh mode", deflection, "kg^-1/2", f"mesh deflection of the mode{along}"),
-    }
+    rigid = "nodal diameter: -1, the ring is rigid"
+    variables["nodal_diameter"] = ("mode", modes.nodal_diameter, "1", rigid)
+    variables |= shape_entries(shape, stiffness, deflection, along)
     coords = coordinates(mode=np.arange(len(modes.frequency)), dof=dofs, mesh=gears.mesh_names)
     named = {"title": attrs["title"], "unknowns": len(modes.shape)}
     return dataset(variables, coords=coords, attrs=named | attrs)

@@ -97,6 +97,8 @@ def continue_curve(
 ) -> Curve:
     """Follow the curve through a solution until it leaves the range of the parameter or closes.
 
+    CaseError: scales that are not positive (E-RANGE). ConvergenceError: no solution near the start.
+
     Parameters
     ----------
     evaluate : callable
@@ -115,13 +117,6 @@ def continue_curve(
         +1 starts towards larger parameters, -1 towards smaller ones.
     describe : callable
         The parameter as text with its name and unit, for messages.
-
-    Raises
-    ------
-    CaseError
-        Scales that are not positive (E-RANGE).
-    ConvergenceError
-        No solution near the start.
     """
     curve = _scaled_curve(
         evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, describe=describe

@@ -183,17 +183,14 @@ class CurvePoint:
 def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=None) -> CurvePoint:
     """Find the point of the curve in the plane ``normal . (z - guess) = 0`` by Newton's method.
 
+    LostError: no convergence, or a bordered matrix that is singular.
+
     Parameters
     ----------
     guess, normal : (n + 1,) arrays
         In the scaled unknowns.
     along : (n + 1,) array, optional
         Sense of the tangent, that of ``normal`` when there is none.
-
-    Raises
-    ------
-    LostError
-        No convergence, or a bordered matrix that is singular.
     """
     z, lengths, contraction, factors = guess.copy(), [], 0.0, None
     residuals = []
@@ -252,10 +249,7 @@ def step_effort(
     short that the curve may turn in one, ``sharp`` that any turn is one of a sharp corner, between whose
     sides the chord lies. Above one the next step has to be shorter.
 
-    Raises
-    ------
-    LostError
-        The angle is twice what is aimed at, or the chord leaves the tangents.
+    LostError: the angle is twice what is aimed at, or the chord leaves the tangents.
     """
     angle, contraction = options.angle, options.contraction
     turn = np.arccos(float(np.clip(point.tangent @ new.tangent, -1.0, 1.0)))
@@ -277,10 +271,7 @@ def step_effort(
 def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
     """Check a step from its other end and at its middle, one evaluation each.
 
-    Raises
-    ------
-    LostError
-        The step left the curve, or passed over a piece of it.
+    LostError: the step left the curve, or passed over a piece of it.
     """
     if np.linalg.norm(new.z - point.z) <= 1e2 * curve.options.tolerance * (1.0 + np.linalg.norm(new.z)):
         return
@@ -415,10 +406,7 @@ def branch_point(segment: Segment) -> tuple[float, CurvePoint]:
     For ends of different orientation. Root of ``tau = 1 / (c^T B^-1 b)`` with the singular vectors b, c of
     the bordered matrix B (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, 3.3).
 
-    Raises
-    ------
-    LostError
-        The ends do not lie on one smooth curve.
+    LostError: the ends do not lie on one smooth curve.
     """
     length = segment.length
     left, _, right = np.linalg.svd(segment.first.bordered)

@@ -197,20 +197,16 @@ def output_load(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
 def output_response(modes: Modes, response: Response, rows, *, residual, load) -> np.ndarray:
     """Compute the harmonics of the outputs ``L q`` [m per unit of L] of a periodic response.
 
+    They are complex (n_speeds, n_outputs, H + 1); the response was computed with the modes.
+
     Parameters
     ----------
-    modes, response
-        The response computed with those modes.
     rows : (n_outputs, n_modes) array
         ``L @ modes.shape`` [kg^-1/2].
     residual : (n_outputs, n_meshes) array
         From :func:`residual_output` [m/N].
     load : (n_outputs,) array
         From :func:`output_load` [m].
-
-    Returns
-    -------
-    (n_speeds, n_outputs, H + 1) complex array
     """
     omega = 2.0 * np.pi * modes.frequency
     forcing = response.force - modes.mesh_stiffness[:, None] * response.deflection

@@ -194,10 +194,7 @@ class Reduction:
 
         Motions without stiffness do not answer at frequency zero: their mean position is free.
 
-        Raises
-        ------
-        ConvergenceError
-            At the undamped resonance of a mode.
+        ConvergenceError at the undamped resonance of a mode.
         """
         omega = np.asarray(omega, float)[..., None]
         size = np.abs(self.constant)
@@ -233,6 +230,9 @@ def reduce_problem(problem: NonlinearSystem, *, reference=None) -> Reduction:
     Damping that the real modes make diagonal keeps them; any other damping and gyroscopic terms give complex
     modes of the state form of the real modes (Ewins, Modal Testing, 2nd ed., sections 2.7 and 2.8).
 
+    CaseError: matrices that do not fit, a constant load that no support takes up. ConvergenceError: a rigid
+    motion that strains a column, negative stiffness, a defective state matrix.
+
     Parameters
     ----------
     problem : NonlinearSystem
@@ -241,13 +241,6 @@ def reduce_problem(problem: NonlinearSystem, *, reference=None) -> Reduction:
     reference : (n_columns,) array, optional
         Spring of every column [N/m], any that are not negative; the size of the elements' own reference
         when not given. It moves nothing but the convergence of iterations.
-
-    Raises
-    ------
-    CaseError
-        Matrices that do not fit, a constant load that no support takes up.
-    ConvergenceError
-        A rigid motion that strains a column, negative stiffness, a defective state matrix.
     """
     reference = np.abs(problem.reference) if reference is None else np.asarray(reference, float)
     modes = _modes_with_loads(problem, reference)

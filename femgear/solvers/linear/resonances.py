@@ -87,21 +87,17 @@ class Crossings:
 def modal_forces(modes: Modes, excitation: MeshExcitation, count: int, output=None) -> ModalForces:
     """Compute the modal forces of mesh harmonics 1 to ``count``.
 
+    CaseError: data that do not fit each other (E-SHAPE), too few positions (E-HARMONICS).
+
     Parameters
     ----------
     modes : Modes
         Basis with the mean stiffnesses of the excitation.
-    excitation : MeshExcitation
     count : int
         At most half the positions of the record.
     output : (n_modes, L) complex array, optional
         Amplitudes [kg^-1/2] of L lines that are heard apart, of every mode: components of a field. Without
         them nothing is heard.
-
-    Raises
-    ------
-    CaseError
-        Data that do not fit each other (E-SHAPE), too few positions (E-HARMONICS).
     """
     if len(modes.mesh_stiffness) != len(excitation.stiffness):
         raise CaseError(

@@ -246,6 +246,9 @@ def harmonic_balance(
 ) -> HarmonicBalance:
     """Make the harmonic equations of a problem.
 
+    CaseError: lines that cannot be used, a harmonic force without line, too few samples. ConvergenceError: a
+    rigid motion that strains a column, see `reduced`.
+
     Parameters
     ----------
     harmonics : int, optional
@@ -256,13 +259,6 @@ def harmonic_balance(
         Points of the phase grid along every base; see `sample_counts` for the default.
     reduction : Reduction, optional
         Of the same problem, from `reduce_problem`; made here when not given.
-
-    Raises
-    ------
-    CaseError
-        Lines that cannot be used, a harmonic force without line, too few samples.
-    ConvergenceError
-        A rigid motion that strains a column, see `reduced`.
     """
     if (harmonics is None) == (orders is None):
         words = "give the number of harmonics or the lines"

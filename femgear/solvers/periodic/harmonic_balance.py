@@ -134,12 +134,7 @@ def displacements(
 
 @dataclass(frozen=True)
 class PeriodicResponse:
-    """A periodic solution and short names of what it says about itself.
-
-    Parameters
-    ----------
-    solution : PeriodicSolution
-    """
+    """A periodic solution and short names of what it says about itself."""
 
     solution: PeriodicSolution
 

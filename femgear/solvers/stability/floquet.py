@@ -74,10 +74,8 @@ def stiffness_in_series(change: np.ndarray, flexibility: np.ndarray) -> np.ndarr
 
     ``k (1 + T k)^-1`` (..., n_c, n_c) [N/m].
 
-    Raises
-    ------
-    ConvergenceError
-        Elements so much softer than their reference that the flexibility cannot carry them (E-RESIDUAL).
+    ConvergenceError: elements so much softer than their reference that the flexibility cannot carry them
+    (E-RESIDUAL).
     """
     carried = np.eye(len(flexibility)) + flexibility @ change
     if np.linalg.eigvals(carried).real.min() <= 0.0:
@@ -166,18 +164,7 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
 
     Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
     positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static
-    flexibility.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    modes : int
-        Most modes kept, lowest first; all where there are no more.
-
-    Returns
-    -------
-    Frame
-        Squared frequencies (n,) [1/s^2], damping (n, n) [1/s] and the rest.
+    flexibility. At most so many ``modes`` are kept, lowest first; all where there are no more.
     """
     system, reference = problem.system, np.maximum(problem.reference, 0.0)
     stiffness = system.K + (system.W * reference) @ system.W.T
@@ -229,7 +216,6 @@ def passage(
 
     Parameters
     ----------
-    frame : Frame
     period : (p,) array
         [s]
     tangents : callable
@@ -318,7 +304,9 @@ def _through(frame: Frame, period, start, duration, tangents, states) -> np.ndar
     gyration = frame.rows @ frame.rows.T
     weight = (2.0 - np.sqrt(3.0)) / 12.0 * dt[..., None, None, None] ** 2
     kicks = 0.5 * dt[..., None, None, None] * (kappa - weight * (kappa @ gyration @ kappa))
-    scale = _scales(frame)
+    # modal velocities over it have the size of the motions
+    natural = np.sqrt(np.abs(frame.square))
+    scale = np.where(natural > 1e-6 * natural.max(), natural, natural.max() or 1.0)
     back = (frame.rows / scale).T
     drift = _modal_drift if frame.diagonal else _coupled_drift
     outer, inner = dt * (0.5 - _GAUSS), dt * (2.0 * _GAUSS)
@@ -337,12 +325,6 @@ def _through(frame: Frame, period, start, duration, tangents, states) -> np.ndar
     while len(state) > m:
         state = state[1::2] @ state[::2]
     return drift(frame, scale, outer[:, -1:])(0, state)
-
-
-def _scales(frame: Frame) -> np.ndarray:
-    """Angular frequencies (n,) that bring modal velocities to the size of the motions."""
-    natural = np.sqrt(np.abs(frame.square))
-    return np.where(natural > 1e-6 * natural.max(), natural, natural.max() or 1.0)
 
 
 def _modal_drift(frame: Frame, scale, durations):
@@ -389,9 +371,11 @@ def floquet_verdicts(
     By exact exponentials where the tangents are constant in pieces, otherwise by a splitting, with steps that
     end where contacts open or close.
 
+    CaseError: a tolerance that is not between 0 and 1 (E-RANGE). ConvergenceError: modes left out that are
+    too flexible.
+
     Parameters
     ----------
-    problem : NonlinearSystem
     solutions : sequence of PeriodicSolution
         All with the same lines. With two base frequencies or the frequency zero the verdict is "not
         covered"; "not determined" where the fastest mode would need more than 20000 steps in a period.
@@ -399,13 +383,6 @@ def floquet_verdicts(
         Relative error of the monodromy matrix.
     modes : int
         Largest number of modes followed; the others count as static flexibility.
-
-    Raises
-    ------
-    CaseError
-        A tolerance that is not between 0 and 1 (E-RANGE).
-    ConvergenceError
-        Modes left out that are too flexible.
 
     Notes
     -----

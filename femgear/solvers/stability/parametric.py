@@ -75,6 +75,9 @@ def stability(
 ) -> Stability:
     """Judge the stability of the linear system with mesh stiffnesses k(t) at many speeds, by its multipliers.
 
+    CaseError: frequencies that are not positive, data that cannot be used, too few steps. ConvergenceError: a
+    mesh stiffness so negative that the static flexibility cannot carry it.
+
     Parameters
     ----------
     modes, excitation
@@ -91,13 +94,6 @@ def stability(
         parametric resonances need ``h f = f_i + f_j``, their first order a ratio of one, their second order
         two. Their own multipliers ``exp(-zeta omega T)`` still count. The static flexibility costs up to
         1e-3 of a modulus below one and less of a growing one; a ratio of 5 or 20 follows nearly every mode.
-
-    Raises
-    ------
-    CaseError
-        Frequencies that are not positive, data that cannot be used, too few steps.
-    ConvergenceError
-        A mesh stiffness so negative that the static flexibility cannot carry it.
 
     Notes
     -----

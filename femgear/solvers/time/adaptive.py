@@ -143,6 +143,8 @@ def trajectory(
 ) -> Iterator[tuple]:  # fmt: skip
     """Integrate the motion from a state; yields accepted steps (from, to [s], interpolation of y).
 
+    ConvergenceError: the integrator gives up, contact chatters, too many steps.
+
     Parameters
     ----------
     start : array
@@ -155,11 +157,6 @@ def trajectory(
         Relative local error, and absolute of ``scale``, the size of the motion [m].
     events : bool
         Stop at every contact change and at every break of a step series.
-
-    Raises
-    ------
-    ConvergenceError
-        The integrator gives up, contact chatters, too many steps.
     """
     steps = _stepped(motion.problem, motion.frequency) if events else []
     y, t, taken = np.asarray(start, float), begin, 0
@@ -214,10 +211,7 @@ def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
 def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.ndarray]:
     """Check displacement (n,) [m] and velocity (n,) [m/s] of a start; rest when none is given.
 
-    Raises
-    ------
-    CaseError
-        Not a pair of n finite numbers each (E-START).
+    CaseError: not a pair of n finite numbers each (E-START).
     """
     n = len(problem.system.M)
     if start is None:

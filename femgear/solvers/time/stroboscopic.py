@@ -78,6 +78,8 @@ def stroboscopic_map(
 ) -> StroboscopicMap:
     """Make the map of one period [s] of the motion.
 
+    CaseError: base frequencies that do not repeat then, steps out of range or beyond the stability limit.
+
     Parameters
     ----------
     frequency : float or (n_bases,) array
@@ -88,11 +90,6 @@ def stroboscopic_map(
         Periods of the first base frequency in one of the map: 2 measures period doubling.
     method : str
         A fixed-step method of `solve_transient`.
-
-    Raises
-    ------
-    CaseError
-        Base frequencies that do not repeat then, steps out of range or beyond the stability limit.
     """
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     period = common_period(frequency, periods)

@@ -127,7 +127,11 @@ def solve_transient(
     ConvergenceError
         A mass matrix that is not positive definite, an adaptive integrator that gives up.
     """
-    times = _checked_times(times)
+    times = checked_numbers(times, "times", code="E-RANGE", unit="s").copy()
+    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+        raise CaseError(
+            "instants must be finite and ascend", code="E-RANGE", key="times", limit="two instants or more"
+        )
     if tolerance is not None:
         tolerance = checked_tolerance(tolerance)
     start = checked_start(problem, start)
@@ -159,6 +163,9 @@ def step_scheme(
 ) -> tuple[Scheme, int]:
     """Make the scheme of a fixed-step method, factorised, and count its steps in a span [s].
 
+    CaseError: an unknown method (E-CHOICE), a step that is not positive or beyond the stability limit
+    (E-RANGE).
+
     Parameters
     ----------
     problem, frequency, method, step
@@ -171,11 +178,6 @@ def step_scheme(
         Spectral radius at infinite frequency of "generalised alpha".
     count : int, optional
         Modes of "modal"; all when not given.
-
-    Raises
-    ------
-    CaseError
-        An unknown method (E-CHOICE), a step that is not positive or beyond the stability limit (E-RANGE).
     """
     made = {"newmark": lambda: StepRule(gamma, beta), "generalised alpha": lambda: generalised_alpha(radius)}
     if method not in RULES and method not in made and method != "modal":
@@ -332,12 +334,3 @@ def _adaptive(problem, frequency, times, start, method, tolerance, events) -> Tr
         times, q, v, x, force, method, True, 0.0, tolerance, steps, 0, 1,
         f"{method} with a relative tolerance of {tolerance:.3g}" + drift_note(problem),
     )  # fmt: skip
-
-
-def _checked_times(times) -> np.ndarray:
-    times = checked_numbers(times, "times", code="E-RANGE", unit="s").copy()
-    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
-        raise CaseError(
-            "instants must be finite and ascend", code="E-RANGE", key="times", limit="two instants or more"
-        )
-    return times

@@ -654,19 +654,16 @@ def embed_torques(data: dict, name: str) -> dict[str, str]:
 def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
     """Read ``"times"`` [s] and ``"torques"`` [N m] of a CSV file.
 
+    CaseError: E-FILE, E-FILE-ENC (see `femgear.case.text.read_text`), with the number of the line: unknown
+    columns or units, numbers that are none, not finite or beyond the limits of a case file, decimal commas
+    beside decimal points, times that do not ascend.
+
     Parameters
     ----------
     path : path-like
         Text in two columns, divided by comma, semicolon or tab (with semicolon or tab the numbers may have
         decimal commas); the first line names them with their units, such as ``time [s]`` and
         ``torque [kN m]``, in either order. Empty lines and those that begin with ``#`` are skipped.
-
-    Raises
-    ------
-    CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `femgear.case.text.read_text`), with the number of the line: unknown
-        columns or units, numbers that are none, not finite or beyond the limits of a case file,
-        decimal commas beside decimal points, times that do not ascend.
     """
     found = read_columns(path, _DIMENSIONS, least=1, most=_MOST_POINTS, remedy=_COLUMNS)
     times, torques = (_column(found, key) for key in ("time", "torque"))

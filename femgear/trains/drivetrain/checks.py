@@ -177,12 +177,9 @@ def default_record_every(rate: float, highest: float) -> int:
 def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
     """Refuse what the stages cannot represent, before anything is computed; return the model with bending.
 
-    Raises
-    ------
-    CaseError
-        As `case_model`; bodies that nothing holds across their axis or against tilting (E-MECHANISM);
-        natural frequencies too far apart for double precision (E-STIFFNESS); steps that cannot follow the
-        meshes (E-RATE); records that are too many (E-RANGE).
+    CaseError: as `case_model`; bodies that nothing holds across their axis or against tilting (E-MECHANISM);
+    natural frequencies too far apart for double precision (E-STIFFNESS); steps that cannot follow the meshes
+    (E-RATE); records that are too many (E-RANGE).
     """
     with refusals_located(case):
         train = computed_drivetrain(case)
@@ -208,11 +205,8 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
 def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
     """Refuse what has no spectra: the stage is not asked for by every run.
 
-    Raises
-    ------
-    CaseError
-        Records that are too few, a resolution that they do not have (E-RANGE); a first body that nearly stops
-        or turns back in the part that the spectra take (E-SPECTRUM).
+    CaseError: records that are too few, a resolution that they do not have (E-RANGE); a first body that
+    nearly stops or turns back in the part that the spectra take (E-SPECTRUM).
     """
     with refusals_located(case):
         _check_records(case, record_rate(case, model))

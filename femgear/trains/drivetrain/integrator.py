@@ -210,6 +210,8 @@ def solve_overlaps(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve ``u + flexibility force(u) = free`` for overlaps u and the contacts that touch (n,).
 
+    ConvergenceError: no contacts fit (E-CONTACT).
+
     Parameters
     ----------
     flexibility : (n, n) array
@@ -220,11 +222,6 @@ def solve_overlaps(
         First guess.
     touching, parted : (n,) arrays
         Forces over overlaps of contacts that touch, and of the others [N/m].
-
-    Raises
-    ------
-    ConvergenceError
-        No contacts fit (E-CONTACT).
     """
     rounding = _OVERLAP_ROUNDING * np.abs(free).max(initial=0.0)
     for number in range(_ROUNDS + _SINGLE):

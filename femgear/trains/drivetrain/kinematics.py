@@ -160,10 +160,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
 
     Willis' equation for planetary stages: ``r_s (s - c) + r_p (p - c) = 0``, ``r_r c + r_p (p - c) = 0``.
 
-    Raises
-    ------
-    CaseError
-        The stages do not leave exactly one spin (E-DRIVETRAIN).
+    CaseError: the stages do not leave exactly one spin (E-DRIVETRAIN).
     """
     turn = {name: first + 4 for name, first in place.body.items()}
     rows = []
@@ -207,10 +204,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
 def speed_ratios(train: Drivetrain) -> dict[str, float]:
     """Compute the speed of every body over that of the first one.
 
-    Raises
-    ------
-    CaseError
-        Stages that leave no single spin (E-DRIVETRAIN).
+    CaseError: stages that leave no single spin (E-DRIVETRAIN).
     """
     place = coordinates_of(train)
     spin = rigid_rotation(train, place)

@@ -204,6 +204,8 @@ def draw_motion(
 ) -> float:
     """Draw a motion as PNG: every disc moves as a rigid body, shafts are the lines that they are given.
 
+    FemgearError: see `femgear.report.scene.load_pyvista`. StorageError where the file cannot be written.
+
     Parameters
     ----------
     layout : Layout
@@ -219,13 +221,6 @@ def draw_motion(
     -------
     float
         The factor of the motion.
-
-    Raises
-    ------
-    FemgearError
-        See `femgear.report.scene.load_pyvista`.
-    StorageError
-        When the file cannot be written.
     """
     pv, plotter = load_pyvista(), new_plotter(size, round(_HEIGHT * size))
     plotter.set_background("white")  # type: ignore[call-arg]

@@ -493,10 +493,7 @@ def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duratio
     that the load of parallel paths follows their stiffness. Weight does not count. A stage without load on
     its flanks, and one that its first body (the carrier) drives, stay as they are.
 
-    Raises
-    ------
-    CaseError
-        A torque on no body, stages that leave no single spin (E-DRIVETRAIN).
+    CaseError: a torque on no body, stages that leave no single spin (E-DRIVETRAIN).
     """
     stages = train.stages
     if not torques or all(one.driver is not None for one in stages):

@@ -16,7 +16,7 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.report.tables import Block, describe_modes, pull, tabulate
-from femgear.storage.results import coordinates, dataset, mode_entries
+from femgear.storage.results import coordinates, dataset, mode_entries, shape_entries
 from femgear.trains.drivetrain.case_file import DrivetrainCase, torque_histories
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
 from femgear.trains.drivetrain.model import DrivetrainModel
@@ -74,14 +74,7 @@ class DrivetrainModesResult:
             "kind": ("mode", _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
             "rotation_share": ("mode", rotation, "1", "share of rotations in the kinetic energy"),
             "energy": ("member mode", energy, "1", "share of the member in the kinetic energy"),
-            "shape": (
-                "dof mode",
-                modes.shape,
-                "kg^-1/2",
-                "mode shape of unit mass; rotations in kg^-1/2 m^-1",
-            ),
-            "mesh_stiffness": ("mesh", model.mean_stiffness, "N/m", "mean mesh stiffness"),
-            "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
+            **shape_entries(modes.shape, model.mean_stiffness, modes.mesh_deflection),
             "ratio": ("body", list(model.ratio.values()), "1", "speed over that of the first body"),
             "base_order": ("base", orders, "1", "mesh frequency over the first body's turn"),
             "mesh_frequency": ("base", line, "Hz", "mesh frequency at the speed of the operation"),

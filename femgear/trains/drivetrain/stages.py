@@ -80,10 +80,7 @@ def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
 def solve_transient_run(case: DrivetrainCase, *, progress: Progress = silent) -> TransientResult:
     """Integrate the motion of a case in time; records are low-passed before they are thinned out.
 
-    Raises
-    ------
-    ConvergenceError
-        The motion outgrows the numbers, or all sense (E-DIVERGED).
+    ConvergenceError: the motion outgrows the numbers, or all sense (E-DIVERGED).
     """
     check_drivetrain(case)
     variants = (BENDING, TORSIONAL) if case.simulation.torsional else (BENDING,)

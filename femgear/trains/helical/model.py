@@ -71,6 +71,9 @@ class HelicalSet(RigidSet):
 
     Bodies, radii, angles and mesh stiffnesses as in `RigidSet`; a stiffness of zero leaves a mesh out.
 
+    CaseError: as `RigidSet`, and radii, centre distance and pressure angles that miss each other by more than
+    10 % (E-RANGE). `closure` tells by how much they do.
+
     Parameters
     ----------
     base_helix_angle : float
@@ -88,12 +91,6 @@ class HelicalSet(RigidSet):
         stiffness, at mid-height of the slice.
     face_width : float
         [m], needed for more than one slice.
-
-    Raises
-    ------
-    CaseError
-        As `RigidSet`, and radii, centre distance and pressure angles that miss each other by more than 10 %
-        (E-RANGE). `closure` tells by how much they do.
     """
 
     base_helix_angle: float
@@ -199,6 +196,8 @@ def helical_excitation(
     ``h eps_beta`` is a whole number. Tangent lines add up: the mesh force is the mean of the forces of the
     slices, and the deflection at which their tangents together carry it is the mean weighted by stiffness.
 
+    CaseError: a slice that loses its stiffness (E-STIFFNESS).
+
     Parameters
     ----------
     record : MeshExcitation
@@ -219,11 +218,6 @@ def helical_excitation(
     -------
     MeshExcitation
         (n_meshes S) rows.
-
-    Raises
-    ------
-    CaseError
-        A slice that loses its stiffness (E-STIFFNESS).
     """
     count = len(record.stiffness)
     overlap = np.broadcast_to(np.asarray(overlap_ratio, float), count)
@@ -311,11 +305,7 @@ def section_stiffness(
     The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse. The
     gears are those of the transverse section; ``cache`` is the folder of generated grids.
 
-    Raises
-    ------
-    CaseError
-        Virtual gears that cannot be made (E-GEOMETRY).
-    GridError, ContactError
+    CaseError: virtual gears that cannot be made (E-GEOMETRY). GridError, ContactError.
     """
     virtual = _virtual_gears(case, gears)
     single = replace(gears, planet_angles=gears.planet_angles[:1])
@@ -416,12 +406,9 @@ def _pair_stiffness(case: HelicalCase, gears: PlanetarySet, load: float, cache: 
 def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
     """Refuse what the helical model cannot represent, before anything is computed.
 
-    Raises
-    ------
-    CaseError
-        E-MECHANISM: torque, thrust or tilting moments that nothing takes up. E-RANGE: stiffnesses too far
-        apart, a torque that no teeth carry. E-PERIODS: a static record of several mesh
-        periods. E-GEOMETRY: virtual gears that cannot be made.
+    CaseError: E-MECHANISM: torque, thrust or tilting moments that nothing takes up. E-RANGE: stiffnesses too
+    far apart, a torque that no teeth carry. E-PERIODS: a static record of several mesh periods. E-GEOMETRY:
+    virtual gears that cannot be made.
     """
     _check_supports(case, gears)
     if case.helical.mesh_stiffness is not None:

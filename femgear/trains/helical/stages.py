@@ -102,6 +102,8 @@ def solve_helical_modes(
 ) -> HelicalModesResult:
     """Solve for natural frequencies, modes, their kinds and phasing.
 
+    CaseError: what `check_helical_case` refuses.
+
     Parameters
     ----------
     case : Case
@@ -112,11 +114,6 @@ def solve_helical_modes(
         Of `section_stiffness`, where it is known already.
     cache : path, optional
         Folder of generated grids.
-
-    Raises
-    ------
-    CaseError
-        What `check_helical_case` refuses.
     """
     gears = planetary_set(case)
     check_helical_case(case, gears)
@@ -155,9 +152,7 @@ def solve_helical_dynamics(
 ) -> HelicalDynamicsResult:
     """Solve for the periodic response at all speeds by the spectral method, with a Floquet verdict at each.
 
-    Raises
-    ------
-    ConvergenceError
+    ConvergenceError: as `femgear.solvers.periodic.spectral.solve_spectral`.
     """
     return next(helical_dynamics_parts(case, modes, progress=progress, most=len(case.operation.speeds)))[1]
 

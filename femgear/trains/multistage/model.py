@@ -68,6 +68,9 @@ class Member:
 class PlanetaryStage:
     """One planetary set of the train.
 
+    CaseError: tooth numbers that do not fit the base radii (E-TEETH), a fixed member that nothing holds
+    (E-MECHANISM).
+
     Parameters
     ----------
     teeth : (3,) tuple of int, optional
@@ -78,12 +81,6 @@ class PlanetaryStage:
         Mesh phases as fractions of the mesh period, as in `femgear.gears.planetary.PlanetarySet.mesh_phases`.
     angle : float
         Angle of the stage's x axis against the common frame at time zero [rad]; lateral couplings see it.
-
-    Raises
-    ------
-    CaseError
-        Tooth numbers that do not fit the base radii (E-TEETH), a fixed member that nothing holds
-        (E-MECHANISM).
     """
 
     data: PlanarSet
@@ -116,6 +113,8 @@ class PlanetaryStage:
 class StageCoupling:
     """A shaft between two members.
 
+    CaseError: members of one stage (E-RANGE).
+
     Parameters
     ----------
     first, second : Member
@@ -126,11 +125,6 @@ class StageCoupling:
     lateral : float
         Isotropic stiffness between their centres [N/m]: two equal springs, without tilt. Infinite joins the
         centres, which only a train at rest can have, or members in frames of one speed.
-
-    Raises
-    ------
-    CaseError
-        Members of one stage (E-RANGE).
     """
 
     first: Member
@@ -149,17 +143,14 @@ class StageCoupling:
 class MultistageSet:
     """Planetary stages and their couplings.
 
+    CaseError: one member for input and output, or one that is fixed (E-MECHANISM).
+
     Parameters
     ----------
     couplings : tuple of StageCoupling
         `in_series` makes those of a plain train. None: stages side by side.
     input, output : Member
         Where the external torques act.
-
-    Raises
-    ------
-    CaseError
-        One member for input and output, or one that is fixed (E-MECHANISM).
     """
 
     stages: tuple[PlanetaryStage, ...]
@@ -342,6 +333,9 @@ def _solved(data: MultistageSet, matrix: np.ndarray, right: np.ndarray) -> np.nd
 def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float = 0.0) -> MechanicalSystem:
     """Assemble the matrices of the train; meshes and turning lateral couplings are columns of ``W`` alone.
 
+    CaseError: a torque on a held member, a train that is not determined or locked (E-MECHANISM), centres
+    joined rigidly between frames of different speeds (E-RANGE).
+
     Parameters
     ----------
     torque : float
@@ -357,12 +351,6 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
         ``gyroscopic`` multiplies the speed of the input and is None for zero. Columns: the 2N meshes of
         every stage, then four for every coupling of `turning_couplings`, x and y of its first and of its
         second member. ``C`` is zero.
-
-    Raises
-    ------
-    CaseError
-        A torque on a held member, a train that is not determined or locked (E-MECHANISM), centres joined
-        rigidly between frames of different speeds (E-RANGE).
     """
     check_turns(data)
     turning = turning_couplings(data, speed)
@@ -409,10 +397,7 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
 
     By the number of the coupling (from 0) the speed of the second frame less that of the first [rad/s].
 
-    Raises
-    ------
-    CaseError
-        Centres joined rigidly between such frames (E-RANGE).
+    CaseError: centres joined rigidly between such frames (E-RANGE).
     """
     if not speed or not any(one.lateral for one in data.couplings):
         return {}

@@ -25,6 +25,7 @@ from femgear.storage.results import (
     declared,
     mode_entries,
     response_entries,
+    shape_entries,
 )
 from femgear.system.fourier import fluctuation
 from femgear.trains.pair.model import PairModel
@@ -75,17 +76,8 @@ class PairModesResult:
     def dataset(self) -> xr.Dataset:
         """Collect the contents of modes.nc."""
         modes, play = self.modes, self.excitation.backlash
-        variables = mode_entries(modes) | {
-            "shape": (
-                "dof mode",
-                modes.shape,
-                "kg^-1/2",
-                "mode shape of unit mass; rotations in kg^-1/2 m^-1",
-            ),
-            "mesh_stiffness": ("mesh", modes.mesh_stiffness, "N/m", "mean mesh stiffness"),
-            "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
-            "backlash": ("mesh", play, *_PLAY),
-        }
+        shapes = shape_entries(modes.shape, modes.mesh_stiffness, modes.mesh_deflection)
+        variables = mode_entries(modes) | shapes | {"backlash": ("mesh", play, *_PLAY)}
         axes = {"mode": np.arange(len(modes.frequency)), "dof": modes.dofs, "mesh": self.gears.mesh_names}
         title = "modes of the pair with its mean mesh stiffness"
         return dataset(variables, coordinates(**axes), {"title": title})

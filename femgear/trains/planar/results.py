@@ -250,7 +250,8 @@ def _coordinates(gears: PlanetarySet) -> dict[str, tuple]:
 def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
     """Tabulate bodies and supports of a planar case, with mesh stiffness, play and weight as notes."""
     planar = case.planar
-    notes = [_stiffness(case), _play(case, planetary)]
+    stiffness = stiffness_text(planar.mesh_stiffness) if planar.mesh_stiffness else "of the static solution"
+    notes = [f"mesh stiffness: {stiffness}", _play(case, planetary)]
     if planar.carrier_bearing is not None:
         one = planar.carrier_bearing
         notes.append(
@@ -273,11 +274,6 @@ def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
     planet = case.planet
     bearing = f"{planet.bearing_stiffness:.6g} (bearing)"
     yield "planet", f"{planet.mass:.6g}", f"{planet.inertia:.6g}", bearing, "0"
-
-
-def _stiffness(case: PlanarCase) -> str:
-    given = case.planar.mesh_stiffness
-    return f"mesh stiffness: {'of the static solution' if given is None else stiffness_text(given)}"
 
 
 def _play(case: PlanarCase, planetary: PlanetarySet) -> str:
@@ -337,16 +333,13 @@ def describe_branch(data: xr.Dataset) -> Block:
     ]
     notes += _verdicts(data) if known else ["stability was not computed"]
     notes += _truncation(data) if known else []
-    notes += [_tails(data), *map(str, tail_warnings(data, "planar.branch.harmonics"))]
-    return tabulate("Response to the weight", sorted(named), columns, notes)
-
-
-def _tails(data: xr.Dataset) -> str:
     tail, force = (float(data[name].max()) for name in ("tail", "force_tail"))
-    return (
+    notes.append(
         f"tail, share of the amplitude in the upper half of the lines: up to {tail:.2g} of the deflections, "
         f"{force:.2g} of the mesh forces"
     )
+    notes += map(str, tail_warnings(data, "planar.branch.harmonics"))
+    return tabulate("Response to the weight", sorted(named), columns, notes)
 
 
 def tail_warnings(data: xr.Dataset, key: str) -> tuple[Finding, ...]:

@@ -74,10 +74,7 @@ _ALONG = ("points", "parameter", "tangent", "iterations", "error")
 def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
     """Refuse what the planar model cannot represent, before anything is computed.
 
-    Raises
-    ------
-    CaseError
-        E-BACKLASH: back flanks without play. E-PERIODS: a static record of several mesh periods.
+    CaseError: E-BACKLASH: back flanks without play. E-PERIODS: a static record of several mesh periods.
     """
     planar, play = case.planar, _least_play(case, gears)
     if planar.back_flanks and planar.line_backlash is None and not play > _NO_PLAY:
@@ -103,10 +100,7 @@ def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -
     The smoothed law carries ``k s^2 / 4 b`` through a gap b, and its force at a compression d is wrong by
     ``(s / 2 d)^2`` of it.
 
-    Raises
-    ------
-    CaseError
-        E-RANGE: a smoothing length above half the play or above the mean compression.
+    CaseError: E-RANGE: a smoothing length above half the play or above the mean compression.
     """
     smoothing, limits = case.planar.smoothing, {}
     if (play := _least_play(case, gears)) > _NO_PLAY:
@@ -260,10 +254,7 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
 
     The static solution is needed where the case gives no mesh stiffness.
 
-    Raises
-    ------
-    CaseError
-        What `check_planar_case` refuses, a load that accelerates the set.
+    CaseError: what `check_planar_case` refuses, a load that accelerates the set.
     """
     gears = planetary_set(case)
     check_planar_case(case, gears)
@@ -283,12 +274,8 @@ def solve_branch(
     Mesh stiffnesses are constant: the given ones, or the mean of the static solution's. The branch ends
     before motions that the model of small displacements does not hold for.
 
-    Raises
-    ------
-    CaseError
-        What `check_planar_case` refuses, a range over an undamped natural frequency (E-RESONANCE).
-    ConvergenceError
-        No response at the start, or one that moves too far (E-MOTION).
+    CaseError: what `check_planar_case` refuses, a range over an undamped natural frequency (E-RESONANCE).
+    ConvergenceError: no response at the start, or one that moves too far (E-MOTION).
     """
     gears, wanted = planetary_set(case), needed(case.planar.branch, "planar.branch")
     check_planar_case(case, gears)
@@ -319,12 +306,8 @@ def solve_planar_response(
 ) -> PlanarResponseResult:
     """Solve for responses to weight and mesh frequency together at the speeds of the operation.
 
-    Raises
-    ------
-    CaseError
-        What `check_planar_case` refuses, a line on an undamped natural frequency (E-RESONANCE).
-    ConvergenceError
-        Speeds without a solution, or with one that moves too far (E-MOTION).
+    CaseError: what `check_planar_case` refuses, a line on an undamped natural frequency (E-RESONANCE).
+    ConvergenceError: speeds without a solution, or with one that moves too far (E-MOTION).
     """
     gears = planetary_set(case)
     check_planar_case(case, gears)
