@@ -621,7 +621,7 @@ def test_a_picture_of_shares_says_when_members_move():
 
 def test_names_lie_on_no_curve():
     """The upper curve dips to the lower one below its end, and rises before its end: both names above it."""
-    figure, (ax,) = style.new_figure()
+    _, (ax,) = style.new_figure()
     x = np.linspace(0.0, 1.0, 200)
     curves = {"sun-planet": 13.0 + x, "planet-ring": 14.8 + 2.2 * np.clip((x - 0.93) / 0.07, 0.0, 1.0)}
     for name, values in curves.items():
