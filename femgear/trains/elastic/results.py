@@ -492,7 +492,7 @@ def _at_kinks(results: Results, contact: np.ndarray, nominal: np.ndarray) -> Ite
     if high.any() and "slice_load" not in results.static:
         yield (
             f"contact pressure of {' and '.join(np.array(KINDS)[high])}: a linear relief begins with a kink, "
-            'under which pressure has no limit and depends on the grid; shape = "parabolic" makes none'
+            'under which pressure has no limit and grows with the cells; shape = "parabolic" makes none'
         )
 
 
