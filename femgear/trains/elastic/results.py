@@ -429,16 +429,13 @@ def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return np.array(factors), sharing
 
 
-def _strength(
-    results: Results, known: Mapping[str, np.ndarray], notes: list[str]
-) -> Iterator[tuple[str, str]]:
+def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> Iterator[tuple[str, str]]:
     """Rows of the largest stresses, and of the safeties of ISO 6336 with known load factors (2,)."""
     stress, material = results.stress, results.case.material
-    N, parts = stress.sizes["mesh"] // 2, ("sun", "planet, sun side", "planet, ring side", "ring")
+    parts = ("sun", "planet, sun side", "planet, ring side", "ring")
 
     def largest(name: str) -> np.ndarray:
-        values = stress[name].values
-        return np.array([values[:N].max(axis=0), values[N:].max(axis=0)])
+        return np.array([half.max(axis=0) for half in np.split(stress[name].values, 2)])
 
     root, nominal = largest("root_worst").ravel(), largest("iso_root_stress").ravel()
     contact, worst = largest("contact_pressure").reshape(2, -1).max(axis=1), int(root.argmax())
@@ -515,6 +512,8 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
         for text, name in _HEARD.items():
             if name in limit:
                 columns[text] = lambda i, name=name: f"{float(limit[name][i]):.1f}"
+        if limit.attrs.get("method") == "casing" and "pressure_level" in limit:
+            notes.append(f"microphone: {_ESTIMATE}")
     ends = sorted({f"{1e-3 * float(one):.4g}" for one in limit["excitation_limit"][[0, -1]]}, key=float)
     notes.append(
         f"levels assume: foundation of the ring {ring.foundation_radial:.3g} N/m³ radial, "

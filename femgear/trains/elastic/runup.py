@@ -242,7 +242,6 @@ def describe_runup(data: xr.Dataset) -> Block:
     """Tabulate the strongest resonances of runup.nc by speed."""
     speed = data["speed"].values
     strongest = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN]
-    count = data.sizes["resonance"]
     value = {str(name): one.values for name, one in data.items() if one.dims[:1] == ("resonance",)}
     columns = {
         "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
@@ -254,8 +253,8 @@ def describe_runup(data: xr.Dataset) -> Block:
         "K_v": lambda i: f"{value['resonance_factor'][i].max():.3f}",
     }
     notes = [
-        f"{len(strongest)} of {count} meetings of a mode with a mesh harmonic that excites it: those with "
-        "the highest level by this mode at this harmonic alone; modes together may give less",
+        f"{len(strongest)} of {data.sizes['resonance']} meetings of a mode with a mesh harmonic that excites "
+        "it: those with the highest level by this mode at this harmonic alone; modes together may give less",
         f"excited: modal force of {EXCITED:g} or more of the largest of that harmonic (force share)",
         f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; largest level {loudest(data)}",
     ]

@@ -308,5 +308,9 @@ def test_the_verdict_says_where_the_run_up_ends(case, files):
     )
     points = list(verdict(results_of(case, files | {"runup": runup, "housing": housing})))[1]
     assert f"excitation up to 1.08 to {fast[1]:.4g} kHz" in points.notes[-1]
+    assert "equivalent radiated power" not in " ".join(points.notes)
+    housing.attrs["method"] = "casing"
+    points = list(verdict(results_of(case, files | {"housing": housing})))[1]
+    assert any(note.startswith("microphone: by equivalent radiated power") for note in points.notes)
     runup["level"][20] = 1999.0
     assert loudest(runup) == f"1999 m/s² at {float(runup['speed'][20]):.6g} rpm"
