@@ -28,7 +28,7 @@ STEMS = 4000
 """Lines of a spectrum that can be told apart, at most."""
 _IDENTICAL, ALIKE = 1e-6, 2e-3
 """Shares of the largest value by which curves differ that are identical, or cannot be told apart."""
-_APART = 0.085
+_APART = 0.1
 """Distance of names beside curves, as a share of the height of a panel."""
 _DPI = 120
 PNG_LEVEL = 3  # of zlib: a third faster than 6, files a fifteenth larger
@@ -129,7 +129,7 @@ def name_curves(ax, *, at: float = 0.985) -> None:
         while crossed := [top for bottom, top in spans if bottom - step < free < top]:
             free = max(crossed)
         look = {"ha": "right", "va": "bottom", "fontsize": SMALL, "color": named[i].get_color()}
-        ax.annotate(texts[i], (end, free), xytext=(0, 3), textcoords="offset points", **look)
+        ax.annotate(texts[i], (end, free), xytext=(0, 5), textcoords="offset points", **look)
     ax.set_ylim(low, max(high, free + step))
 
 
