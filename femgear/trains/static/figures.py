@@ -371,7 +371,8 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
     highest = float(stress["pressure_distribution"].max()) * 1e-6
     if highest > top:
         text = f"up to {highest:.0f} MPa where a tip edge carries, cut here: no limit as cells shrink"
-        figure.legends[0].set_title(text, prop={"size": SIZE - 1})
+        figure.legends[0].set_title(text)
+        figure.legends[0].get_title().set_fontsize(SIZE - 1)
     return figure
 
 
