@@ -19,9 +19,11 @@ from femgear.housing.sound import Cylinder, pressure_transfer
 from femgear.report import response, style, waterfall
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, WIDTH, _highest, distinct_lines
+from femgear.report.tables import describe_response
 from femgear.trains.elastic import figures as elastic_figures
 from femgear.trains.elastic.results import describe_housing
 from femgear.trains.static import figures as static_figures
+from femgear.trains.static.results import describe_static
 
 _HERE = Path(__file__).parents[1]
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -617,6 +619,14 @@ def test_a_picture_of_shares_says_when_members_move():
     static["member_motion"] = (("member", "position"), np.zeros((2, static.sizes["position"])))
     title = static_figures.load_sharing(static).axes[0].get_title(loc="left")
     assert title.endswith(", on supports and bearings")
+
+
+def test_tables_explain_what_holds_the_members_and_what_the_solver_says():
+    unequal, equal = (describe_static(synthetic.static(defect=one), 1.5e-3).notes[0] for one in (0.2, 0.0))
+    assert "all centres held, K_gamma = 1.0" in unequal and "K_gamma" not in equal
+    words = " ".join(describe_response(synthetic.dynamics()).notes)
+    assert "radius: by what a step of the fixed point multiplies the error" in words
+    assert "Floquet: largest growth of a disturbance" in words and "dynamic transmission error" in words
 
 
 def test_names_lie_on_no_curve():
