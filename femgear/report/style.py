@@ -28,7 +28,7 @@ STEMS = 4000
 """Lines of a spectrum that can be told apart, at most."""
 _IDENTICAL, ALIKE = 1e-6, 2e-3
 """Shares of the largest value by which curves differ that are identical, or cannot be told apart."""
-_APART = 0.085
+_APART = 0.1
 """Distance of names beside curves, as a share of the height of a panel."""
 _DPI = 120
 PNG_LEVEL = 3  # of zlib: a third faster than 6, files a fifteenth larger
@@ -118,17 +118,18 @@ def name_curves(ax, *, at: float = 0.985) -> None:
     end, step, free = left + at * (right - left), _APART * (high - low), -np.inf
     named = [line for line in ax.get_lines() if not str(line.get_label()).startswith("_")]
     texts = [str(line.get_label()).split(" (")[0] for line in named]
-    inches, height = ax.figure.get_figwidth() * ax.get_position().width, list[float]()
-    for line, text in zip(named, texts):
-        # letters are about 0.6 as wide as high
-        reach = end - 0.6 * SMALL / 72.0 * len(text) / inches * (right - left)
-        height.append(float(np.interp(np.linspace(reach, end, 50), line.get_xdata(), line.get_ydata()).max()))
-    for i in np.argsort(height, kind="stable"):
-        free = max(height[i], free + step)
-        for other in sorted(height):  # no curve crosses a name
-            free = other if free < other < free + step else free
+    inches, spans = ax.figure.get_figwidth() * ax.get_position().width, list[tuple[float, float]]()
+    for line in named:
+        # letters are little more than half as wide as high
+        reach = end - 0.55 * SMALL / 72.0 * max(map(len, texts)) / inches * (right - left)
+        beside = np.interp(np.linspace(reach, right, 50), line.get_xdata(), line.get_ydata())
+        spans.append((float(beside.min()), float(beside.max())))
+    for i in sorted(range(len(spans)), key=lambda i: spans[i][1]):
+        free = max(spans[i][1], free + step)
+        while crossed := [top for bottom, top in spans if bottom - step < free < top]:
+            free = max(crossed)
         look = {"ha": "right", "va": "bottom", "fontsize": SMALL, "color": named[i].get_color()}
-        ax.annotate(texts[i], (end, free), xytext=(0, 3), textcoords="offset points", **look)
+        ax.annotate(texts[i], (end, free), xytext=(0, 5), textcoords="offset points", **look)
     ax.set_ylim(low, max(high, free + step))
 
 
@@ -272,6 +273,12 @@ def excited_to(data, speed_index: int) -> str:
     if "excitation_limit" not in data:
         return ""
     return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
+
+
+def excited_by(data) -> str:
+    """Write how many mesh harmonics excite a housing that stands still, and up to which frequency."""
+    limit, mesh = data["excitation_limit"].values, data["mesh_frequency"].values
+    return f"{limit[0] / mesh[0]:.0f} mesh harmonics, up to {1e-3 * limit.max():.4g} kHz"
 
 
 def digits(value: float) -> str:

@@ -117,8 +117,9 @@ def describe_response(data: xr.Dataset) -> Block:
         # helical cases are excited by a number of harmonics
         del columns["excited up to [kHz]"]
     notes = [
-        "DTE rms: the largest of all meshes, without its mean; iterations, radius: of the fixed point,",
-        "which contracts below 1; Floquet: largest multiplier, stable up to 1 (exactly 1 without damping)",
+        "DTE rms: dynamic transmission error about its mean, largest of all meshes; radius: by what a step "
+        "of the fixed point multiplies the error (iterations: number of steps), which contracts below 1",
+        "Floquet: largest growth of a disturbance in a period, stable up to 1 (exactly 1 without damping)",
         f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
     ]
     if "level_change" in data:

@@ -19,6 +19,7 @@ from femgear.report.style import (
     SIZE,
     SMALL,
     VERMILION,
+    excited_by,
     label,
     legend_below,
     name_curves,
@@ -33,7 +34,7 @@ RUNUP_CAPTIONS = {
     "run_up_levels": (
         "Over the speed: level at the sensor with its strongest resonances (mode × mesh harmonic), "
         "fluctuation of the mesh forces, and dynamic factor K_v, largest over mean mesh force. Dots: "
-        "operating speeds."
+        "operating speeds, with the excitation of the run-up."
     ),
     "campbell": (
         "Natural frequencies and harmonics of the mesh frequency. Circles mark where a harmonic meets a mode "
@@ -201,6 +202,10 @@ def runup_levels(runup: xr.Dataset) -> Figure:
     speed, level = runup["speed"].values, runup["level"].values
     axes[0].plot(speed, level, color=BLACK, linewidth=1.6)
     axes[0].set_ylim(0.0, 1.45 * level.max(initial=0.0) or 1.0)
+    words = "a × b: mode a at mesh harmonic b; dots: operating speeds"
+    if runup.attrs.get("method", "exact") != "exact":
+        words += f"\nall speeds excited by {excited_by(runup)}"
+    label(axes[0], y="level, r.m.s. [m/s²]", title=words)
     _name_resonances(axes[0], runup)
     operating = np.atleast_1d(runup.attrs["operating_speeds"])
     operating = operating[(operating >= speed[0]) & (operating <= speed[-1])]
@@ -216,7 +221,6 @@ def runup_levels(runup: xr.Dataset) -> Figure:
     axes[0].set_xlim(speed[0], speed[-1])
     for ax in axes[1:]:
         name_curves(ax)
-    label(axes[0], y="level, r.m.s. [m/s²]")
     label(axes[1], y="mesh force, r.m.s.\nabout its mean [N]")
     label(axes[2], "speed of the input [rpm]", "dynamic factor K_v [1]")
     return figure

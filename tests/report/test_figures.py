@@ -16,12 +16,14 @@ from femgear.errors import StorageError
 from femgear.housing.orders import OrderSpectrum
 from femgear.housing.sensor import fixed_sensor_signal, stored_lines
 from femgear.housing.sound import Cylinder, pressure_transfer
-from femgear.report import response, style
+from femgear.report import response, style, waterfall
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, WIDTH, _highest, distinct_lines
+from femgear.report.tables import describe_response
 from femgear.trains.elastic import figures as elastic_figures
 from femgear.trains.elastic.results import describe_housing
 from femgear.trains.static import figures as static_figures
+from femgear.trains.static.results import describe_static
 
 _HERE = Path(__file__).parents[1]
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -605,10 +607,55 @@ def test_load_sharing_says_what_the_planets_carry(defect, words):
     ax = static_figures.load_sharing(static).axes[0]
     share = static["load_share"].values
     title = ax.get_title(loc="left")
-    factor = float(title.rpartition("= ")[2])
-    assert factor == pytest.approx(3.0 * share.mean(axis=1).max(), abs=6e-4)
+    factor, _, held = title.rpartition("= ")[2].partition(", ")
+    assert held == ("all centres held" if defect else "")
+    assert float(factor) == pytest.approx(3.0 * share.mean(axis=1).max(), abs=6e-4)
     most = int(share.max(axis=1).argmax()) + 1
     assert title.startswith(words.replace("planet 3", f"planet {most}"))
+
+
+def test_a_picture_of_shares_says_when_members_move():
+    static = synthetic.static(defect=0.2)
+    static["member_motion"] = (("member", "position"), np.zeros((2, static.sizes["position"])))
+    title = static_figures.load_sharing(static).axes[0].get_title(loc="left")
+    assert title.endswith(", on supports and bearings")
+
+
+def test_tables_explain_what_holds_the_members_and_what_the_solver_says():
+    unequal, equal = (describe_static(synthetic.static(defect=one), 1.5e-3).notes[0] for one in (0.2, 0.0))
+    assert "all centres held, K_gamma = 1.0" in unequal and "K_gamma" not in equal
+    words = " ".join(describe_response(synthetic.dynamics()).notes)
+    assert "radius: by what a step of the fixed point multiplies the error" in words
+    assert "Floquet: largest growth of a disturbance" in words and "dynamic transmission error" in words
+
+
+def test_names_lie_on_no_curve():
+    """The upper curve dips to the lower one below its end, and rises before its end: both names above it."""
+    _, (ax,) = style.new_figure()
+    x = np.linspace(0.0, 1.0, 200)
+    curves = {"sun-planet": 13.0 + x, "planet-ring": 14.8 + 2.2 * np.clip((x - 0.93) / 0.07, 0.0, 1.0)}
+    for name, values in curves.items():
+        ax.plot(x, values, label=name)
+    ax.set_xlim(0.0, 1.0)
+    ax.set_ylim(0.0, 20.0)
+    style.name_curves(ax)
+    height, beside = 0.085 * 20.0, x > 0.9
+    for text in ax.texts:
+        bottom = text.xy[1]
+        assert all(
+            (v[beside] <= bottom + 1e-9).all() or (v[beside] > bottom + height).all() for v in curves.values()
+        )
+    assert [text.get_text() for text in sorted(ax.texts, key=lambda one: one.xy[1])] == list(curves)
+
+
+def test_the_run_up_explains_its_numbers_and_its_excitation():
+    runup = synthetic.runup()
+    title = waterfall.runup_levels(runup).axes[0].get_title(loc="left")
+    assert title == "a × b: mode a at mesh harmonic b; dots: operating speeds"
+    runup.attrs["method"] = "supports"
+    runup["excitation_limit"] = 6.0 * runup["mesh_frequency"]
+    title = waterfall.runup_levels(runup).axes[0].get_title(loc="left")
+    assert title.endswith("all speeds excited by 6 mesh harmonics, up to 1.08 kHz")
 
 
 def test_the_whole_signal_lies_between_its_extremes():

@@ -296,11 +296,8 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     ax.set_xlim(centre - reach, centre + reach)
     strongest = int(np.argmax(np.where(own, peak, -1.0)))
     title = f"mesh harmonic {harmonic} (order {harmonic}·{ring_teeth} = {centre})"
-    label(
-        ax,
-        "carrier order [1]",
-        title=f"{title}: largest line {order[strongest]:.6g} with {peak[strongest]:.3g} m/s²",
-    )
+    title += f": largest line {order[strongest]:.6g} with {peak[strongest]:.3g} m/s²"
+    label(ax, "carrier order [1]", title=title)
 
 
 def _labelled(order, amplitude, candidates, *, spacing):

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import Entries
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
 from femgear.gears.iso6336 import contact_safety, root_safety, single_pair_factor
+from femgear.gears.modifications import FlankForm
 from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
 from femgear.housing.sensor import (
@@ -45,6 +46,7 @@ from femgear.housing.sound import (
     whole_turns,
 )
 from femgear.report.response import harmonics_of
+from femgear.report.style import excited_by
 from femgear.report.tables import MANY, Block, chosen, tabulate
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.storage.results import (
@@ -58,7 +60,8 @@ from femgear.storage.results import (
 from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import checked_speeds
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
-from femgear.trains.elastic.runup import KINDS, meeting_columns
+from femgear.trains.elastic.runup import KINDS, loudest, meeting_columns
+from femgear.trains.static.results import UNEQUAL, shares
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,6 +82,10 @@ _FEW, _CUTS = 4, 24
 _FIRST, _STRONGEST = 6, 4
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
+_FORMS = ("sun", "planet_sun_side", "planet_ring_side", "ring")
+_HEARD = {"microphone [dB(A)]": "pressure_level", "sound power [dB(A)]": "power_level"}
+_KINKED = 1.3
+"""Contact pressure of flanks with kinks over sigma_H0 that is told."""
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
 _SUPPORTED = {
@@ -347,31 +354,53 @@ class HousingResult:
 def verdict(results: Results) -> Iterator[Block]:
     """Tabulate what decides, as far as it was computed: errors, factors, stresses, levels, resonances."""
     stages, rows, notes = results.stages, list[tuple[str, str]](), list[str]()
+    if replace(set_deviations(results.case), **dict.fromkeys(_FORMS, FlankForm())).ideal:
+        notes.append("teeth and pins without errors")
     if "static" in stages:
         static = results.static
         error = _by_kind(static["mesh"].values, np.ptp(static["ste"].values, axis=1) * 1e6)
         rows.append(("transmission error, peak to peak", _kinds("{:.3f} um", error)))
-    factors, sharing = np.ones((1, 2)), np.ones(2)
+    factors, known = np.ones((1, 2)), dict[str, np.ndarray]()
     if "dynamics" in stages:
         factors, sharing = _load_factors(results.dynamics)
         rows.append(("planet load factor K_gamma", _kinds("{:.3f}", sharing)))
+        rows += _unequal(results, sharing, notes)
         rows.append(("largest dynamic factor K_v", _kinds("{:.3f}", factors.max(axis=0))))
+        known = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
     if "stress" in stages:
-        width, static = np.ones(2), results.static
+        static = results.static
         if "face_load_factor" in static:
-            width = _by_kind(static["mesh"].values, static["face_load_factor"].values)
-            rows.append(("face load factor K_Hβ", _kinds("{:.3f}", width)))
-        rows += _strength(results, sharing * width * factors.max(axis=0), notes)
+            known["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+            rows.append(("face load factor K_Hβ", _kinds("{:.3f}", known["K_Hβ"])))
+        rows += _strength(results, known, notes)
     if "runup" in stages:
-        speed, level = results.runup["speed"].values, results.runup["level"].values
-        worst = int(level.argmax())
-        rows.append(("largest level of the run-up", f"{level[worst]:.4g} m/s² at {speed[worst]:.6g} rpm"))
+        rows.append(("largest level of the run-up", loudest(results.runup)))
+        if results.runup.attrs.get("method", "exact") != "exact" and "housing" in stages:
+            at_speeds = results.housing.assign(mesh_frequency=results.dynamics["mesh_frequency"])
+            notes.append(f"run-up: {excited_by(results.runup)}; operating speeds: {excited_by(at_speeds)}")
     if rows:
         yield Block("Verdict", rows=tuple(rows), notes=tuple(notes))
     if "dynamics" in stages:
         yield _operating_points(results, factors)
     if "runup" in stages:
         yield _near_resonances(results.runup)
+
+
+def _unequal(results: Results, sharing: np.ndarray, notes: list[str]) -> Iterator[tuple[str, str]]:
+    """Row of the largest share at one instant, on supports, if K_gamma (2,) hides it; what static shows."""
+    most = sharing
+    if "modes" in results.stages and "supported_force" in results.modes:
+        force = results.modes["supported_force"].values
+        most = np.array([(one / one.mean(axis=0)).max() for one in np.split(force, 2)])
+    if (most > UNEQUAL * sharing).any():
+        yield "the same at one instant, at rest", _kinds("{:.3f}", most)
+        notes.append("at one instant: largest share of a planet over the equal one; K_v contains it")
+    shown, mean, held = shares(results.static)
+    if not 1.0 / UNEQUAL < shown / most.max() < UNEQUAL:
+        notes.append(
+            "K_gamma, K_v: on supports and bearings; static stresses and load shares (static.members): "
+            f"{held}, K_gamma = {mean:.3f}, at one instant {shown:.3f}"
+        )
 
 
 def _by_kind(names, values: np.ndarray) -> np.ndarray:
@@ -400,46 +429,67 @@ def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return np.array(factors), sharing
 
 
-def _strength(results: Results, factors: np.ndarray, notes: list[str]) -> Iterator[tuple[str, str]]:
-    """Rows of the largest stresses, and of the safeties of ISO 6336 with load factors (2,) of either mesh."""
+def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> Iterator[tuple[str, str]]:
+    """Rows of the largest stresses, and of the safeties of ISO 6336 with known load factors (2,)."""
     stress, material = results.stress, results.case.material
-    N, parts = stress.sizes["mesh"] // 2, ("sun", "planet, sun side", "planet, ring side", "ring")
+    parts = ("sun", "planet, sun side", "planet, ring side", "ring")
 
     def largest(name: str) -> np.ndarray:
-        values = stress[name].values
-        return np.array([values[:N].max(axis=0), values[N:].max(axis=0)])
+        return np.array([half.max(axis=0) for half in np.split(stress[name].values, 2)])
 
     root, nominal = largest("root_worst").ravel(), largest("iso_root_stress").ravel()
     contact, worst = largest("contact_pressure").reshape(2, -1).max(axis=1), int(root.argmax())
+    nominals, factors = largest("iso_contact_stress"), np.prod([np.ones(2), *known.values()], axis=0)
     yield "largest root stress, static", f"{root[worst] * 1e-6:.1f} MPa, {parts[worst]}"
     yield "largest contact pressure, static", _kinds("{:.1f} MPa", contact * 1e-6)
+    notes += _at_kinks(results, contact, nominals)
     if results.case.helix_angle is not None:
         notes.append("no safeties of helical teeth: nominal stresses of ISO 6336 are those of spur teeth")
         return
     limits = material.root_stress_limit, material.contact_stress_limit
+    over = " ".join(known)
     if limits[0] is not None:
         safe = [
             root_safety(limits[0], one, factors[i // 2], reversed_bending=i in (1, 2))
             for i, one in enumerate(nominal)
         ]
         yield "safety S_F, ISO 6336-3", ", ".join(f"{part} {one:.2f}" for part, one in zip(parts, safe))
-    if limits[1] is not None:
-        nominals = largest("iso_contact_stress")
-        gears = planetary_set(results.case)
-        pairs = (
-            (gears.sun, gears.planet, gears.working_pressure_angle_sun_planet, gears.path_sun_planet),
-            (gears.planet, gears.ring, gears.working_pressure_angle_planet_ring, gears.path_planet_ring),
+        notes.append(
+            f"S_F = 2 sigma_Flim Y_M/({f'sigma_F0 {over}'.rstrip()}): sigma_Flim = {1e-6 * limits[0]:g} MPa "
+            "of ISO 6336-5 (Y_ST = 2), not the permissible sigma_FP; Y_M = 0.7 for planets (bent both ways)"
         )
-        single = [single_pair_factor(*two, working_angle=angle, path=path) for *two, angle, path in pairs]
+    if limits[1] is not None:
+        single = [
+            single_pair_factor(*pair.gears, working_angle=pair.working_pressure_angle, path=pair.path)
+            for pair in planetary_set(results.case).kinds
+        ]
         safe = [contact_safety(limits[1], *one) for one in zip(nominals * single, factors)]
         yield "safety S_H, ISO 6336-2", _kinds("{:.2f}", safe)
+        notes.append(
+            f"S_H = sigma_Hlim/(Z sigma_H0{f' sqrt({over})' * bool(over)}): sigma_Hlim = "
+            f"{1e-6 * limits[1]:g} MPa of ISO 6336-5, not the permissible sigma_HP; Z: larger of Z_B, Z_D"
+        )
     if None in limits:
         notes.append("material.root_stress_limit and contact_stress_limit would give safeties")
     if limits != (None, None):
-        notes.append(
-            "S_F and S_H: nominal stresses with K_gamma and K_v alone, long life, planets bent both ways "
-            "(Y_M = 0.7), single pairs in contact (Z_B, Z_D), of sets in slices K_Hβ (for S_F too, on the "
-            "safe side), every other factor 1"
+        missing = "" if "K_v" in known else "; K_gamma and K_v were not computed"
+        wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "K_Hβ" in known else ""
+        notes.append(f"long life, every other factor of ISO 6336-2 and -3 is 1{missing}{wide}")
+
+
+def _at_kinks(results: Results, contact: np.ndarray, nominal: np.ndarray) -> Iterator[str]:
+    """Say why pressures (2,) are far above sigma_H0 (2,) at the kinks where linear reliefs begin.
+
+    Under a kink pressure has no limit (K. L. Johnson, Contact Mechanics, 1985, section 5.2, blunt wedges).
+    """
+    given, back = set_deviations(results.case), driving_torque(results.case) < 0
+    laws = ([one for form in given.mesh_forms(k, back) for one in form.profile] for k in range(len(KINDS)))
+    kinked = [any(getattr(one, "power", 2.0) <= 1.0 for one in found) for found in laws]
+    high = kinked & (contact > _KINKED * nominal * np.sqrt(shares(results.static)[0]))
+    if high.any() and "slice_load" not in results.static:
+        yield (
+            f"contact pressure of {' and '.join(np.array(KINDS)[high])}: a linear relief begins with a kink, "
+            'under which pressure has no limit and grows with the cells; shape = "parabolic" makes none'
         )
 
 
@@ -452,17 +502,23 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
         **{f"K_v {kind}": lambda i, k=k: f"{factors[shown.index(i), k]:.3f}" for k, kind in enumerate(KINDS)},
         "level [m/s²]": lambda i: f"{float(results.housing['level'][i]):.4g}" if housing else "-",
     }
-    ring, end, notes = case.ring, "", list[str]()
+    ring, limit, notes = case.ring, dynamics, list[str]()
     if housing and "one_way_difference" in results.housing:
         apart = results.housing["one_way_difference"].values
         columns["level [m/s²]"] = lambda i: f"{float(results.housing['level'][i]):.4g} ({apart[i]:+.1f} dB)"
         notes.append(f"level: in brackets how far from {_ONE_WAY} (one way)")
-    if "excitation_limit" in dynamics:
-        end = f"excitation up to {1e-3 * float(dynamics['excitation_limit'].min()):.4g} kHz; "
+    if housing:
+        limit = results.housing
+        for text, name in _HEARD.items():
+            if name in limit:
+                columns[text] = lambda i, name=name: f"{float(limit[name][i]):.1f}"
+        if limit.attrs.get("method") == "casing" and "pressure_level" in limit:
+            notes.append(f"microphone: {_ESTIMATE}")
+    ends = sorted({f"{1e-3 * float(one):.4g}" for one in limit["excitation_limit"][[0, -1]]}, key=float)
     notes.append(
         f"levels assume: foundation of the ring {ring.foundation_radial:.3g} N/m³ radial, "
         f"{ring.foundation_tangential:.3g} N/m³ tangential; damping ratio {case.dynamics.damping_ratio:g} of "
-        f"all modes; {end}small motion about the static state"
+        f"all modes; excitation up to {' to '.join(ends)} kHz; small motion about the static state"
     )
     return tabulate("At the operating speeds", shown, columns, notes)
 

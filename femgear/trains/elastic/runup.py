@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from femgear.case.quantities import RPM
 from femgear.errors import Finding
 from femgear.housing.orders import order_level
 from femgear.housing.sound import REFERENCE_ACCELERATION
+from femgear.report.style import excited_by
 from femgear.report.tables import Block, tabulate
 from femgear.solvers.linear.resonances import EXCITED
 from femgear.storage.results import as_written, complex_entries, coordinates, dataset, declared
@@ -36,7 +38,6 @@ _SILENT = 1e-6
 """Lines below this share of the largest one of all speeds are left out."""
 _SHOWN = 12
 """Rows of the table of resonances."""
-_STANDING_STILL = ("levels and K_v in the housing that stands still; modes, and alone, on the foundation",)
 
 
 @dataclass(frozen=True)
@@ -183,21 +184,14 @@ class RunupResult:
     unresolved: int
     method: str = "exact"
 
-    def at(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate values (s, ...) to the speeds of the resonances, (c, ...)."""
-        speed = self.resonances["resonance_speed"] * RPM
-        after = np.clip(np.searchsorted(self.input_speed, speed), 1, len(self.input_speed) - 1)
-        low, high = self.input_speed[after - 1], self.input_speed[after]
-        part = ((speed - low) / (high - low)).reshape(-1, *[1] * (values.ndim - 1))
-        return (1.0 - part) * values[after - 1] + part * values[after]
-
     def dataset(self) -> xr.Dataset:
         """Collect the contents of runup.nc."""
         heard, kinds = self.heard, "speed mesh_kind"
         words = "acceleration at the sensor, single-sided amplitude"
+        at = partial(np.interp, self.resonances["resonance_speed"] * RPM, self.input_speed)
         there = {
-            "resonance_level": self.at(heard.level),
-            "resonance_factor": self.at(heard.dynamic_factor),
+            "resonance_level": at(heard.level),
+            "resonance_factor": np.stack([at(one) for one in heard.dynamic_factor.T], axis=1),
         }
         variables = {
             "mesh_frequency": ("speed", self.mesh_frequency, "Hz", "mesh frequency"),
@@ -213,21 +207,17 @@ class RunupResult:
         }
         return dataset(
             variables,
-            coords=coordinates(speed=self.input_speed / RPM)
-            | {
+            coords=coordinates(speed=self.input_speed / RPM) | {
                 "mesh_kind": ("mesh_kind", list(KINDS), "1", "kind of mesh"),
                 "order": ("order", heard.order, "1", "carrier order"),
             },
             attrs={
                 "title": "run-up: sensor, mesh forces and resonances over the speed",
-                "sensor_angle": self.sensor_angle,
-                "method": self.method,
-                "ring_teeth": self.ring_teeth,
-                "reference_acceleration": REFERENCE_ACCELERATION,
+                "sensor_angle": self.sensor_angle, "method": self.method, "ring_teeth": self.ring_teeth,
+                "reference_acceleration": REFERENCE_ACCELERATION, "unresolved_resonances": self.unresolved,
                 "operating_speeds": as_written(self.operating_speeds / RPM),
-                "unresolved_resonances": self.unresolved,
             },
-        )
+        )  # fmt: skip
 
 
 def meeting_columns(value: Mapping[str, np.ndarray]) -> dict[str, Callable[[int], str]]:
@@ -240,11 +230,18 @@ def meeting_columns(value: Mapping[str, np.ndarray]) -> dict[str, Callable[[int]
     }
 
 
+def loudest(data: xr.Dataset) -> str:
+    """Write the largest level of runup.nc, its speed, and whether the level may rise beyond that."""
+    speed, level = data["speed"].values, data["level"].values
+    worst = int(level.argmax())
+    end = ", the end of its range" if worst in (0, len(speed) - 1) else ""
+    return f"{level[worst]:.4g} m/s² at {speed[worst]:.6g} rpm{end}"
+
+
 def describe_runup(data: xr.Dataset) -> Block:
     """Tabulate the strongest resonances of runup.nc by speed."""
-    speed, level = data["speed"].values, data["level"].values
+    speed = data["speed"].values
     strongest = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN]
-    worst, count = int(level.argmax()), data.sizes["resonance"]
     value = {str(name): one.values for name, one in data.items() if one.dims[:1] == ("resonance",)}
     columns = {
         "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
@@ -255,14 +252,17 @@ def describe_runup(data: xr.Dataset) -> Block:
         "level [m/s²]": lambda i: f"{value['resonance_level'][i]:.4g}",
         "K_v": lambda i: f"{value['resonance_factor'][i].max():.3f}",
     }
-    notes = (
-        f"{len(strongest)} of {count} meetings of a mode with a mesh harmonic that excites it: those with "
-        "the highest level by this mode at this harmonic alone; modes together may give less",
+    notes = [
+        f"{len(strongest)} of {data.sizes['resonance']} meetings of a mode with a mesh harmonic that excites "
+        "it: those with the highest level by this mode at this harmonic alone; modes together may give less",
         f"excited: modal force of {EXCITED:g} or more of the largest of that harmonic (force share)",
-        f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; largest level "
-        f"{level[worst]:.4g} m/s² at {speed[worst]:.6g} rpm",
-        *_STANDING_STILL[data.attrs.get("method", "exact") == "exact" :],
-    )
+        f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; largest level {loudest(data)}",
+    ]
+    if data.attrs.get("method", "exact") != "exact":
+        notes.append(
+            f"levels and K_v in the housing that stands still, excited by {excited_by(data)} (at operating "
+            "speeds up to what the table Housing says); modes, and alone, on the foundation"
+        )
     return tabulate("Run-up", sorted(strongest), columns, notes)
 
 

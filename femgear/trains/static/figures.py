@@ -48,7 +48,7 @@ from femgear.report.style import (
 )
 from femgear.storage.files import write_text
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.results import SIDES, StaticResult
+from femgear.trains.static.results import SIDES, UNEQUAL, StaticResult, shares
 from femgear.trains.static.stages import over_width, static_supports
 
 if TYPE_CHECKING:
@@ -94,12 +94,8 @@ def _one_error(position: np.ndarray, error: np.ndarray, title: str) -> Figure:
     figure, (ax,) = new_figure(height=3.6)
     ax.plot(position, error, **line_style(0))
     ax.set_xlim(0, position[-1])
-    label(
-        ax,
-        position_words(position),
-        "transmission error [µm]",
-        f"{title}: peak to peak {np.ptp(error):.3g} µm",
-    )
+    title += f": peak to peak {np.ptp(error):.3g} µm"
+    label(ax, position_words(position), "transmission error [µm]", title)
     return figure
 
 
@@ -141,7 +137,7 @@ def load_sharing(static: xr.Dataset) -> Figure:
     """
     position, share = periodic(static["position"], static["load_share"].values * 100)
     equal, names = 100.0 / len(share), _of_planets(static, share)
-    factor = float(static["load_share"].mean("position").max()) * len(share)
+    largest, factor, held = shares(static)
     figure, (ax,) = new_figure(height=2.4 if len(names) == 1 else 3.6)
     for i, (text, row) in enumerate(names):
         ax.plot(position, share[row], label=text, linewidth=2.0, **line_style(i))
@@ -156,6 +152,7 @@ def load_sharing(static: xr.Dataset) -> Figure:
         most = f"planet {static['planet'].values[highest.argmax()]}"
         most = "every planet" if np.ptp(highest) < ALIKE * highest.max() else most
         title = f"{most} carries up to {share.max():.4g} % at a position; mean shares K_γ = {factor:.3f}"
+        title += f", {held}" if largest > UNEQUAL else ""
     label(ax, position_words(position), "share of the torque [%]", title)
     if len(names) > 1:
         legend_below(figure, columns=4)
@@ -360,14 +357,9 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
         largest = float(row["contact_pressure"].max()) * 1e-6
         label(upper, title=f"{row['mesh'].item()}\n{largest:.4g} MPa away from flank ends")
         image = lower.pcolormesh(
-            np.broadcast_to(path, place.shape),
-            place,
-            np.ma.masked_less_equal(pressure, 0.0),
-            shading="nearest",
-            cmap="viridis",
-            vmin=0.0,
-            vmax=1.2 * top,
-        )
+            np.broadcast_to(path, place.shape), place, np.ma.masked_less_equal(pressure, 0.0),
+            shading="nearest", cmap="viridis", vmin=0.0, vmax=1.2 * top,
+        )  # fmt: skip
         lower.set_xlim(upper.get_xlim())
         reach = 1.1 * np.abs(place[pressure > 0.0]).max(initial=0.0)
         lower.set_ylim(-reach or -1.0, reach or 1.0)
@@ -379,9 +371,8 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
     highest = float(stress["pressure_distribution"].max()) * 1e-6
     if highest > top:
         text = f"up to {highest:.0f} MPa where a tip edge carries, cut here: no limit as cells shrink"
-        from matplotlib.font_manager import FontProperties
-
-        figure.legends[0].set_title(text, prop=FontProperties(size=SIZE - 1))
+        figure.legends[0].set_title(text)
+        figure.legends[0].get_title().set_fontsize(SIZE - 1)
     return figure
 
 
@@ -726,7 +717,7 @@ _STATIC = Figures(
         ),
         "load_sharing": (
             "Share of every planet in the torque of the sun, and the planet load factor K_γ: the largest "
-            "mean share over the equal one."
+            "mean share over the equal one. Members are held, or on their supports, as static.members says."
         ),
         "tooth_loads": "Load of one tooth pair from its first to its last contact.",
         "face_load": (

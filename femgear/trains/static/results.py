@@ -156,6 +156,8 @@ _HARMONICS, _ROWS = 6, 8
 """Harmonics whose phasing is listed, and neighbouring sets."""
 _DISTANCE, _TOLERANCE = 3, 0.02
 """How far teeth and ratio of neighbouring sets may lie away."""
+UNEQUAL = 1.03
+"""Share over the equal one with which planets are no longer taken as alike."""
 SIDES = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
 """Names of the flanks in both kinds of mesh of a planetary set; those of a pair are its gears."""
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
@@ -216,10 +218,10 @@ class StaticResult:
             },
             attrs={
                 "title": "static transmission error, load sharing and mesh stiffness",
-                **{f"contact_ratio_{name}": pair.contact_ratio for name, pair in kinds.items()},
                 **{
-                    f"working_pressure_angle_{name}": pair.working_pressure_angle
-                    for name, pair in kinds.items()
+                    f"{name}_{kind}": getattr(pair, name)
+                    for name in ("contact_ratio", "working_pressure_angle")
+                    for kind, pair in kinds.items()
                 },
                 "mesh_phases": np.asarray(gears.mesh_phases),
                 "planet_angles": np.asarray(gears.planet_angles),
@@ -331,12 +333,7 @@ class StressResult:
     def dataset(self) -> xr.Dataset:
         """Collect the contents of stress.nc."""
         cycle, edges = self.cycle, self.spectrum.edges
-        values: dict[str, Any] = {
-            **root_values(self.roots),
-            **self._worst(),
-            **self._ranges(),
-            **self._loads(),
-        }
+        values: dict[str, Any] = root_values(self.roots) | self._worst() | self._ranges() | self._loads()
         values["contact_pressure"] = cycle.max_pressure
         if cycle.pressure is not None:
             values |= {
@@ -495,14 +492,16 @@ def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
         yield from _lifted(data)
         yield from _helical(data)
     unloaded = (force + back)[: data.sizes["planet"]] <= 0.0
-    if unloaded.any() and force.any():
-        planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
-        text = (
-            f"planet {planets} carries nothing at some positions: its place and transmission error (*, a "
-            "dash where it never carries) are not determined there; the smallest motion without penetration "
-            "stands for them"
-        )
-        yield Finding("W-OPEN", "", text)
+    always = unloaded.all(axis=1)
+    for word, one in (("all", always), ("some", unloaded.any(axis=1) & ~always)):
+        if one.any() and force.any():
+            planets = ", ".join(str(n + 1) for n in np.flatnonzero(one))
+            text = (
+                f"planet {planets} carries nothing at {word} positions: its place and transmission error (*, "
+                "a dash where it never carries) are not determined there; the smallest motion without "
+                "penetration stands for them"
+            )
+            yield Finding("W-OPEN", "", text)
     if ((force > 0) & (back > 0)).any():
         yield Finding("W-WEDGED", "", "some meshes are loaded on both flanks at once")
     if ((back > 0) & ~(force > 0)).any():
@@ -608,9 +607,17 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
         f"load share of a planet {share.min():.4f} to {share.max():.4f} "
         f"(equal sharing {1 / data.sizes['planet']:.4f}); {contact}"
     )
-    notes = [sharing, *_stiffness_notes(elastic=data.sizes.get("member", 0) > 0)]
+    most, mean, held = shares(data)
+    sharing += f"; {held}, K_gamma = {mean:.3f}" if most > UNEQUAL else ""
+    k = "k: tangent stiffness dF/dx of teeth and bodies"
+    notes = [sharing, f"{k}, held at their bores and at the outer surface of the ring"]
+    if data.sizes.get("member", 0):
+        notes[1] = (
+            f"{k}; of planet-ring with the ring on its foundation in series, so that it is no stiffness of "
+            "the teeth alone; the STE contains that and the motion of the members"
+        )
     if data.sizes["mesh"] == 1:
-        notes = [contact, "k: tangent stiffness dF/dx of teeth and bodies, held at bore or outer surface"]
+        notes = [contact, f"{k}, held at bore or outer surface"]
     if "axial_force" in data:
         axial = float(np.abs(data.axial_force.values).mean(axis=1).max())
         notes.append(
@@ -623,15 +630,11 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
     return tabulate("Static", [data.sel(mesh=mesh) for mesh in data.mesh.values], columns, notes)
 
 
-def _stiffness_notes(*, elastic: bool) -> list[str]:
-    """Tell what the columns k and STE of the static table contain."""
-    held = "k: tangent stiffness dF/dx of teeth and bodies"
-    if not elastic:
-        return [f"{held}, held at their bores and at the outer surface of the ring"]
-    return [
-        f"{held}; of planet-ring with the ring on its foundation in series, so that it is no",
-        "stiffness of the teeth alone; the STE contains that and the motion of the members",
-    ]
+def shares(data: xr.Dataset) -> tuple[float, float, str]:
+    """Find the largest share of static.nc and K_gamma, over the equal share, and what holds the members."""
+    share = data["load_share"] * data.sizes["planet"]
+    held = "on supports and bearings" if data.sizes.get("member", 0) else "all centres held"
+    return float(share.max()), float(share.mean("position").max()), held
 
 
 def describe_stress(data: xr.Dataset) -> Block:
@@ -652,7 +655,8 @@ def describe_stress(data: xr.Dataset) -> Block:
     header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [deg]", "range", "cycles"
     notes = [
         f"ISO 6336: nominal stresses sigma_H0 and sigma_F0 (method B) with {equal}no "
-        "load factors; FE: largest contact pressure away from flank ends, and largest tension in the root",
+        "load factors; FE, under the loads of static.nc: largest contact pressure away from flank ends, and "
+        "largest tension in the root",
         "position in mesh periods; arc from the end of the flank, tangent to the centreline of the tooth; "
         "range: smallest to largest stress at the root point where they differ most, while the gear turns "
         f"once{against}; cycles: load cycles of the flank in that turn",

@@ -14,7 +14,7 @@ from femgear.storage.results import Manifest, Results
 from femgear.system.fourier import fluctuation, sample
 from femgear.trains.elastic.checks import runup_ends
 from femgear.trains.elastic.results import verdict
-from femgear.trains.elastic.runup import describe_runup, runup_warnings
+from femgear.trains.elastic.runup import describe_runup, loudest, runup_warnings
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value, with_values
 from femgear.trains.registry import check_case, stages_of
@@ -176,25 +176,48 @@ def test_peaks_between_the_speeds_are_counted():
     assert unresolved(speeds, resonance, heard, np.zeros(3)) == 0
 
 
-def test_the_verdict_states_factors_stresses_and_what_they_assume(static, case, modes, found, tmp_path):
-    """K_v and safeties against the numbers that they come from; the run-up after the operating points."""
-    strong = with_values(
-        case, {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"}
-    )
-    check_case(strong)
-    dynamics = solve_dynamics(strong, static, modes)  # the limits decide no stage
-    files = {
+LIMITS = {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"}
+
+
+@pytest.fixture(scope="module")
+def files(case, static, modes, found):
+    """Contents of the files of a run with limits, which decide no stage."""
+    strong = with_values(case, LIMITS)
+    dynamics = solve_dynamics(strong, static, modes)
+    return {
         "static": static.dataset(),
         "stress": solve_stress(strong, static).dataset(),
+        "modes": modes.dataset(),
         "dynamics": dynamics.dataset(),
         "housing": solve_housing(strong, dynamics).dataset(),
         "runup": found.dataset(),
     }
+
+
+def results_of(case, files) -> Results:
     names = Manifest(complete=True, files={f"{name}.nc": "" for name in files})
-    results = Results(tmp_path, names, lambda path: strong).with_known(files)
-    vars(results)["case"] = strong
-    first, points, near = verdict(results)
-    told = dict(first.rows)
+    results = Results(Path(), names, lambda path: case).with_known(files)
+    vars(results)["case"] = case
+    return results
+
+
+def told_of(case, files) -> tuple[dict[str, str], str]:
+    """Rows and notes of the first table of the verdict."""
+    first = next(verdict(results_of(with_values(case, LIMITS), files)))
+    return dict(first.rows), " | ".join(first.notes)
+
+
+def test_the_verdict_states_factors_stresses_and_what_they_assume(case, files, found):
+    """K_v and safeties against the numbers that they come from; the run-up after the operating points."""
+    strong = with_values(case, LIMITS)
+    check_case(strong)
+    first, points, near = verdict(results_of(strong, files))
+    told, notes = dict(first.rows), " | ".join(first.notes)
+    assert "S_F = 2 sigma_Flim Y_M/(sigma_F0 K_gamma K_v): sigma_Flim = 430 MPa of ISO 6336-5" in notes
+    assert "S_H = sigma_Hlim/(Z sigma_H0 sqrt(K_gamma K_v)): sigma_Hlim = 1500 MPa of ISO 6336-5" in notes
+    assert "Y_M = 0.7 for planets" in notes and "not computed" not in notes
+    assert first.notes[0] == "teeth and pins without errors" and "kink" not in notes
+    assert "static.members" not in notes and "at one instant" not in notes + " ".join(told)
     at_3100 = np.argmin(np.abs(found.input_speed / RPM - 3100.0))
     sun, ring = found.heard.dynamic_factor[at_3100]
     assert told["largest dynamic factor K_v"] == f"sun-planet {sun:.3f}, planet-ring {ring:.3f}"
@@ -214,5 +237,80 @@ def test_the_verdict_states_factors_stresses_and_what_they_assume(static, case, 
     assert single > 1.002
     assert f"sun-planet {1500e6 / (single * contact * np.sqrt(sun)):.2f}" in told["safety S_H, ISO 6336-2"]
     assert points.rows[1][3] == f"{float(files['housing']['level'][1]):.4g}"
+    heard = points.header.index("microphone [dB(A)]"), points.header.index("sound power [dB(A)]")
+    for column, name in zip(heard, ("pressure_level", "power_level")):
+        assert points.rows[1][column] == f"{float(files['housing'][name][1]):.1f}"
     assert "1e+10 N/m³ radial" in points.notes[0] and "damping ratio 0.05" in points.notes[0]
     assert ("3100", "15", "4") in {(row[0], row[2], row[5]) for row in near.rows}
+
+
+def test_safeties_of_static_runs_have_no_dynamic_factors(case, files):
+    alone = {name: files[name] for name in ("static", "stress")}
+    told, notes = told_of(case, alone)
+    safety = 2 * 430e6 / files["stress"]["iso_root_stress"].values[0, 0]
+    assert told["safety S_F, ISO 6336-3"].startswith(f"sun {safety:.2f},")
+    assert "Y_M/(sigma_F0):" in notes and "(Z sigma_H0):" in notes
+    assert "K_gamma and K_v were not computed" in notes
+
+
+def test_the_verdict_says_what_shares_belong_to(case, files):
+    """Static results with fixed centres beside factors on supports, and shares of an instant beside means."""
+    share = np.array([0.0, 0.5, 0.5])[:, None] + 0.0 * files["static"]["load_share"]
+    one_off = files | {"static": files["static"].assign(load_share=share.transpose("planet", "position"))}
+    notes = told_of(case, one_off)[1]
+    assert (
+        "on supports and bearings; static stresses and load shares (static.members): all centres held"
+        in notes
+    )
+    assert "K_gamma = 1.500, at one instant 1.500" in notes
+    force = files["modes"]["supported_force"].values.copy()
+    force[0, :5] *= 1.9
+    turning = files | {
+        "modes": files["modes"].assign(supported_force=(("mesh", "supported_position"), force))
+    }
+    rows = told_of(case, turning)[0]
+    assert rows["planet load factor K_gamma"] == "sun-planet 1.000, planet-ring 1.000"
+    # 1.9 of 1.9 + 1 + 1
+    most = 3 * 1.9 / 3.9
+    assert rows["the same at one instant, at rest"] == f"sun-planet {most:.3f}, planet-ring 1.000"
+
+
+def test_the_verdict_names_the_kink_of_a_linear_relief(case, files):
+    """Only where the pressure is far above the nominal one, and a parabolic relief has none."""
+    relief = {"kind": "tip relief", "amount": "4 um", "start_diameter": "43 mm"}
+    high = files | {"stress": files["stress"].assign(contact_pressure=2.5 * files["stress"].contact_pressure)}
+    for shape, data, kinked in (("linear", high, True), ("linear", files, False), ("parabolic", high, False)):
+        one = with_value(case, "sun.modifications", [relief | {"shape": shape}])
+        notes = told_of(one, data)[1]
+        assert ("contact pressure of sun-planet: a linear relief begins with a kink" in notes) == kinked
+        assert notes.startswith("teeth and pins without errors")
+    off = with_value(case, "set.pin_errors", [{"planet": 1, "tangential": "5 um"}])
+    assert "without errors" not in told_of(off, files)[1]
+
+
+def test_the_verdict_says_where_the_run_up_ends(case, files):
+    """At an end of its range the level may be higher beyond it; on supports fewer harmonics excite it."""
+    runup, housing = files["runup"].copy(deep=True), files["housing"].copy(deep=True)
+    runup["level"][-1] = 999.0
+    runup["excitation_limit"] = 6 * runup["mesh_frequency"]
+    housing["excitation_limit"] = 12 * files["dynamics"]["mesh_frequency"]
+    runup.attrs["method"] = "supports"
+    rows, notes = told_of(case, files | {"runup": runup, "housing": housing})
+    assert rows["largest level of the run-up"] == "999 m/s² at 3500 rpm, the end of its range"
+    fast = 6 * float(runup["mesh_frequency"][-1]) / 1e3, 12 * 1116.0 / 1e3
+    assert (
+        f"run-up: 6 mesh harmonics, up to {fast[0]:.4g} kHz; operating speeds: 12 mesh harmonics, up to "
+        in notes
+    )
+    assert (
+        f"up to {fast[1]:.4g} kHz" in notes
+        and "excited by 6 mesh harmonics" in describe_runup(runup).notes[-1]
+    )
+    points = list(verdict(results_of(case, files | {"runup": runup, "housing": housing})))[1]
+    assert f"excitation up to 1.08 to {fast[1]:.4g} kHz" in points.notes[-1]
+    assert "equivalent radiated power" not in " ".join(points.notes)
+    housing.attrs["method"] = "casing"
+    points = list(verdict(results_of(case, files | {"housing": housing})))[1]
+    assert any(note.startswith("microphone: by equivalent radiated power") for note in points.notes)
+    runup["level"][20] = 1999.0
+    assert loudest(runup) == f"1999 m/s² at {float(runup['speed'][20]):.6g} rpm"
