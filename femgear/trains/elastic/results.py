@@ -514,6 +514,7 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
                 columns[text] = lambda i, name=name: f"{float(limit[name][i]):.1f}"
         if limit.attrs.get("method") == "casing" and "pressure_level" in limit:
             notes.append(f"microphone: {_ESTIMATE}")
+        notes.append(f"the ring moves {1e6 * _passing(limit):.3g} um past the sensor while planets pass")
     ends = sorted({f"{1e-3 * float(one):.4g}" for one in limit["excitation_limit"][[0, -1]]}, key=float)
     notes.append(
         f"levels assume: foundation of the ring {ring.foundation_radial:.3g} N/m³ radial, "
@@ -521,6 +522,14 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
         f"all modes; excitation up to {' to '.join(ends)} kHz; small motion about the static state"
     )
     return tabulate("At the operating speeds", shown, columns, notes)
+
+
+def _passing(housing: xr.Dataset) -> float:
+    """Find the largest displacement of the sensor, peak to peak, by orders below the mesh [m]."""
+    lines = stored_lines(housing)
+    low = lines.order < lines.z_ring / 2
+    turned = np.exp(1j * np.outer(lines.order[low], np.linspace(0, 2 * np.pi * lines.turns, 720)))
+    return float(np.ptp(np.real(lines.displacement[:, low] @ turned), axis=-1).max())
 
 
 def _near_resonances(runup: xr.Dataset) -> Block:

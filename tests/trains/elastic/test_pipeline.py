@@ -16,6 +16,7 @@ from femgear.housing.sensor import fixed_sensor_lines, heaviside_linear_lines, s
 from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.checks import max_nodal_diameter
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs
+from femgear.trains.elastic.results import _passing
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import parse_case, read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
@@ -182,6 +183,15 @@ def test_the_default_signal_has_only_lines_of_the_ring(case, dynamics):
     assert np.allclose(
         order_level(stored_lines(data, form="exact")), order_level(housing.exact)[1], rtol=1e-7
     )
+
+
+def test_the_verdict_tells_how_far_the_ring_moves_past_the_sensor(case, dynamics):
+    """Peak to peak over a turn of the carrier, from the field of the ring at rest with the gears."""
+    data = solve_housing(case, dynamics).dataset()
+    n, turn = np.arange(-(dynamics.ring_radial.shape[-1] // 2), dynamics.ring_radial.shape[-1] // 2 + 1), []
+    for angle in np.linspace(0.0, 2.0 * np.pi, 1000):
+        turn.append(np.real(dynamics.ring_radial[:, 0] @ np.exp(-1j * n * angle)))
+    assert _passing(data) == pytest.approx(np.ptp(turn, axis=0).max(), rel=0.02)
 
 
 def test_mesh_harmonics_of_the_force_balance_the_torque(dynamics, static):
