@@ -285,7 +285,11 @@ def _frequency(mode: int, variant: Variant) -> float:
     found = variant.modes().modes.frequency
     if mode > len(found):
         raise CaseError(
-            "the modal basis ends before this mode", code="E-MODES", key="mode", value=mode, limit=len(found)
+            "the modal basis ends before this mode",
+            code="E-MODES",
+            key="mode",
+            value=mode,
+            limit=f"1 to {len(found)}",
         )
     return float(found[mode - 1])
 

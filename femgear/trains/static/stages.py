@@ -158,8 +158,9 @@ def _helical(case: Case, gears: PlanetarySet) -> tuple[float, tuple[float, ...]]
 
     Plane contact knows no helix.
     """
-    known = case.helix_angle is not None and case.static.slices > 1
-    base = base_helix_angle(case.pressure_angle, case.helix_angle) if known else 0.0
+    base = 0.0
+    if case.helix_angle is not None and case.static.slices > 1:
+        base = base_helix_angle(case.pressure_angle, case.helix_angle)
     return base, tuple(helical_stiffness(base, internal=pair.gear_2.internal) for pair in gears.kinds)
 
 
