@@ -514,12 +514,12 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
                 columns[text] = lambda i, name=name: f"{float(limit[name][i]):.1f}"
         if limit.attrs.get("method") == "casing" and "pressure_level" in limit:
             notes.append(f"microphone: {_ESTIMATE}")
-        notes.append(f"the ring moves {1e6 * _passing(limit):.3g} um past the sensor while planets pass")
     ends = sorted({f"{1e-3 * float(one):.4g}" for one in limit["excitation_limit"][[0, -1]]}, key=float)
     notes.append(
         f"levels assume: foundation of the ring {ring.foundation_radial:.3g} N/m³ radial, "
         f"{ring.foundation_tangential:.3g} N/m³ tangential; damping ratio {case.dynamics.damping_ratio:g} of "
         f"all modes; excitation up to {' to '.join(ends)} kHz; small motion about the static state"
+        + (f"; past a sensor the ring moves by {1e6 * _passing(limit):.3g} um" if housing else "")
     )
     return tabulate("At the operating speeds", shown, columns, notes)
 
