@@ -118,7 +118,8 @@ def describe_response(data: xr.Dataset) -> Block:
         del columns["excited up to [kHz]"]
     notes = [
         "DTE rms: dynamic transmission error about its mean, largest of all meshes; radius: by what a step "
-        "of the fixed point multiplies the error (iterations: number of steps), which contracts below 1",
+        "of the fixed point multiplies the error (iterations: number of steps), which contracts below 1; "
+        "direct solutions (method) need no contraction",
         "Floquet: largest growth of a disturbance in a period, stable up to 1 (exactly 1 without damping)",
         f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
     ]

@@ -332,7 +332,7 @@ class HousingResult:
                 levels["power_level"] = power_level(sound[1], frequency), f"A-weighted {power}"
             words = _EQUIVALENT if sound[1] is not None else f"A-weighted {power}, {_ESTIMATE}"
             levels["equivalent_power_level"] = power_level(sound[2], frequency), words
-            variables |= {name: ("speed", one, "dB", said) for name, (one, said) in levels.items()}
+            variables |= {name: ("speed", one, "dB(A)", said) for name, (one, said) in levels.items()}
         supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in self.supported.items()}
         names = {kind: (kind, one[0], "1", f"name of the {kind}") for kind, one in self.outputs.items()}
         order = {"order": ("order", exact.order, "1", "carrier order")}
@@ -359,7 +359,7 @@ def verdict(results: Results) -> Iterator[Block]:
     if "static" in stages:
         static = results.static
         error = _by_kind(static["mesh"].values, np.ptp(static["ste"].values, axis=1) * 1e6)
-        rows.append(("transmission error, peak to peak", _kinds("{:.3f} um", error)))
+        rows.append((f"transmission error, peak to peak{_where(static, '')}", _kinds("{:.3f} um", error)))
     factors, known = np.ones((1, 2)), dict[str, np.ndarray]()
     if "dynamics" in stages:
         factors, sharing = _load_factors(results.dynamics)
@@ -403,6 +403,12 @@ def _unequal(results: Results, sharing: np.ndarray, notes: list[str]) -> Iterato
         )
 
 
+def _where(static: xr.Dataset, equal: str) -> str:
+    """Say on what static results stand where planets do not share equally, else as they are equal."""
+    largest, _, held = shares(static)
+    return f", {held}" if largest > UNEQUAL else equal
+
+
 def _by_kind(names, values: np.ndarray) -> np.ndarray:
     """Find the largest values (2,) of sun-planet and planet-ring meshes, of those of all (n_meshes,)."""
     ring = np.array(["ring" in str(name) for name in names])
@@ -440,8 +446,9 @@ def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> I
     root, nominal = largest("root_worst").ravel(), largest("iso_root_stress").ravel()
     contact, worst = largest("contact_pressure").reshape(2, -1).max(axis=1), int(root.argmax())
     nominals, factors = largest("iso_contact_stress"), np.prod([np.ones(2), *known.values()], axis=0)
-    yield "largest root stress, static", f"{root[worst] * 1e-6:.1f} MPa, {parts[worst]}"
-    yield "largest contact pressure, static", _kinds("{:.1f} MPa", contact * 1e-6)
+    where = _where(results.static, ", static")
+    yield f"largest root stress{where}", f"{root[worst] * 1e-6:.1f} MPa, {parts[worst]}"
+    yield f"largest contact pressure{where}", _kinds("{:.1f} MPa", contact * 1e-6)
     notes += _at_kinks(results, contact, nominals)
     if results.case.helix_angle is not None:
         notes.append("no safeties of helical teeth: nominal stresses of ISO 6336 are those of spur teeth")

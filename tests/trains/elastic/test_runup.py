@@ -257,7 +257,11 @@ def test_the_verdict_says_what_shares_belong_to(case, files):
     """Static results with fixed centres beside factors on supports, and shares of an instant beside means."""
     share = np.array([0.0, 0.5, 0.5])[:, None] + 0.0 * files["static"]["load_share"]
     one_off = files | {"static": files["static"].assign(load_share=share.transpose("planet", "position"))}
-    notes = told_of(case, one_off)[1]
+    rows, notes = told_of(case, one_off)
+    assert {"largest root stress, all centres held", "transmission error, peak to peak, all centres held"} < {
+        *rows
+    }
+    assert "largest root stress, static" in told_of(case, files)[0]
     assert (
         "on supports and bearings; static stresses and load shares (static.members): all centres held"
         in notes
