@@ -299,6 +299,39 @@ def test_hostile_files(tmp_path, text, code, words):
     assert caught.value.code == code and words in str(caught.value) and str(path) in str(caught.value)
 
 
+TORQUE = '<attribute id="torque_around_u_axis" unit="N m">'
+CASES_TWICE = """<load_spectrum id="1"><load_case id="1"><component id="34" type="shaft">{}</component>
+<component id="{}" type="shaft"/></load_case></load_spectrum></model>"""
+SPEED = '<attribute id="rotational_speed" unit="1 / min">9</attribute>'
+TORQUE_JSON = '{"id": "torque_around_u_axis"'
+GOOD_JSON = Gearbox().json()
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        (GOOD.replace(TORQUE, f"{TORQUE}15</attribute>{TORQUE}"), "external_load 38, torque_around_u_axis"),
+        (GOOD.replace("</model>", CASES_TWICE.format(SPEED, 34)), "load case 1, component 34"),
+        (
+            GOOD.replace("</model>", CASES_TWICE.format(2 * SPEED, 4)),
+            "load case 1, component 34, rotational_speed",
+        ),
+        (GOOD_JSON.replace('{"version"', '{"version": "1.0", "version"'), "version"),
+        (GOOD_JSON.replace('"floating_point": 1591.', '"floating_point": 1, "floating_point": 1591.'),
+         "torque_around_u_axis, floating_point"),
+        (GOOD_JSON.replace(TORQUE_JSON, f'{TORQUE_JSON}, "integer": 15}}, {TORQUE_JSON}'),
+         "external_load 38, torque_around_u_axis"),
+    ],
+)  # fmt: skip
+def test_what_is_given_twice_is_refused(tmp_path, text, key):
+    assert text not in (GOOD, GOOD_JSON)
+    path = tmp_path / "stage.rexs"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CaseError, match="given twice") as caught:
+        read_model(path)
+    assert (caught.value.code, caught.value.key, caught.value.file) == ("E-REXS", key, str(path))
+
+
 def test_files_that_are_too_long_or_no_text(tmp_path):
     path = tmp_path / "stage.rexs"
     with open(path, "wb") as stream:
@@ -325,6 +358,9 @@ def test_zips(tmp_path):
                 archive.writestr(name, GOOD)
         with pytest.raises(CaseError, match=words):
             read_model(path)
+    path.write_text(GOOD, encoding="utf-8")
+    with pytest.raises(CaseError, match="not a zip file"):
+        read_model(path)
     whole = Gearbox().write(path).read_bytes()
     for broken in (whole[:1000], whole[:200] + b"\0" * 50 + whole[250:]):
         path.write_bytes(broken)
