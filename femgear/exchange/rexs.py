@@ -16,7 +16,7 @@ import re
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
@@ -197,17 +197,17 @@ def _from_json(text: str, name: str) -> dict:
 
 
 def _table(pairs: list[tuple[str, Any]], name: str) -> dict:
-    """Table of JSON, whose keys differ."""
-    table = dict(pairs)
-    if len(table) < len(pairs):
-        key, _ = Counter(key for key, _ in pairs).most_common(1)[0]
-        raise _twice("key", f"{table['id']}, {key}" if "id" in table else key, name)
+    """Table of JSON, no key of which is given twice."""
+    if len(table := dict(pairs)) < len(pairs):
+        _need_once([key for key, _ in pairs], f"{table['id']}, " if "id" in table else "", name)
     return table
 
 
-def _twice(what: str, key: str, name: str) -> CaseError:
-    """Refusal of what has one value in a file."""
-    return CaseError(f"the {what} is given twice", code="E-REXS", key=key, file=name, remedy=_EXPORT)
+def _need_once(ids: list[str], where: str, name: str) -> None:
+    """Refuse ids of which one is given twice (E-REXS)."""
+    for id, count in Counter(ids).most_common(1):
+        if count > 1:
+            raise CaseError("it is given twice", code="E-REXS", key=where + id, file=name, remedy=_EXPORT)
 
 
 def _from_xml(text: str, name: str) -> dict:
@@ -264,8 +264,7 @@ def _model(data: dict, name: str) -> Model:
             limit="1.0 to 1.7 and 2.0", remedy="export the gear unit in one of these versions",
         )  # fmt: skip
     components: dict[str, Component] = {}
-    relations = tuple(_relations(_dicts(data, "relations")))
-    model = Model(name, version, components, relations, _load_cases(data, name))
+    model = Model(name, version, components, tuple(_relations(data)), _load_cases(data, name))
     for one in _dicts(data, "components"):
         id, kind = str(one.get("id", "")), str(one.get("type", ""))
         if not id or not kind or id in components:
@@ -281,23 +280,21 @@ def _model(data: dict, name: str) -> Model:
     return model
 
 
-def _relations(tables: Iterable[dict]) -> Iterator[Relation]:
-    for one in tables:
+def _relations(data: dict) -> Iterator[Relation]:
+    for one in _dicts(data, "relations"):
         refs = ((str(ref.get("role", "")), str(ref.get("id", ""))) for ref in _dicts(one, "refs"))
         yield Relation(str(one.get("type", "")), tuple(refs))
 
 
 def _attributes(table: dict, component: str, name: str) -> dict[str, tuple[str, str | None]]:
     """Values and units of a component; JSON has true and numbers, XML texts."""
-    found, ids = {}, set[str]()
-    for one in _dicts(table, "attributes"):
-        id, value, unit = str(one.get("id", "")), one.get("value"), one.get("unit")
-        if id in ids:
-            raise _twice("attribute", f"{component}, {id}", name)
-        ids.add(id)
+    found, attributes = {}, _dicts(table, "attributes")
+    _need_once([str(one.get("id", "")) for one in attributes], f"{component}, ", name)
+    for one in attributes:
+        value, unit = one.get("value"), one.get("unit")
         if value is not None:
             text = str(value).lower() if isinstance(value, bool) else str(value)
-            found[id] = text, None if unit is None else str(unit)
+            found[str(one.get("id", ""))] = text, None if unit is None else str(unit)
     return found
 
 
@@ -305,11 +302,9 @@ def _load_cases(data: dict, name: str) -> tuple[dict, ...]:
     """Attributes by component id of every load case of the first load spectrum."""
     found = []
     for case in (c for one in _dicts(data, "load_spectrum")[:1] for c in _dicts(one, "load_cases")):
-        found.append(given := {})
-        for one in _dicts(case, "components"):
-            if (id := str(one.get("id"))) in given:
-                raise _twice("component", f"load case {len(found)}, component {id}", name)
-            given[id] = _attributes(one, f"load case {len(found)}, component {id}", name)
+        where, members = f"load case {len(found) + 1}, component ", _dicts(case, "components")
+        _need_once([str(one.get("id")) for one in members], where, name)
+        found.append({(id := str(one.get("id"))): _attributes(one, where + id, name) for one in members})
     return tuple(found)
 
 
