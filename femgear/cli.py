@@ -520,14 +520,15 @@ def import_rexs(
     force
         Replace the file.
     """
-    from femgear.exchange.planetary_stage import case_tables
+    from femgear.exchange.planetary_stage import case_tables, named
     from femgear.exchange.rexs import read_model
     from femgear.trains.drafts import draft_text
 
     model = read_model(file)
     tables, remarks = case_tables(model, stage)
     head = f"Written by femgear import {file.name} (REXS {model.version}). What is assumed says so."
-    text = draft_text(tables, remarks, word="assumed", head=[head])
+    with named(model, stage):
+        text = draft_text(tables, remarks, word="assumed", head=[head])
     _write_case(text, output, force=force)
     _say(f"entries that are assumed: {text.count('# assumed')}")
     _say("attributes that are not used:")
@@ -551,7 +552,7 @@ def rexs(
     case
         TOML case file.
     output
-        REXS file to write.
+        REXS file to write, NAME.rexs.
     force
         Replace the file.
     """
@@ -560,6 +561,9 @@ def rexs(
     from femgear.exchange.rexs import model_text
     from femgear.trains.reading import read_case
 
+    if output.suffix.lower() != ".rexs":
+        message, limit = "femgear writes REXS as XML, unzipped", "a name that ends with .rexs"
+        raise CaseError(message, code="E-OUTPUT", file=str(output), limit=limit)
     data = read_case(case)
     need_set(data)
     text = model_text(stage_model(data, output.name), "femgear", femgear.__version__)

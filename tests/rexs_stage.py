@@ -48,14 +48,15 @@ class Gearbox:
         self.relate("assembly", assembly=34, part=38)
         self.add(65, "switchable_coupling", rotational_stiffness=(1e20, "N mm / rad"))
         self.relate("side", assembly=65, outer_part=2, inner_part=62)
-        for bearing, shaft in ((36, 34), (59, 4)):
+        for bearing, shaft in ((36, 34), (37, 34), (59, 4), (60, 4)):
             self.add(bearing, "concept_bearing", radial_stiffness=(1e20, "N / m"))
             self.relate("side", assembly=bearing, outer_part=2, inner_part=shaft)
         for n in range(planets):
             self.gear(240 + n, 22, "cylindrical_gear", 230 + n, 58.0, 83, shift=0.0)
             self.add(270 + n, "shaft")
-            self.add(280 + n, "concept_bearing", radial_stiffness=(1e20, "N / m"))
-            self.relate("side", assembly=280 + n, outer_part=230 + n, inner_part=270 + n)
+            for bearing in (280 + n, 290 + n):
+                self.add(bearing, "concept_bearing", radial_stiffness=(1e20, "N / m"))
+                self.relate("side", assembly=bearing, outer_part=230 + n, inner_part=270 + n)
             for mesh, first, second, angle in ((210, 53, 240 + n, 0.0), (220, 240 + n, 58, 180.0)):
                 turned = (360.0 - n * 360.0 / planets + angle) % 360.0
                 self.add(mesh + n, "cylindrical_stage", center_distance=(78.0, MM),

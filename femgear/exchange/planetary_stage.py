@@ -3,20 +3,21 @@
 Stages are found by their relations, not by names: the planetary stage holds cylindrical stages, each of which
 joins two gears; the ring gear is a component of its own type, planets mesh with it, the sun with the planets.
 The ring's profile shift has the sign of ISO 21771, the opposite of femgear's; its teeth and diameters are
-positive, negative ones are understood. Attributes are those of the REXS specifications 1.0 to 2.0
-(www.rexs.info), units are read from the file.
+positive, negative ones are understood. Centre distances are positive, of internal pairs too. Attributes are
+those of the REXS specifications 1.0 to 2.0 (www.rexs.info), units are read from the file.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
-from femgear.case.estimates import STEEL, usual_rim, usual_torque
+from femgear.case.estimates import STEEL, estimates, usual_rim, usual_torque
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import (
     ANGLE,
@@ -31,7 +32,7 @@ from femgear.case.quantities import (
     to_si,
 )
 from femgear.case.sections import Case
-from femgear.errors import CaseError
+from femgear.errors import CaseError, FemgearError
 from femgear.exchange.rexs import Component, Model, Relation
 from femgear.gears.kinematics import MEMBERS, torque_ratios
 
@@ -57,11 +58,11 @@ class _Stage:
     def common(
         self, of: Iterable[Component], attribute: str, kind: Dimension | None = None, *, sign: bool = True
     ) -> float | None:  # fmt: skip
-        """Value in SI units that all components have which give it, None where none does."""
+        """Value in SI units of all that give it, None where none does; without ``sign`` of rings positive."""
         found: dict[float, Component] = {}
         for one in of:
             if (value := self.model.number(one, attribute, kind)) is not None:
-                found.setdefault(value if sign else abs(value), one)
+                found.setdefault(value if sign or one.type != "ring_gear" else abs(value), one)
         if found and max(found) - min(found) > 1e-9 * max(map(abs, found)):
             least, most = found[min(found)], found[max(found)]
             self.model.refuse(
@@ -71,7 +72,7 @@ class _Stage:
         return next(iter(found), None)
 
     def needed(self, of: list[Component], attribute: str, kind: Dimension | None = None) -> float:
-        """Value that all components have; tooth numbers without their sign, which tells internal gears."""
+        """Value that all components have; tooth numbers of ring gears without their sign."""
         if (value := self.common(of, attribute, kind, sign=attribute != "number_of_teeth")) is None:
             self.model.refuse("the attribute is missing", f"{of[0]}, {attribute}", "give it in the gear unit")
         return value
@@ -86,7 +87,7 @@ def case_tables(model: Model, wanted: str | None = None) -> tuple[dict[str, Any]
     E-UNIT.
     """
     s, remarks = _stage(model, _chosen(model, wanted)), dict[str, str]()
-    title = "".join(c for c in f"{s.stage.name or s.stage} of {Path(model.name).name}" if c.isprintable())
+    title = "".join(c for c in s.stage.name or str(s.stage) if c.isprintable())
     tables = {"format": 1, "title": title[:200], "set": _set(s, remarks), "material": _material(s, remarks)}
     tables |= {name: _gear(s, name, remarks) for name in _GEARS}
     _racks(s, tables, remarks)
@@ -97,9 +98,34 @@ def case_tables(model: Model, wanted: str | None = None) -> tuple[dict[str, Any]
     if "helix_angle" in tables["set"]:
         tables["static"], remarks["static.slices"] = {"slices": 25}, "assumed"
     if left := [name for name in ("sun", "ring") if "profile_shift" not in tables[name]]:
-        of = " and ".join(left)
-        remarks["set.centre_distance"] = f"assumed: no play, which gives the profile shift of {of}"
+        of = f"hence the profile shift of {' and '.join(left)}"
+        remarks["set.centre_distance"] = f"assumed: no play at the distance of the file, {of}"
     return tables, remarks
+
+
+_ATTRIBUTES = {
+    "teeth": "number_of_teeth", "module": "normal_module", "pressure_angle": "normal_pressure_angle",
+    "profile_shift": "addendum_modification_coefficient", "centre_distance": "center_distance",
+    "youngs_modulus": "elastic_modulus", "torque": "torque_around_u_axis",
+}  # fmt: skip
+"""Names in REXS of entries of a case that have another one there."""
+
+
+@contextmanager
+def named(model: Model, wanted: str | None = None) -> Iterator[None]:
+    """Let refusals of the case of a stage name the file, and component and attribute where these are sure."""
+    try:
+        yield
+    except FemgearError as error:
+        s = _stage(model, _chosen(model, wanted))
+        for one in {error, *error.problems}:
+            path = (one.key or "").split(".")
+            one.file, attribute = model.name, _ATTRIBUTES.get(path[-1], path[-1])
+            near = [*s.gears.get(path[0], ()), *s.flanks.get(path[0], ())] or model.components.values()
+            read = [m for m in near if attribute in m.attributes and (m.type, attribute) in model.used]
+            if len({member.attributes[attribute] for member in read}) == 1:
+                one.key = f"{read[0]}, {attribute} ({one.key})"
+        raise
 
 
 def _chosen(model: Model, wanted: str | None) -> Component:
@@ -164,7 +190,7 @@ def _shown(value: float, dimension: Dimension) -> str:
 def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     """Section of what the gears share; planet angles where planets are not equally spaced."""
     found: dict[str, Any] = {"planets": len(s.gears["planet"])}
-    if (distance := s.common(s.meshes, "center_distance", LENGTH, sign=False)) is not None:
+    if (distance := s.common(s.meshes, "center_distance", LENGTH)) is not None:
         found["centre_distance"] = _shown(distance, LENGTH)
     given = [s.common(s.gears[name], "face_width", LENGTH) for name in _GEARS]
     widths = {one for one in given if one is not None}
@@ -223,7 +249,7 @@ def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
     """Section of a gear without rack and rim."""
     gears, every = s.gears[name], [one for ones in s.gears.values() for one in ones]
     teeth = s.needed(gears, "number_of_teeth")
-    if teeth != round(teeth):
+    if not teeth or teeth != round(teeth):
         s.model.refuse(f"{teeth:g} is no number of teeth", f"{gears[0]}, number_of_teeth")
     found: dict[str, Any] = {"teeth": round(teeth)}
     if name == "sun":
@@ -310,14 +336,15 @@ def _supports(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> Non
     for name in ("sun", "carrier"):
         bearings[name] = _beside(s.model, s.shafts[name], "inner_part", "gear_casing")
     for name, found in bearings.items():
-        springs = [one for one in found if one.type.endswith("bearing")]
-        values = [s.model.number(one, "radial_stiffness", STIFFNESS) for one in springs]
-        total = sum(one for one in values if one is not None)
+        springs = (one for one in found if one.type.endswith("bearing"))
+        values = [k for one in springs if (k := s.model.number(one, "radial_stiffness", STIFFNESS))]
         key = "bearing_stiffness" if name == "planet" else "support_stiffness"
-        if 1.0 <= total <= _SOFT:
-            tables[name][key] = _shown(total, STIFFNESS)
-        elif total:
-            remarks[f"{name}.{key}"] = f"the {total:.3g} N/m of the file stand for a rigid bearing"
+        if sum(values) > _SOFT:
+            many = Counter(f"{one:.3g} N/m" for one in values).items()
+            what = ", ".join(f"{n} bearing{'s' * (n > 1)} of {one}" for one, n in many)
+            remarks[f"{name}.{key}"] = f"taken as rigid: {what} in the file"
+        elif values:
+            tables[name][key] = _shown(sum(values), STIFFNESS)
 
 
 def _beside(model: Model, shafts: list[Component], role: str, mate: str) -> list[Component]:
@@ -335,7 +362,9 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> di
     held = [name for name in MEMBERS if any(one.type.endswith("coupling") for one in coupled[name])]
     fixed = held[0] if len(held) == 1 else "ring"
     remarks |= {} if len(held) == 1 else {"operation.fixed": "assumed"}
-    states = [_state(s, fixed, given) for given in (s.model.load_cases or ({},))]
+    said = [_state(s, fixed, given) for given in (s.model.load_cases or ({},))]
+    stands, idle = (any(0.0 in one.values() for one in ones) for ones in zip(*said, strict=True))
+    states = [[{member: one for member, one in values.items() if one} for values in pair] for pair in said]
     turning, loaded = states[0]
     usual = "carrier" if fixed == "sun" else "sun"
     member = next(iter([*(one for one in turning if one in loaded), *turning, *loaded]), usual)
@@ -352,11 +381,11 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> di
         teeth = tables["sun"]["teeth"], tables["planet"]["teeth"]
         on_sun = usual_torque(*teeth, module, width, tables["set"]["planets"])
         torques = [float(f"{on_sun * abs(ratios[member]):.3g}")]
-        remarks["operation.torque"] = "assumed: K factor of 1 N/mm^2"
-    elif max(torques) - min(torques) > 1e-6 * abs(torques[0]):
-        remarks["operation.torque"] = "assumed: of the first load case; those of the file differ"
+        remarks["operation.torque"] = f"assumed: K factor of 1 N/mm^2{'; that of the file is 0' * idle}"
+    elif len(torques) < len(states) or max(torques) - min(torques) > 1e-6 * abs(torques[0]):
+        remarks["operation.torque"] = "assumed: of the first load case that has one; those of the file differ"
     remarks |= {} if turning or loaded else {"operation.input": "assumed"}
-    remarks |= {} if speeds else {"operation.speeds": "assumed"}
+    remarks |= {} if speeds else {"operation.speeds": f"assumed{'; that of the file is 0' * stands}"}
     shown = [_shown(one, SPEED) for one in speeds or [1000.0 * SPEED.scale]]
     return {"input": member, "fixed": fixed, "torque": _shown(torques[0], TORQUE), "speeds": shown}
 
@@ -367,14 +396,14 @@ def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[st
     for name, shaft in ((m, one) for m in MEMBERS if m != fixed for one in s.shafts[m]):
         now = replace(shaft, attributes={**shaft.attributes, **given.get(shaft.id, {})})
         speed = model.number(now, "rotational_speed", SPEED)
-        turns |= {name: speed} if speed else {}
+        turns |= {} if speed is None else {name: turns.get(name) or speed}
         for part in model.related("assembly", "part", assembly=shaft.id):
             if part.type == "external_load":
                 load = replace(part, attributes={**part.attributes, **given.get(part.id, {})})
                 torque = model.number(load, "torque_around_u_axis", TORQUE)
                 power = model.number(load, "power", _POWER)
-                torque = torque or (power / speed if power and speed else None)
-                loads |= {name: torque} if torque else {}
+                torque = power / speed if power is not None and speed and not torque else torque
+                loads |= {} if torque is None else {name: loads.get(name, 0.0) + torque}
     return turns, loads
 
 
@@ -412,7 +441,7 @@ def _attribute(value: float | None, unit: str = "none") -> tuple[str, str] | Non
 def stage_model(case: Case, name: str) -> Model:
     """Write gears, material, bearings and operation of a planetary set as a REXS model of version 1.4.
 
-    Masses, play, errors and modifications of teeth, dynamics and housing are left out.
+    Masses, estimated stiffnesses, play, errors and modifications of teeth, dynamics and housing are left out.
     """
     gears, w, a = planetary_set(case), _Writer(), _attribute
     unit, casing = w.add("gear_unit", case.title), w.add("gear_casing", "casing")
@@ -426,7 +455,7 @@ def stage_model(case: Case, name: str) -> Model:
         w.relate("central_shaft", planetary_stage=stage, shaft=shaft)
     for number, angle in enumerate(gears.planet_angles, start=1):
         planet, shaft = _add_gear(w, case, f"planet {number}", gears.planet)
-        pin, stiffness = w.add("shaft", f"pin {number}"), a(case.planet.bearing_stiffness, "N / m")
+        pin, stiffness = w.add("shaft", f"pin {number}"), _stiffness(case, "planet", "bearing_stiffness")
         w.relate("planet_shaft", planetary_stage=stage, shaft=shaft)
         w.relate("planet_pin", planetary_stage=stage, shaft=pin)
         bearing = w.add("concept_bearing", f"bearing of planet {number}", radial_stiffness=stiffness)
@@ -491,13 +520,19 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any) -> tuple[str, str]:
     return id, shaft
 
 
+def _stiffness(case: Case, member: str, key: str) -> tuple[str, str] | None:
+    """Stiffness of a bearing, none where it is the estimate to its four digits."""
+    value, estimate = getattr(getattr(case, member), key), estimates(case)[f"{member}.{key}"].value
+    return None if f"{value or 0.0:.4g}" == f"{estimate:.4g}" else _attribute(value, "N / m")
+
+
 def _add_operation(w: _Writer, case: Case, shafts: dict[str, str], casing: str) -> tuple[dict, ...]:
     """Add load, coupling of the fixed member, bearings of sun and carrier; load cases of several speeds."""
     operation, a = case.operation, _attribute
     joints = {operation.fixed: [w.add("coupling", f"{operation.fixed} held")]}
     for member in ("sun", "carrier"):
-        if stiffness := getattr(case, member).support_stiffness:
-            bearing = w.add("concept_bearing", f"{member} bearing", radial_stiffness=a(stiffness, "N / m"))
+        if stiffness := _stiffness(case, member, "support_stiffness"):
+            bearing = w.add("concept_bearing", f"{member} bearing", radial_stiffness=stiffness)
             joints.setdefault(member, []).append(bearing)
     for member, joint in ((member, one) for member, ones in joints.items() for one in ones):
         w.relate("side", assembly=joint, outer_part=casing, inner_part=shafts[member])

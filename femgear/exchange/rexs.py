@@ -1,9 +1,9 @@
 """REXS files: components with attributes and units, and relations between them.
 
 REXS is FVA's open exchange format of gear units (versions 1.0 to 2.0, www.rexs.info): XML in ``.rexs``, JSON
-in ``.rexsj``, either of them zipped in ``.rexsz``. What a file holds is told by its first bytes, not by its
-name. Files are not trusted: document types and entities are refused before XML is parsed, sizes are limited
-before and while a zip is unpacked, ids and relations must fit each other.
+in ``.rexsj``, either of them zipped in ``.rexsz``. What a file holds is told by its first bytes; one
+that is named a zip must be one. Files are not trusted: document types and entities are refused before XML is
+parsed, sizes are limited before and while a zip is unpacked, ids and relations must fit each other.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import os
 import re
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
@@ -151,11 +152,12 @@ def read_model(path: str | os.PathLike) -> Model:
     """Read a REXS file of any form and of versions 1.0 to 2.0.
 
     CaseError: E-FILE: unreadable, too long, no XML, JSON or zip, or with entities. E-FILE-ENC: not UTF-8.
-    E-FORMAT: another version. E-REXS: ids missing, given twice or unknown, parts that hold each other.
+    E-FORMAT: another version. E-REXS: ids missing or unknown, anything given twice, parts of each other.
     """
     name = os.fsdecode(path)
     data = read_bytes(path, MOST_BYTES, "name a REXS file: .rexs, .rexsj or .rexsz")
-    text = decoded(_unzipped(data, name) if data[:2] == b"PK" else data, name)
+    zipped = data[:2] == b"PK" or name.lower().endswith((".rexsz", ".zip"))
+    text = decoded(_unzipped(data, name) if zipped else data, name)
     return _model((_from_json if text.lstrip()[:1] == "{" else _from_xml)(text, name), name)
 
 
@@ -181,7 +183,9 @@ def _unzipped(data: bytes, name: str) -> bytes:
 
 def _from_json(text: str, name: str) -> dict:
     try:
-        model = json.loads(text)["model"]
+        model = json.loads(text, object_pairs_hook=lambda pairs: _table(pairs, name))["model"]
+    except CaseError:
+        raise
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise _broken(f"no REXS model in JSON: {type(error).__name__}: {error}", name) from error
     cases = [case for one in _dicts(model, "load_spectrum") for case in _dicts(one, "load_cases")]
@@ -190,6 +194,20 @@ def _from_json(text: str, name: str) -> dict:
             values = (one[key] for key in one if key not in ("id", "unit"))
             one["value"] = next((value for value in values if isinstance(value, str | int | float)), None)
     return model if isinstance(model, dict) else {}
+
+
+def _table(pairs: list[tuple[str, Any]], name: str) -> dict:
+    """Table of JSON, no key of which is given twice."""
+    if len(table := dict(pairs)) < len(pairs):
+        _need_once([key for key, _ in pairs], f"{table['id']}, " if "id" in table else "", name)
+    return table
+
+
+def _need_once(ids: list[str], where: str, name: str) -> None:
+    """Refuse ids of which one is given twice (E-REXS)."""
+    for id, count in Counter(ids).most_common(1):
+        if count > 1:
+            raise CaseError("it is given twice", code="E-REXS", key=where + id, file=name, remedy=_EXPORT)
 
 
 def _from_xml(text: str, name: str) -> dict:
@@ -246,13 +264,13 @@ def _model(data: dict, name: str) -> Model:
             limit="1.0 to 1.7 and 2.0", remedy="export the gear unit in one of these versions",
         )  # fmt: skip
     components: dict[str, Component] = {}
-    model = Model(name, version, components, tuple(_relations(_dicts(data, "relations"))), _load_cases(data))
+    model = Model(name, version, components, tuple(_relations(data)), _load_cases(data, name))
     for one in _dicts(data, "components"):
         id, kind = str(one.get("id", "")), str(one.get("type", ""))
         if not id or not kind or id in components:
             wrong = "is given twice" if id in components else f"has no {'type' if id else 'id'}"
             model.refuse(f"the component {str(one.get('name', '')) or kind!a} {wrong}", f"component {id}")
-        components[id] = Component(id, kind, str(one.get("name", "")), _attributes(one))
+        components[id] = Component(id, kind, str(one.get("name", "")), _attributes(one, f"{kind} {id}", name))
     for relation in model.relations:
         for role, id in relation.refs:
             if id not in components:
@@ -262,16 +280,17 @@ def _model(data: dict, name: str) -> Model:
     return model
 
 
-def _relations(tables: Iterable[dict]) -> Iterator[Relation]:
-    for one in tables:
+def _relations(data: dict) -> Iterator[Relation]:
+    for one in _dicts(data, "relations"):
         refs = ((str(ref.get("role", "")), str(ref.get("id", ""))) for ref in _dicts(one, "refs"))
         yield Relation(str(one.get("type", "")), tuple(refs))
 
 
-def _attributes(table: dict) -> dict[str, tuple[str, str | None]]:
+def _attributes(table: dict, component: str, name: str) -> dict[str, tuple[str, str | None]]:
     """Values and units of a component; JSON has true and numbers, XML texts."""
-    found = {}
-    for one in _dicts(table, "attributes"):
+    found, attributes = {}, _dicts(table, "attributes")
+    _need_once([str(one.get("id", "")) for one in attributes], f"{component}, ", name)
+    for one in attributes:
         value, unit = one.get("value"), one.get("unit")
         if value is not None:
             text = str(value).lower() if isinstance(value, bool) else str(value)
@@ -279,12 +298,14 @@ def _attributes(table: dict) -> dict[str, tuple[str, str | None]]:
     return found
 
 
-def _load_cases(data: dict) -> tuple[dict, ...]:
+def _load_cases(data: dict, name: str) -> tuple[dict, ...]:
     """Attributes by component id of every load case of the first load spectrum."""
-    cases = [
-        case for spectrum in _dicts(data, "load_spectrum")[:1] for case in _dicts(spectrum, "load_cases")
-    ]
-    return tuple({str(c.get("id")): _attributes(c) for c in _dicts(case, "components")} for case in cases)
+    found = []
+    for case in (c for one in _dicts(data, "load_spectrum")[:1] for c in _dicts(one, "load_cases")):
+        where, members = f"load case {len(found) + 1}, component ", _dicts(case, "components")
+        _need_once([str(one.get("id")) for one in members], where, name)
+        found.append({(id := str(one.get("id"))): _attributes(one, where + id, name) for one in members})
+    return tuple(found)
 
 
 def _refuse_loops(model: Model) -> None:

@@ -10,9 +10,10 @@ import pytest
 from rexs_stage import DEG, MM, NONE, Gearbox
 from scipy.optimize import brentq
 
+from femgear import cli
 from femgear.case.gear_set import planetary_set
-from femgear.errors import CaseError, GeometryError
-from femgear.exchange.planetary_stage import case_tables, stage_model
+from femgear.errors import CaseError, FemgearError, GeometryError
+from femgear.exchange.planetary_stage import case_tables, named, stage_model
 from femgear.exchange.rexs import MOST_BYTES, model_text, read_model
 from femgear.trains.drafts import draft_text
 from femgear.trains.reading import parse_case, read_case, with_values
@@ -24,7 +25,10 @@ OWN = os.environ.get("FEMGEAR_REXS")  # a file of FVA's example, for whoever has
 
 def imported(path, stage=None):
     """Text and case of the planetary stage of a file."""
-    text = draft_text(*case_tables(read_model(path), stage), word="assumed")
+    model = read_model(path)
+    tables = case_tables(model, stage)
+    with named(model, stage):
+        text = draft_text(*tables, word="assumed")
     return text, parse_case(text)
 
 
@@ -72,7 +76,10 @@ def test_a_stage_of_every_form_and_version(tmp_path, suffix, version, addendum):
     assumed = {line.split(" = ")[0] for line in text.splitlines() if "# assumed" in line}
     assert {"mass", "inertia", "bearing_stiffness", "support_stiffness", "addendum"} <= assumed
     assert not {"teeth", "module", "face_width", "dedendum", "torque", "speeds", "bore_radius"} & assumed
-    assert "the 1e+20 N/m of the file stand for a rigid bearing" in text
+    assert text.count("taken as rigid: 2 bearings of 1e+20 N/m in the file") == 3
+    assert "no play at the distance of the file, hence the profile shift of sun and ring" in text
+    one = box.set(280, radial_stiffness=(2e20, "N / m")).write(tmp_path / f"one.{suffix}")
+    assert "taken as rigid: 1 bearing of 2e+20 N/m, 1 bearing of 1e+20 N/m in the file" in imported(one)[0]
 
 
 @pytest.mark.skipif(OWN is None, reason="FEMGEAR_REXS names no file of FVA's example")
@@ -168,6 +175,58 @@ def test_a_case_comes_back(tmp_path, name, changes):
         assert getattr(getattr(back, member), f"{key}_stiffness") == pytest.approx(given, rel=1e-9)
 
 
+def test_estimates_come_back_as_such(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Gearbox().write(Path("stage.rexs"))
+    assert cli.main(["import", "stage.rexs", "-o", "case.toml"]) == 0
+    assert cli.main(["rexs", "case.toml", "-o", "back.rexs"]) == 0
+    assert cli.main(["import", "back.rexs", "-o", "again.toml"]) == 0
+    first, again = (
+        {(line.split(" = ")[0], line.split("  #")[0]): line for line in Path(name).read_text().splitlines()}
+        for name in ("case.toml", "again.toml")
+    )
+    kept = [one for one in first if one[0] in ("title", "bearing_stiffness", "support_stiffness")]
+    assert len(kept) == 3 and all(one in again for one in kept)
+    assert all("# assumed" in again[one] for one in kept if one[0] != "title")
+
+
+def test_other_endings_are_not_written(tmp_path, capsys):
+    for name in ("back.rexsj", "back.rexsz", "back"):
+        assert cli.main(["rexs", str(CASES / "planetary_27_40_108.toml"), "-o", str(tmp_path / name)]) == 2
+        said = capsys.readouterr().err
+        assert "E-OUTPUT" in said and name in said and ".rexs\n" in said and not (tmp_path / name).exists()
+
+
+FURLONGS = {id: {"normal_module": (4.0, "furlong")} for id in (53, 58, 240, 241, 242)}
+OUTWARDS = {id: {"center_distance": (-78.0, MM)} for id in (*range(210, 213), *range(220, 223))}
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "keys"),
+    [
+        (FURLONGS, "E-RANGE", ["cylindrical_gear 53, normal_module (sun.module)", "ring.outer_radius"]),
+        (OUTWARDS, "E-RANGE", ["cylindrical_stage 210, center_distance (set.centre_distance)"]),
+        ({210: OUTWARDS[210]}, "E-REXS", ["cylindrical_stage 210, center_distance"]),
+        ({53: {"number_of_teeth": (-17, NONE)}}, "E-RANGE",
+         ["cylindrical_gear 53, number_of_teeth (sun.teeth)"]),
+        ({53: {"number_of_teeth": (18, NONE)}}, "E-ASSEMBLY", ["set.planets"]),
+        ({86: {"density": (7850.0, "kg / dm^3")}}, "E-RANGE", ["material 86, density (material.density)"]),
+        ({38: {"torque_around_u_axis": (1e20, "N m")}}, "E-RANGE",
+         ["external_load 38, torque_around_u_axis (operation.torque)"]),
+    ],
+)  # fmt: skip
+def test_refusals_of_the_case_name_file_component_and_attribute(tmp_path, changes, code, keys):
+    box = Gearbox()
+    for id, attributes in changes.items():
+        box = box.set(id, **attributes)
+    path = box.write(tmp_path / "stage.rexs")
+    with pytest.raises(FemgearError) as caught:
+        imported(path)
+    assert caught.value.code == code and caught.value.file == str(path)
+    assert [one.key for one in caught.value.problems][: len(keys)] == keys
+    assert {one.file for one in caught.value.problems} == {str(path)}
+
+
 def test_torque_and_speed_of_other_members_and_powers(tmp_path):
     box = Gearbox().set(34, rotational_speed=(-1500.0, "1 / min"))
     assert imported(box.write(tmp_path / "a.rexs"))[1].operation.torque == pytest.approx(-1591.5494309)
@@ -180,6 +239,16 @@ def test_torque_and_speed_of_other_members_and_powers(tmp_path):
     operation = imported(box.write(tmp_path / "c.rexs"))[1].operation
     assert operation.input == "sun"
     assert operation.torque == pytest.approx(-1591.5494309 * 17 / (17 + 61))
+    box = Gearbox()
+    box.add(39, "external_load", torque_around_u_axis=(100.0, "N m"))
+    box.relate("assembly", assembly=34, part=39)
+    assert imported(box.write(tmp_path / "sum.rexs"))[1].operation.torque == pytest.approx(1691.5494309)
+    for nothing in ({"torque_around_u_axis": (0.0, "N m")}, {"power": (0.0, "kW")}):
+        box = Gearbox().set(38, **{"torque_around_u_axis": None} | nothing)
+        text = imported(box.write(tmp_path / "idle.rexs"))[0]
+        assert "# assumed: K factor of 1 N/mm^2; that of the file is 0" in text
+    still = Gearbox().set(34, rotational_speed=(0.0, "1 / min")).write(tmp_path / "still.rexs")
+    assert 'speeds = ["1000 rpm"]  # assumed; that of the file is 0' in imported(still)[0]
     bare = Gearbox().set(38, torque_around_u_axis=None).set(34, rotational_speed=None)
     text = imported(bare.write(tmp_path / "d.rexs"))[0]
     assert all(any(f"{key} = " in line and "# assumed" in line for line in text.splitlines())
@@ -243,6 +312,8 @@ def second_sun():
         (Gearbox().set(53, number_of_teeth=(17, MM)), "E-UNIT", "cylindrical_gear 53, number_of_teeth"),
         (Gearbox().set(53, number_of_teeth=("inf", NONE)), "E-UNIT", "cylindrical_gear 53, number_of_teeth"),
         (Gearbox().set(53, number_of_teeth=(17.5, NONE)), "E-REXS", "cylindrical_gear 53, number_of_teeth"),
+        (Gearbox().set(53, number_of_teeth=(0, NONE)).set(38, torque_around_u_axis=None), "E-REXS",
+         "cylindrical_gear 53, number_of_teeth"),
         (Gearbox().set(53, number_of_teeth=None), "E-REXS", "cylindrical_gear 53, number_of_teeth"),
         (Gearbox().set(53, normal_module=(3.0, MM)), "E-REXS", "cylindrical_gear 53, normal_module"),
         (Gearbox().set(241, number_of_teeth=(23, NONE)), "E-REXS", "cylindrical_gear 240, number_of_teeth"),
@@ -299,6 +370,39 @@ def test_hostile_files(tmp_path, text, code, words):
     assert caught.value.code == code and words in str(caught.value) and str(path) in str(caught.value)
 
 
+TORQUE = '<attribute id="torque_around_u_axis" unit="N m">'
+CASES_TWICE = """<load_spectrum id="1"><load_case id="1"><component id="34" type="shaft">{}</component>
+<component id="{}" type="shaft"/></load_case></load_spectrum></model>"""
+SPEED = '<attribute id="rotational_speed" unit="1 / min">9</attribute>'
+TORQUE_JSON = '{"id": "torque_around_u_axis"'
+GOOD_JSON = Gearbox().json()
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        (GOOD.replace(TORQUE, f"{TORQUE}15</attribute>{TORQUE}"), "external_load 38, torque_around_u_axis"),
+        (GOOD.replace("</model>", CASES_TWICE.format(SPEED, 34)), "load case 1, component 34"),
+        (
+            GOOD.replace("</model>", CASES_TWICE.format(2 * SPEED, 4)),
+            "load case 1, component 34, rotational_speed",
+        ),
+        (GOOD_JSON.replace('{"version"', '{"version": "1.0", "version"'), "version"),
+        (GOOD_JSON.replace('"floating_point": 1591.', '"floating_point": 1, "floating_point": 1591.'),
+         "torque_around_u_axis, floating_point"),
+        (GOOD_JSON.replace(TORQUE_JSON, f'{TORQUE_JSON}, "integer": 15}}, {TORQUE_JSON}'),
+         "external_load 38, torque_around_u_axis"),
+    ],
+)  # fmt: skip
+def test_what_is_given_twice_is_refused(tmp_path, text, key):
+    assert text not in (GOOD, GOOD_JSON)
+    path = tmp_path / "stage.rexs"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CaseError, match="given twice") as caught:
+        read_model(path)
+    assert (caught.value.code, caught.value.key, caught.value.file) == ("E-REXS", key, str(path))
+
+
 def test_files_that_are_too_long_or_no_text(tmp_path):
     path = tmp_path / "stage.rexs"
     with open(path, "wb") as stream:
@@ -325,6 +429,9 @@ def test_zips(tmp_path):
                 archive.writestr(name, GOOD)
         with pytest.raises(CaseError, match=words):
             read_model(path)
+    path.write_text(GOOD, encoding="utf-8")
+    with pytest.raises(CaseError, match="not a zip file"):
+        read_model(path)
     whole = Gearbox().write(path).read_bytes()
     for broken in (whole[:1000], whole[:200] + b"\0" * 50 + whole[250:]):
         path.write_bytes(broken)
