@@ -61,9 +61,7 @@ def test_numbers_that_are_given():
         assert "estimated" not in line or not line.startswith(("torque", "face_width", "planets"))
 
 
-@pytest.mark.parametrize(
-    ("teeth", "planets"), [((27, 40, 108), 3), ((30, 20, 70), 4), ((20, 30, 81), 1), ((21, 30, 79), 4)]
-)
+@pytest.mark.parametrize(("teeth", "planets"), [((27, 40, 108), 3), ((30, 20, 70), 4), ((21, 30, 79), 4)])
 def test_sets_close_with_teeth_left_over_or_missing(teeth, planets):
     gears = planetary_set(read_case(new_case("planetary", teeth=teeth)))
     assert gears.n_planets == planets
@@ -78,6 +76,10 @@ def test_sets_close_with_teeth_left_over_or_missing(teeth, planets):
         ("planetary", {"teeth": (27, 40)}, "E-COUNT"),
         ("pair", {"teeth": (27, 40, 108)}, "E-COUNT"),
         ("pair", {"teeth": (27, -40)}, "E-COUNT"),
+        ("planar", {"teeth": (27, 40, 10**400)}, "E-COUNT"),
+        *((kind, {"module": "1e300 mm"}, "E-RANGE") for kind in KINDS),
+        *(("pair", {name: ""}, "E-UNIT") for name in ("module", "face_width", "torque", "speed")),
+        ("planetary", {"teeth": (17, 22, 62)}, "E-ASSEMBLY"),
         ("pair", {"module": "2"}, "E-UNIT"),
         ("drivetrain", {"module": "2 kg"}, "E-UNIT"),
         ("planetary", {"torque": "12 N"}, "E-UNIT"),
@@ -90,6 +92,19 @@ def test_numbers_that_make_no_case(kind, numbers, code):
     with pytest.raises(FemgearError) as caught:
         new_case(kind, **numbers)
     assert caught.value.code == code and (caught.value.limit or caught.value.remedy)
+
+
+def test_refusals_name_the_option():
+    with pytest.raises(CaseError, match="E-RANGE") as caught:
+        new_case("planetary", module="1e300 mm")
+    assert caught.value.key == "--module"
+    with pytest.raises(CaseError, match="E-ASSEMBLY") as caught:
+        new_case("planetary", teeth=(17, 22, 62))
+    assert "or 17 22 61" in (caught.value.remedy or "")
+
+
+def test_teeth_of_the_ring_have_either_sign():
+    assert new_case("planetary", teeth=(17, 22, -61)) == new_case("planetary", teeth=(17, 22, 61))
 
 
 @pytest.mark.parametrize("teeth", [(27, 40, 108), (30, 20, 70), (21, 30, 81), (20, 30, 81)])

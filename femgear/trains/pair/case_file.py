@@ -35,6 +35,7 @@ from femgear.case.sections import (
     Mass,
     MaterialSection,
     ModificationSection,
+    Module,
     PressureAngle,
     RackSection,
     Radius,
@@ -61,7 +62,7 @@ class SetSection(Section):
     a right-handed gear 1, module, pressure angle, racks and shifts are of the normal section.
     """
 
-    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.1)]
+    module: Module
     pressure_angle: PressureAngle
     face_width: FaceWidth
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-4, 20.0)] | None = None
