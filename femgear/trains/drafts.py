@@ -143,11 +143,10 @@ def new_case(
     given = {"teeth": teeth, "module": module, "planets": planets, "face-width": face_width}
     given |= {"torque": torque, "speed": speed}
     teeth, count = _teeth_and_planets(kind, teeth, planets)
-    module, of_set = "2 mm" if module is None else module, len(teeth) == 3
-    size = _read(Module, module, "--module")
+    module, speed = "2 mm" if module is None else module, "1000 rpm" if speed is None else speed
+    size, of_set = _read(Module, module, "--module"), len(teeth) == 3
     width = 12.0 * size if face_width is None else _read(FaceWidth, face_width, "--face-width")
     load = f"{usual_torque(teeth[0], teeth[1], size, width, count):.3g} N m" if torque is None else torque
-    speed = "1000 rpm" if speed is None else speed
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
