@@ -140,9 +140,9 @@ def to_si(
         raise _no_text(value, dimension, low, high)
     example = f'write it as in "{dimension.show(dimension.scale)}"'
     match = _NUMBER.fullmatch(value)
-    if re.match(r"\s*[+-]?\d+,\d", value):
-        message = f"{dimension.name} has a comma in its number"
-        raise CaseError(message, code="E-UNIT", value=value, remedy="use a decimal point")
+    if slip := _slip(value):
+        message = f"{dimension.name} has {slip[0]}"
+        raise CaseError(message, code="E-UNIT", value=value, remedy=slip[1])
     if not match:
         message = f"{dimension.name} must start with a number"
         raise CaseError(message, code="E-UNIT", value=value, remedy=example)
@@ -164,6 +164,26 @@ def to_si(
             remedy=_factor_hint(number, low, high, dimension, value) or remedy,
         )  # fmt: skip
     return number
+
+
+def _slip(text: str) -> tuple[str, str] | None:
+    """Find what a number has that no number has, and what to do about it."""
+    if re.match(r"\s*[+-]?\d+,\d", text):
+        return "a comma in its number", "use a decimal point"
+    if (usual := re.sub(r"[−–](?=[\d.])", "-", text)) != text:
+        return "a typographic minus", f'write it with a hyphen, "{usual}"'
+    if re.match(r"\s*[+-]?\d{1,3}(\s\d{3})+(?!\d)", text):
+        usual = re.sub(r"(?<=\d)\s(?=\d{3})", "", text)
+        return "a blank in its number", f'leave it out, "{usual}"'
+    return None
+
+
+def _unquoted(text: str) -> str | None:
+    """How to write a number that stands in quotation marks; None where it is none."""
+    match = _NUMBER.fullmatch(text)
+    if match and match[2].strip() == "%":
+        return f"write {float(match[1]) / 100:g}"
+    return "write it without quotes" if match and not match[2].strip() else None
 
 
 def _too_small(value: object) -> CaseError:
@@ -314,7 +334,7 @@ def Number(
 
     def convert(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            remedy = "write it without quotes" if isinstance(value, str) else None
+            remedy = _unquoted(value) if isinstance(value, str) else None
             message = f"a number is needed, not {described(value)}"
             raise CaseError(message, code="E-TYPE", value=value, limit=limit, remedy=remedy)
         above = low < value if open_low else low <= value
@@ -390,10 +410,13 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: 
             raise CaseError(message, code="E-TYPE", value=value, limit=f"{low} to {high}", remedy=plain)
         number = abs(value) if signed else value
         if not low <= number <= high:
-            why = note if number > high else ""
+            why, sign = (
+                note if number > high else "",
+                f"did you mean {-value}?" if low <= -value <= high else None,
+            )
             raise CaseError(
                 f"{shown(value)} is out of range{': ' + why if why else ''}", code="E-RANGE",
-                value=found(value), limit=f"{low} to {high}", remedy=remedy,
+                value=found(value), limit=f"{low} to {high}", remedy=sign or remedy,
             )  # fmt: skip
         return number
 

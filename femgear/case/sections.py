@@ -272,7 +272,7 @@ class SetSection(Section):
     ``helix_angle``, positive for a right-handed sun, module, racks and shifts are of the normal section.
     """
 
-    planets: Annotated[int, Count(1, 1000)]
+    planets: Annotated[int, Count(1, 1000, remedy="usual: 3 to 6")]
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-3, 10.0)] | None = None
     face_width: FaceWidth
     planet_angles: Annotated[tuple[Angle, ...], at_most(1000)] | None = None

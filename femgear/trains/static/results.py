@@ -759,7 +759,7 @@ def describe_gears(s: GearSet) -> Block:
     notes = (
         f"module {first.module * 1e3:.6g} mm, pressure angle {math.degrees(first.pressure_angle):.6g} deg, "
         f"face width {first.face_width * 1e3:.6g} mm, centre distance {s.centre_distance * 1e3:.6g} mm",
-        *[f"{s.n_planets} planets at {angles} deg"][: len(s.kinds) - 1],
+        *[f"{s.n_planets} planet{'s' * (s.n_planets > 1)} at {angles} deg"][: len(s.kinds) - 1],
         *[
             f"profile shift of the {gear.name}: positive moves the flank outwards (the opposite of ISO 21771)"
             for gear in s.gears
