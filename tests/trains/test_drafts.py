@@ -103,6 +103,21 @@ def test_refusals_name_the_option():
     assert "or 17 22 61" in (caught.value.remedy or "")
 
 
+def test_rounding_is_no_play_and_one_planet_is_singular():
+    """Profile shifts that close the set leave a play of about 1e-18 m, of either sign."""
+    for teeth in ((27, 40, 108), (30, 20, 70)):
+        case = read_case(new_case("planar", teeth=teeth))
+        notes = [note for block in train_of(case).describe_case(case) for note in block.notes]
+        assert any(note.startswith("play along the line of action 0 um,") for note in notes)
+        pins = [{"planet": 1, "tangential": "20 um"}]
+        case = with_values(read_case(new_case("planetary", teeth=teeth)), {"set.pin_errors": pins})
+        said = next(one for one in train_of(case).case_warnings(case) if one.code == "W-WEDGING")
+        assert "ideal gears have 0.000 um" in str(said)
+    case = read_case(new_case("planetary", planets=1))
+    notes = [note for block in train_of(case).describe_case(case) for note in block.notes]
+    assert "1 planet at 0 deg" in notes
+
+
 def test_teeth_of_the_ring_have_either_sign():
     assert new_case("planetary", teeth=(17, 22, -61)) == new_case("planetary", teeth=(17, 22, 61))
 
