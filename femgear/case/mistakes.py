@@ -250,7 +250,7 @@ def _in_transverse_section(error: GeometryError, case: Case) -> None:
     error.message += ")"
 
 
-def added_material(case: Case) -> Iterator[Finding]:
+def added_material(case: Any) -> Iterator[Finding]:
     """Find reliefs and crownings with a negative amount [m]: most are slips of the sign."""
     for gear in case.gear_names:
         for i, one in enumerate(getattr(case, gear).modifications):

@@ -140,9 +140,7 @@ def to_si(
         raise _no_text(value, dimension, low, high)
     example = f'write it as in "{dimension.show(dimension.scale)}"'
     match = _NUMBER.fullmatch(value)
-    if slip := _slip(value):
-        message = f"{dimension.name} has {slip[0]}"
-        raise CaseError(message, code="E-UNIT", value=value, remedy=slip[1])
+    _check_number(value, dimension.name)
     if not match:
         message = f"{dimension.name} must start with a number"
         raise CaseError(message, code="E-UNIT", value=value, remedy=example)
@@ -166,24 +164,17 @@ def to_si(
     return number
 
 
-def _slip(text: str) -> tuple[str, str] | None:
-    """Find what a number has that no number has, and what to do about it."""
+def _check_number(text: str, name: str) -> None:
+    """Refuse what stands in no number: a decimal comma, a typographic minus, blanks between digits."""
     if re.match(r"\s*[+-]?\d+,\d", text):
-        return "a comma in its number", "use a decimal point"
+        message = f"{name} has a comma in its number"
+        raise CaseError(message, code="E-UNIT", value=text, remedy="use a decimal point")
     if (usual := re.sub(r"[−–](?=[\d.])", "-", text)) != text:
-        return "a typographic minus", f'write it with a hyphen, "{usual}"'
-    if re.match(r"\s*[+-]?\d{1,3}(\s\d{3})+(?!\d)", text):
-        usual = re.sub(r"(?<=\d)\s(?=\d{3})", "", text)
-        return "a blank in its number", f'leave it out, "{usual}"'
-    return None
-
-
-def _unquoted(text: str) -> str | None:
-    """How to write a number that stands in quotation marks; None where it is none."""
-    match = _NUMBER.fullmatch(text)
-    if match and match[2].strip() == "%":
-        return f"write {float(match[1]) / 100:g}"
-    return "write it without quotes" if match and not match[2].strip() else None
+        message = f"{name} has a typographic minus"
+        raise CaseError(message, code="E-UNIT", value=text, remedy=f'write it with a hyphen, "{usual}"')
+    if (usual := re.sub(r"(?<=\d)\s(?=\d{3}(?!\d))", "", text)) != text:
+        message = f"{name} has a blank in its number"
+        raise CaseError(message, code="E-UNIT", value=text, remedy=f'leave it out, "{usual}"')
 
 
 def _too_small(value: object) -> CaseError:
@@ -334,7 +325,9 @@ def Number(
 
     def convert(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            remedy = _unquoted(value) if isinstance(value, str) else None
+            match = _NUMBER.fullmatch(str(value))
+            plain = "write it without quotes" if match and not match[2].strip() else None
+            remedy = f"write {float(match[1]) / 100:g}" if match and match[2].strip() == "%" else plain
             message = f"a number is needed, not {described(value)}"
             raise CaseError(message, code="E-TYPE", value=value, limit=limit, remedy=remedy)
         above = low < value if open_low else low <= value

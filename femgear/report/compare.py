@@ -63,7 +63,7 @@ def _value(case: Any, key: str) -> Any:
 def _alike(x: Any, y: Any) -> bool:
     """Whether two values agree but for the rounding of their units."""
     if isinstance(x, float) and isinstance(y, float):
-        return math.isclose(x, y, rel_tol=1e-12) or (math.isnan(x) and math.isnan(y))
+        return math.isclose(x, y, rel_tol=1e-12)
     if isinstance(x, list | tuple) and isinstance(y, list | tuple):
         return len(x) == len(y) and all(map(_alike, x, y))
     return x == y

@@ -574,11 +574,8 @@ def samples_into(
 
 def _limits(case: Case, model: SampleModel) -> Iterator[str]:
     """Say what the numbers of all samples assume."""
-    if case.static.members == "elastic":
-        yield f"stiffness {SERIES}"
-    else:
-        elastic = '; static.members = "elastic" lets the members move on their supports and bearings'
-        yield f"{HELD}{'' if case.rigid else elastic}"
+    elastic = '; static.members = "elastic" lets them move on their supports and bearings' * (not case.rigid)
+    yield f"stiffness {SERIES}" if case.static.members == "elastic" else f"{HELD}{elastic}"
     if model.level(*model.windows).tilts is not None:
         yield "profile slopes do not move the windows here (some tenths of a per cent)"
 
@@ -718,8 +715,8 @@ def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[
         f"{data.attrs['positions']} positions of one mesh period; over the {data.attrs['turn']} of a turn of "
         f"the carrier these samples have {' and '.join(turns)}",
         f"a planet loses its load in {float(data.opens.any('planet').mean()):.2%} of the samples",
-        f"worst.toml: sample {worst}, transmission error {exact:.6g} um exactly, as femgear run --only "
-        f"static has it; largest share: sample {at}",
+        f"worst.toml (femgear run --only static): sample {worst}, exact STE {exact:.6g} um; "
+        f"largest share: sample {at}",
         *limits,
     )
     header = ("number", "ideal", *(f"{q:.0%}" for q in QUANTILES), "largest")

@@ -47,9 +47,7 @@ _COUNTING = (
     "crossings of zero, ASTM E1049)"
 )
 HELD = "all centres held"
-SERIES = (
-    "of planet-ring with the ring on its foundation in series, so that it is no stiffness of the teeth alone"
-)
+SERIES = "of planet-ring with the ring on its foundation in series: no stiffness of the teeth alone"
 """What a mesh stiffness is, where members move."""
 _PIN_FORCE = "force of the pin on the planet in the frame of the carrier"
 STATIC_VARIABLES = {
