@@ -627,7 +627,8 @@ def sweep(
         found, names = sweep_into(data, output, over=over, of=of, **options)
     failed = sum(bool(error) for error in found.errors)
     _print([describe_sweep(found)])
-    print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")
+    cases = f"{len(found.points)} case{'s' * (len(found.points) != 1)}"
+    print(f"{cases}, {found.computed} computed now, {failed} cannot be computed")
     _say(f"files in {output}: {', '.join(names)}")
     return 0
 

@@ -276,6 +276,9 @@ def test_a_sweep_prints_its_table(tmp_path, capsys, monkeypatch):
         shift, ratio = line.split(",")[:2]
         assert re.search(rf"{shift}\s+{float(ratio):.5g}\s", out)
     assert max(map(len, out.split(" cases, ")[0].splitlines())) <= 80
+    command[3] = str(tmp_path / "one")
+    assert cli.main([*command, "--over", "sun.profile_shift=0.50"]) == 0
+    assert "1 case, 1 computed now" in capsys.readouterr().out
 
 
 def test_progress_tells_per_cent_count_and_time_left(monkeypatch, capsys):

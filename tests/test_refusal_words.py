@@ -51,6 +51,23 @@ WORDS = {
         edited("teeth = 27", "teeth = true"),
         ("E-TYPE", "sun.teeth", "not true or false", "found:   true", "5 to 5000"),
     ),
+    "external teeth with the sign of internal ones": (
+        edited("teeth = 27", "teeth = -27"),
+        ("E-RANGE", "sun.teeth", "found:   -27", "did you mean 27?"),
+    ),
+    "no planets": (edited("planets = 3", "planets = 0"), ("E-RANGE", "set.planets", "usual: 3 to 6")),
+    "a member in capitals": (
+        edited('input = "sun"', 'input = "Sun"'),
+        ("E-CHOICE", "operation.input", "found:   'Sun'", "did you mean 'sun'?"),
+    ),
+    "a kind of modification misspelt": (
+        edited("teeth = 27", 'teeth = 27\nmodifications = [{kind = "tip releif", amount = "5 um"}]'),
+        ("E-CHOICE", "sun.modifications[0].kind", "did you mean 'tip relief'?"),
+    ),
+    "millimetres of pin errors": (
+        edited("[set]", '[[set.pin_errors]]\nplanet = 1\ntangential = "5 mm"\n\n[set]'),
+        ("E-RANGE", "set.pin_errors[0].tangential", "found:   '5000 um'", "check the unit"),
+    ),
     "a text for a list of tables": (
         edited("teeth = 27", 'teeth = 27\nmodifications = "none"'),
         ("E-TYPE", "sun.modifications", "[[sun.modifications]]"),

@@ -206,6 +206,7 @@ def check_gear_deviations(case: Any, more: Iterable[tuple[str, float]] = ()) -> 
         if abs(value) > most:
             yield CaseError(
                 f"a deviation of {value * 1e6:.6g} um is not plausible", code="E-RANGE", key=key,
+                value=f"{value * 1e6:.6g} um",
                 limit=f"{LARGEST_DEVIATION} modules, {most * 1e6:.6g} um", remedy="check the unit",
             )  # fmt: skip
 

@@ -75,8 +75,11 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
     if kind == "extra_forbidden":
         return _unknown_key(item["loc"], key, model)
     if kind == "literal_error":
+        limit = context["expected"]
+        near = difflib.get_close_matches(str(value).lower(), re.findall("'(.+?)'", limit), n=1)
+        remedy = f"did you mean {near[0]!r}?" if near else None
         return CaseError(
-            "not one of the choices", code="E-CHOICE", key=key, value=value, limit=context["expected"]
+            "not one of the choices", code="E-CHOICE", key=key, value=value, limit=limit, remedy=remedy
         )
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         message = f"a table is needed, not {case_text.described(value)}"
@@ -247,7 +250,7 @@ def _in_transverse_section(error: GeometryError, case: Case) -> None:
     error.message += ")"
 
 
-def added_material(case: Case) -> Iterator[Finding]:
+def added_material(case: Any) -> Iterator[Finding]:
     """Find reliefs and crownings with a negative amount [m]: most are slips of the sign."""
     for gear in case.gear_names:
         for i, one in enumerate(getattr(case, gear).modifications):

@@ -140,9 +140,7 @@ def to_si(
         raise _no_text(value, dimension, low, high)
     example = f'write it as in "{dimension.show(dimension.scale)}"'
     match = _NUMBER.fullmatch(value)
-    if re.match(r"\s*[+-]?\d+,\d", value):
-        message = f"{dimension.name} has a comma in its number"
-        raise CaseError(message, code="E-UNIT", value=value, remedy="use a decimal point")
+    _check_number(value, dimension.name)
     if not match:
         message = f"{dimension.name} must start with a number"
         raise CaseError(message, code="E-UNIT", value=value, remedy=example)
@@ -164,6 +162,19 @@ def to_si(
             remedy=_factor_hint(number, low, high, dimension, value) or remedy,
         )  # fmt: skip
     return number
+
+
+def _check_number(text: str, name: str) -> None:
+    """Refuse what stands in no number: a decimal comma, a typographic minus, blanks between digits."""
+    if re.match(r"\s*[+-]?\d+,\d", text):
+        message = f"{name} has a comma in its number"
+        raise CaseError(message, code="E-UNIT", value=text, remedy="use a decimal point")
+    if (usual := re.sub(r"[−–](?=[\d.])", "-", text)) != text:
+        message = f"{name} has a typographic minus"
+        raise CaseError(message, code="E-UNIT", value=text, remedy=f'write it with a hyphen, "{usual}"')
+    if (usual := re.sub(r"(?<=\d)\s(?=\d{3}(?!\d))", "", text)) != text:
+        message = f"{name} has a blank in its number"
+        raise CaseError(message, code="E-UNIT", value=text, remedy=f'leave it out, "{usual}"')
 
 
 def _too_small(value: object) -> CaseError:
@@ -314,7 +325,9 @@ def Number(
 
     def convert(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            remedy = "write it without quotes" if isinstance(value, str) else None
+            match = _NUMBER.fullmatch(str(value))
+            plain = "write it without quotes" if match and not match[2].strip() else None
+            remedy = f"write {float(match[1]) / 100:g}" if match and match[2].strip() == "%" else plain
             message = f"a number is needed, not {described(value)}"
             raise CaseError(message, code="E-TYPE", value=value, limit=limit, remedy=remedy)
         above = low < value if open_low else low <= value
@@ -390,10 +403,13 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: 
             raise CaseError(message, code="E-TYPE", value=value, limit=f"{low} to {high}", remedy=plain)
         number = abs(value) if signed else value
         if not low <= number <= high:
-            why = note if number > high else ""
+            why, sign = (
+                note if number > high else "",
+                f"did you mean {-value}?" if low <= -value <= high else None,
+            )
             raise CaseError(
                 f"{shown(value)} is out of range{': ' + why if why else ''}", code="E-RANGE",
-                value=found(value), limit=f"{low} to {high}", remedy=remedy,
+                value=found(value), limit=f"{low} to {high}", remedy=sign or remedy,
             )  # fmt: skip
         return number
 

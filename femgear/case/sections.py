@@ -76,6 +76,7 @@ Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
 Shift = Annotated[float, Number(-5.0, 5.0)]
 Teeth = Annotated[int, Count(4, 5000)]
 """Of gears without a tooth form; `SunSection` and others say what their form allows."""
+Module = Annotated[float, Quantity(LENGTH, 5e-5, 0.1)]
 FaceWidth = Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
 DampingRatio = Annotated[float, Number(0.0, 1.0, open_high=True)]
 _OTHER_FLANKS = "give speeds above zero: a negative torque loads the other flanks"
@@ -271,7 +272,7 @@ class SetSection(Section):
     ``helix_angle``, positive for a right-handed sun, module, racks and shifts are of the normal section.
     """
 
-    planets: Annotated[int, Count(1, 1000)]
+    planets: Annotated[int, Count(1, 1000, remedy="usual: 3 to 6")]
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-3, 10.0)] | None = None
     face_width: FaceWidth
     planet_angles: Annotated[tuple[Angle, ...], at_most(1000)] | None = None
@@ -325,7 +326,7 @@ class SunSection(Section):
     """The sun, and with it the module and the pressure angle of the set."""
 
     teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
-    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.1)]
+    module: Module
     pressure_angle: PressureAngle
     profile_shift: Shift | None = None
     bore_radius: Radius

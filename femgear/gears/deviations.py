@@ -584,6 +584,6 @@ def _wedging(d: SetDeviations, s: GearSet):
             "W-WEDGING",
             "set.backlash",
             f"{which} may exceed the backlash by {-least * 1e6:.3f} um {where} "
-            f"(ideal gears have {nominal * 1e6:.3f} um): loaded and back flanks may touch at once",
+            f"(ideal gears have {max(0.0, nominal * 1e6):.3f} um): loaded and back flanks may touch at once",
             "play of 0 um or more",
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,10 +27,8 @@ _FADED = 0.55
 
 def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]:
     """Tabulate what differs between two runs of one train: entries of the case, then numbers by stage."""
-    cases = (_flat(tomllib.loads(run.case.source)) for run in (first, second))
-    a, b = ({key: str(value) for key, value in entries} for entries in cases)
-    keys = sorted(key for key in a.keys() | b.keys() if a.get(key) != b.get(key))
-    rows = tuple((key, a.get(key, "not given"), b.get(key, "not given")) for key in keys)
+    cases = [(run.case.source, run.case.model_dump(by_alias=True)) for run in (first, second)]
+    rows = tuple(_entries(*cases))
     entries = Block(
         "Cases", ("entry", "first", "second") if rows else (), rows, () if rows else ("the same",)
     )
@@ -40,13 +40,42 @@ def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]
     return tuple(found)
 
 
+def _entries(*cases: tuple[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Entries of two cases, texts and values, of which the values differ: "120 N m" is "120 Nm"."""
+    a, b = (dict(_flat(tomllib.loads(text))) for text, _ in cases)
+    for key in sorted(a.keys() | b.keys()):
+        if a.get(key) != b.get(key) and not _alike(*(_value(case, key) for _, case in cases)):
+            yield key, str(a.get(key, "not given")), str(b.get(key, "not given"))
+
+
+def _value(case: Any, key: str) -> Any:
+    """Value of an entry; of one inside what is read as a whole, such as a range of speeds, that whole."""
+    for part in re.findall(r"[^.\[\]]+", key):
+        inner = case.get(part) if isinstance(case, dict) else None
+        if isinstance(case, list | tuple) and part.isdigit() and int(part) < len(case):
+            inner = case[int(part)]
+        if inner is None:
+            return None if isinstance(case, dict) else case
+        case = inner
+    return case
+
+
+def _alike(x: Any, y: Any) -> bool:
+    """Whether two values agree but for the rounding of their units."""
+    if isinstance(x, float) and isinstance(y, float):
+        return math.isclose(x, y, rel_tol=1e-12)
+    if isinstance(x, list | tuple) and isinstance(y, list | tuple):
+        return len(x) == len(y) and all(map(_alike, x, y))
+    return x == y
+
+
 def _flat(entries: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """Entries of a case file with their whole names."""
     if isinstance(entries, dict):
         for key, value in entries.items():
             yield from _flat(value, f"{path}.{key}" if path else key)
     elif isinstance(entries, list) and any(isinstance(one, dict) for one in entries):
-        for i, value in enumerate(entries, 1):
+        for i, value in enumerate(entries):
             yield from _flat(value, f"{path}[{i}]")
     else:
         yield path, entries

@@ -285,7 +285,7 @@ def _frequency(mode: int, variant: Variant) -> float:
     found = variant.modes().modes.frequency
     if mode > len(found):
         raise CaseError(
-            "the modal basis ends before this mode",
+            f"the modal basis ends before this mode, with number {len(found)} at {found[-1]:.5g} Hz",
             code="E-MODES",
             key="mode",
             value=mode,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -65,6 +65,7 @@ from femgear.study.relief import DesignBasis, design_basis, sun_torque
 from femgear.study.runner import Runner, check_complete
 from femgear.trains.protocol import Progress, one_blas_thread, silent
 from femgear.trains.reading import to_toml, with_values
+from femgear.trains.static.results import HELD, SERIES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -568,8 +569,15 @@ def samples_into(
         save_figure(figure(data), folder / FILES[1])
         write_text(to_toml(sample_case(case, model, seed, data.attrs["worst"])), folder / FILES[2])
     (folder / _JOURNAL).unlink(missing_ok=True)
-    tilted = model.level(*model.windows).tilts is not None
-    return [_described(data, ideal, tilted)], list(FILES)
+    return [_described(data, ideal, _limits(case, model))], list(FILES)
+
+
+def _limits(case: Case, model: SampleModel) -> Iterator[str]:
+    """Say what the numbers of all samples assume."""
+    elastic = '; static.members = "elastic" lets them move on their supports and bearings' * (not case.rigid)
+    yield f"stiffness {SERIES}" if case.static.members == "elastic" else f"{HELD}{elastic}"
+    if model.level(*model.windows).tilts is not None:
+        yield "profile slopes do not move the windows here (some tenths of a per cent)"
 
 
 def _computed(model, more, count, journal: Journal, progress, runner: Runner) -> dict[str, np.ndarray]:
@@ -687,8 +695,8 @@ def figure(data: xr.Dataset):
     return found
 
 
-def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], tilted: bool) -> Block:
-    """Quantiles of all numbers, and how far to trust them; whether samples have profile slopes."""
+def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[str]) -> Block:
+    """Quantiles of all numbers, and how far to trust them; what they assume."""
     scales = {"m": (1e6, " [um]"), "N/m": (1e-6, " [N/um]"), "1": (1.0, "")}
     rows, errors, turns = [], [], []
     for name in _SHOWN:
@@ -707,8 +715,9 @@ def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], tilted: bool) -> 
         f"{data.attrs['positions']} positions of one mesh period; over the {data.attrs['turn']} of a turn of "
         f"the carrier these samples have {' and '.join(turns)}",
         f"a planet loses its load in {float(data.opens.any('planet').mean()):.2%} of the samples",
-        f"worst.toml: sample {worst}, transmission error {exact:.6g} um exactly; largest share: sample {at}",
-        *(["profile slopes do not move the windows here (some tenths of a per cent)"] * tilted),
+        f"worst.toml (femgear run --only static): sample {worst}, exact STE {exact:.6g} um; "
+        f"largest share: sample {at}",
+        *limits,
     )
     header = ("number", "ideal", *(f"{q:.0%}" for q in QUANTILES), "largest")
     return Block(f"{len(data.sample)} samples, seed {data.attrs['seed']}", header, tuple(rows), notes)

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from textwrap import wrap
-from typing import Any
+from typing import Any, get_args
 
 from femgear.case import text as case_text
 from femgear.case.estimates import (
@@ -22,7 +22,8 @@ from femgear.case.estimates import (
     usual_torque,
 )
 from femgear.case.gear_set import planetary_set
-from femgear.case.quantities import ANGLE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION, to_si
+from femgear.case.quantities import ANGLE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
+from femgear.case.sections import FaceWidth, Module
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.phasing import neighbouring_teeth
 from femgear.trains.reading import parse_case
@@ -121,7 +122,7 @@ def new_case(
     kind : str
         Of `KINDS`.
     teeth : tuple of int
-        Of sun, planet and ring, or of both gears.
+        Of sun, planet and ring, which may be negative as in ISO 21771, or of both gears.
     module : str, optional
         By default 2 mm.
     torque : str, optional
@@ -129,7 +130,7 @@ def new_case(
     speed : str, optional
         By default 1000 rpm.
     planets : int, optional
-        By default the first of 3, 4, 5, 2 and 1 that equal spacing allows.
+        By default the first of 3, 4, 5 and 2 that equal spacing allows.
     face_width : str, optional
         By default twelve modules.
 
@@ -142,10 +143,10 @@ def new_case(
     given = {"teeth": teeth, "module": module, "planets": planets, "face-width": face_width}
     given |= {"torque": torque, "speed": speed}
     teeth, count = _teeth_and_planets(kind, teeth, planets)
-    module, speed, of_set = module or "2 mm", speed or "1000 rpm", len(teeth) == 3
-    size = _length(module, "--module")
-    width = _length(face_width, "--face-width") if face_width else 12.0 * size
-    load = torque or f"{usual_torque(teeth[0], teeth[1], size, width, count):.3g} N m"
+    module, speed = "2 mm" if module is None else module, "1000 rpm" if speed is None else speed
+    size, of_set = _read(Module, module, "--module"), len(teeth) == 3
+    width = 12.0 * size if face_width is None else _read(FaceWidth, face_width, "--face-width")
+    load = f"{usual_torque(teeth[0], teeth[1], size, width, count):.3g} N m" if torque is None else torque
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
@@ -188,18 +189,20 @@ def _teeth_and_planets(kind: str, teeth: tuple[int, ...], planets: int | None) -
         limit = ", ".join(KINDS)
         raise CaseError("there is no such kind of case", code="E-CHOICE", key="kind", value=kind, limit=limit)
     usual, teeth = KINDS[kind], teeth or KINDS[kind]
-    if len(teeth) != len(usual) or min(teeth) < 5:
+    if len(usual) == 3 == len(teeth):
+        teeth = (*teeth[:2], abs(teeth[2]))
+    if len(teeth) != len(usual) or min(teeth) < 5 or max(teeth) > 5000:
         raise CaseError(
             f"a {kind} case needs {len(usual)} numbers of teeth", code="E-COUNT", key="--teeth",
-            value=teeth, limit=f"5 or more each, as in --teeth {' '.join(map(str, usual))}",
+            value=teeth, limit=f"5 to 5000 each, as in --teeth {' '.join(map(str, usual))}",
         )  # fmt: skip
     of_set, total = len(usual) == 3, sum(teeth[::2])
     if planets is not None and not of_set:
         remedy = "leave it out"
         raise CaseError(f"a {kind} case has no planets", code="E-ARGUMENTS", key="--planets", remedy=remedy)
     if planets is None:
-        return teeth, next((n for n in (3, 4, 5, 2) if total % n == 0), 1) if of_set else 1
-    if planets > 0 and total % planets:
+        planets = next((n for n in (3, 4, 5, 2) if total % n == 0), 3) if of_set else 1
+    if of_set and planets > 0 and total % planets:
         raise _unequal(teeth, planets)
     return teeth, planets
 
@@ -220,9 +223,10 @@ def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:
     )  # fmt: skip
 
 
-def _length(text: str, key: str) -> float:
+def _read(kind: Any, text: str, key: str) -> float:
+    """Read a quantity as the entry of a case file that has the kind."""
     try:
-        return to_si(text, LENGTH)
+        return get_args(kind)[1].read(text)
     except CaseError as error:
         error.key = key
         raise

@@ -52,13 +52,19 @@ def listed(names: list[str]) -> str:
 
 def entries_without_effect(data: dict, others: Sequence[str] = ()) -> list[str]:
     """List entries that no set of rigid bodies takes up: machines, housing, run-up, foundation of the ring,
-    others.
+    strength, others.
 
     ``data`` are the tables of a case file that was checked.
     """
     machines = [name for name in ("motor", "brake", "housing", "runup") if name in data]
     keys = ("foundation_radial", "foundation_tangential")
-    return [*machines, *others, *(f"ring.{key}" for key in keys if key in data["ring"])]
+    foundation = (f"ring.{key}" for key in keys if key in data["ring"])
+    return [*machines, *others, *foundation, *strength_entries(data)]
+
+
+def strength_entries(data: dict) -> list[str]:
+    """List the limits of the material, from which elastic sets alone find safeties."""
+    return [f"material.{key}" for key in data["material"] if key.endswith("_stress_limit")]
 
 
 def flank_entries(data: dict) -> list[str]:

@@ -92,6 +92,30 @@ def test_wrong_units_name_near_ones(text, dimension, near):
 
 
 @pytest.mark.parametrize(
+    ("text", "dimension", "slip", "usual"),
+    [
+        ("1 200 rpm", quantities.SPEED, "a blank", '"1200 rpm"'),
+        ("12 345 678 N/m", quantities.STIFFNESS, "a blank", '"12345678 N/m"'),
+        ("−300 N m", quantities.TORQUE, "a typographic minus", '"-300 N m"'),
+        ("1e−4 kg m^2", quantities.INERTIA, "a typographic minus", '"1e-4 kg m^2"'),
+        ("1,5 mm", quantities.LENGTH, "a comma", "decimal point"),
+    ],
+)
+def test_slips_in_numbers_are_named(text, dimension, slip, usual):
+    with pytest.raises(CaseError, match=f"has {slip}") as caught:
+        quantities.to_si(text, dimension)
+    assert caught.value.code == "E-UNIT" and usual in caught.value.remedy
+    assert quantities.to_si("1450 1/min", quantities.SPEED) == pytest.approx(1450 * quantities.RPM)
+
+
+@pytest.mark.parametrize(("text", "usual"), [("5 %", "write 0.05"), ("5", "without quotes"), ("five", None)])
+def test_numbers_in_quotes(text, usual):
+    with pytest.raises(CaseError, match="a number is needed") as caught:
+        Number(0.0, 1.0).read(text)
+    assert usual in caught.value.remedy if usual else caught.value.remedy is None
+
+
+@pytest.mark.parametrize(
     ("text", "dimension", "near"),
     [
         ("400 N/mm2", quantities.STRESS, "N/mm^2"),

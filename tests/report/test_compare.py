@@ -1,15 +1,43 @@
 """Two runs compared: entries and numbers that differ, and the page with both."""
 
 import json
+from pathlib import Path
 
 from femgear.report import compare
 from femgear.report.tables import Block
+from femgear.trains.reading import read_case, with_value, with_values
+
+CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 
 
 def test_entries_have_their_whole_names():
     case = {"gears": {"sun": {"teeth": 27}}, "bodies": [{"mass": 1}, {"mass": 2}], "speeds": [1, 2]}
-    expected = [("gears.sun.teeth", 27), ("bodies[1].mass", 1), ("bodies[2].mass", 2), ("speeds", [1, 2])]
+    expected = [("gears.sun.teeth", 27), ("bodies[0].mass", 1), ("bodies[1].mass", 2), ("speeds", [1, 2])]
     assert list(compare._flat(case)) == expected
+
+
+def test_entries_differ_by_what_they_say():
+    case = with_value(read_case(CASE), "sun.modifications", [{"kind": "profile crowning", "amount": "5 um"}])
+
+    def found(one, two):
+        return [*compare._entries(*((one.source, one.model_dump(by_alias=True)) for one in (one, two)))]
+
+    words = {"operation.torque": "0.1 kN m", "static.members": "fixed", "ring.teeth": -108}
+    assert found(case, with_values(case, words)) == []
+    other = with_values(case, {"sun.modifications[0].amount": "6 um", "operation.torque": "101 N m"})
+    assert found(case, other) == [
+        ("operation.torque", "100 N m", "101 N m"),
+        ("sun.modifications[0].amount", "5 um", "6 um"),
+    ]
+    assert ("sun.modifications[0].amount", "5 um", "not given") in found(case, read_case(CASE))
+    machine = {"inertia": "1 kg m^2", "coupling_stiffness": "1e6 N m/rad"}
+    assert len(found(case, with_value(case, "motor", machine))) == 2
+    # a range is read as its speeds
+    speeds = [{"from": "1000 rpm", "to": f"{to} rpm", "count": 3} for to in (2000, 3000)]
+    speeds.append(["1000 1/min", "1500 1/min", "2000 1/min"])
+    one, two, three = (with_value(case, "operation.speeds", values) for values in speeds)
+    assert found(one, three) == [] and len(found(two, three)) == 4
+    assert found(one, two) == [("operation.speeds.to", "2000 rpm", "3000 rpm")]
 
 
 def test_cells_that_differ_come_with_their_change():

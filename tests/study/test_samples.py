@@ -332,6 +332,7 @@ def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, 
     words = ["samples", str(path), "--tolerances", str(TOLERANCES), "-o", str(out), "--seed", "3"]
     assert main([*words, "-n", "30"]) == 0
     said = capsys.readouterr().out
+    assert "all centres held" in said and "--only static" in said and "in series" not in said
     data = read_dataset(out / "samples.nc")
     assert data.sizes["sample"] == 30 and data.attrs["seed"] == 3 and "sigma" in data.attrs["tolerances"]
     assert data.transmission_error.attrs["units"] == "m"
@@ -357,6 +358,18 @@ def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, 
     few = read_dataset(out / "samples.nc")
     np.testing.assert_allclose(few.transmission_error, data.transmission_error[:2], rtol=1e-3)
     assert planetary_set(again).n_planets == 3
+
+
+def test_members_that_move_share_better_and_are_told(case, tmp_path):
+    path = tmp_path / "pins.toml"
+    path.write_text('pin_errors.tangential = { distribution = "normal", sigma = "3 um" }', encoding="utf-8")
+    medians = []
+    for members, note in (("fixed", "all centres held"), ("elastic", "planet-ring with the ring on its fou")):
+        one = with_value(case, "static.members", members)
+        (block,), _ = samples_into(one, tmp_path / members, prepared(one, path, cache=grid_cache()), count=20)
+        assert [note in line for line in block.notes].count(True) == 1
+        medians.append(float(read_dataset(tmp_path / members / "samples.nc").largest_share.median()))
+    assert medians[1] < 0.4 < 0.45 < medians[0]
 
 
 class Interrupted(Runner):

@@ -61,9 +61,7 @@ def test_numbers_that_are_given():
         assert "estimated" not in line or not line.startswith(("torque", "face_width", "planets"))
 
 
-@pytest.mark.parametrize(
-    ("teeth", "planets"), [((27, 40, 108), 3), ((30, 20, 70), 4), ((20, 30, 81), 1), ((21, 30, 79), 4)]
-)
+@pytest.mark.parametrize(("teeth", "planets"), [((27, 40, 108), 3), ((30, 20, 70), 4), ((21, 30, 79), 4)])
 def test_sets_close_with_teeth_left_over_or_missing(teeth, planets):
     gears = planetary_set(read_case(new_case("planetary", teeth=teeth)))
     assert gears.n_planets == planets
@@ -78,6 +76,10 @@ def test_sets_close_with_teeth_left_over_or_missing(teeth, planets):
         ("planetary", {"teeth": (27, 40)}, "E-COUNT"),
         ("pair", {"teeth": (27, 40, 108)}, "E-COUNT"),
         ("pair", {"teeth": (27, -40)}, "E-COUNT"),
+        ("planar", {"teeth": (27, 40, 10**400)}, "E-COUNT"),
+        *((kind, {"module": "1e300 mm"}, "E-RANGE") for kind in KINDS),
+        *(("pair", {name: ""}, "E-UNIT") for name in ("module", "face_width", "torque", "speed")),
+        ("planetary", {"teeth": (17, 22, 62)}, "E-ASSEMBLY"),
         ("pair", {"module": "2"}, "E-UNIT"),
         ("drivetrain", {"module": "2 kg"}, "E-UNIT"),
         ("planetary", {"torque": "12 N"}, "E-UNIT"),
@@ -90,6 +92,34 @@ def test_numbers_that_make_no_case(kind, numbers, code):
     with pytest.raises(FemgearError) as caught:
         new_case(kind, **numbers)
     assert caught.value.code == code and (caught.value.limit or caught.value.remedy)
+
+
+def test_refusals_name_the_option():
+    with pytest.raises(CaseError, match="E-RANGE") as caught:
+        new_case("planetary", module="1e300 mm")
+    assert caught.value.key == "--module"
+    with pytest.raises(CaseError, match="E-ASSEMBLY") as caught:
+        new_case("planetary", teeth=(17, 22, 62))
+    assert "or 17 22 61" in (caught.value.remedy or "")
+
+
+def test_rounding_is_no_play_and_one_planet_is_singular():
+    """Profile shifts that close the set leave a play of about 1e-18 m, of either sign."""
+    for teeth in ((27, 40, 108), (30, 20, 70)):
+        case = read_case(new_case("planar", teeth=teeth))
+        notes = [note for block in train_of(case).describe_case(case) for note in block.notes]
+        assert any(note.startswith("play along the line of action 0 um,") for note in notes)
+        pins = [{"planet": 1, "tangential": "20 um"}]
+        case = with_values(read_case(new_case("planetary", teeth=teeth)), {"set.pin_errors": pins})
+        said = next(one for one in train_of(case).case_warnings(case) if one.code == "W-WEDGING")
+        assert "ideal gears have 0.000 um" in str(said)
+    case = read_case(new_case("planetary", planets=1))
+    notes = [note for block in train_of(case).describe_case(case) for note in block.notes]
+    assert "1 planet at 0 deg" in notes
+
+
+def test_teeth_of_the_ring_have_either_sign():
+    assert new_case("planetary", teeth=(17, 22, -61)) == new_case("planetary", teeth=(17, 22, 61))
 
 
 @pytest.mark.parametrize("teeth", [(27, 40, 108), (30, 20, 70), (21, 30, 81), (20, 30, 81)])

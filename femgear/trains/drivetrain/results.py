@@ -401,7 +401,8 @@ def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
         meshes = [i for i, mesh in enumerate(train.meshes) if mesh.stage == number and not mesh.planet]
         waves, radii, (first, second) = [train.meshes[i].section for i in meshes], one.pitch_radii, one.ends
         if isinstance(one, PlanetarySection):
-            teeth = f"{one.sun_teeth} / {one.ring_teeth}, {len(one.angles)} planets"
+            n = len(one.angles)
+            teeth = f"{one.sun_teeth} / {one.ring_teeth}, {n} planet{'s' * (n > 1)}"
             radii = (*radii, one.ring_radius)
         else:
             teeth = f"{one.teeth[0]} / {one.teeth[1]}"

@@ -35,6 +35,7 @@ from femgear.case.sections import (
     Mass,
     MaterialSection,
     ModificationSection,
+    Module,
     PressureAngle,
     RackSection,
     Radius,
@@ -46,10 +47,11 @@ from femgear.case.sections import (
     speed_range,
 )
 from femgear.case.text import CaseFile, ReadCase
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding, remark
 from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import SetDeviations, no_deviations
 from femgear.gears.pair import GearPair, close_pair
+from femgear.trains.rigid import listed, strength_entries
 
 
 class SetSection(Section):
@@ -61,7 +63,7 @@ class SetSection(Section):
     a right-handed gear 1, module, pressure angle, racks and shifts are of the normal section.
     """
 
-    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.1)]
+    module: Module
     pressure_angle: PressureAngle
     face_width: FaceWidth
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-4, 20.0)] | None = None
@@ -219,6 +221,11 @@ def cross_check(case: PairCase) -> Iterator[CaseError]:
     yield from check_gear_deviations(case)
 
 
-FILE = CaseFile(
-    PairCase, cross_check, notices=lambda tables, case: added_material(case), embed=embed_profiles
-)
+def pair_notices(data: dict, case: PairCase) -> Iterator[Finding]:
+    """List what a pair gives in a way that deserves to be said, by the tables of its checked file."""
+    yield from added_material(case)
+    if unused := strength_entries(data):
+        yield remark(f"{listed(unused)} no effect on a pair, which has no safeties")
+
+
+FILE = CaseFile(PairCase, cross_check, notices=pair_notices, embed=embed_profiles)

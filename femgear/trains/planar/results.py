@@ -279,7 +279,7 @@ def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
 def _play(case: PlanarCase, planetary: PlanetarySet) -> str:
     play = case.planar.line_backlash
     values = (planetary.backlash_sun_planet, planetary.backlash_planet_ring) if play is None else (play,)
-    text = " and ".join(dict.fromkeys(f"{max(value, 0.0) * 1e6:.6g}" for value in values))
+    text = " and ".join(dict.fromkeys(f"{max(0.0, round(value * 1e6, 6)):.6g}" for value in values))
     own = "on lines of action of their own" if case.planar.back_flanks else "on those of the drive flanks"
     return f"play along the line of action {text} um, back flanks {own}"
 

@@ -46,6 +46,9 @@ _COUNTING = (
     "one load cycle an engagement, from zero to the largest load of the tooth (peak counting between "
     "crossings of zero, ASTM E1049)"
 )
+HELD = "all centres held"
+SERIES = "of planet-ring with the ring on its foundation in series: no stiffness of the teeth alone"
+"""What a mesh stiffness is, where members move."""
 _PIN_FORCE = "force of the pin on the planet in the frame of the carrier"
 STATIC_VARIABLES = {
     "ste": ("mesh position", "m", "static transmission error of the mesh"),
@@ -612,10 +615,7 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
     k = "k: tangent stiffness dF/dx of teeth and bodies"
     notes = [sharing, f"{k}, held at their bores and at the outer surface of the ring"]
     if data.sizes.get("member", 0):
-        notes[1] = (
-            f"{k}; of planet-ring with the ring on its foundation in series, so that it is no stiffness of "
-            "the teeth alone; the STE contains that and the motion of the members"
-        )
+        notes[1] = f"{k}; {SERIES}; the STE contains that and the motion of the members"
     if data.sizes["mesh"] == 1:
         notes = [contact, f"{k}, held at bore or outer surface"]
     if "axial_force" in data:
@@ -633,7 +633,7 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
 def shares(data: xr.Dataset) -> tuple[float, float, str]:
     """Find the largest share of static.nc and K_gamma, over the equal share, and what holds the members."""
     share = data["load_share"] * data.sizes["planet"]
-    held = "on supports and bearings" if data.sizes.get("member", 0) else "all centres held"
+    held = "on supports and bearings" if data.sizes.get("member", 0) else HELD
     return float(share.max()), float(share.mean("position").max()), held
 
 
@@ -757,7 +757,7 @@ def describe_gears(s: GearSet) -> Block:
     notes = (
         f"module {first.module * 1e3:.6g} mm, pressure angle {math.degrees(first.pressure_angle):.6g} deg, "
         f"face width {first.face_width * 1e3:.6g} mm, centre distance {s.centre_distance * 1e3:.6g} mm",
-        *[f"{s.n_planets} planets at {angles} deg"][: len(s.kinds) - 1],
+        *[f"{s.n_planets} planet{'s' * (s.n_planets > 1)} at {angles} deg"][: len(s.kinds) - 1],
         *[
             f"profile shift of the {gear.name}: positive moves the flank outwards (the opposite of ISO 21771)"
             for gear in s.gears
