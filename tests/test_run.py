@@ -168,6 +168,17 @@ def test_a_function_is_no_result(tmp_path):
     assert not (tmp_path / "a.npz").exists()
 
 
+@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 1, 0), (1, 2, 0), (0, 2, 1)])
+def test_results_keep_the_order_of_axes_in_memory(axes, tmp_path):
+    """Products of arrays in another order round differently: a run that goes on would have other bits."""
+    whole = np.arange(60.0).reshape(3, 4, 5).transpose(axes)
+    for value in (whole, whole[:, :2]):
+        write_result(value, tmp_path / "a.npz", fingerprint="f")
+        found = read_result(tmp_path / "a.npz", fingerprint="f")
+        assert np.array_equal(found, value)
+        assert np.array_equal(np.argsort(found.strides), np.argsort(value.strides))
+
+
 def test_results_keep_types_identity_and_what_may_be_written(tmp_path):
     shared = np.arange(4.0)
     shared.setflags(write=False)

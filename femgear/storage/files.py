@@ -296,8 +296,10 @@ def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, A
     # the value itself is kept, so that no other one gets its id
     known[id(value)] = number, value
     if type(value) is np.ndarray and value.dtype != object:
-        arrays.append(value)
-        return ["array", number, len(arrays) - 1, not value.flags.writeable]
+        # axes as they lie in memory: products of arrays in another order round differently
+        axes = np.argsort([-abs(stride) for stride in value.strides], kind="stable").tolist()
+        arrays.append(value.transpose(axes))
+        return ["array", number, len(arrays) - 1, not value.flags.writeable, "".join(map(str, axes))]
     if isinstance(value, np.generic):
         arrays.append(np.asarray(value))
         return ["generic", number, len(arrays) - 1]
@@ -341,7 +343,7 @@ def _made(kind: str, parts: list, arrays: list[np.ndarray]) -> Any:
     """Make a value of its parts."""
     match kind:
         case "array":
-            array = arrays[parts[0]]
+            array = arrays[parts[0]].transpose(np.argsort([int(axis) for axis in parts[2]]))
             array.setflags(write=not parts[1])
             return array
         case "generic":

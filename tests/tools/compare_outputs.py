@@ -85,7 +85,7 @@ class Mask:
 MASKS = {
     "run times, terminal": Mask(r"(?m)^Time\n(?:[ ─].*\n|\n(?= ))+", r"\s+|─+|\d+\.\d+", " "),
     "run times, manifest": Mask(r'"timings": \{[^}]*\}', r"[\d.e+-]+(?=[,\n])", "0"),
-    "run times, report": Mask(r"(?s)<h3>Time</h3>.*?</table>", r"<td>[\d.]+</td>", "<td></td>"),
+    "run times, report": Mask(r"(?s)<caption>Time</caption>.*?</table>", r"<td>[\d.]+</td>", "<td></td>"),
     "run times, journal": Mask(r'"seconds": [\d.e+-]+', r"[\d.e+-]+$", "0"),
     "run times, search": Mask(r"computed now \([\d.e+-]+ s each\)", r"\([\d.e+-]+", "("),
     "run times, pin errors": Mask(r"(?:curves|samples)\s+\d+\.\d\d\s+s\b", r"\d+\.\d\d", ""),
