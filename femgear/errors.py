@@ -1,7 +1,7 @@
 """The exceptions of femgear: every refusal says what was wrong, where, what is allowed and what to do.
 
 `checked_numbers`, `checked_tolerance` and `checked_count` refuse by name what is no number, tolerance or
-count. What is allowed but deserves a look is a `Finding`.
+count. What is allowed but deserves a look is a `femgear.findings.Finding`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
@@ -116,39 +115,6 @@ CODES = {
 """Meaning of every code; docs/errors.md lists the messages that carry it."""
 MOST_SHOWN = 10
 """Mistakes of a case file that one message lists."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something that is allowed but deserves a look; ``str(finding)`` is the sentence that the user reads.
-
-    Parameters
-    ----------
-    code : str
-        Stable identifier such as ``"W-TORQUE"``; empty for a remark.
-    key : str
-        Dotted path of the entry of the case file that draws it, or empty.
-    text : str
-        What is worth a look, with the numbers.
-    remedy : str, optional
-        What to do about it.
-    """
-
-    code: str
-    key: str
-    text: str
-    _: KW_ONLY
-    remedy: str = ""
-
-    def __str__(self) -> str:
-        head = f"[{self.code}] " if self.code else ""
-        where = f"{self.key}: " if self.key else ""
-        return printable(f"{head}{where}{self.text}{'; ' if self.remedy else ''}{self.remedy}")
-
-
-def remark(text: str) -> Finding:
-    """Make a finding without code and entry: what was read in a way that deserves to be said."""
-    return Finding("", "", text)
 
 
 class FemgearError(Exception):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import fingerprint
-from femgear.errors import CaseError, Finding, StorageError
+from femgear.errors import CaseError, StorageError
 from femgear.exchange.formats import (
     SCALES,
     Sampling,
@@ -28,6 +28,7 @@ from femgear.exchange.formats import (
     write_wav,
     write_workbook,
 )
+from femgear.findings import Finding
 from femgear.housing.sound import sound_quality
 from femgear.report.page import page, write_pictures
 from femgear.storage.files import (

@@ -12,6 +12,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "femgear"
 LAYERS = (
     ("errors",),
+    ("findings",),
     ("gears", "fe"),
     ("contact", "system"),
     ("solvers",),

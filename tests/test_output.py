@@ -15,7 +15,8 @@ from rich.console import Console
 
 from femgear import cli
 from femgear import run as run_module
-from femgear.errors import CaseError, Finding, StorageError
+from femgear.errors import CaseError, StorageError
+from femgear.findings import Finding
 from femgear.report.tables import Block, merged
 from femgear.storage.files import checked_name
 from femgear.trains.reading import open_results, read_case

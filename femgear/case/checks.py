@@ -20,7 +20,8 @@ from femgear.case.sections import (
     GearErrors,
     check_published,
 )
-from femgear.errors import CaseError, Finding, GeometryError
+from femgear.errors import CaseError, GeometryError
+from femgear.findings import Finding
 from femgear.gears.kinematics import unheld_members
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import Any
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import FOUNDATION, INERTIA, MASS, STIFFNESS, TORSION, Dimension, Section
 from femgear.case.sections import MaterialSection
-from femgear.errors import Finding
+from femgear.findings import Finding
 from femgear.gears.gear import Gear
 
 STEEL = 206e9

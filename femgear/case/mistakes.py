@@ -19,7 +19,8 @@ from pydantic import BaseModel, ValidationError
 from femgear.case import text as case_text
 from femgear.case.quantities import ANGLE, LENGTH, wrong_length
 from femgear.case.sections import Case, RackSection
-from femgear.errors import MOST_SHOWN, CaseError, Finding, GeometryError, remark
+from femgear.errors import MOST_SHOWN, CaseError, GeometryError
+from femgear.findings import Finding, remark
 
 _DIMENSIONS = {
     "centre_distance": LENGTH,

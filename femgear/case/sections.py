@@ -39,7 +39,8 @@ from femgear.case.quantities import (
     at_most,
 )
 from femgear.case.text import CaseFile, ReadCase, described
-from femgear.errors import CaseError, Finding, remark
+from femgear.errors import CaseError
+from femgear.findings import Finding, remark
 
 LARGEST_DEVIATION = 0.2
 """Largest plausible amount of any modification or error, in modules."""

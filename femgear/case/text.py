@@ -18,7 +18,8 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, PrivateAttr
 
-from femgear.errors import MOST_SHOWN, CaseError, Finding, printable
+from femgear.errors import MOST_SHOWN, CaseError, printable
+from femgear.findings import Finding
 
 _MAX_BYTES = 1_000_000
 _MAX_DEPTH = 32

@@ -15,7 +15,8 @@ from numbers import Integral
 
 import numpy as np
 
-from femgear.errors import Finding, GeometryError
+from femgear.errors import GeometryError
+from femgear.findings import Finding
 from femgear.gears.profile import (
     ISO_53_C,
     BasicRack,

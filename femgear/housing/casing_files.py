@@ -32,7 +32,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from femgear.errors import CaseError, Finding, nvh_library
+from femgear.errors import CaseError, nvh_library
+from femgear.findings import Finding
 from femgear.housing.structure import FixedStructure, from_arrays
 
 UNITS = {"SI": (1.0, 1.0), "mm-t-s": (1e-3, 1e3)}

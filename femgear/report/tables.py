@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.errors import Finding, remark
+from femgear.findings import Finding, remark
 from femgear.report.response import harmonics_of, some_at_a_time
 from femgear.system.fourier import fluctuation, sample
 

@@ -30,7 +30,8 @@ import numpy as np
 from femgear import __version__
 from femgear.case.dependencies import Steps, compliance_entries
 from femgear.case.sections import Case
-from femgear.errors import ContactError, FemgearError, Finding, StorageError
+from femgear.errors import ContactError, FemgearError, StorageError
+from femgear.findings import Finding
 from femgear.storage.files import exclusive_lock, storage_errors
 from femgear.study.objectives import STAGES, Quantity, Variant
 from femgear.study.problem import Limit, Point, Problem, Variable, Vector

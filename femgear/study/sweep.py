@@ -17,7 +17,8 @@ from textwrap import fill
 import numpy as np
 
 from femgear.case.sections import Case
-from femgear.errors import CaseError, Finding
+from femgear.errors import CaseError
+from femgear.findings import Finding
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
 from femgear.report.tables import Block
 from femgear.storage.files import own_files, resumable, write_csv

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from threadpoolctl import ThreadpoolController
 
-    from femgear.errors import Finding
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
+    from femgear.findings import Finding
     from femgear.storage.results import Results
 
 Progress = Callable[[str, float, float], None]

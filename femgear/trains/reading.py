@@ -24,7 +24,8 @@ from femgear.case.gear_set import with_shafts
 from femgear.case.mistakes import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.text import described, text_with_points
-from femgear.errors import CaseError, Finding
+from femgear.errors import CaseError
+from femgear.findings import Finding
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from femgear.errors import FemgearError
 from femgear.trains.reading import read_case
 from femgear.trains.registry import check_case, train_of
-from soak.trials import Outcome, TooSlow, metered
+from soak.trials import Outcome, TooSlow, metered, place_in_package
 
 PIECE = 1000
 SECONDS, MEGABYTES = 1.0, 500.0
@@ -93,7 +93,7 @@ def trial(number: int, folder: Path) -> Outcome:
     except TooSlow:
         said, failure = "stopped", f"does not end within {_STOP:g} s of CPU time"
     except Exception as error:
-        last = _place(error)
+        last = place_in_package(error)
         said, failure = "traceback", f"{type(error).__name__}: {str(error)[:200]} ({last})"
     if not failure and meter.seconds > SECONDS:
         failure = f"{meter.seconds:.1f} s of CPU time, {said}"
@@ -128,17 +128,6 @@ def _warm(folder: Path, case: int) -> None:
     name, text = originals()[case]
     (folder / name).write_text(text, encoding="utf-8")
     _described(folder / name)
-
-
-def _place(error: BaseException) -> str:
-    """File and line of the package where an exception was raised."""
-    place, trace = "", error.__traceback__
-    while trace is not None:
-        file = Path(trace.tb_frame.f_code.co_filename)
-        if "femgear" in file.parts:
-            place = f"{file.name}:{trace.tb_lineno}"
-        trace = trace.tb_next
-    return place
 
 
 def mutant(number: int) -> bytes:

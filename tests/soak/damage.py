@@ -18,7 +18,6 @@ import select
 import shutil
 import signal
 import sys
-import traceback
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -37,7 +36,7 @@ from femgear.study.objectives import named_quantity
 from femgear.study.sweep import sweep
 from femgear.trains.reading import open_results, parse_case
 from soak.programs import case_texts, start, undisturbed, workspace
-from soak.trials import Outcome
+from soak.trials import Outcome, place_in_package
 
 PIECE = 300
 # seconds after which a reader counts as hanging, memory that it may have [bytes]
@@ -118,9 +117,7 @@ def _called(read: Callable[[], object]) -> tuple[str, object]:
         str(error).encode()
         return f"refused {error.code}", ""
     except BaseException as error:
-        lines = traceback.extract_tb(error.__traceback__)
-        own = [f"{Path(line.filename).name}:{line.lineno}" for line in lines if "femgear" in line.filename]
-        return "traceback", f"{type(error).__name__}: {str(error)[:200]} ({own[-1] if own else ''})"
+        return "traceback", f"{type(error).__name__}: {str(error)[:200]} ({place_in_package(error)})"
 
 
 def _difference(found: object, expected: object) -> str:

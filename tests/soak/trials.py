@@ -12,6 +12,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import femgear
+
 KINDS = ("case_text", "damage", "kills", "faults", "sets", "determinism")
 """Modules of this folder that have trials."""
 # failures of a piece that are kept word by word; further ones are counted
@@ -145,3 +147,11 @@ def _status(name: str) -> float:
         line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(f"{name}:")
     )
     return float(line.split()[1]) / 1000
+
+
+def place_in_package(error: BaseException) -> str:
+    """File and line of femgear's own code where an exception was last seen, empty where it never was there."""
+    package = Path(femgear.__file__).parent
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if Path(frame.filename).is_relative_to(package)]
+    return f"{Path(own[-1].filename).name}:{own[-1].lineno}" if own else ""

@@ -36,7 +36,8 @@ from femgear.case.quantities import (
 )
 from femgear.case.sections import FORMAT, DampingRatio, Speed
 from femgear.case.text import CaseFile, ReadCase
-from femgear.errors import CaseError, FemgearError, Finding
+from femgear.errors import CaseError, FemgearError
+from femgear.findings import Finding
 from femgear.gears.deviations import common_period
 from femgear.gears.pair import GearPair
 from femgear.trains.drivetrain.parts import (

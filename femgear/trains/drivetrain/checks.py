@@ -13,7 +13,8 @@ import numpy as np
 from scipy import linalg
 
 from femgear.case.quantities import FREQUENCY, RPM, SPEED, TIME
-from femgear.errors import CaseError, Finding
+from femgear.errors import CaseError
+from femgear.findings import Finding
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.case_file import (

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.errors import Finding
+from femgear.findings import Finding
 from femgear.report.tables import Block, describe_modes, pull, tabulate
 from femgear.storage.results import coordinates, dataset, mode_entries, shape_entries
 from femgear.trains.drivetrain.case_file import DrivetrainCase, torque_histories

@@ -19,7 +19,8 @@ from femgear.case.csv_columns import checksum, checksum_of_all
 from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case, SupportSection, output_member
-from femgear.errors import CaseError, Finding
+from femgear.errors import CaseError
+from femgear.findings import Finding
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.housing.casing_files import named_outputs, read_casing

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.gear_set import planetary_set, set_deviations
-from femgear.errors import Finding
+from femgear.findings import Finding
 from femgear.gears.deviations import no_deviations, rotational_symmetry
 from femgear.housing.carrier_orders import MeshPaths
 from femgear.housing.casing_files import may_lack_compliance, missing_compliance

@@ -16,8 +16,8 @@ import numpy as np
 from femgear.case.dependencies import Entries
 from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
 from femgear.case.quantities import RPM
-from femgear.errors import Finding
 from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
+from femgear.findings import Finding
 from femgear.gears.iso6336 import contact_safety, root_safety, single_pair_factor
 from femgear.gears.modifications import FlankForm
 from femgear.gears.planetary import mesh_names

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.errors import Finding
+from femgear.findings import Finding
 from femgear.housing.orders import order_level
 from femgear.housing.sound import REFERENCE_ACCELERATION
 from femgear.report.style import excited_by

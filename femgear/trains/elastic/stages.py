@@ -30,8 +30,8 @@ from femgear.contact.bodies import Bodies, with_ring
 from femgear.contact.cycle import CycleOptions
 from femgear.contact.loaded_period import loaded_period
 from femgear.contact.supports import Supports
-from femgear.errors import Finding
 from femgear.fe.elasticity import mass
+from femgear.findings import Finding
 from femgear.gears.deviations import common_period, rotational_symmetry
 from femgear.gears.planetary import mesh_names
 from femgear.housing.sensor import component_lines

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.errors import Finding
+from femgear.findings import Finding
 from femgear.report.tables import Block
 from femgear.solvers.continuation.branches import Branch, parameter_curve
 from femgear.solvers.continuation.corrector import StepOptions

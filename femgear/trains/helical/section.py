@@ -18,7 +18,8 @@ from femgear.case.sections import (
     RigidCase,
 )
 from femgear.case.text import CaseFile
-from femgear.errors import CaseError, Finding, remark
+from femgear.errors import CaseError
+from femgear.findings import Finding, remark
 from femgear.trains.rigid import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
 
 _MOST_SLICES = 30

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.errors import Finding
+from femgear.findings import Finding
 from femgear.gears.planetary import mesh_names
 from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
 from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, mode_entries

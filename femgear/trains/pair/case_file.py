@@ -47,7 +47,8 @@ from femgear.case.sections import (
     speed_range,
 )
 from femgear.case.text import CaseFile, ReadCase
-from femgear.errors import CaseError, Finding, remark
+from femgear.errors import CaseError
+from femgear.findings import Finding, remark
 from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import SetDeviations, no_deviations
 from femgear.gears.pair import GearPair, close_pair

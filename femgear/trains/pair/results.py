@@ -11,8 +11,8 @@ import numpy as np
 
 from femgear.case.dependencies import Entries
 from femgear.case.quantities import RPM
-from femgear.errors import Finding
 from femgear.exchange.formats import Sampling, Signal, line_extent
+from femgear.findings import Finding
 from femgear.gears.pair import GearPair
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
 from femgear.report.tables import Block, chosen, first_speeds, response_warnings, tabulate

@@ -21,7 +21,8 @@ from femgear.case.checks import runup_range
 from femgear.case.dependencies import check_entries, modal_entries, static_entries
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.quantities import RPM
-from femgear.errors import ConvergenceError, Finding, GeometryError
+from femgear.errors import ConvergenceError, GeometryError
+from femgear.findings import Finding
 from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import common_period
 from femgear.gears.iso6336 import pair_mesh_stiffness

@@ -16,7 +16,7 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.case.sections import output_member
-from femgear.errors import Finding, remark
+from femgear.findings import Finding, remark
 from femgear.gears.kinematics import torques
 from femgear.report.response import harmonics_of
 from femgear.report.tables import Block, chosen, first_speeds, tabulate

@@ -34,7 +34,8 @@ from femgear.case.sections import (
     output_member,
 )
 from femgear.case.text import CaseFile
-from femgear.errors import CaseError, Finding, remark
+from femgear.errors import CaseError
+from femgear.findings import Finding, remark
 from femgear.trains.rigid import (
     Gravity,
     entries_without_effect,

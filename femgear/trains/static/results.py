@@ -21,7 +21,7 @@ from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
 from femgear.contact.slices import PARTS as SLICES
-from femgear.errors import Finding
+from femgear.findings import Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import tooth_thickness

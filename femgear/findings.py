@@ -1,0 +1,130 @@
+"""Findings: what is allowed, or was computed, but deserves a look; and the catalogue of their codes.
+
+A refusal is an exception of `femgear.errors`. A finding ends nothing: it goes into the one list of a run,
+which terminal, page, manifest, result files, ``femgear check`` and docs/errors.md read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+
+from femgear.errors import printable
+
+NOTE, DOUBT, FAULT = "note", "doubt", "fault"
+SEVERITIES = (NOTE, DOUBT, FAULT)
+"""From the least to the most severe: worth knowing; a number may be wrong; nothing real carries that."""
+
+CATALOGUE = {
+    "W-BACK": (NOTE, "Meshes carry on their back flanks."),
+    "W-BACKLASH": (NOTE, "Contact loss is asked for where teeth have no back side, or there are no meshes."),
+    "W-BALANCE": (DOUBT, "A harmonic balance did not converge."),
+    "W-BEARING": (NOTE, "Bearings are missing, or one has a property that a stage does not take."),
+    "W-BRANCH": (DOUBT, "The curve of a response breaks off."),
+    "W-CHAOS": (DOUBT, "Neighbouring motions move apart: details of the record depend on the steps."),
+    "W-CLEARANCE": (NOTE, "A tip comes close to the root of its mate."),
+    "W-CLIPPING": (DOUBT, "Samples of a sound exceed its full scale."),
+    "W-CONTACT-POINTS": (DOUBT, "The mesh forces on both gears do not act on one line."),
+    "W-CONTACT-RATIO": (NOTE, "The contact ratio is low."),
+    "W-COUPLING": (NOTE, "The torque turns a coupling further than couplings go."),
+    "W-DAMPING": (DOUBT, "Without damping resonances have no limit."),
+    "W-DEFLECTION": (DOUBT, "Deflections are no longer small."),
+    "W-EDGE": (DOUBT, "Contacts lie at the end of a flank, where the pressure has no limit."),
+    "W-ENDS": (DOUBT, "Free ends of the teeth make meshes softer than the model has them."),
+    "W-ESTIMATED": (NOTE, "Values that were left out are estimated."),
+    "W-EXCITATION": (
+        DOUBT,
+        "The excitation ends below what levels need, or nothing excites.",
+    ),
+    "W-FACE-LOAD": (DOUBT, "Slices are too wide for the load distribution over the face width."),
+    "W-FILLET": (NOTE, "A tip runs into the root fillet of its mate by a little."),
+    "W-GROWTH": (DOUBT, "The free motion grows: a parametric resonance."),
+    "W-HELIX": (DOUBT, "The helix angle lies outside what is validated."),
+    "W-JOURNAL": (NOTE, "Lines of a journal were damaged and are left out."),
+    "W-LIFTED": (NOTE, "Parts of the face width never carry."),
+    "W-LOAD": (NOTE, "Without load nothing keeps the flanks on one side."),
+    "W-MOTION": (DOUBT, "A member moves far enough to change contact points and arms."),
+    "W-NEIGHBOURS": (NOTE, "Neighbouring planets come close to one another."),
+    "W-ONE-WAY": (NOTE, "Supports or a casing change the level that load factors are computed without."),
+    "W-OPEN": (NOTE, "A planet carries nothing at some positions."),
+    "W-PARTED": (NOTE, "Teeth never touch."),
+    "W-PLANETS": (NOTE, "Planets are not equally spaced, or their number is unusual."),
+    "W-POINTS": (DOUBT, "Points on the ring do not resolve its waves."),
+    "W-PRESSURE": (FAULT, "The contact pressure exceeds what any steel carries."),
+    "W-PROFILE": (NOTE, "A profile has proportions that are unusual."),
+    "W-PULL": (DOUBT, "Meshes pull where real teeth would part."),
+    "W-RATE": (DOUBT, "Steps or samples are too coarse for the frequencies."),
+    "W-RECORD": (NOTE, "A record ends below a frequency that matters."),
+    "W-RELIEF-SIGN": (NOTE, "A modification adds material."),
+    "W-RESIDUAL": (DOUBT, "Static compliance beyond the modes of a casing is missing."),
+    "W-RESPONSE": (NOTE, "There are modes alone."),
+    "W-RIM": (NOTE, "A rim is thin."),
+    "W-ROWS": (NOTE, "Tables that no sheet can hold are left out."),
+    "W-SEPARATION": (NOTE, "Flanks part at speeds of operation."),
+    "W-SETTLED": (DOUBT, "Motions do not repeat within the periods that are allowed."),
+    "W-SIZE": (NOTE, "The computation takes long, or fills much memory."),
+    "W-SLICES": (NOTE, "Slices make the dynamics slow."),
+    "W-SMOOTHING": (DOUBT, "The smoothing of contact changes the result."),
+    "W-SPECTRUM": (NOTE, "The stage spectrum refuses this case."),
+    "W-SPEED": (NOTE, "Torques change the speed within the record."),
+    "W-STEPS": (DOUBT, "Peaks of resonances are too narrow for the speeds of a run-up."),
+    "W-SWEEP": (NOTE, "A sweep takes long."),
+    "W-TAIL": (DOUBT, "The highest harmonics of a response are not small."),
+    "W-TEETH": (NOTE, "Radii and tooth numbers have different ratios."),
+    "W-THRUST": (DOUBT, "Axial forces tilt the planets, which the model holds upright."),
+    "W-TIP-THIN": (NOTE, "The tooth is thin at its tip."),
+    "W-TORQUE": (NOTE, "The torque has an unusual sign or size."),
+    "W-UNDERCUT": (NOTE, "The tool cuts into the flank at the root."),
+    "W-UNUSED": (NOTE, "An entry of the case has no effect."),
+    "W-WEDGED": (NOTE, "Meshes are loaded on both flanks at once."),
+    "W-WEDGING": (NOTE, "Teeth have so little play that they may wedge."),
+}
+"""Severity and meaning of every code, in one sentence; the text of a finding says the numbers."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is allowed but deserves a look; ``str(finding)`` is the sentence that the user reads.
+
+    Parameters
+    ----------
+    code : str
+        Stable identifier out of `CATALOGUE`; empty for a remark.
+    key : str
+        Dotted path of the entry of the case file that draws it, or empty.
+    text : str
+        What is worth a look, with the numbers.
+    remedy : str, optional
+        What to do about it.
+    severity : str, optional
+        One of `SEVERITIES`; empty takes that of the catalogue, for a remark ``"note"``.
+
+    Raises
+    ------
+    KeyError
+        The catalogue has no such code.
+    ValueError
+        There is no such severity.
+    """
+
+    code: str
+    key: str
+    text: str
+    _: KW_ONLY
+    remedy: str = ""
+    severity: str = ""
+
+    def __post_init__(self) -> None:
+        usual = CATALOGUE[self.code][0] if self.code else NOTE
+        object.__setattr__(self, "severity", self.severity or usual)
+        if self.severity not in SEVERITIES:
+            raise ValueError(f"{self.severity!r} is no severity: {', '.join(SEVERITIES)}")
+
+    def __str__(self) -> str:
+        head = f"[{self.code}] " if self.code else ""
+        where = f"{self.key}: " if self.key else ""
+        return printable(f"{head}{where}{self.text}{'; ' if self.remedy else ''}{self.remedy}")
+
+
+def remark(text: str) -> Finding:
+    """Make a finding without code and entry: what was read in a way that deserves to be said."""
+    return Finding("", "", text)
