@@ -150,7 +150,7 @@ def _status(name: str) -> float:
 
 
 def place_in_package(error: BaseException) -> str:
-    """File and line of femgear's own code where an exception was last seen, empty where it never was there."""
+    """File and line of femgear where an exception was last seen, empty where it never was there."""
     package = Path(femgear.__file__).parent
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if Path(frame.filename).is_relative_to(package)]
