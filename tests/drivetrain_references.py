@@ -78,13 +78,13 @@ def torsional_matrices(train: Drivetrain) -> tuple[np.ndarray, np.ndarray, np.nd
         (radius, planet), cosine = stage.pitch_radii, math.cos(stage.pressure_angle)
         sense = stage.flank * spin[stage.carrier]
         c, s, planets = at[stage.carrier], at[stage.sun], at[number]
-        M[c, c] += len(planets) * stage.planet_mass * stage.centre_distance**2
+        M[c, c] += len(planets) * stage.planet_mass * stage.axis_distance**2
         sun, ring = np.zeros((2, len(planets), len(names)))
         for p, place in enumerate(planets):
             M[place, place] += stage.planet_inertia
             # the pin pushes the planet: its flanks approach sun and ring ahead of it
-            sun[p, [c, s, place]] = stage.centre_distance, -radius, -planet
-            ring[p, [c, place]] = stage.centre_distance, planet
+            sun[p, [c, s, place]] = stage.axis_distance, -radius, -planet
+            ring[p, [c, place]] = stage.axis_distance, planet
         columns += list(sense * cosine * sun) + list(sense * cosine * ring)
     for stage in train.parallel:
         row = np.zeros(len(names))

@@ -37,7 +37,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import FORMAT, DampingRatio, Speed
 from femgear.case.text import CaseFile, ReadCase
 from femgear.errors import CaseError, FemgearError
-from femgear.findings import Finding
+from femgear.findings import DOUBT, Finding
 from femgear.gears.deviations import common_period
 from femgear.gears.pair import GearPair
 from femgear.trains.drivetrain.parts import (
@@ -57,7 +57,7 @@ _MOST_POINTS = 20_000
 _POINTS = Values(min_length=1, max_length=_MOST_POINTS)
 _LARGEST_TORQUE, _LATEST = 1e9, 1e6
 
-# Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
+# Ratios of radii and teeth that differ by more belong to no gears; rounded radii explain the rest.
 _RATIO_TOLERANCE = 0.01
 # Angles and radii of a stage and of the pair that gives its stiffness, of digits as printed.
 _UNLIKE = 1e-3
@@ -65,6 +65,8 @@ _UNLIKE = 1e-3
 _REMARK = 1e-4
 # Teeth of a planet that profile shifts may add or take.
 _SHIFTED = 2
+# Largest working pressure angle that is plausible.
+_STEEPEST = math.radians(45.0)
 # Entries that give the sizes of the gears of a stage, each way whole, and the same in words.
 _WAYS = {
     "parallel": ((("radii",), ("base_radii",), ("module",)), "radii, base_radii or module"),
@@ -534,14 +536,41 @@ def _gear_sizes(stage: ParallelSection | PlanetarySection, kind: str, key: str) 
                 key=f"{key}.{name}", limit=f"ratios within {_RATIO_TOLERANCE:.0%} of one another",
                 remedy="correct the teeth or the radii, or give module in place of the radii",
             )  # fmt: skip
-    if isinstance(stage, PlanetarySection) and stage.module is not None and stage.planet_teeth is not None:
-        between = 0.5 * (stage.ring_teeth - stage.sun_teeth)
-        if abs(stage.planet_teeth - between) > _SHIFTED:
-            yield CaseError(
-                "the planet has other teeth than fit between sun and ring", code="E-TEETH",
-                key=f"{key}.planet_teeth", value=stage.planet_teeth,
-                limit=f"{between:g}, or up to {_SHIFTED} more or less with profile shift",
-            )  # fmt: skip
+    if isinstance(stage, PlanetarySection):
+        yield from _planet_teeth(stage, key)
+
+
+def _planet_teeth(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
+    """Teeth of a planet that is one, and axes at which it meshes with sun and ring."""
+    between, least = 0.5 * (stage.ring_teeth - stage.sun_teeth), math.cos(_STEEPEST)
+    if stage.planet_teeth is None and stage.module is not None and between % 1.0:
+        yield CaseError(
+            f"no planet has {between:g} teeth", code="E-KEY-MISSING", key=f"{key}.planet_teeth",
+            limit=f"a whole number near {between:g}",
+            remedy=f"give planet_teeth (say {math.floor(between)}), and centre_distance of the shifted gears",
+        )  # fmt: skip
+        return
+    if stage.planet_teeth is not None and abs(stage.planet_teeth - between) > _SHIFTED:
+        yield CaseError(
+            "the planet has other teeth than fit between sun and ring", code="E-TEETH",
+            key=f"{key}.planet_teeth", value=stage.planet_teeth,
+            limit=f"{between:g}, or up to {_SHIFTED} more or less with profile shift",
+        )  # fmt: skip
+    elif stage.centre_distance is not None and stage.sun_radius is not None:
+        yield CaseError(
+            "pitch radii give the centre distance already", code="E-CHOICE", key=f"{key}.centre_distance",
+            limit="module or base radii beside it", remedy="leave it out",
+        )  # fmt: skip
+    elif not all(least <= share <= 1.0 + _REMARK**2 for share in stage.base_shares):
+        sun, planet, ring = stage.base_radii
+        low, high = max(sun + planet, ring - planet), min(sun + planet, ring - planet) / least
+        near = f"{LENGTH.show(low)} to {LENGTH.show(high)}" if low < high else "gears that mesh at one"
+        yield CaseError(
+            "at this distance of the axes sun, planet and ring do not mesh", code="E-CENTRE-DISTANCE",
+            key=f"{key}.{'centre_distance' if stage.sun_radius is None else 'sun_radius'}",
+            value=LENGTH.show(stage.axis_distance), limit=near,
+            remedy="give the centre distance of the gears, or correct teeth and sizes",
+        )  # fmt: skip
 
 
 def _ratios(stage: ParallelSection | PlanetarySection) -> list[tuple[str, float, float]]:
@@ -554,10 +583,9 @@ def _ratios(stage: ParallelSection | PlanetarySection) -> list[tuple[str, float,
     sun, planet = stage.sun_radius, stage.planet_radius
     if sun is None or planet is None:
         sun, planet = stage.sun_base_radius or 0.0, stage.planet_base_radius or 0.0
-    found = [("ring_teeth", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)]
     if stage.planet_teeth is not None:
-        found.append(("planet_teeth", planet / sun, stage.planet_teeth / stage.sun_teeth))
-    return found
+        return [("planet_teeth", planet / sun, stage.planet_teeth / stage.sun_teeth)]
+    return [("ring_teeth", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)]
 
 
 def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
@@ -597,14 +625,7 @@ def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
     stages = [(f"parallel[{i}]", stage) for i, stage in enumerate(case.parallel)]
     stages += [(f"planetary[{i}]", stage) for i, stage in enumerate(case.planetary)]
     for key, stage in stages:
-        for _, radii, teeth in _ratios(stage)[:1]:
-            if abs(teeth / radii - 1.0) > _REMARK:
-                yield Finding(
-                    "W-TEETH",
-                    f"{key}.teeth",
-                    f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
-                    "the radii, mesh frequencies the teeth of the first gear or of the ring",
-                )
+        yield from _teeth_notices(stage, key)
     if not case.bearing:
         yield Finding("W-BEARING", "", "there is no [[bearing]]")
     if not case.simulation.contact_loss:
@@ -622,6 +643,31 @@ def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
             "without backlash given there is no back side: with "
             "simulation.contact_loss these teeth part and meet no back flank",
         )
+
+
+def _teeth_notices(stage: ParallelSection | PlanetarySection, key: str) -> Iterator[Finding]:
+    """Remark what of teeth and radii decides where they differ, and a distance of axes that nobody gave."""
+    all_teeth = isinstance(stage, PlanetarySection) and stage.planet_teeth is not None
+    for name, radii, teeth in _ratios(stage):
+        if abs(teeth / radii - 1.0) > _REMARK:
+            decides = (
+                "the teeth decide, and the radii give the distance of the axes alone"
+                if all_teeth
+                else "speeds follow the radii, mesh frequencies the teeth of the first gear or of the ring"
+            )
+            text = f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; {decides}"
+            yield Finding("W-TEETH", f"{key}.{name}", text)
+    if isinstance(stage, PlanetarySection) and stage.centre_distance is None and stage.sun_radius is None:
+        sun, ring = stage.base_shares
+        if abs(sun / ring - 1.0) > _REMARK:
+            angles = " and ".join(f"{math.degrees(angle):.4g}" for angle in stage.working_angles)
+            yield Finding(
+                "W-TEETH", f"{key}.centre_distance",
+                f"a planet of {stage.planet_teeth_or_half:g} teeth needs profile shifts, and the distance of "
+                f"the axes is not given: {1e3 * stage.axis_distance:.6g} mm is taken, half-way between those "
+                f"of both meshes without shift, with working pressure angles of {angles} deg",
+                remedy="give centre_distance", severity=DOUBT,
+            )  # fmt: skip
 
 
 def embed_files(data: dict, name: str) -> dict[str, str]:

@@ -158,7 +158,8 @@ def _eliminated(rows, free, place):
 def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
     """Solve for the free spin (n,) of the chain among its coordinates, one radian of the first body [rad].
 
-    Willis' equation for planetary stages: ``r_s (s - c) + r_p (p - c) = 0``, ``r_r c + r_p (p - c) = 0``.
+    Willis' equation for planetary stages: ``r_bs (s - c) + r_bp (p - c) = 0``, ``r_br c + r_bp (p - c) = 0``.
+    Base radii have the ratios of the teeth, whatever the profile shifts.
 
     CaseError: the stages do not leave exactly one spin (E-DRIVETRAIN).
     """
@@ -178,10 +179,10 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
         condition(*((turn[name], radius) for name, radius in zip(stage.between, stage.pitch_radii)))
     for stage, planets in zip(train.planetary, place.planets):
         c, s = turn[stage.carrier], turn[stage.sun]
-        sun, planet = stage.pitch_radii
+        sun, planet, ring = stage.base_radii
         for p in planets[:, 2]:
-            condition((s, sun), (p, planet), (c, -stage.centre_distance))
-            condition((c, stage.ring_radius - planet), (p, planet))
+            condition((s, sun), (p, planet), (c, -(sun + planet)))
+            condition((c, ring - planet), (p, planet))
     rotations = sorted({*turn.values(), *(int(p) for own in place.planets for p in own[:, 2])})
     rotations += [first + 4 for _, *inner, _ in place.stations for first in inner]
     table = np.array(rows).reshape(-1, place.count)[:, rotations]
@@ -197,7 +198,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
     for stage, planets in zip(train.planetary, place.planets):
         if math.isfinite(stage.planet_bearing):
             # planets that are not fixed to their pins have tangential coordinates of their own
-            spin[planets[:, 1]] = stage.centre_distance * spin[turn[stage.carrier]]
+            spin[planets[:, 1]] = stage.axis_distance * spin[turn[stage.carrier]]
     return spin
 
 
@@ -298,7 +299,7 @@ def _turned_directions(direction) -> tuple[np.ndarray, np.ndarray]:
 
 def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
     """Make the lumped set of a stage with a held ring; supports are those of the chain, hence none here."""
-    cosine = math.cos(stage.pressure_angle)
+    (sun, planet, ring), (sun_angle, ring_angle) = stage.base_radii, stage.working_angles
     bodies = {
         key: PlanarBody(train.body(name).mass, train.body(name).inertia)
         for key, name in (("carrier", stage.carrier), ("sun", stage.sun))
@@ -306,27 +307,26 @@ def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
     return PlanarSet(
         ring=PlanarBody(1.0, 1.0, math.inf, math.inf),
         planet=PlanarBody(stage.planet_mass, stage.planet_inertia),
-        sun_radius=stage.pitch_radii[0] * cosine, ring_radius=stage.ring_radius * cosine,
-        planet_radius=stage.pitch_radii[1] * cosine, centre_distance=stage.centre_distance,
-        planet_angles=stage.angles, pressure_angle_sun_planet=stage.pressure_angle,
-        pressure_angle_planet_ring=stage.pressure_angle, stiffness_sun_planet=stage.sun_mesh.stiffness,
+        sun_radius=sun, ring_radius=ring, planet_radius=planet, centre_distance=stage.axis_distance,
+        planet_angles=stage.angles, pressure_angle_sun_planet=sun_angle,
+        pressure_angle_planet_ring=ring_angle, stiffness_sun_planet=stage.sun_mesh.stiffness,
         stiffness_planet_ring=stage.ring_mesh.stiffness, planet_bearing=stage.planet_bearing, **bodies,
     )  # fmt: skip
 
 
 def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.ndarray:
     """Compute coordinates (3 (N + 3), n) of the stage `number` per unit of the chain's, at angle zero."""
-    own, cosine = place.planets[number], math.cos(stage.pressure_angle)
+    own, (sun_radius, planet_radius, _) = place.planets[number], stage.base_radii
     B = np.zeros((9 + 3 * len(own), place.count))
     for row, name, radius in (
-        (0, stage.carrier, stage.centre_distance),
-        (6, stage.sun, stage.pitch_radii[0] * cosine),
+        (0, stage.carrier, stage.axis_distance),
+        (6, stage.sun, sun_radius),
     ):
         first = place.body[name]
         B[row, first] = B[row + 1, first + 1] = 1.0
         B[row + 2, first + 4] = radius
     for p, planet in enumerate(own):
-        B[11 + 3 * p, planet[2]] = stage.pitch_radii[1] * cosine
+        B[11 + 3 * p, planet[2]] = planet_radius
         if math.isfinite(stage.planet_bearing):
             B[9 + 3 * p, planet[0]] = B[10 + 3 * p, planet[1]] = 1.0
     if math.isinf(stage.planet_bearing):

@@ -67,7 +67,7 @@ def drivetrain_layout(train: Drivetrain) -> Layout:
     """Place the bodies [m]: along z by shaft lengths, across it by centre distances."""
     names = [body.name for body in train.bodies]
     gears = [radius for s in train.parallel for radius in s.pitch_radii]
-    gears += [stage.centre_distance for stage in train.planetary]
+    gears += [stage.axis_distance for stage in train.planetary]
     size = max(gears, default=0.3)
     places = {names[0]: np.zeros(3)}
     links = [(*s.between, np.array([0.0, 0.0, s.length])) for s in train.shafts]
@@ -87,7 +87,7 @@ def drivetrain_layout(train: Drivetrain) -> Layout:
     wheels = _wheels(train, places, size)
     for stage in train.planetary:
         for p, angle in enumerate(stage.angles, start=1):
-            arm = stage.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
+            arm = stage.axis_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
             centre.append(places[stage.carrier] + arm)
             wheels.append(Wheel(f"planet {p}", centre[-1], stage.pitch_radii[1], 0.2 * size, len(centre) - 1))
         names += train.planet_names(stage)
@@ -100,7 +100,7 @@ def _wheels(train: Drivetrain, places, size: float) -> list[Wheel]:
     found = []
     for stage in train.planetary:
         plate = places[stage.carrier] - np.array([0.0, 0.0, 0.2 * size])
-        found.append((stage.carrier, plate, stage.centre_distance, 0.06 * size))
+        found.append((stage.carrier, plate, stage.axis_distance, 0.06 * size))
         found.append((stage.sun, places[stage.sun], stage.pitch_radii[0], 0.2 * size))
     for stage in train.parallel:
         first, second = (places[name] for name in stage.between)

@@ -333,8 +333,8 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
     for number, stage in enumerate(train.planetary):
         carrier = place.body[stage.carrier]
         B = lumped_map(stage, place, number)
-        n, a = len(stage.angles), stage.centre_distance
-        reduced = stage.planet_inertia / (stage.pitch_radii[1] * math.cos(stage.pressure_angle)) ** 2
+        n, a = len(stage.angles), stage.axis_distance
+        reduced = stage.planet_inertia / stage.base_radii[1] ** 2
         M += (B[9:].T * np.tile([stage.planet_mass, stage.planet_mass, reduced], n)) @ B[9:]
         tilt = n * (stage.planet_transverse_inertia + 0.5 * stage.planet_mass * a**2)
         M[carrier + 2, carrier + 2] += tilt

@@ -257,11 +257,14 @@ class PlanetarySection(Part):
     ring_teeth: Teeth
     sun_teeth: Teeth
     planet_teeth: Teeth | None = None
+    """Where not given ``(z_r - z_s)/2``, as without profile shift, or what radii say."""
     sun_radius: Radius | None = None
     planet_radius: Radius | None = None
     sun_base_radius: Radius | None = None
     planet_base_radius: Radius | None = None
     module: Module | None = None
+    centre_distance: Radius | None = None
+    """Of profile-shifted gears, beside the module or the base radii."""
     planets: Annotated[int, Count(1, 24)] = 3
     planet_angles: Annotated[tuple[Angle, ...], Values(min_length=1, max_length=24)] | None = None
     """Ascending, from x when the carrier's phase is zero."""
@@ -298,29 +301,68 @@ class PlanetarySection(Part):
         return self.planet_angles or equal_planet_angles(self.planets)
 
     @property
-    def pitch_radii(self) -> tuple[float, float]:
-        """Pitch radii of sun and planet [m]."""
-        if self.module is not None:
-            # half teeth of the planet are a matter of its profile shift
-            teeth = self.sun_teeth, 0.5 * (self.ring_teeth - self.sun_teeth)
-            return 0.5 * self.module * teeth[0], 0.5 * self.module * teeth[1]
-        if self.sun_base_radius is not None and self.planet_base_radius is not None:
-            cosine = math.cos(self.pressure_angle)
-            return self.sun_base_radius / cosine, self.planet_base_radius / cosine
-        assert self.sun_radius is not None and self.planet_radius is not None  # one of three ways
-        return self.sun_radius, self.planet_radius
+    def planet_teeth_or_half(self) -> float:
+        """Teeth of a planet: as given, or ``(z_r - z_s)/2``."""
+        return self.planet_teeth or 0.5 * (self.ring_teeth - self.sun_teeth)
 
     @property
-    def centre_distance(self) -> float:
-        """Distance of the planets' axes from that of the sun [m]."""
-        sun, planet = self.pitch_radii
-        return sun + planet
+    def base_radii(self) -> tuple[float, float, float]:
+        """Base radii of sun, planet and ring [m]: ``m z cos(alpha)/2`` of a module (ISO 21771).
+
+        With all tooth numbers given they have these ratios; radii then give the sum of sun and planet.
+        """
+        cosine = math.cos(self.pressure_angle)
+        if self.module is not None:
+            half = 0.5 * self.module * cosine
+            return self.sun_teeth * half, self.planet_teeth_or_half * half, self.ring_teeth * half
+        if self.sun_base_radius is not None and self.planet_base_radius is not None:
+            sun, planet = self.sun_base_radius, self.planet_base_radius
+        else:
+            assert self.sun_radius is not None and self.planet_radius is not None  # one of three ways
+            sun, planet = self.sun_radius * cosine, self.planet_radius * cosine
+        if self.planet_teeth is None:
+            # the radii alone say how large the ring is
+            return sun, planet, sun + 2.0 * planet
+        tooth = (sun + planet) / (self.sun_teeth + self.planet_teeth)
+        return self.sun_teeth * tooth, self.planet_teeth * tooth, self.ring_teeth * tooth
+
+    @property
+    def axis_distance(self) -> float:
+        """Distance of the planets' axes from that of the sun [m].
+
+        As given, the sum of pitch radii that are given, or ``(r_bs + r_br)/(2 cos(alpha))``: exact without
+        profile shift, else half-way between the distances at which either mesh has the pressure angle.
+        """
+        if self.centre_distance is not None:
+            return self.centre_distance
+        if self.sun_radius is not None and self.planet_radius is not None:
+            return self.sun_radius + self.planet_radius
+        sun, _, ring = self.base_radii
+        return 0.5 * (sun + ring) / math.cos(self.pressure_angle)
+
+    @property
+    def base_shares(self) -> tuple[float, float]:
+        """Cosines of the working pressure angles, ``(r_bs + r_bp)/a`` and ``(r_br - r_bp)/a`` (ISO 21771)."""
+        (sun, planet, ring), distance = self.base_radii, self.axis_distance
+        return (sun + planet) / distance, (ring - planet) / distance
+
+    @property
+    def working_angles(self) -> tuple[float, float]:
+        """Working pressure angles of the meshes of sun and ring [rad]."""
+        sun, ring = self.base_shares
+        return math.acos(min(sun, 1.0)), math.acos(min(ring, 1.0))
+
+    @property
+    def pitch_radii(self) -> tuple[float, float]:
+        """Pitch radii of sun and planet in their mesh at the distance of their axes [m]."""
+        (sun, planet, _), distance = self.base_radii, self.axis_distance
+        return distance * sun / (sun + planet), distance * planet / (sun + planet)
 
     @property
     def ring_radius(self) -> float:
-        """Pitch radius of the ring [m]."""
-        sun, planet = self.pitch_radii
-        return sun + 2.0 * planet
+        """Pitch radius of the ring in its mesh with the planets [m]."""
+        _, planet, ring = self.base_radii
+        return self.axis_distance * ring / (ring - planet)
 
 
 class BearingSection(Part):

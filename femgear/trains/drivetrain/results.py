@@ -402,7 +402,9 @@ def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
         waves, radii, (first, second) = [train.meshes[i].section for i in meshes], one.pitch_radii, one.ends
         if isinstance(one, PlanetarySection):
             n = len(one.angles)
-            teeth = f"{one.sun_teeth} / {one.ring_teeth}, {n} planet{'s' * (n > 1)}"
+            planet, known = one.planet_teeth_or_half, one.planet_teeth or one.module
+            of_planet = f"{planet:g} / " if known else ""
+            teeth = f"{one.sun_teeth} / {of_planet}{one.ring_teeth}, {n} planet{'s' * (n > 1)}"
             radii = (*radii, one.ring_radius)
         else:
             teeth = f"{one.teeth[0]} / {one.teeth[1]}"
