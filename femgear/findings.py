@@ -69,7 +69,7 @@ CATALOGUE = {
     "W-STEPS": (DOUBT, "Peaks of resonances are too narrow for the speeds of a run-up."),
     "W-SWEEP": (NOTE, "A sweep takes long."),
     "W-TAIL": (DOUBT, "The highest harmonics of a response are not small."),
-    "W-TEETH": (NOTE, "Radii and tooth numbers have different ratios, or shifted planets no centre distance."),
+    "W-TEETH": (NOTE, "Radii and teeth have different ratios, or shifted planets no centre distance."),
     "W-THRUST": (DOUBT, "Axial forces tilt the planets, which the model holds upright."),
     "W-TIP-THIN": (NOTE, "The tooth is thin at its tip."),
     "W-TORQUE": (NOTE, "The torque has an unusual sign or size."),
