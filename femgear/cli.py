@@ -286,7 +286,7 @@ def run(
     case = case or _only_case()
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
-    output = output or case.with_name(f"{case.stem}_results")
+    output = output or _results_folder(case)
     train = train_of(data)
     _warn(train.case_warnings(data))
     place = run_folder(output, case=data.source, force=force)
@@ -301,6 +301,11 @@ def run(
         if "report.html" in results.manifest.files:
             _say(f"report:  {output / 'report.html'}")
     return 0
+
+
+def _results_folder(case: Path) -> Path:
+    """Name the folder of the results of a case file, beside it."""
+    return case.with_name(f"{case.stem}_results")
 
 
 def _only_case() -> Path:
@@ -439,9 +444,11 @@ def export(
 
 
 def _write_case(text: str, path: Path, *, force: bool) -> None:
-    """Write a file that no other one is lost for."""
-    from femgear.storage.files import write_text
+    """Write a file that no other one is lost for, under a name whose results femgear run can write."""
+    from femgear.storage.files import checked_name, write_text
 
+    for name in (path.name, _results_folder(path).name):
+        checked_name(name)
     if path.exists() and not force:
         raise CaseError(
             "the file is there already", code="E-OUTPUT", file=str(path), limit="a new file",

@@ -652,6 +652,16 @@ def test_rexs_in_and_out(tmp_path, capsys, monkeypatch):
     assert "E-MODEL" in capsys.readouterr().err and not Path("pair.rexs").exists()
 
 
+@pytest.mark.parametrize("name", ["a\nb.toml", "con.toml", "a:b.toml", "x" * 98 + ".toml"])
+def test_files_are_written_under_names_that_run_takes(tmp_path, capsys, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["rexs", str(CASE), "-o", "stage.rexs"]) == 0
+    for command in (["import", "stage.rexs", "-o", name], ["new", "pair", "-o", name]):
+        assert cli.main(command) != 0
+        assert "E-CHOICE" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["stage.rexs"]
+
+
 @pytest.mark.parametrize("columns", ["", "0", "1", "02"])
 def test_terminals_without_columns_have_a_help(columns, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", columns)

@@ -3,7 +3,8 @@
 REXS is FVA's open exchange format of gear units (versions 1.0 to 2.0, www.rexs.info): XML in ``.rexs``, JSON
 in ``.rexsj``, either of them zipped in ``.rexsz``. What a file holds is told by its first bytes; one
 that is named a zip must be one. Files are not trusted: document types and entities are refused before XML is
-parsed, sizes are limited before and while a zip is unpacked, ids and relations must fit each other.
+parsed, sizes are limited before and while a zip is unpacked and before XML or JSON is parsed, ids and
+relations must fit each other.
 """
 
 from __future__ import annotations
@@ -30,6 +31,14 @@ from femgear.errors import CaseError
 
 MOST_BYTES = 20_000_000
 """Of a file, and of what a zip holds; those of whole gear units have some hundred kilobytes."""
+MOST_ELEMENTS = 500_000
+"""Tags of an XML text, tables of a JSON text; those of whole gear units have some ten thousand."""
+_ENCODINGS = {
+    "utf-8": "utf-8-sig", "us-ascii": "ascii", "iso-8859-1": "latin-1", "iso-8859-15": "iso8859-15",
+    "windows-1252": "cp1252", "utf-16": "utf-16", "utf-16le": "utf-16-le", "utf-16be": "utf-16-be",
+}  # fmt: skip
+"""Codecs of the encodings that are read, by their names in XML."""
+_DECLARED = re.compile(rb"<\?xml\s[^>]{0,200}?\bencoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"']")
 _VERSIONS = re.compile(r"(1\.[0-7]|2\.0)(\.\d+)?")
 _EXPORT = "export the gear unit again, or name another file"
 _PLAIN = ("none", "-", "1", "")
@@ -151,14 +160,42 @@ class Model:
 def read_model(path: str | os.PathLike) -> Model:
     """Read a REXS file of any form and of versions 1.0 to 2.0.
 
-    CaseError: E-FILE: unreadable, too long, no XML, JSON or zip, or with entities. E-FILE-ENC: not UTF-8.
+    CaseError: E-FILE: unreadable, too long, no XML, JSON or zip, or with entities. E-FILE-ENC: an encoding
+    that is not read, or other bytes than the file declares; without a declaration it is UTF-8.
     E-FORMAT: another version. E-REXS: ids missing or unknown, anything given twice, parts of each other.
     """
     name = os.fsdecode(path)
     data = read_bytes(path, MOST_BYTES, "name a REXS file: .rexs, .rexsj or .rexsz")
     zipped = data[:2] == b"PK" or name.lower().endswith((".rexsz", ".zip"))
-    text = decoded(_unzipped(data, name) if zipped else data, name)
-    return _model((_from_json if text.lstrip()[:1] == "{" else _from_xml)(text, name), name)
+    text = _text(_unzipped(data, name) if zipped else data, name)
+    in_json = text.lstrip()[:1] == "{"
+    if (count := text.count("{" if in_json else "<")) > MOST_ELEMENTS:
+        what = "tables" if in_json else "tags"
+        message, limit = f"{count} {what} are too many", f"{MOST_ELEMENTS} {what}"
+        raise _broken(message, name, "export one gear unit", limit=limit)
+    return _model((_from_json if in_json else _from_xml)(text, name), name)
+
+
+def _text(data: bytes, name: str) -> str:
+    """Decode a file as its byte-order mark or its declaration says (XML 1.0, appendix F), else as UTF-8."""
+    wide = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"<\0": "utf-16le", b"\0<": "utf-16be"}
+    declared = _DECLARED.match(data.removeprefix(b"\xef\xbb\xbf"))
+    encoding = wide.get(data[:2]) or (declared[1].decode().lower() if declared else "utf-8")
+    if encoding == "utf-8":
+        return decoded(data, name)
+    # a declaration that can be read byte by byte stands in no text of two bytes a character
+    fits = (data[:2] in wide) == encoding.startswith("utf-16")
+    try:
+        text = data.decode(_ENCODINGS[encoding]) if fits else None
+    except (KeyError, UnicodeError):
+        text = None
+    if text is None:
+        what = "does not fit the bytes of the file" if encoding in _ENCODINGS else "is not read"
+        raise CaseError(
+            f"the encoding {encoding} {what}", code="E-FILE-ENC", file=name, limit=", ".join(_ENCODINGS),
+            remedy="save the file as UTF-8, with the declaration",
+        )  # fmt: skip
+    return text.removeprefix("\ufeff")
 
 
 def _broken(message: str, name: str, remedy: str = _EXPORT, limit: str | None = None) -> CaseError:

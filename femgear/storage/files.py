@@ -571,7 +571,7 @@ def checked_name(name: str) -> str:
     plain = name.isprintable() and unicodedata.is_normalized("NFC", name) and not _RESERVED.fullmatch(name)
     if not plain or len(name) > 100 or len(name.encode()) > 240:
         raise StorageError(
-            "not a safe file name", code="E-CHOICE", value=name, remedy="name another folder",
+            "not a safe file name", code="E-CHOICE", value=name, remedy="name another one",
             limit='1 to 100 characters (240 bytes), composed (NFC), without / \\ : * ? " < > | and control '
             "characters, no dot or blank at the ends, none that Windows reserves (con, nul, com1, ...)",
         )  # fmt: skip

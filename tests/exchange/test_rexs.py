@@ -2,6 +2,7 @@
 
 import math
 import os
+import time
 import zipfile
 from pathlib import Path
 
@@ -409,11 +410,73 @@ def test_files_that_are_too_long_or_no_text(tmp_path):
         stream.truncate(100_000_000)
     with pytest.raises(CaseError, match="too long"):
         read_model(path)
-    path.write_bytes(b"\xff\xfe" + GOOD.encode("utf-16-le"))
+    path.write_bytes(GOOD.encode("utf-8") + b"\xfc")
     with pytest.raises(CaseError, match="E-FILE-ENC"):
         read_model(path)
     with pytest.raises(CaseError, match="E-FILE"):
         read_model(tmp_path)
+
+
+NAMED = GOOD.replace('name="gear_unit [1]"', 'name="Pr\xfcfstand 2 \xb5m"')
+
+
+@pytest.mark.parametrize(
+    ("declared", "codec"),
+    [
+        ("UTF-8", "utf-8"), ("UTF-8", "utf-8-sig"), ("ISO-8859-1", "latin-1"), ("iso-8859-1", "latin-1"),
+        ("ISO-8859-15", "iso8859-15"), ("windows-1252", "cp1252"), ("UTF-16", "utf-16"),
+        ("UTF-16", "utf-16-le"), ("UTF-16", "utf-16-be"), ("UTF-16LE", "utf-16-le"),
+    ],
+)  # fmt: skip
+def test_declared_encodings_are_read(tmp_path, declared, codec):
+    path = tmp_path / "stage.rexs"
+    path.write_bytes(NAMED.replace('"UTF-8"', f'"{declared}"').encode(codec))
+    model = read_model(path)
+    assert model.components["1"].name == "Pr\xfcfstand 2 \xb5m"
+    assert case_tables(model)[0]["sun"]["teeth"] == 17
+
+
+@pytest.mark.parametrize(
+    ("declared", "codec", "words"),
+    [
+        ("EBCDIC-CP-FR", "latin-1", "is not read"), ("utf-7", "latin-1", "is not read"),
+        ("UTF-16", "latin-1", "does not fit"), ("us-ascii", "latin-1", "does not fit"),
+        ("UTF-8", "latin-1", "not UTF-8"),
+    ],
+)  # fmt: skip
+def test_other_encodings_are_refused(tmp_path, declared, codec, words):
+    path = tmp_path / "stage.rexs"
+    path.write_bytes(NAMED.replace('"UTF-8"', f'"{declared}"').encode(codec))
+    with pytest.raises(CaseError, match=words) as caught:
+        read_model(path)
+    assert caught.value.code == "E-FILE-ENC"
+
+
+@pytest.mark.parametrize("codec", ["utf-16", "latin-1"])
+def test_entities_are_refused_in_every_encoding(tmp_path, codec):
+    path = tmp_path / "stage.rexs"
+    bomb = '<!DOCTYPE x [<!ENTITY a "b">]>' + NAMED.split("\n", 1)[1]
+    declared = codec.replace("latin-1", "ISO-8859-1")
+    path.write_bytes(f'<?xml version="1.0" encoding="{declared}"?>{bomb}'.encode(codec))
+    with pytest.raises(CaseError, match="entities"):
+        read_model(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<model version='1.4'>" + "<a/>" * 4_700_000 + "</model>",
+        '{"model": {"version": "1.4", "components": [' + "{}," * 6_300_000 + "{}]}}",
+    ],
+    ids=["xml", "json"],
+)
+def test_files_of_nothing_but_elements_are_refused_at_once(tmp_path, text):
+    path = tmp_path / "stage.rexs"
+    path.write_text(text, encoding="utf-8")
+    start = time.process_time()
+    with pytest.raises(CaseError, match="are too many") as caught:
+        read_model(path)
+    assert caught.value.code == "E-FILE" and time.process_time() - start < 5.0
 
 
 def test_zips(tmp_path):
