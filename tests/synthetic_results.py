@@ -83,6 +83,7 @@ def static(*, defect: float = 0.0) -> xr.Dataset:
             "working_pressure_angle_sun_planet": np.radians(22.1995),
             "working_pressure_angle_planet_ring": np.radians(20.0),
             "contact": "profile",
+            "module": 1.5e-3,
         },
     )
 

@@ -203,11 +203,11 @@ def test_a_pitch_error_that_separates_a_planet_is_computed_and_said():
     cycle = static.cycle
     assert cycle.open_planets[1].any() and not cycle.open_planets[[0, 2]].any()
     assert np.isfinite(cycle.stiffness).all() and not cycle.force[1][cycle.open_planets[1]].any()
-    assert any("[W-OPEN] planet 2" in str(warning) for warning in static.warnings)
+    assert any("[W-OPEN] planet 2" in str(warning) for warning in static.findings)
     # the table marks it where it carries at others
     data = static.dataset()
     data["mesh_force"].loc[{"mesh": "sun-planet 2", "position": data.position[0]}] = 1.0
-    for row in describe_static(data, 1.5e-3).rows:
+    for row in describe_static(data).rows:
         assert [cell.endswith("*") for cell in row[1:3]] == [row[0] == "sun-planet 2"] * 2
 
 
@@ -217,9 +217,10 @@ def test_a_planet_that_never_carries_shows_no_transmission_error():
     case = with_values(read_case(CASE), settings)
     behind = with_value(case, "set.pin_errors", [{"planet": 1, "tangential": "50 um"}])
     for one, shown in ((behind, "-"), (with_value(case, "operation.torque", "0 N m"), "0.0000")):
-        block = describe_static(solve_static(one).dataset(), 1.5e-3)
+        static = solve_static(one)
+        block = describe_static(static.dataset())
         assert {row[1:3] for row in block.rows if "planet 1" in row[0]} == {(shown, shown)}
-        assert any("a dash where it never carries" in note for note in block.notes) == (shown == "-")
+        assert any("a dash where it never carries" in one.text for one in static.findings) == (shown == "-")
 
 
 # --- loads and linear algebra -------------------------------------------------------------------------

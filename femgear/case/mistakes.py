@@ -272,7 +272,6 @@ def notices(data: dict, case: Case) -> Iterator[Finding]:
             "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
         )
     if not case.rigid and "bearing_clearance" in data["planet"] and case.static.members == "fixed":
-        yield remark(
-            'planet.bearing_clearance has no effect while static.members is "fixed": write '
-            'static.members = "elastic"'
-        )
+        text = 'has no effect while static.members is "fixed"'
+        remedy = 'write static.members = "elastic"'
+        yield Finding("W-UNUSED", "planet.bearing_clearance", text, remedy=remedy)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.findings import Finding, remark
+from femgear.findings import Finding
 from femgear.report.response import harmonics_of, some_at_a_time
 from femgear.system.fourier import fluctuation, sample
 
@@ -142,13 +142,16 @@ def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
     speed = data["speed"].values
     pulls = [pulls_of(harmonics_of(one, "mesh_force")) for one in some_at_a_time(data)]
     yield from pulling_meshes(speed, data["mesh"].values, pulls)
-    for bad, text in (
-        (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),
-        (~data["stable"].values.astype(bool), "the periodic solution is unstable at"),
+    for code, bad, text in (
+        ("W-CONVERGENCE", ~data["converged"].values.astype(bool), "did not converge at"),
+        ("W-UNSTABLE", ~data["stable"].values.astype(bool), "is unstable at"),
     ):
         if bad.any():
             rest = np.count_nonzero(bad) - MANY
-            yield remark(f"{text} {first_speeds(speed[bad])}{f' and {rest} more speeds' if rest > 0 else ''}")
+            more = f" and {rest} more speeds" if rest > 0 else ""
+            yield Finding(
+                code, "operation.speeds", f"the periodic solution {text} {first_speeds(speed[bad])}{more}"
+            )
 
 
 def pulls_of(forces: np.ndarray) -> np.ndarray:

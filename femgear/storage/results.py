@@ -75,7 +75,7 @@ _ATTRIBUTES = {
     for unit, names in (
         ("Hz", "bandwidth compared_to excitation_reach natural_frequency resolution"),
         ("kg/m^3", "air_density"),
-        ("m", "centre_distance face_width half_backlash microphone_distance outer_radius"),
+        ("m", "centre_distance face_width half_backlash microphone_distance module outer_radius"),
         ("m/s", "sound_speed"),
         ("m/s^2", "reference_acceleration"),
         ("N", "unit_force"),

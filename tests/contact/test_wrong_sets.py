@@ -56,7 +56,7 @@ def test_pin_error_beyond_the_play_unloads_its_planet(solved):
     assert cycle.open_planets[0].all() and not cycle.open_planets[1:].any()
     assert "lose all load" in cycle.message
     assert any(
-        "W-OPEN" in str(one) and "planet 1 carries nothing at all" in str(one) for one in result.warnings
+        "W-OPEN" in str(one) and "planet 1 carries nothing at all" in str(one) for one in result.findings
     )
 
 
@@ -88,7 +88,7 @@ def test_planet_pushed_into_the_sun_is_wedged(solved):
     )
     check_equilibrium(result, 100.0)
     assert result.cycle.wedged[0].all() and "wedged" in result.cycle.message
-    assert any("W-WEDGED" in str(warning) for warning in result.warnings)
+    assert any("W-WEDGED" in str(warning) for warning in result.findings)
 
 
 def test_pitch_error_that_separates_one_planet(solved):
@@ -109,7 +109,7 @@ def test_pitch_error_that_separates_one_planet(solved):
     assert cycle.load_share[[0, 2]][:, separated] == pytest.approx(0.5, abs=2e-3)
     assert cycle.load_share[1][~separated].max() == pytest.approx(1 / 3, abs=2e-3)
     assert any(
-        "W-OPEN" in str(one) and "planet 2 carries nothing at some" in str(one) for one in result.warnings
+        "W-OPEN" in str(one) and "planet 2 carries nothing at some" in str(one) for one in result.findings
     )
 
 
@@ -128,7 +128,7 @@ def test_no_torque_and_enough_play_leave_everything_open(solved, back):
         "max_pressure",
     ):
         assert np.isfinite(getattr(cycle, name)).all() and not getattr(cycle, name).any()
-    assert result.warnings == ()
+    assert result.findings == ()
     dataset = result.dataset()
     assert all(np.isfinite(dataset[name]).all() for name in dataset if dataset[name].dtype.kind == "f")
 

@@ -171,8 +171,11 @@ def test_verdicts_are_warnings(tmp_path):
             data["stable"].values[0] = False
 
     text = html(ELASTIC, open_results(make_run(tmp_path / "out", change=change)))
-    assert "<li>the periodic solution did not converge at 3100 rpm</li>" in text
-    assert "<li>the periodic solution is unstable at 250 rpm</li>" in text
+    assert (
+        "<li>[W-CONVERGENCE] operation.speeds: the periodic solution did not converge at 3100 rpm</li>"
+        in text
+    )
+    assert "<li>[W-UNSTABLE] operation.speeds: the periodic solution is unstable at 250 rpm</li>" in text
 
 
 def test_verdict_stands_before_the_stages_and_trust_is_folded_away_at_the_end(tmp_path):

@@ -22,7 +22,7 @@ def warned(printed: str) -> list[str]:
     ("name", "key", "value", "words"),
     [
         ("planetary_27_40_108", "sun.tip_diameter", "45.6 mm", "[W-CLEARANCE]"),
-        ("nrel_pga", "title", "given stiffness", "static, dynamics.mesh_harmonics"),
+        ("nrel_pga", "title", "given stiffness", "[W-UNUSED] static, dynamics.mesh_harmonics"),
         ("helical_30_20_70", "operation.torque", "-10 N m", "[W-TORQUE]"),
         ("own_chain", "simulation.rate", "15 kHz", "[W-RATE]"),
         ("own_chain", "simulation.damping_ratio", 0.0, "[W-DAMPING]"),

@@ -25,7 +25,7 @@ from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.housing.casing_files import named_outputs, read_casing
 from femgear.housing.structure import FixedStructure, Support
-from femgear.report.tables import first_speeds, remark, response_warnings
+from femgear.report.tables import first_speeds, response_warnings
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
@@ -389,7 +389,8 @@ def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("W-EXCITATION", "dynamics.mesh_harmonics", text, remedy=remedy)
     if "turn_multiplier" in data and (bad := data["turn_multiplier"].values > 1.0 + CIRCLE).any():
         speeds = first_speeds(data["speed"].values[bad])
-        yield remark(f"in the housing that stands still the periodic solution is unstable at {speeds}")
+        text = f"in the housing that stands still the periodic solution is unstable at {speeds}"
+        yield Finding("W-UNSTABLE", "operation.speeds", text)
     if missing := data.attrs.get("missing_compliance"):
         remedy = "export more modes, or residual vectors, or matrices, unless the casing is as stiff as that"
         yield Finding("W-RESIDUAL", "housing.structure.file", missing, remedy=remedy)

@@ -22,7 +22,6 @@ from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness, contact_ratios
 from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
-from femgear.trains.static.results import static_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -222,11 +221,8 @@ def _model(case: HelicalCase, s: PlanetarySet) -> tuple[str, ...]:
     return text, f"{slices} over the face width; forces act at the {points}"
 
 
-def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None, *, module: float) -> Block:
-    """Tabulate static.nc, which holds spur gears, and beside them the helical meshes of modes.nc.
-
-    ``module`` is that of the transverse section [m].
-    """
+def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None) -> Block:
+    """Tabulate static.nc, which holds spur gears, and beside them the helical meshes of modes.nc."""
     sources = [("spur", static["ste"], static["mesh_stiffness"])]
     if modes is not None and "helical_ste" in modes:
         sources.insert(0, ("helical", modes["helical_ste"], modes["helical_stiffness"]))
@@ -249,5 +245,4 @@ def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None,
     ]
     if static.attrs.get("mesh_periods", 1) > 1:
         notes.append(str(static.attrs["period"]))
-    notes += map(str, static_warnings(static, module))
     return Block("Static", tuple(header), tuple(zip(*columns)), tuple(notes))

@@ -19,7 +19,7 @@ from femgear.case.sections import (
 )
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError
-from femgear.findings import Finding, remark
+from femgear.findings import Finding
 from femgear.trains.rigid import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
 
 _MOST_SLICES = 30
@@ -83,7 +83,7 @@ def helical_notices(data: dict, helix_angle: float) -> Iterator[Finding]:
     if data["planet"].get("bearing_clearance"):
         unused.append("planet.bearing_clearance")
     if unused:
-        yield remark(f"{listed(unused)} no effect in this helical case")
+        yield Finding("W-UNUSED", "", f"{listed(unused)} no effect in this helical case")
     if data["helical"].get("contact_points") == "base_circles":
         yield Finding(
             "W-CONTACT-POINTS",
@@ -98,9 +98,11 @@ def helical_notices(data: dict, helix_angle: float) -> Iterator[Finding]:
             given.append("helical.section")
         given += flank_entries(data)
         if given:
-            yield remark(
+            yield Finding(
+                "W-UNUSED",
+                "",
                 f"{listed(given)} no effect while helical.mesh_stiffness is given: it leaves nothing that "
-                "excites, and modes are all that is computed"
+                "excites, and modes are all that is computed",
             )
     else:
         yield from steep_helix("helical.helix_angle", helix_angle)

@@ -240,7 +240,6 @@ HELICAL = Train(
             describe=lambda results: describe_helical_static(
                 results.static,
                 results.modes if "modes" in results.stages else None,
-                module=planetary_set(results.case).sun.module,
             ),
             unavailable=lambda case: (
                 _NO_TEETH if _given(case) else ""

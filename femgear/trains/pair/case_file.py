@@ -48,7 +48,7 @@ from femgear.case.sections import (
 )
 from femgear.case.text import CaseFile, ReadCase
 from femgear.errors import CaseError
-from femgear.findings import Finding, remark
+from femgear.findings import Finding
 from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import SetDeviations, no_deviations
 from femgear.gears.pair import GearPair, close_pair
@@ -226,7 +226,7 @@ def pair_notices(data: dict, case: PairCase) -> Iterator[Finding]:
     """List what a pair gives in a way that deserves to be said, by the tables of its checked file."""
     yield from added_material(case)
     if unused := strength_entries(data):
-        yield remark(f"{listed(unused)} no effect on a pair, which has no safeties")
+        yield Finding("W-UNUSED", "", f"{listed(unused)} no effect on a pair, which has no safeties")
 
 
 FILE = CaseFile(PairCase, cross_check, notices=pair_notices, embed=embed_profiles)

@@ -149,7 +149,7 @@ def _describe_case(case: PairCase) -> tuple[Block, ...]:
 def _describe_static(results: Results) -> Block:
     """Tabulate static.nc, with the stiffness per face width beside that of the standard."""
     case, data = results.case, results.static
-    block = describe_static(data, case.module)
+    block = describe_static(data)
     single, mean = (1e-9 * value for value in iso_stiffness(case))
     found = 1e-9 * float(data.mesh_stiffness.mean()) / case.set.face_width
     words = f"mean k over face width {found:.3f} N/(mm um); ISO 6336-1, method B: "

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.case.sections import output_member
-from femgear.findings import Finding, remark
+from femgear.findings import NOTE, Finding
 from femgear.gears.kinematics import torques
 from femgear.report.response import harmonics_of
 from femgear.report.tables import Block, chosen, first_speeds, tabulate
@@ -31,7 +32,8 @@ from femgear.trains.planar.model import (
     merged_folds,
     shown_points,
 )
-from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
+from femgear.trains.rigid import modes_dataset, needed, stiffness_text, torsion_text
+from femgear.trains.static.results import set_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -290,13 +292,33 @@ def _smoothing(case: PlanarCase, planetary: PlanetarySet) -> str:
     text = f"contact sets in over {smoothing * 1e6:.6g} um"
     if given is None:
         return text
+    compression = _mean_compression(case, planetary)
+    text += f", {smoothing / compression:.2g} of the mean compression {compression * 1e6:.4g} um"
+    return text
+
+
+def _mean_compression(case: PlanarCase, planetary: PlanetarySet) -> float:
+    """Compression of the stiffer mesh of a case that gives its stiffnesses, under the mean load [m]."""
+    given = needed(case.planar.mesh_stiffness, "planar.mesh_stiffness")
     torque = torques(planetary, member=case.operation.input, torque=case.operation.torque).sun
     force = abs(torque) / (planetary.n_planets * planetary.sun.base_radius)
-    compression = force / max(given.sun_planet, given.planet_ring)
-    text += f", {smoothing / compression:.2g} of the mean compression {compression * 1e6:.4g} um"
-    if smoothing <= _SMOOTH * compression:
-        return text
-    return str(Finding("W-SMOOTHING", "", f"{text}: lower planar.smoothing where teeth part or wedge"))
+    return force / max(given.sun_planet, given.planet_ring)
+
+
+def planar_warnings(case: PlanarCase) -> Iterator[Finding]:
+    """List what deserves a look in a planar case: that of its set, and contact that sets in over too much."""
+    yield from set_warnings(case)
+    smoothing = case.planar.smoothing
+    if case.planar.mesh_stiffness is None:
+        return
+    compression = _mean_compression(case, planetary_set(case))
+    if smoothing > _SMOOTH * compression:
+        text = (
+            f"contact sets in over {smoothing * 1e6:.6g} um, {smoothing / compression:.2g} of the mean "
+            f"compression {compression * 1e6:.4g} um"
+        )
+        remedy = "lower it where teeth part or wedge"
+        yield Finding("W-SMOOTHING", "planar.smoothing", text, remedy=remedy)
 
 
 def _sense(case: PlanarCase) -> str:
@@ -338,7 +360,6 @@ def describe_branch(data: xr.Dataset) -> Block:
         f"tail, share of the amplitude in the upper half of the lines: up to {tail:.2g} of the deflections, "
         f"{force:.2g} of the mesh forces"
     )
-    notes += map(str, tail_warnings(data, "planar.branch.harmonics"))
     return tabulate("Response to the weight", sorted(named), columns, notes)
 
 
@@ -358,7 +379,7 @@ def tail_warnings(data: xr.Dataset, key: str) -> tuple[Finding, ...]:
             f"{_where(data, cut)}: {worst.max() ** 2:.2g} of the energy of deflections or mesh forces lies "
             f"in the upper half of the lines; {key} says how many there are"
         )
-        return (remark(text),)
+        return (Finding("W-TAIL", "", text, severity=NOTE),)
     return ()
 
 
@@ -373,7 +394,7 @@ def _where(data: xr.Dataset, bad: np.ndarray) -> str:
 def branch_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """List what speaks against branch.nc: an early end, and truncation of its lines."""
     if not bool(data.attrs["complete"]):
-        yield remark(f"the branch of the response to the weight: {data.attrs['message']!s}")
+        yield Finding("W-BRANCH", "planar.branch", str(data.attrs["message"]))
     yield from tail_warnings(data, "planar.branch.harmonics")
 
 
@@ -434,7 +455,6 @@ def describe_response(data: xr.Dataset) -> Block:
             "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
             "weight to the mesh frequency; r.m.s. values count such lines apart"
         )
-    notes += map(str, response_warnings(data))
     return tabulate("Weight and mesh frequency", chosen(data.sizes["speed"]), columns, notes)
 
 

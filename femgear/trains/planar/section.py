@@ -35,7 +35,7 @@ from femgear.case.sections import (
 )
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError
-from femgear.findings import Finding, remark
+from femgear.findings import Finding
 from femgear.trains.rigid import (
     Gravity,
     entries_without_effect,
@@ -168,22 +168,23 @@ def planar_notices(data: dict) -> Iterator[Finding]:
         keys += ["mesh_harmonics", "response_harmonics"]
     dynamics = [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
     if unused := entries_without_effect(data, dynamics):
-        yield remark(f"{listed(unused)} no effect in this planar case")
+        yield Finding("W-UNUSED", "", f"{listed(unused)} no effect in this planar case")
     if "mesh_stiffness" in planar and (unused := _without_static(data)):
-        yield remark(f"{listed(unused)} no effect while planar.mesh_stiffness is given")
+        yield Finding("W-UNUSED", "", f"{listed(unused)} no effect while planar.mesh_stiffness is given")
     if "response" in planar and "mesh_stiffness" in planar:
         still = "no weight acts" if "gravity" not in planar else ""
         if data["operation"].get("fixed", "ring") == "carrier":
             still = "the weight does not turn against a carrier that stands"
         if still:
             yield Finding(
-                "",
+                "W-EXCITATION",
                 "planar.response",
                 "nothing varies in time, every response is static: planar.mesh_stiffness is "
                 f"constant and {still}",
             )
     if data["planet"].get("bearing_clearance") and not {"branch", "response"} & planar.keys():
-        yield remark("planet.bearing_clearance has no effect without planar.branch or planar.response")
+        text = "has no effect without planar.branch or planar.response"
+        yield Finding("W-UNUSED", "planet.bearing_clearance", text)
 
 
 def _without_static(data: dict) -> list[str]:

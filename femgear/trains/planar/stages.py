@@ -39,6 +39,7 @@ from femgear.trains.planar.results import (
     describe_planar,
     describe_response,
     doubts,
+    planar_warnings,
     published_modes,
     response_warnings,
 )
@@ -53,7 +54,7 @@ from femgear.trains.protocol import (
     silent,
 )
 from femgear.trains.rigid import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
-from femgear.trains.static.results import StaticResult, describe_set, set_warnings
+from femgear.trains.static.results import StaticResult, describe_set
 from femgear.trains.static.stages import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
 
 if TYPE_CHECKING:
@@ -424,7 +425,7 @@ PLANAR = Train(
         ),
     ),
     describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),
-    warnings=set_warnings,
+    warnings=planar_warnings,
     figures=FIGURES,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
 )  # fmt: skip

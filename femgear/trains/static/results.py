@@ -186,9 +186,9 @@ class StaticResult:
     base_helix_angle: float = 0.0
 
     @property
-    def warnings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings that an engineer should not overlook in this result."""
-        return tuple(static_warnings(self.dataset(), self.planetary_set.gears[0].module))
+        return tuple(static_warnings(self.dataset()))
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of static.nc."""
@@ -209,7 +209,7 @@ class StaticResult:
                 name: HELIX_VARIABLES[name] for name in HELIX_VARIABLES if name in values
             }
         teeth, planets = cycle.tooth_load.shape[1], np.arange(1, gears.n_planets + 1)
-        found = dataset(
+        return dataset(
             declared(variables, values),
             coords=self._over_width(width)
             | {
@@ -230,6 +230,7 @@ class StaticResult:
                 "planet_angles": np.asarray(gears.planet_angles),
                 "centre_distance": gears.centre_distance,
                 "face_width": width,
+                "module": gears.gears[0].module,
                 "overlap_ratio": abs(self.overlap_ratio),
                 "free_ends": self._free_ends(),
                 "teeth": np.array([gear.teeth for gear in gears.gears]),
@@ -242,8 +243,6 @@ class StaticResult:
                 "message": cycle.message,
             },
         )
-        found.attrs["warnings"] = " ".join(map(str, static_warnings(found, gears.gears[0].module)))
-        return found
 
     def _planet_couple(self) -> np.ndarray:
         """Couple (N, P) [N m] of the axial forces of sun and ring on every planet, at the working circles."""
@@ -455,11 +454,9 @@ def _by_gear(rows) -> np.ndarray:
     return values.reshape(-1, 2, *values.shape[1:])
 
 
-def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
-    """List what is wrong with the contents of static.nc in an engineer's eyes.
-
-    The module is that of the gears, of helical ones in their transverse section [m].
-    """
+def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """List what is wrong with the contents of static.nc in an engineer's eyes."""
+    module = float(data.attrs["module"])  # of helical gears in their transverse section
     names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
     force, back, pressure, motion, approach = (data[name].values for name in names)
     if "lead_offset" in data:
@@ -579,8 +576,8 @@ def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
     )
 
 
-def describe_static(data: xr.Dataset, module: float) -> Block:
-    """Tabulate transmission errors, stiffnesses and load sharing of static.nc; module of the gears [m]."""
+def describe_static(data: xr.Dataset) -> Block:
+    """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
     share = data.load_share.values
 
     def error(one: xr.Dataset, value: float) -> str:
@@ -626,7 +623,6 @@ def describe_static(data: xr.Dataset, module: float) -> Block:
         )
     if data.attrs.get("mesh_periods", 1) > 1:
         notes.append(str(data.attrs["period"]))
-    notes += map(str, static_warnings(data, module))
     return tabulate("Static", [data.sel(mesh=mesh) for mesh in data.mesh.values], columns, notes)
 
 

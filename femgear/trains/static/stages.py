@@ -47,6 +47,7 @@ from femgear.trains.static.results import (
     StressResult,
     describe_static,
     describe_stress,
+    static_warnings,
 )
 
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
@@ -469,7 +470,8 @@ STATIC = Stage(
         "message": result.cycle.message,
         "contact": result.cycle.contact,
     },
-    describe=lambda results: describe_static(results.static, planetary_set(results.case).gears[0].module),
+    describe=lambda results: describe_static(results.static),
+    warnings=static_warnings,
     check=lambda case: check_slices(case, planetary_set(case)),
 )
 

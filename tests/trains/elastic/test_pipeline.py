@@ -285,7 +285,7 @@ def test_overload_is_said(case, steps):
         with_value(with_value(case, "operation.torque", "20000 N m"), "static.positions", 16),
         steps=steps,
     )
-    words = " ".join(map(str, overload.warnings))
+    words = " ".join(map(str, overload.findings))
     assert "W-PRESSURE" in words and "W-DEFLECTION] the teeth deflect by" in words
 
 
@@ -301,7 +301,7 @@ def test_motion_of_the_ring_on_its_foundation_is_not_called_deflection_of_teeth(
         },
     )
     static = solve_static(soft, steps=steps)
-    (words,) = [str(one) for one in static.warnings if one.code == "W-DEFLECTION"]
+    (words,) = [str(one) for one in static.findings if one.code == "W-DEFLECTION"]
     sun, ring = (np.abs(half).max() * 1e6 for half in np.split(static.cycle.deflection, 2))
     assert sun < 20.0 and ring > 75.0
     assert f"{sun:.0f} um between sun and planets and by {ring:.0f} um between planets and ring" in words
@@ -318,7 +318,7 @@ def test_motions_beyond_small_displacements_are_refused(case, steps):
     with pytest.raises(ContactError, match="E-MOTION"):
         solve_static(with_value(soft, "planet.bearing_stiffness", "1 N/m"), steps=steps)
     loose = solve_static(with_value(soft, "planet.bearing_clearance", "0.5 mm"), steps=steps)
-    assert "W-MOTION" in [one.code for one in loose.warnings]
+    assert "W-MOTION" in [one.code for one in loose.findings]
 
 
 def test_thick_teeth_wedge_without_any_other_error(case, steps):

@@ -53,8 +53,8 @@ def test_the_shipped_case_is_the_train_of_the_paper(given):
         elif name != "face_width":
             np.testing.assert_allclose(one, other, rtol=2e-4, err_msg=name)
     assert tuple(map(str, given.notices)) == (
-        "static, dynamics have no effect while helical.mesh_stiffness is given: it leaves nothing that "
-        "excites, and modes are all that is computed",
+        "[W-UNUSED] static, dynamics have no effect while helical.mesh_stiffness is given: it leaves nothing "
+        "that excites, and modes are all that is computed",
     )
 
 
@@ -166,7 +166,7 @@ def test_keys_without_effect_are_said(case):
     more = with_value(more, "material.contact_stress_limit", "1400 MPa")
     unused = "housing, ring.foundation_radial, material.contact_stress_limit, static.stresses, "
     unused += "planet.bearing_clearance"
-    assert tuple(map(str, more.notices)) == (f"{unused} have no effect in this helical case",)
+    assert tuple(map(str, more.notices)) == (f"[W-UNUSED] {unused} have no effect in this helical case",)
 
 
 def test_thrust_that_nothing_takes_up_is_refused(given):

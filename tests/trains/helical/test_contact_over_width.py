@@ -75,7 +75,7 @@ def test_elastic_set_with_a_helix(few_waves, tmp_path):
     arms = gears.centre_distance * planet / np.array([sun + planet, ring - planet])
     couple = arms[0] * axial[: gears.n_planets] + arms[1] * axial[gears.n_planets :]
     assert data["planet_couple"].values == pytest.approx(couple, rel=1e-12)
-    assert "W-THRUST" in [one.code for one in found.warnings]
+    assert "W-THRUST" in [one.code for one in found.findings]
 
 
 @pytest.mark.parametrize(("angle", "steep"), [(30, False), (31, True)])

@@ -353,15 +353,14 @@ def test_stages_of_helical_cases(coarse, given, tmp_path, capsys):
 
 
 def test_static_table_has_the_helical_meshes_beside_the_spur_section(results):
-    module = planetary_set(results.case).sun.module
-    block = describe_helical_static(results.static, results.modes, module=module)
+    block = describe_helical_static(results.static, results.modes)
     assert block.title == "Static" and "transverse spur section" in block.notes[0]
     assert not any("p max" in text for text in block.header) and len(block.rows) == 8
     row = dict(zip(block.header, block.rows[0]))
     for name, data, entry in (("helical", results.modes, "helical"), ("spur", results.static, "mesh")):
         mean = data[f"{entry}_stiffness"].values[0].mean() / 1e6
         assert float(row[f"{name} k mean [N/um]"]) == pytest.approx(mean, rel=1e-3)
-    alone = describe_helical_static(results.static, module=module)
+    alone = describe_helical_static(results.static)
     assert not any("helical" in text for text in alone.header)
     assert len(alone.header) == len(alone.rows[0])
 

@@ -19,7 +19,7 @@ from femgear.trains.pair.stages import iso_stiffness
 from femgear.trains.reading import with_values
 from femgear.trains.registry import check_case
 from femgear.trains.static.figures import contact_pattern
-from femgear.trains.static.results import load_warnings
+from femgear.trains.static.results import load_warnings, static_warnings
 from femgear.trains.static.stages import solve_static
 
 SLICES = 12
@@ -63,7 +63,7 @@ def test_the_other_hand_mirrors_the_width(kind):
     assert "planet_couple" not in right
     # solid pairs of 0, 10 and 20 degrees; of 20 degrees and 27.6 mm it is 9.4 %
     assert right.attrs["free_ends"] == pytest.approx(0.094 * 27.6 / 20.0, rel=0.01)
-    assert "[W-ENDS]" in right.attrs["warnings"]
+    assert "W-ENDS" in [one.code for one in static_warnings(right)]
     assert len(contact_pattern(right).axes) == 2  # the mesh and its colours
 
 
@@ -162,10 +162,11 @@ def test_the_slices_that_a_warning_advises_can_be_taken():
     slope = [{"kind": "lead slope", "amount": "40 um"}]
     coarse = {"operation.torque": "3000 N m", "static.positions": 8, "static.flank_elements": 8}
     case = pair_case({**coarse, "gear_1.modifications": slope, "static.slices": 8})
-    advice = re.search(r"8th of the width: take (\d+) slices, about", solve_static(case).dataset().warnings)
+    said = " ".join(map(str, solve_static(case).findings))
+    advice = re.search(r"8th of the width: take (\d+) slices, about", said)
     assert advice and 8 < int(advice[1]) < 25
     case = with_values(case, {"static.slices": int(advice[1])})
-    assert "more would be thinner" in solve_static(case).dataset().warnings
+    assert any("more would be thinner" in one.text for one in solve_static(case).findings)
 
 
 def test_stiffness_of_the_standard_knows_material_and_small_loads():
