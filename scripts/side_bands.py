@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -193,7 +194,8 @@ def _read_csv(path: Path, channel: str | None) -> Measured:
     from femgear.case.text import read_text
 
     lines = [(i, one) for i, one in enumerate(read_text(path).splitlines(), 1) if one.strip()]
-    lines = [(i, one) for i, one in lines if not one.lstrip().startswith("#")]
+    # spreadsheets write "sep=;" above the heading of files with decimal commas
+    lines = [(i, one) for i, one in lines if not one.lstrip().lower().startswith(("#", "sep="))]
 
     def problem(message: str, line: int, value=None, limit=None, remedy: str = REMEDY) -> CaseError:
         where = {"file": f"{path}:{line}", "value": value, "limit": limit, "remedy": remedy}
@@ -205,8 +207,8 @@ def _read_csv(path: Path, channel: str | None) -> Measured:
         )
     divider = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
     (first, heading), *table = [(i, next(csv.reader([one], delimiter=divider))) for i, one in lines]
-    names = [cell.strip().partition("[")[::2] for cell in heading]
-    names = [(name.strip().lower(), unit.rstrip("] ").strip()) for name, unit in names]
+    names = [[*re.split(r"[\[(]", cell.strip(), maxsplit=1), ""] for cell in heading]
+    names = [(name.strip().lower(), unit.rstrip(")] ").strip()) for name, unit, *_ in names]
     title = ", ".join(heading)
     axis = [i for i, (name, _) in enumerate(names) if name in ("order", "carrier order", "frequency")]
     if len(axis) != 1:

@@ -5,7 +5,8 @@
 * ``.npz``, ``.nc``: the arrays of `femgear.housing.structure.from_arrays`;
 * ``.pch``, ``.bdf``, ``.dat``: reduced stiffness and mass as DMIG, with GRID cards or without; ``.op4``: the
   same in ASCII, rows for the degrees of freedom of the nodes in their order, other coordinates after them;
-* ``.uff``, ``.unv``: normal modes (universal file, datasets 55, 15 or 2411, 164).
+* ``.uff``, ``.unv``: normal modes (universal file, datasets 55 or 2414, 15 or 2411, 164); binary datasets of
+  other data are passed over.
 
 Matrices and modes need a table of nodes (CSV): columns ``node`` and ``role``, with ``x``, ``y``, ``z`` where
 the file has no coordinates, ``direction`` (of a sensor: x, y, z, radial, tangential, or one of these after a
@@ -22,19 +23,22 @@ accelerations of the free ones (R. R. Craig and A. J. Kurdila, Fundamentals of S
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 from scipy.linalg import eigh
 
-from femgear.errors import CaseError, nvh_library
+from femgear.errors import CaseError, FemgearError, nvh_library
 from femgear.findings import Finding
-from femgear.housing.structure import FixedStructure, from_arrays
+from femgear.housing.structure import ARRAY_NAMES, FixedStructure, from_arrays
 
 UNITS = {"SI": (1.0, 1.0), "mm-t-s": (1e-3, 1e3)}
 """Systems of units: metres and kilograms of the units of length and mass; time is in seconds."""
@@ -49,6 +53,9 @@ _POWERS = {
 _OFF_CIRCLE = 0.01  # distance of a point from the pitch circle over its radius, at most
 _ASYMMETRY = 1e-6  # of a matrix over its largest entry: files hold 7 to 16 digits
 _FREE = 1e-10  # square of a natural frequency over the largest one: what may be rounding of the file
+_DISPLACEMENT, _REAL = 8, (2, 4)  # codes of dataset 2414: type of result, types of real data
+_MASSLESS = 1e-14  # of the largest entry of the mass matrix: a coordinate without mass
+_MOST_BYTES = 1_000_000_000  # of all arrays of a structure: 1000 modes at 1000 points take 16 MB
 _MISSING = 0.05  # part of the static compliance that may be missing without a word
 
 
@@ -68,7 +75,8 @@ class Node:
 class _Modes:
     """Mass-normalised modes in SI: frequency (m,) [rad/s], shape (m, r), coordinate by node and component.
 
-    Damping ratio (m,); forces on the feet by modes (m, o), and by the loads themselves (o, r).
+    Damping ratio (m,); forces on the feet by modes (m, o), and by the loads themselves (o, r); static
+    compliance of coordinates without mass (r, r), which no mode has [m/N], None where there are none.
     """
 
     frequency: np.ndarray
@@ -78,6 +86,7 @@ class _Modes:
     damping: np.ndarray | None
     foot_force: np.ndarray
     foot_direct: np.ndarray
+    compliance: np.ndarray | None = None
 
 
 def read_casing(
@@ -236,6 +245,8 @@ def _foreign(words: str) -> Iterator[None]:
     """Turn what a library says of a damaged file into E-FILE."""
     try:
         yield
+    except FemgearError:
+        raise
     except Exception as error:
         text = " ".join(str(error).split())[:200]
         raise CaseError(f"no {words} that can be read: {text}", code="E-FILE", limit=words) from error
@@ -326,8 +337,11 @@ def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, units) 
     path = np.asarray(direction, float) @ shape
     outputs = np.hstack([modes.shape @ heard.T, modes.foot_force])
     direct = np.vstack([np.zeros_like(heard), modes.foot_direct])
-    damping = {} if modes.damping is None else {"damping_ratio": modes.damping}
-    return damping | {
+    others = {} if modes.damping is None else {"damping_ratio": modes.damping}
+    if modes.compliance is not None:
+        others["ring_compliance"] = path @ modes.compliance @ path.T
+        direct[: len(heard)] += heard @ modes.compliance
+    return others | {
         "natural_frequency": modes.frequency,
         "ring_angle": angle,
         "ring_shape": np.moveaxis(shape @ modes.shape.T, -1, 0),
@@ -399,25 +413,45 @@ def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
     """Arrays of a file .npz or NetCDF by name in SI units, of units of length [m] and mass [kg]."""
     with _foreign("arrays of a structure (.npz, NetCDF)"):
         if path.suffix.lower() == ".npz":
+            with ZipFile(path) as archive:
+                size = sum(archive.getinfo(f"{name}.npy").file_size for name in _named(archive.namelist()))
+            _check_size(size)
             with np.load(path, allow_pickle=False) as stored:
-                found = dict(stored.items())
+                found = {name: stored[name] for name in ARRAY_NAMES if name in stored}
         else:
             import xarray as xr
 
             with xr.open_dataset(path) as data:
-                found = {str(name): one.values for name, one in data.data_vars.items()}
-        numbers = {name: one for name, one in found.items() if one.dtype.kind not in "OSU"}
+                named = {name: data[name] for name in ARRAY_NAMES if name in data}
+                _check_size(sum(one.nbytes for one in named.values()))
+                found = {name: one.values for name, one in named.items()}
+    words = [name for name, one in found.items() if one.dtype.kind not in "buifc"]
+    _check("arrays that hold no numbers", not words, code="E-TYPE", key="arrays", value=", ".join(words),
+           limit="numbers", remedy="export the array again")  # fmt: skip
     # complex numbers are some if they have an imaginary part
-    turned = [name for name, one in numbers.items() if np.iscomplexobj(one) and np.imag(one).any()]
+    turned = [name for name, one in found.items() if np.iscomplexobj(one) and np.imag(one).any()]
     _check(
         "complex arrays", not turned, code="E-TYPE", key="arrays", value=", ".join(turned),
         limit="real numbers", remedy="give modes without damping, and damping ratios",
     )  # fmt: skip
-    powers = {name: _POWERS.get(name, (0, 0)) for name in numbers}
+    powers = {name: _POWERS.get(name, (0, 0)) for name in found}
     return {
         name: np.asarray(np.real(one), float) * mass ** powers[name][0] * length ** powers[name][1]
-        for name, one in numbers.items()
+        for name, one in found.items()
     }
+
+
+def _named(entries: Sequence[str]) -> list[str]:
+    """Names of the arrays of a structure among the entries of an archive; others are never unpacked."""
+    return [name for name in ARRAY_NAMES if f"{name}.npy" in entries]
+
+
+def _check_size(size: int) -> None:
+    """Refuse arrays that fill more memory than any casing needs (E-MEMORY)."""
+    _check(
+        f"the arrays of the structure fill {size / 1e6:.0f} MB", size <= _MOST_BYTES, code="E-MEMORY",
+        key="arrays", limit=f"{_MOST_BYTES / 1e6:.0f} MB", remedy="export fewer modes, points or sensors",
+    )  # fmt: skip
 
 
 def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:
@@ -457,15 +491,22 @@ def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:
 
 def _pair(matrices: Mapping[str, Any]) -> list[Any]:
     """Stiffness and mass among matrices by name: the one that begins with K and the one with M."""
-    # KAAX goes before what else begins with K, such as the structural damping K4AAX
-    names = [[f"{k}AAX"] if f"{k}AAX" in matrices else [name for name in matrices if name[:1].upper() == k]
-             for k in "KM"]  # fmt: skip
+    names = [_stiffness_or_mass(matrices, letter) for letter in "KM"]
     _check(
         "the file does not hold one stiffness and one mass matrix", [len(one) for one in names] == [1, 1],
         code="E-COUNT", key="matrices", value=", ".join(matrices),
-        limit="one name that begins with K (KAAX), one that begins with M (MAAX)",
+        limit="one name that begins with K (KAAX, KAA), one that begins with M (MAAX, MAA)",
     )  # fmt: skip
     return [matrices[name] for (name,) in names]
+
+
+def _stiffness_or_mass(matrices: Mapping[str, Any], letter: str) -> list[str]:
+    """Names of matrices that may be the stiffness (K) or the mass (M)."""
+    # Nastran's names of reduced matrices go before others of the letter, such as the structural damping K4AAX
+    for usual in (f"{letter}AAX", f"{letter}AA"):
+        if usual in matrices:
+            return [usual]
+    return [name for name in matrices if name[:1].upper() == letter]
 
 
 def _op4(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], dict, dict]:
@@ -513,12 +554,16 @@ def _modes(found, row, place, table: Sequence[Node], length: float, mass: float)
         limit="the components 1, 2 and 3 of every foot",
         remedy="keep the feet in the reduction, or leave out feet that are held already",
     )  # fmt: skip
+    heavy, light = _with_and_without_mass(M, free)
+    follow, compliance = _massless(K, heavy, light)
     try:
-        square, shape = eigh(K[np.ix_(free, free)], M[np.ix_(free, free)])
+        condensed = K[np.ix_(heavy, heavy)] + K[np.ix_(heavy, light)] @ follow
+        square, shape = eigh(0.5 * (condensed + condensed.T), M[np.ix_(heavy, heavy)])
     except np.linalg.LinAlgError as error:
         raise CaseError(
             "the mass matrix is not positive definite", code="E-MASS", key="mass",
-            limit="mass on every coordinate", remedy="condense coordinates without mass before the export",
+            limit="mass on every coordinate, or none at all", remedy="condense coordinates of negative mass "
+            "before the export",
         ) from error  # fmt: skip
     below = int((square <= _FREE * square[-1]).sum())
     _check(
@@ -527,28 +572,101 @@ def _modes(found, row, place, table: Sequence[Node], length: float, mass: float)
         remedy="hold the casing (role foot); a negative one means a lost entry or matrices of two models",
     )  # fmt: skip
     phi = np.zeros((len(square), len(K)))
-    phi[:, free] = shape.T
+    phi[:, heavy], phi[:, light] = shape.T, shape.T @ follow.T
     names = _feet(table)
     total = np.zeros((len(names), 3, len(K)))
     for rows, one in zip(feet, standing):
         total[names.index(one.name), range(3), rows] += 1.0
-    stiff, heavy = (total.reshape(-1, len(K)) @ matrix for matrix in (K, M))
-    force = square[:, None] * (phi @ heavy.T) - phi @ stiff.T
+    stiff, inert = (total.reshape(-1, len(K)) @ matrix for matrix in (K, M))
+    force = square[:, None] * (phi @ inert.T) - phi @ stiff.T
+    direct = -(inert @ phi.T) @ phi
+    if len(light):
+        direct -= stiff @ compliance
     places = place | {one.number: one.position for one in table if one.position is not None}
     places = {number: length * x for number, x in places.items()}
-    return _Modes(np.sqrt(square), phi, row, places, None, force, -(heavy @ phi.T) @ phi)
+    return _Modes(np.sqrt(square), phi, row, places, None, force, direct, compliance if len(light) else None)
+
+
+def _with_and_without_mass(M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Split free coordinates into those with mass and those that no mass moves with."""
+    moved = np.abs(M[np.ix_(free, free)]).max(axis=1, initial=0.0)
+    light = moved <= _MASSLESS * moved.max(initial=0.0)
+    return free[~light], free[light]
+
+
+def _massless(K: np.ndarray, heavy: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Condense coordinates without mass: their motion by that of the others, and their own compliance.
+
+    ``K_ll u_l + K_lh u_h = F_l``: exact static condensation (R. J. Guyan, AIAA J. 3, 1965, 380). Returns
+    ``-K_ll^-1 K_lh`` and ``K_ll^-1`` among all coordinates (r, r). CaseError: E-MECHANISM.
+    """
+    compliance = np.zeros_like(K)
+    own = K[np.ix_(light, light)]
+    _check(
+        "coordinates without mass are held by nothing",
+        not len(light) or float(np.linalg.cond(own)) < 1 / _FREE, code="E-MECHANISM", key="mass",
+        limit="stiffness or mass on every coordinate",
+        remedy="leave these coordinates out of the export, or give them mass",
+    )  # fmt: skip
+    inverse = np.linalg.inv(own) if len(light) else own
+    compliance[np.ix_(light, light)] = inverse
+    return -inverse @ K[np.ix_(light, heavy)], compliance
+
+
+_BINARY = re.compile(rb"^ {4}-1[ ]*\r?\n +\d+b +\d+ +\d+ +(\d+) +(\d+)[^\n]*\n", re.MULTILINE)
+"""Head of a binary dataset: byte order, format of numbers, lines of text and bytes that follow."""
+
+
+def _without_binary(content: bytes) -> bytes:
+    """Leave out the binary datasets (58b) of a universal file, whose bytes may look like anything."""
+    while head := _BINARY.search(content):
+        end = head.end()
+        for _ in range(int(head[1])):
+            end = content.index(b"\n", end) + 1
+        end = content.index(b"    -1", end + int(head[2])) + len(b"    -1")
+        content = content[: head.start()] + content[end:].lstrip(b" ").removeprefix(b"\r").removeprefix(b"\n")
+    return content
+
+
+def _analysis_data(sets: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Normal modes of datasets 2414 at nodes, in the entries of datasets 55.
+
+    Real specific data are time, frequency, eigenvalue, modal mass, viscous and hysteretic damping ratio
+    (universal file dataset 2414, records 12 and 13).
+    """
+    modes = list[dict[str, Any]]()
+    for one in sets:
+        if one["type"] != 2414 or one["dataset_location"] != 1 or one["result_type"] != _DISPLACEMENT:
+            continue
+        if one["analysis_type"] != 2:
+            continue
+        motion = np.array(one["data_at_node"], float)
+        _check(
+            "modes whose nodes have no displacement vectors", motion.ndim == 2 and motion.shape[1] in (3, 6)
+            and one["data_type"] in _REAL, code="E-TYPE", key="modes", limit="three or six real components",
+        )  # fmt: skip
+        vectors = {f"r{c + 1}": motion[:, c] for c in range(3)}
+        modes.append(vectors | {
+            "node_nums": one["node_nums"], "analysis_type": 2, "freq": one["record12_field2"],
+            "modal_m": one["record12_field4"], "modal_damp_vis": one["record12_field5"],
+            "modal_damp_his": one["record12_field6"],
+        })  # fmt: skip
+    return modes
 
 
 def _universal(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
-    """Modes of a universal file, datasets 55, at the nodes of datasets 15 or 2411."""
+    """Modes of a universal file, datasets 55 or 2414, at the nodes of datasets 15 or 2411."""
     with nvh_library("universal files"):
         import pyuff
     with _foreign("universal file"):
+        content = _without_binary(path.read_bytes())
         # the library reads a file that breaks off up to its last whole dataset
-        ends = sum(line.strip() == "-1" for line in path.read_text(encoding="latin-1").splitlines())
-        if ends % 2:
+        if sum(line.strip() == b"-1" for line in content.splitlines()) % 2:
             raise ValueError("it breaks off within a dataset")
-        sets = pyuff.UFF(str(path)).read_sets()
+        with NamedTemporaryFile(suffix=".uff") as file:
+            file.write(content)
+            file.flush()
+            sets = pyuff.UFF(file.name).read_sets()
         sets = sets if isinstance(sets, list) else [sets]
     system = [one["length"] for one in sets if one["type"] == 164]
     _check(
@@ -556,13 +674,19 @@ def _universal(path: Path, table: Sequence[Node], length: float, mass: float) ->
         code="E-UNITS", key="units", value=f"units of length a metre: {system[:1]}", limit=f"{1 / length:g}",
         remedy="give the units of the file",
     )  # fmt: skip
-    modes = [one for one in sets if one["type"] == 55]
+    modes = [one for one in sets if one["type"] == 55] + _analysis_data(sets)
     real = all(one["analysis_type"] == 2 and not np.iscomplexobj(one["r1"]) for one in modes)
     _check("complex modes", real, code="E-TYPE", key="modes", limit="real normal modes (analysis type 2)")
+    kinds = sorted({int(one["type"]) for one in sets})
+    _check(
+        "the file holds no modes", len(modes) > 0, code="E-COUNT", key="modes",
+        value=f"datasets {', '.join(map(str, kinds))}", limit="datasets 55, or 2414 of normal modes at nodes",
+        remedy="export normal modes, displacements at nodes, in ASCII",
+    )  # fmt: skip
     weights = np.array([one["modal_m"] for one in modes], float)
     _check(
-        "no modes, or modes without modal mass", len(modes) > 0 and bool((weights > 0).all()), code="E-MASS",
-        key="modal mass", value=weights.tolist(), limit="above 0 in every dataset 55",
+        "modes without modal mass", bool((weights > 0).all()), code="E-MASS",
+        key="modal mass", value=weights.tolist(), limit="above 0 in every dataset 55 or 2414",
         remedy="export modes with the modal mass that they are normalised to",
     )  # fmt: skip
     _check(

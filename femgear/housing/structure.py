@@ -141,13 +141,54 @@ class FixedStructure(ReadOnlyArrays):
 
 
 _ARRAYS = ("natural_frequency", "damping_ratio", "ring_angle", "ring_shape", "sensor_shape")
+_OPTIONAL = ("ring_compliance", "sensor_compliance", "sensor_area")
+ARRAY_NAMES = (*_ARRAYS, *_OPTIONAL)
+"""Arrays that `from_arrays` takes."""
+_DIMENSIONS = {
+    "natural_frequency": "(modes,)", "damping_ratio": "() or (modes,)", "ring_angle": "(points,)",
+    "ring_shape": "(modes, points, 2)", "sensor_shape": "(modes, sensors)",
+    "ring_compliance": "(points, points)", "sensor_compliance": "(sensors, points)",
+    "sensor_area": "(sensors,)",
+}  # fmt: skip
+_LARGEST = 1e30
+"""Entry of an array in SI units, at most: squares of larger ones overflow, and no casing has them."""
+_SLOWEST, _FASTEST = 2e-3 * np.pi, 2e9 * np.pi
+"""Natural frequencies that a casing can have: 1 mHz to 1 GHz [rad/s]."""
+
+
+def _check_arrays(values: Mapping[str, np.ndarray]) -> None:
+    """Refuse arrays of other dimensions, entries that are not finite and frequencies that no casing has."""
+    for name, array in values.items():
+        shape = _DIMENSIONS[name]
+        dimensions = {len(one.strip("()").replace(",", " ").split()) for one in shape.split(" or ")}
+        if array.ndim not in dimensions:
+            raise CaseError(
+                f"{name} has the shape {array.shape}", code="E-SHAPE", key=name, limit=shape,
+                remedy="export the array with these dimensions",
+            )  # fmt: skip
+        if not (np.abs(array) <= _LARGEST).all():
+            wrong = array[~(np.abs(array) <= _LARGEST)][0]
+            raise CaseError(
+                f"{name} has an entry that is not finite, or too large", code="E-FINITE", key=name,
+                value=float(wrong), limit=f"finite numbers up to {_LARGEST:g} in SI units",
+                remedy="export the array again, and look at the units",
+            )  # fmt: skip
+    frequency = values["natural_frequency"]
+    outside = frequency[(frequency > 0) & ((frequency < _SLOWEST) | (frequency > _FASTEST))]
+    if outside.size:
+        raise CaseError(
+            "a natural frequency that no casing has", code="E-RANGE", key="natural_frequency",
+            value=float(outside[0]), limit=f"{_SLOWEST:.3g} to {_FASTEST:.3g} rad/s",
+            remedy="give natural frequencies in rad/s",
+        )  # fmt: skip
 
 
 def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> FixedStructure:
     """Make a structure of mode shapes at points of the pitch circle and at sensors.
 
     CaseError: as `FixedStructure`; E-KEY-MISSING: arrays that are missing; E-COUNT: too few points;
-    E-DUPLICATE: two at one angle; E-RANGE: points that leave gaps, a direction that is no unit vector.
+    E-DUPLICATE: two at one angle; E-FINITE: entries that are not finite, or too large; E-RANGE: points that
+    leave gaps, a direction that is no unit vector, natural frequencies that no casing has.
 
     Parameters
     ----------
@@ -168,7 +209,8 @@ def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> F
     if missing:
         message, limit = f"the structure lacks {', '.join(missing)}", f"the arrays {', '.join(_ARRAYS)}"
         raise CaseError(message, code="E-KEY-MISSING", key=missing[0], limit=limit)
-    values = {name: np.asarray(arrays[name], float) for name in arrays}
+    values = {name: np.asarray(arrays[name], float) for name in (*_ARRAYS, *_OPTIONAL) if name in arrays}
+    _check_arrays(values)
     angle, shape, sensors = (values[name] for name in ("ring_angle", "ring_shape", "sensor_shape"))
     if np.abs(angle).max(initial=0.0) > 4 * np.pi:
         message, limit = "angles of the points beyond two turns", "radians, up to one turn"

@@ -1,5 +1,8 @@
 """Casings from files: all formats hold the same one, closed forms, and everything that is refused."""
 
+import shutil
+import tracemalloc
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -337,7 +340,8 @@ ONE[2, 3] = 1.0
         ({"K": K0 * (I16 + ONE)}, {}, "E-SYMMETRY"),
         ({"K": K0 * (1 + 0.02j) * I16}, {}, "E-TYPE"),
         ({"M": M0 * np.eye(15)}, {}, "E-SHAPE"),
-        ({"M": M0 * np.diag([1.0] * 15 + [0.0])}, {}, "E-MASS"),
+        ({"M": M0 * np.diag([1.0] * 15 + [-1.0])}, {}, "E-MASS"),
+        ({"M": M0 * np.diag([1.0] * 15 + [0.0]), "K": K0 * np.diag([1.0] * 15 + [0.0])}, {}, "E-MECHANISM"),
         ({"K": K0 * np.diag([1.0] * 15 + [0.0])}, {}, "E-MECHANISM"),
         ({"K": K0 * np.diag([1.0] * 15 + [-1.0])}, {}, "E-MECHANISM"),
         ({"cards": lambda t: t.replace("MAAX", "NAAX")}, {"name": "ring.pch"}, "E-COUNT"),
@@ -408,6 +412,12 @@ def test_universal_file_that_breaks_off(folder, tmp_path):
         (lambda a: {"ring_angle": np.append(a["ring_angle"][1] - 2 * np.pi, a["ring_angle"][1:])},
          "E-DUPLICATE", "ring_angle"),
         (lambda a: {"ring_shape": 0 * a["ring_shape"]}, "E-COUNT", "ring_shape"),
+        (lambda a: {"sensor_shape": np.float64(1.0)}, "E-SHAPE", "sensor_shape"),
+        (lambda a: {"natural_frequency": 1e-200 * a["natural_frequency"]}, "E-RANGE", "natural_frequency"),
+        (lambda a: {"ring_angle": np.where(np.arange(len(a["ring_angle"])) == 3, np.nan, a["ring_angle"])},
+         "E-FINITE", "ring_angle"),
+        (lambda a: {"ring_shape": 1e200 * a["ring_shape"]}, "E-FINITE", "ring_shape"),
+        (lambda a: {"sensor_shape": np.array([["top"]])}, "E-TYPE", "arrays"),
         (lambda a: {name: a[name][:0] for name in ("natural_frequency", "ring_shape", "sensor_shape")},
          "E-COUNT", "ring_shape"),
     ],
@@ -419,6 +429,88 @@ def test_refused_arrays(change, code, key, folder, tmp_path):
     with pytest.raises(CaseError) as error:
         read_casing(tmp_path / "a.npz", max_diameter=4, expected_stiffness=1e8, **KNOWN)
     assert (error.value.code, error.value.key) == (code, key) and error.value.limit
+
+
+def test_arrays_of_other_names_are_not_unpacked(folder, tmp_path, monkeypatch):
+    """200 MB of zeros that nobody named, a fifth of a megabyte on disk; and named ones beyond the limit."""
+    path, size = tmp_path / "a.npz", 200_000_000
+    shutil.copy(folder / "casing.npz", path)
+    header = f"{{'descr': '|u1', 'fortran_order': False, 'shape': ({size},), }}".ljust(117) + "\n"
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        head = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode()
+        archive.writestr("more.npy", head + bytes(size))
+    tracemalloc.start()
+    read(folder, path)
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+    monkeypatch.setattr("femgear.housing.casing_files._MOST_BYTES", 10_000)
+    with pytest.raises(CaseError) as error:
+        read(folder, path)
+    assert error.value.code == "E-MEMORY" and error.value.file == str(path)
+
+
+def test_reduced_matrices_by_the_names_of_nastran(tmp_path):
+    """KAA and MAA among other names of EXTSEOUT: sqrt(4e7/0.1)/(2 pi) = 3183.1 Hz."""
+    angle = 2 * np.pi * np.arange(8) / 8
+    matrices = {"K4XX": np.eye(1), "KAA": 4e7 * I16, "KASMX": np.eye(1), "MAA": 0.1 * I16, "MASMX": np.eye(1)}
+    OP4(debug=False).write_op4(
+        str(tmp_path / "a.op4"), {name: (6, one) for name, one in matrices.items()}, is_binary=False
+    )
+    lines = [f"{n},ring,{x},{y},{z},12" for n, (x, y, z) in enumerate(around(angle).tolist(), 1)]
+    (tmp_path / "nodes.csv").write_text("node,role,x,y,z,dofs\n" + "\n".join([*lines, "1,sensor top,,,,12"]))
+    one = read_ring(tmp_path, "a.op4")
+    np.testing.assert_allclose(one.natural_frequency / (2 * np.pi), 3183.0989, rtol=1e-6)
+
+
+def test_coordinates_without_mass_are_those_of_vanishing_mass(tmp_path):
+    """Points of the ring on springs to masses on springs to the ground, against masses of 1e-9 kg on them."""
+    angle = 2 * np.pi * np.arange(8) / 8
+    K = np.kron([[1.0, -1.0], [-1.0, 3.0]], K0 * I16)
+    lines = [f"{n},ring,{x},{y},{z},12" for n, (x, y, z) in enumerate(around(angle).tolist(), 1)]
+    lines.append("1,sensor top,,,,12")
+    (tmp_path / "nodes.csv").write_text("node,role,x,y,z,dofs\n" + "\n".join(lines))
+    known = []
+    for name, mass in (("none", 0.0), ("little", 1e-9)):
+        M = np.kron(np.diag([0.0, 1.0]), M0 * I16) + np.kron(np.diag([1.0, 0.0]), mass * I16)
+        path = tmp_path / f"{name}.op4"
+        OP4(debug=False).write_op4(str(path), {"K": (6, K), "M": (6, M)}, is_binary=False)
+        known.append(read_ring(tmp_path, path.name, damping_ratio=0.0))
+    none, little = known
+    assert len(none.natural_frequency) == 16 and len(little.natural_frequency) == 32
+    np.testing.assert_allclose(mean_compliance(none), mean_compliance(little), rtol=1e-9)
+    for hertz in (0.0, 700.0, 4000.0):
+        for a, b in zip(transfer(none, hertz), transfer(little, hertz)):
+            np.testing.assert_allclose(a, b, atol=1e-6 * np.abs(b).max())
+
+
+def test_modes_of_dataset_2414(folder, tmp_path):
+    """The casing's modes as analysis data, with a binary dataset of another measurement before them."""
+
+    def change(one):
+        if one["type"] != 55:
+            return one
+        motion = np.column_stack([one[f"r{c}"] for c in (1, 2, 3)])
+        return {
+            "type": 2414, "analysis_dataset_label": 1, "analysis_dataset_name": "mode", "dataset_location": 1,
+            **{f"id{i}": "NONE" for i in range(1, 6)}, "model_type": 1, "analysis_type": 2,
+            "data_characteristic": 2, "result_type": 8, "data_type": 4,
+            "number_of_data_values_for_the_data_component": 3, "record12_field2": one["freq"],
+            "record12_field4": one["modal_m"], "node_nums": one["node_nums"], "data_at_node": list(motion),
+        }  # fmt: skip
+
+    path = _sets(folder, tmp_path / "a.unv", change)
+    binary = b"    58b     1     2          11          24     0     0           0           0\n"
+    text = b"NONE\n" * 11
+    head = b"    -1\n" + binary + text + b"    -1\n" * 3 + b"abc" + b"\n    -1\n"
+    path.write_bytes(head + path.read_bytes())
+    whole, again = read(folder, "casing.uff", "nodes_held.csv"), read(folder, path, "nodes_held.csv")
+    np.testing.assert_allclose(again.natural_frequency, whole.natural_frequency, rtol=1e-5)
+    np.testing.assert_allclose(again.ring_shape, whole.ring_shape, atol=2e-5 * abs(whole.ring_shape).max())
+    nothing, sets = tmp_path / "b.unv", pyuff.UFF(str(folder / "casing.uff")).read_sets()
+    pyuff.UFF(str(nothing)).write_sets([one for one in sets if one["type"] != 55], mode="overwrite")
+    with pytest.raises(CaseError, match="holds no modes") as error:
+        read(folder, nothing, "nodes_held.csv")
+    assert error.value.code == "E-COUNT"
 
 
 def test_complex_arrays_without_imaginary_part_and_areas_in_mm(folder, tmp_path):
