@@ -52,7 +52,7 @@ except (ImportError, MemoryError) as error:
     sys.stderr.write(
         f"[E-LIBRARY] {type(error).__name__}: {' '.join(str(error).split())}\n  remedy:  {_LOADING}\n"
     )
-    raise SystemExit(3) from None
+    raise SystemExit(5) from None  # femgear.errors, where the number stands, may be what cannot be loaded
 
 app = App(
     name="femgear",

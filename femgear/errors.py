@@ -113,6 +113,9 @@ CODES = {
     "E-WORKER": "A task ends its worker, or cannot be given to one.",
 }
 """Meaning of every code; docs/errors.md lists the messages that carry it."""
+SURROUNDINGS = frozenset({"E-CLUSTER", "E-LIBRARY", "E-SYSTEM-LIBRARY"})
+"""Codes of what is missing or fails around femgear, whatever the case: they end the command line with 5."""
+SURROUNDINGS_EXIT = 5
 MOST_SHOWN = 10
 """Mistakes of a case file that one message lists."""
 
@@ -160,6 +163,8 @@ class FemgearError(Exception):
         self.limit = limit
         self.remedy = remedy
         self.file = file
+        if self.code in SURROUNDINGS:
+            self.exit_code = SURROUNDINGS_EXIT
         # the mistakes of a case file one by one, where there are several
         self.problems: tuple[FemgearError, ...] = (self,)
 

@@ -407,14 +407,14 @@ def _started(program="import sys; from femgear.cli import main; sys.exit(main())
     ("failure", "code", "said"),
     [
         ("raise KeyboardInterrupt", 130, "interrupted\n"),
-        ("raise ImportError('libx.so: no such file')", 3, "[E-LIBRARY] ImportError: libx.so: no such file\n"),
-        ("raise MemoryError", 3, "[E-LIBRARY] MemoryError: \n"),
+        ("raise ImportError('libx.so: no such file')", 5, "[E-LIBRARY] ImportError: libx.so: no such file\n"),
+        ("raise MemoryError", 5, "[E-LIBRARY] MemoryError: \n"),
     ],
 )
 def test_failures_while_the_program_is_loaded(tmp_path, failure, code, said):
     (tmp_path / "cyclopts.py").write_text(f"{failure}\n")
     done = _started(env=os.environ | {"PYTHONPATH": str(tmp_path)})
-    remedy = f"  remedy:  {cli._LOADING}\n" if code == 3 else ""
+    remedy = f"  remedy:  {cli._LOADING}\n" if code == 5 else ""
     assert done.returncode == code and done.stderr == said + remedy
 
 
@@ -520,7 +520,7 @@ def _fill(*_, **__):
         (_exhaust, 3, "E-MEMORY"),
         (_crowd, 3, "E-MEMORY"),
         (_differ, 3, "E-SOLVE"),
-        (_lack, 3, "E-LIBRARY"),
+        (_lack, 5, "E-LIBRARY"),
         (_interrupt, 130, "interrupted"),
         (_terminate, 130, "interrupted"),
         (_fill, 4, "E-DISK-FULL"),

@@ -360,6 +360,12 @@ def open_runner(workers: int = 1, cluster: str | None = None) -> Runner:
     answers).
     """
     number = checked_count(workers, "--workers", code="E-RANGE")
+    scheme = cluster.partition("://")[0] if cluster and "://" in cluster else ""
+    if scheme == "inproc":
+        raise CaseError(
+            "a scheduler within another process cannot be reached", code="E-ARGUMENTS", key="--cluster",
+            value=cluster, limit="tcp://host:port or tls://host:port", remedy="dask scheduler starts one",
+        )  # fmt: skip
     if cluster is None:
         return Processes(number) if number > 1 else Runner()
     if number > 1:

@@ -686,7 +686,11 @@ def figure(data: xr.Dataset):
     axes[0].plot(share[worst], ste[worst], "D", color=VERMILION, label=f"worst: sample {worst}")
     label(axes[0], names[1], names[0], f"{len(ste)} samples, seed {data.attrs['seed']}")
     for ax, name, values in zip(axes[1:], names, (ste, share), strict=True):
-        ax.hist(values, 80, weights=np.full(len(values), 100.0 / len(values)), color=BLUE)
+        # limits below rounding leave samples that differ by less than bins can
+        middle, spread = float(np.mean(values)), float(np.ptp(values))
+        reach = max(0.5 * spread, 1e-6 * abs(middle), 1e-12) if spread < 1e-6 * abs(middle) else None
+        ends = None if reach is None else (middle - reach, middle + reach)
+        ax.hist(values, 80, range=ends, weights=np.full(len(values), 100.0 / len(values)), color=BLUE)
         for part, dash in ((0.5, "-"), (0.95, "--"), (0.99, ":")):
             at = np.quantile(values, part)
             ax.axvline(at, color=VERMILION, linestyle=dash, label=f"{part:.0%} of the samples below")

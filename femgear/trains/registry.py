@@ -64,7 +64,7 @@ class Installed(Known):
             found = resolve_name(place)
             if (name := name_of(found)) != self.name:
                 raise ValueError(f"{place} is of {name}")
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise FemgearError(
                 f"the train {self.name} of the package {self.package} cannot be loaded: "
                 f"{type(error).__name__}: {' '.join(str(error).split())}",

@@ -178,7 +178,7 @@ def test_without_certificates_none_gets_in(words, secure, tmp_path):
     assert_resumes(words, tmp_path, 0, secure)
     for address in (secure.address, secure.address.replace("tls", "tcp")):
         refused = programs.start([*words, "--cluster", address], tmp_path, fresh=True).wait()
-        assert refused.code == 3 and "E-CLUSTER" in refused.err and not refused.crash
+        assert refused.code == 5 and "E-CLUSTER" in refused.err and not refused.crash
 
 
 @pytest.mark.parametrize("who", ["client", "worker", "scheduler"])

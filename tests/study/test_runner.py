@@ -146,13 +146,14 @@ def test_refusals(capsys):
     for arguments, code in (
         ({"workers": 0}, "E-RANGE"),
         ({"workers": 2, "cluster": "tcp://127.0.0.1:1"}, "E-ARGUMENTS"),
+        ({"cluster": "inproc://10.0.0.1/5/1"}, "E-ARGUMENTS"),
     ):
         with pytest.raises(CaseError) as error:
             open_runner(**arguments)
         assert error.value.code == code
     assert type(open_runner(1)) is Runner and open_runner(3).workers == 3
     words = ["sweep", str(CASE), "-o", "out", "--over", "carrier.mass=1 kg,2 kg", "--cluster", "udp:nowhere"]
-    assert cli.main(words) == 3 and "E-CLUSTER" in capsys.readouterr().err
+    assert cli.main(words) == 5 and "E-CLUSTER" in capsys.readouterr().err
 
 
 def test_keys_without_an_outcome_are_an_error(case, tmp_path):

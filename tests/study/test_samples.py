@@ -360,6 +360,15 @@ def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, 
     assert planetary_set(again).n_planets == 3
 
 
+def test_errors_below_rounding_are_computed_and_drawn(case, tmp_path):
+    path, out, laws = tmp_path / "case.toml", tmp_path / "out", tmp_path / "laws.toml"
+    path.write_text(case.source, encoding="utf-8")
+    law = 'tangential = {distribution = "normal", sigma = "3 um", limit = "1e-9 um"}'
+    laws.write_text(f"[pin_errors]\n{law}\n", encoding="utf-8")
+    assert main(["samples", str(path), "--tolerances", str(laws), "-o", str(out), "-n", "3"]) == 0
+    assert np.ptp(read_dataset(out / "samples.nc").transmission_error.values) < 1e-13
+
+
 def test_members_that_move_share_better_and_are_told(case, tmp_path):
     path = tmp_path / "pins.toml"
     path.write_text('pin_errors.tangential = { distribution = "normal", sigma = "3 um" }', encoding="utf-8")

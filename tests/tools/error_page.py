@@ -22,7 +22,7 @@ HEAD = """# Errors
 Every refusal names the file and the key where there are any, the value found, what is allowed and what to do.
 Its code is stable: scripts may test the `code` of a `femgear.errors.FemgearError`. Exit codes of the command
 line are 2 for input that cannot be used, 3 for computations without trustworthy result, 4 for results that
-cannot be written or read.
+cannot be written or read, 5 for libraries, packages with trains and schedulers of clusters that fail.
 
 Below are all codes with the messages that carry them; `…` stands for numbers and names. Warnings, which end
 nothing, follow [at the end](#warnings). This page is written by

@@ -63,12 +63,13 @@ def test_it_is_loaded_for_its_own_cases_alone(install, tmp_path, capsys):
     [
         ("raise ImportError('no library\\nof springs')", "ImportError: no library of springs"),
         ("x = 1 / 0", "ZeroDivisionError"),
+        ("import sys; sys.exit('no licence')", "SystemExit: no licence"),
         ("FILE = 3", "AttributeError: 'int' object has no attribute 'model'"),
         ("from femgear.trains.pair.case_file import FILE", "swinging:FILE is of pair"),
     ],
 )
 def test_what_cannot_be_loaded_names_its_package(install, capsys, text, reason):
-    assert cli.main(["check", str(install(text))]) == 3
+    assert cli.main(["check", str(install(text))]) == 5
     said = capsys.readouterr().err
     assert "[E-LIBRARY] the train oscillator of the package swings cannot be loaded" in said
     assert reason in said and "update swings or remove it" in said
