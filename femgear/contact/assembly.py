@@ -87,6 +87,31 @@ class Windows:
 
 
 @dataclass(frozen=True)
+class ListedPairs:
+    """All tooth pairs that may come near, candidates or not; ``...`` stands for (meshes, P, pairs).
+
+    Parameters
+    ----------
+    near : (...) bool array
+        Whether the pair comes near enough to be a candidate.
+    gap : (...) array
+        Smallest separation [m]; infinite where the flanks have no points in common.
+    roll : (2, ...) array
+        Roll lengths of the middle of the window on gear 1 and gear 2 [m].
+    tooth : (2, meshes, pairs) int array
+        Tooth numbers in the first mesh period.
+    first : (meshes,) int array
+        Number of the first one with a window.
+    """
+
+    near: np.ndarray
+    gap: np.ndarray
+    roll: np.ndarray
+    tooth: np.ndarray
+    first: np.ndarray
+
+
+@dataclass(frozen=True)
 class MeshWindows(Windows):
     """Contact windows of all meshes and positions, or of twice as many with the back flanks.
 
@@ -102,6 +127,8 @@ class MeshWindows(Windows):
         Half-plane compliance of both bodies within a window [m/N], for all kinds of mesh and layouts.
     cell_area : (meshes, 4, cells) array
         Areas of the pressure cells in all layouts [m^2].
+    listed : ListedPairs
+        Those without windows among them, see `femgear.contact.omitted_pairs`.
     images : int
         Sectors of the set that are all in the same state: the planets are those of the first.
     """
@@ -111,6 +138,7 @@ class MeshWindows(Windows):
     turns: np.ndarray
     local: np.ndarray
     cell_area: np.ndarray
+    listed: ListedPairs
     images: int = 1
 
     @property
@@ -133,11 +161,6 @@ class MeshWindows(Windows):
         """Pressure cells in a window."""
         return self.gap.shape[-1]
 
-    @cached_property
-    def smallest_gap(self) -> np.ndarray:
-        """Smallest separation in every window [m], shape (meshes, P, pairs)."""
-        return self.gap.min(axis=-1)
-
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
         """Mesh with windows that stands for each mesh of the set (M,), and which image of it that is (M,)."""
@@ -153,20 +176,11 @@ class MeshWindows(Windows):
     def with_planet_gaps(self, planet_gaps) -> MeshWindows:
         """Add separations (N,) [m] of the sun-side drive flanks of the planets."""
         gap = self.gap.copy()
-        gap[: self.n_planets] += np.asarray(planet_gaps, float)[:, None, None, None]
-        return replace(self, gap=gap)
-
-    def missed(self, positions, deflection) -> np.ndarray:
-        """Separation from the nearest pair within which no omitted pair penetrates [m]; zero if none does.
-
-        ``deflection`` (meshes, P) is the approach of the drive flanks of every mesh [m] at `positions` (P,).
-        """
-        gap = self.smallest_gap[:, positions]
-        # a back flank approaches when its drive flank parts
-        approach = np.concatenate([deflection, -np.asarray(deflection)])[: len(gap)]
-        penetrates = ~self.near[:, positions] & (gap < approach[..., None])
-        relative = approach - gap.min(axis=-1)
-        return np.where(penetrates.any(axis=-1), relative, 0.0).max(axis=0, initial=0.0)
+        further = np.asarray(planet_gaps, float)[:, None, None]
+        gap[: self.n_planets] += further[..., None]
+        listed = self.listed.gap.copy()
+        listed[: self.n_planets] += further
+        return replace(self, gap=gap, listed=replace(self.listed, gap=listed))
 
 
 @dataclass(frozen=True)
@@ -491,12 +505,12 @@ def windows(
     layout = at_edge[0] + 2 * at_edge[1]
     arc = start[..., None] + width * cell_centres(cells)[layout]
     gap = _separation_at(pair, zeta[..., None], arc, form) + np.asarray(shift)[..., None]
-    gap = np.where(arc < high[..., None], gap, np.inf)
+    gap = np.where((arc < high[..., None]) & (low < high)[..., None], gap, np.inf)
     node_arc = np.minimum(start[..., None] + WINDOW_NODES * width, np.maximum(high, low + width)[..., None])
     roll_1 = np.sqrt(2 * pair.base_radius_1 * node_arc)
     roll_2 = separation(pair, zeta[..., None], roll_1)[1]
     begin, end = pair.path
-    smallest = np.where(low < high, gap.min(axis=-1), np.inf)
+    smallest = gap.min(axis=-1)
     on_path = (zeta >= begin) & (zeta <= end)
     return Windows(
         zeta=zeta,
@@ -639,7 +653,7 @@ def _tooth_pairs(planetary_set, pairs, phase, direction, passed) -> tuple[np.nda
     lowest = np.floor(begin - phase - np.ceil(passed.max())).astype(int) - 1
     # slices of helical teeth reach beyond a mesh period
     further = int(np.ceil(max(passed.max() - passed.min() - 1.0, 0.0)))
-    index = lowest[:, None] + np.arange(int(np.ceil(end - begin)) + 4 + further)
+    index = lowest[:, None] + np.arange(int(np.ceil(end - begin)) + 5 + further)
     zeta = pitch * (passed[None, :, None] + phase[:, None, None] + index[:, None, :])
     return zeta, side_teeth(planetary_set, index, direction)
 
@@ -666,7 +680,7 @@ def _window_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
 
 
 def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int) -> MeshWindows:
-    """Join all meshes and drop the leading and trailing pairs that never come near."""
+    """Join all meshes; leading and trailing pairs that never come near are listed, but have no windows."""
     used = np.concatenate([w.near.any(axis=1) for w in found])
     # every mesh keeps the same number of pairs, starting at its own first candidate
     first = used.argmax(axis=1)
@@ -681,6 +695,13 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
         whole = np.concatenate([getattr(w, name) for w in found], axis=int(of_gears))
         parts[name] = whole if name == "cell" else whole[:, *places] if of_gears else whole[places]
     area = parts["cell"] * cells * bodies.face_width
+    listed = ListedPairs(
+        near=np.concatenate([w.near for w in found]),
+        gap=np.concatenate([w.gap.min(axis=-1) for w in found]),
+        roll=np.concatenate([w.roll[..., 1] for w in found], axis=1),
+        tooth=tooth,
+        first=first,
+    )
     return MeshWindows(
         **parts,
         gears=gears,
@@ -690,6 +711,7 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
             [_window_compliance(w.cell[0] * cells, cells, bodies) for w in found[: len(gears.kinds)]]
         ),
         cell_area=area[:, None, None] * np.diff(cell_edges(cells)),
+        listed=listed,
     )
 
 

@@ -33,6 +33,7 @@ from femgear.contact.batch import (
 from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
 from femgear.contact.flank_pairs import mesh_count
+from femgear.contact.omitted_pairs import needed_nearest
 from femgear.contact.slices import largest_mean
 from femgear.contact.supports import (
     RIGID,
@@ -520,19 +521,21 @@ class _Walk:
             check_residual(candidates, state)
             found.append({} if empty.helical else self._at_positions(candidates, state))
             if self.width is None:
-                reach = found[-1]["deflection"]
+                approach, force = found[-1]["deflection"], state.loads.sum(axis=-1)
             else:
                 sliced = contact_over_width(
                     self.width, candidates, state, load, found[-1], self.members, self.deviations
                 )
-                overflow, reach = overflow | sliced.pop("overflow"), sliced.pop("reach")
+                overflow |= sliced.pop("overflow")
+                approach, force = sliced.pop("pair_approach"), sliced.pop("pair_force")
                 found[-1] |= sliced
             if "held_tangents" in found[-1]:
                 tangents = found[-1].pop("held_tangents")
                 found[-1]["held_compliance"] = _between_meshes(setup, tangents, found[-1]["force"])
-            missed = setup.missed(rows, reach)
-            if empty.contact == "profile" and (missed > nearest).any():
-                return None, share, 1.2 * missed[missed > nearest][0]
+            if empty.contact == "profile":
+                needed = needed_nearest(candidates, approach, force).max()
+                if needed > 0.0:
+                    return None, share, 1.2 * float(needed)
             unknowns = max(unknowns, self.images * int(candidates.candidate.sum(axis=(1, 2)).max()))
             overflow |= candidates.touches_window_end(state.active)
             if options.progress is not None:

@@ -75,13 +75,13 @@ def contact_over_width(
     Returns
     -------
     dict
-        With ``reach`` (meshes, rows), the approach up to which pairs may touch [m], and ``overflow``, whether
-        a contact leaves its window.
+        With ``pair_approach`` (meshes, rows, pairs) of all listed pairs in the slice that comes nearest [m],
+        ``pair_force`` (rows, W) of the windows [N], and ``overflow``, whether a contact leaves its window.
     """
     W, driver, turns = len(found.mesh), found.setup.driver, found.setup.gears.rotation_approach
     S, rows, places = over.slices, len(found.position), found.setup.places
     P = rows // S if over.helical else rows
-    lead, apart = _leads(found, deviations, S, P)
+    lead, apart, every = _leads(found, deviations, S, P)
     laws, sliced = _solve(over, found, state, load, apart)
     force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
     motion = np.zeros((len(members.names), P))
@@ -90,7 +90,6 @@ def contact_over_width(
     pulled = members.approach[:, sprung].T @ force[places[0]]
     motion[sprung] = -pulled / members.stiffness[sprung, None]
     base = turns @ sliced.motions.T[: driver + 1] + members.approach[places[1] == 0] @ motion
-    nearest = (apart - np.moveaxis(twisted, -1, 0).swapaxes(1, 2)[..., found.mesh]).min(axis=1)
     # of the least-squares lines through the slices, from one end of the width to the other
     place = 2.0 * (np.arange(S) + 0.5) / S - 1.0
     rise = 2.0 * np.einsum("s,msp->mp", place, twisted - lead[..., None]) / (place @ place)
@@ -103,9 +102,12 @@ def contact_over_width(
         "lead_offset": apart.reshape(P, -1, len(force), W // len(force)).min(axis=(1, 3)).T,
         "member_tilt": angles,
     }
-    # the slice that comes nearest decides which pairs may touch
-    reach = base - nearest.reshape(P, len(force), W // len(force)).min(axis=-1).T
-    values["reach"] = np.repeat(reach, rows // P, axis=1)
+    # the slice that comes nearest decides which pairs may touch; a row of helical teeth is a slice
+    closer = np.repeat(np.moveaxis(twisted, 1, -1), rows // P, axis=1)[:, :, None] - every
+    if over.helical:
+        closer = closer[:, np.arange(rows), :, np.arange(rows) % S].swapaxes(0, 1)[..., None]
+    values["pair_approach"] = np.repeat(base, rows // P, axis=1)[..., None] + closer.max(axis=-1)
+    values["pair_force"] = sliced.force.reshape(rows, -1, W).mean(axis=1)
     for name, tangent in zip(("stiffness", "held_stiffness"), sliced.own, strict=False):
         # tangents of the springs change; what they begin at is that of the cells
         values[name] = plane.get(name, 0.0) + tangent.T
@@ -182,21 +184,28 @@ def _of_pairs(found: Candidates, state: BatchState, laws: PairLaws, sliced: Slic
     }
 
 
-def _leads(found: Candidates, d: SetDeviations | None, S: int, P: int) -> tuple[np.ndarray, np.ndarray]:
-    """Separations by leads and misalignments, of meshes (2N, S) and windows (P, S, W) [m]."""
+def _leads(
+    found: Candidates, d: SetDeviations | None, S: int, P: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Separations by leads and misalignments [m].
+
+    Of meshes (2N, S), of windows (P, S, W), and of all listed pairs in all slices (2N, rows, pairs, S), which
+    may be the same for all rows and pairs.
+    """
     rows, mesh, lead = np.arange(len(found.position))[:, None], found.mesh, np.zeros((found.setup.meshes, S))
     if d is not None:
         lead = lead_separation(d, found.setup.gears, S)
-    apart = np.broadcast_to(lead[mesh].T, (P, S, len(mesh)))
+    apart, every = np.broadcast_to(lead[mesh].T, (P, S, len(mesh))), lead[:, None, None]
     forms = () if d is None else (d.sun, d.planet_sun_side, d.planet_ring_side, d.ring)
     if d is not None and any(isinstance(one, FlankTwist) for form in forms for one in form.lead):
         # a twist by the places of the pairs on the flanks, of helical teeth a row a slice
-        rolls = found.setup.roll[:, : len(lead), found.position][..., 1]
-        every = lead_separation(d, found.setup.gears, S, rolls)[mesh, rows, found.pair]
+        listed = found.setup.listed
+        every = lead_separation(d, found.setup.gears, S, listed.roll[:, : len(lead), found.position])
+        of_windows = every[mesh, rows, found.pair + listed.first[mesh]]
         helical = len(rows) != P
-        apart = every[rows[:, 0], :, rows[:, 0] % S] if helical else every.swapaxes(1, 2)
+        apart = of_windows[rows[:, 0], :, rows[:, 0] % S] if helical else of_windows.swapaxes(1, 2)
         apart = apart.reshape(P, S, len(mesh))
-    return lead, apart
+    return lead, apart, every
 
 
 def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.ndarray]:

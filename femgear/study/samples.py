@@ -327,7 +327,7 @@ class SampleModel:
         shifts, tilts, unit, ideal = [], [], 1e-6, no_deviations(self.basis.gears)
         for one in np.eye(self.size):
             own = self.image(self.deviations(unit * one, ideal))
-            where = setup.tooth, setup.turns, self.position
+            where = setup.listed.tooth, setup.turns, self.position
             shifts.append(pair_separations(s.gears, own, *where, back=False) / unit)
             if tilted:
                 kinds = [profile_separation(own, s.gears, kind, *rolls) / unit for kind in (0, 1)]
@@ -427,7 +427,8 @@ def _solved(
     (n, P), back = (len(errors), len(model.position)), np.argsort(model.order)
     shifts = np.tensordot(errors, level.shifts, 1)
     tilts = None if level.tilts is None else np.tensordot(errors, level.tilts, 1)
-    separations = shifts[:, found.mesh, found.position[:, None], found.pair]
+    of_windows = found.pair + setup.listed.first[found.mesh]
+    separations = shifts[:, found.mesh, found.position[:, None], of_windows]
     force, motions, stiffness, ended = solve_laws(level.laws, model.load, separations, tilts)
     unsolved = ~ended.all(axis=1)
     if exact:
@@ -436,8 +437,8 @@ def _solved(
     if model.solved.contact == "profile":
         of_mesh = force.reshape(n, P, len(found.approach), -1).sum(axis=-1)
         approach = motions @ found.approach.T - of_mesh @ found.supports
-        inside = setup.smallest_gap + shifts < np.moveaxis(approach, 1, 2)[..., None]
-        missed = (inside & ~setup.near).reshape(n, -1)
+        inside = setup.listed.gap + shifts < np.moveaxis(approach, 1, 2)[..., None]
+        missed = (inside & ~setup.listed.near).reshape(n, -1)
     share = force.reshape(n, P, 2, N, -1).sum(axis=-1)[:, :, 0, back] / model.load[N]
     stiffness = stiffness.reshape(n, P, 2, N).mean(axis=(1, 3))
     numbers = np.ptp(motions[..., N], axis=1), share.max(axis=(1, 2)), *stiffness.T

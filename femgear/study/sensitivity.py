@@ -29,13 +29,14 @@ from scipy.linalg import cho_solve
 from femgear.contact.active_set import factor
 from femgear.contact.assembly import (
     ROUGH_STIFFNESS,
-    assemble_contact,
     cell_centres,
+    contact_candidates,
     cycle_positions,
     in_windows,
     mesh_windows,
 )
 from femgear.contact.flank_pairs import mesh_pairs, separation, tooth_steps
+from femgear.contact.omitted_pairs import needed_nearest
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
 from femgear.errors import CaseError
@@ -191,13 +192,16 @@ def _solve(solved: DesignBasis, load: float, position: np.ndarray, numbers):
         )
         answers, overflow, outside, previous = [], False, False, None
         for p in numbers:
-            problem = assemble_contact(setup, bodies, p, members)
+            found = contact_candidates(setup, bodies, [p], members)
+            problem = found.problem(0)
             start = None if previous is None else problem.warm_start(*previous)
             state = solve_contact(problem.compliance, problem.gap, problem.G, right, start=start)
             previous = (problem, state.active)
             answers.append(_answer(problem, state, members))
             overflow |= problem.touches_window_end(state.active, setup)
-            missed = setup.missed([p], answers[-1]["deflection"][:, None])
+            force = np.zeros((1, len(found.mesh)))
+            np.add.at(force[0], found.candidate[0].nonzero()[0], state.loads)
+            missed = needed_nearest(found, answers[-1]["deflection"][:, None], force)
             outside |= solved.contact == "profile" and bool(missed.any())
         return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
 

@@ -48,7 +48,7 @@ def test_clearance_of_the_back_flanks_is_the_backlash(gears, bodies):
         contact="profile",
         both_flanks=True,
     )
-    nearest = setup.smallest_gap.min(axis=2)
+    nearest = setup.listed.gap.min(axis=2)
     assert nearest[:6] == pytest.approx(0.0, abs=1e-7)
     assert nearest[6:] == pytest.approx(80e-6 * np.cos(np.deg2rad(20)), abs=2e-7)
 

@@ -1,0 +1,83 @@
+"""Tooth pairs that a contact solution left out: whether they would touch.
+
+A pair whose separation exceeds that of the nearest pair of its mesh by more than a limit is no candidate. That
+is right where it stays apart in the state that was found: its separation ``gap + S z - G q``, with what the
+bodies yield there under the loads of all candidates, is not negative. Under loads beside it a flank mostly
+moves away; where it comes nearer, as on a soft ring whose other planets carry more, that counts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femgear.contact.assembly import Candidates, windows_of_bodies
+from femgear.contact.bodies import station_weights
+from femgear.gears.pair import EACH
+
+
+def needed_nearest(found: Candidates, approach, force) -> np.ndarray:
+    """Find the limit ``nearest`` (P,) [m] with which pairs that penetrate are candidates; zero without any.
+
+    Parameters
+    ----------
+    found : Candidates
+        Solved at P positions.
+    approach : (meshes, P) or (meshes, P, pairs) array
+        Of the drive flanks by the motions, of meshes or of all listed pairs [m]; back flanks part by it.
+    force : (P, W) array
+        Loads of the windows [N].
+    """
+    listed, approach = found.setup.listed, np.asarray(approach, float)
+    approach = approach if approach.ndim == 3 else approach[..., None]
+    gap, near = listed.gap[:, found.position], listed.near[:, found.position]
+    limit = np.concatenate([approach, -approach])[: len(gap)]
+    closing = _largest_closing(found) * found.setup.images * force.sum(axis=1)
+    mesh, row, pair = np.nonzero(~near & np.isfinite(gap) & (gap < limit + closing[:, None]))
+    limit = np.broadcast_to(limit, gap.shape)[mesh, row, pair]
+    limit = limit - np.minimum(yielding(found, force, mesh, row, pair), 0.0)
+    needed, smallest = np.zeros(len(force)), gap.min(axis=-1)
+    penetrates = gap[mesh, row, pair] < limit
+    np.maximum.at(needed, row[penetrates], (limit - smallest[mesh, row])[penetrates])
+    return needed
+
+
+def _largest_closing(found: Candidates) -> float:
+    """How far flanks of both gears of a mesh come nearer to one another at most, per load elsewhere [m/N]."""
+    least = 0.0
+    for body in (one for one in found.bodies.gears if one is not None):
+        regular, n = body.regular, len(body.roll)
+        # a pair that is left out shares no flank with one that carries
+        own = regular[0, :n, n:].min(), regular[0, n:, :n].min()
+        least = min(least, regular[1:].min(), *own)
+    return -2.0 * least
+
+
+def yielding(found: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarray:
+    """Compute by how much bodies part the flanks of listed pairs (n,) under the loads of all windows [m].
+
+    Of meshes, rows of positions and pairs (n,); loads are (P, W) [N], taken at the middle of their windows.
+    """
+    setup, listed = found.setup, found.setup.listed
+    total, softness = np.zeros(len(mesh)), np.sqrt(found.bodies.of_kinds(setup.kind(found.mesh)))
+    loads, position = (force / softness)[row], found.position[row]
+    candidates = windows_of_bodies(setup.gears, found.mesh)
+    for (number, own, gear, side), (_, these, gear_of, side_of) in zip(
+        candidates, windows_of_bodies(setup.gears, mesh), strict=True
+    ):
+        body = found.bodies.gears[number]
+        if body is None or not len(these):
+            continue
+        j, i, at = found.mesh[own], found.pair[row[these]][:, own], position[these]
+        index, weight = station_weights(setup.roll[gear, j, at[:, None], i, 1], body.roll)
+        index = index + (side * len(body.roll))[:, None]
+        place, share = station_weights(listed.roll[gear_of, mesh[these], at, pair[these]], body.roll)
+        place = place + (side_of * len(body.roll))[:, None]
+        away = listed.tooth[gear_of, mesh[these], pair[these]][:, None] - setup.tooth[gear, j, i]
+        count, images = len(body.regular), 1 if number == EACH else setup.images
+        for image in range(images):
+            lag = (away - image * count // images) % count
+            values = body.regular[lag[..., None, None], place[:, None, :, None], index[:, :, None, :]]
+            total[these] += np.einsum(
+                "oa,owab,owb,ow->o", share, values, weight, loads[these][:, own], optimize=True
+            )
+    return total / np.sqrt(found.bodies.of_kinds(setup.kind(mesh)))
