@@ -128,7 +128,7 @@ def test_a_loaded_flank_lets_pairs_in_that_it_draws_nearer(gears, bodies):
     "factors", [(1.05, 1.0), pytest.param((1.05, 0.5, 1.0, 1.0001, 2.0), marks=pytest.mark.slow)]
 )
 def test_candidates_decide_nothing_of_a_twisted_set(grids, factors):
-    """Young's modulus, torque and tilt stiffnesses times one factor: the same shares and k over the factor."""
+    """Young's modulus, torque and tilt stiffnesses times one factor: the same shares and k over it."""
     case, found = parse_case(TWISTED), []
     for factor in factors:
         scaled = {
