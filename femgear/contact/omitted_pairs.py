@@ -2,8 +2,8 @@
 
 A pair whose separation exceeds that of the nearest pair of its mesh by more than a limit is no candidate.
 That is right where it stays apart in the state that was found: its separation ``gap + S z - G q``, with what
-the bodies yield there under the loads of all candidates, is not negative. Under loads beside it a flank mostly
-moves away; where it comes nearer, as on a soft ring whose other planets carry more, that counts.
+the bodies yield there under the loads of all candidates, is not negative. Loads beside it mostly move a flank
+away; where it comes nearer, as on a soft ring whose other planets carry more, that counts.
 """
 
 from __future__ import annotations
