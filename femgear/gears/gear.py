@@ -24,6 +24,7 @@ from femgear.gears.profile import (
     PinionCutter,
     RackTip,
     arcinv,
+    cutter_rounding,
     inv,
     pressure_angle_at,
     roll,
@@ -179,7 +180,9 @@ class Gear:
     def undercut_shift(self) -> float:
         """Least profile shift [modules] at which this gear's own tool would not undercut it."""
         sine = math.sin(self.pressure_angle)
-        rounding = self.rack.root_radius * (1.0 - sine)
+        # of the normal section, in which the rounding is a circle
+        normal_sine = math.sin(math.atan(math.tan(self.pressure_angle) / self.rack.stretch))
+        rounding = self.rack.root_radius * (1.0 - normal_sine)
         root = (self.reference_radius - self.root_radius) / self.module + self.profile_shift
         return root - rounding - 0.5 * self.teeth * sine**2
 
@@ -237,14 +240,16 @@ def _rack_tip(gear: Gear, rounding: float | None) -> RackTip:
     # depth of the rounding's centre under the tool's datum line
     depth = reference + gear.profile_shift * gear.module - gear.root_radius - rounding
     half_thickness = 0.25 * math.pi * gear.module + 0.5 * gear.thickness_allowance
-    alpha = gear.pressure_angle
+    alpha, stretch = gear.pressure_angle, gear.rack.stretch
+    normal_cosine = math.cos(math.atan(math.tan(alpha) / stretch))
     return RackTip(
         pitch_radius=reference,
         centre_depth=reference - gear.root_radius - rounding,
-        centre_offset=half_thickness - depth * math.tan(alpha) - rounding / math.cos(alpha),
+        centre_offset=half_thickness - depth * math.tan(alpha) - stretch * rounding / normal_cosine,
         rounding=rounding,
         gap_angle=math.pi / gear.teeth,
         end_angle=0.5 * math.pi - alpha,
+        stretch=stretch,
     )
 
 
@@ -266,8 +271,10 @@ def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
     pitch, cutter_pitch = gear.base_radius / math.cos(working), base / math.cos(working)
     centre_radius = gear.root_radius - (pitch - cutter_pitch) - rounding
     base_half = (0.5 * math.pi + 2.0 * cutter.profile_shift * tangent) / cutter.teeth + inv(alpha)
-    # the parallel of an involute is an involute of the same base circle, begun rounding/rb further in
-    centre_angle = base_half - rounding / base - inv(pressure_angle_at(centre_radius, base))
+    stretch = gear.rack.stretch
+    # where the rounding passes into the involute, whose normals touch the base circle
+    _, cutter_roll, end = cutter_rounding(base, centre_radius, rounding, stretch)
+    centre_angle = base_half - inv(math.atan2(float(cutter_roll), base)) - float(end)
     return CutterTip(
         pitch_radius=pitch,
         cutter_pitch_radius=cutter_pitch,
@@ -278,6 +285,7 @@ def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
         rounding=rounding,
         gap_angle=math.pi / gear.teeth,
         end_angle=0.5 * math.pi - working,
+        stretch=stretch,
     )
 
 

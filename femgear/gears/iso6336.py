@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, cutter_of
 from femgear.gears.pair import GearPair
-from femgear.gears.profile import inv
+from femgear.gears.profile import base_helix_angle, inv
 
 # coefficients C1 .. C9 of the minimum flexibility q', ISO 6336-1:2019, eq. 82 (gears of one module depth)
 _C = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)
@@ -302,7 +302,13 @@ def _check_contact_ratio(contact_ratio: float) -> None:
 
 
 def theoretical_single_stiffness(
-    teeth_1: int, teeth_2: float, shift_1: float, shift_2: float, *, helix_angle: float = 0.0
+    teeth_1: int,
+    teeth_2: float,
+    shift_1: float,
+    shift_2: float,
+    *,
+    helix_angle: float = 0.0,
+    pressure_angle: float = math.radians(20.0),
 ) -> float:
     """Compute the theoretical stiffness c'_th [N/m^2] of a tooth pair of solid steel discs, per face width.
 
@@ -311,22 +317,26 @@ def theoretical_single_stiffness(
 
     Parameters
     ----------
+    teeth_1 : int
+        Of the pinion, the gear with fewer teeth: the formula is not symmetric.
     teeth_2 : float
-        ``math.inf`` for an internal gear.
+        Of the wheel; ``math.inf`` for an internal gear.
     shift_1, shift_2 : float
         Profile shifts in modules; for an internal gear 2 the standard's shift enters as printed there, which
         is minus that of `gear.Gear`.
-    helix_angle : float
-        [rad]; z_n is taken as ``z / cos^3(beta)``.
+    helix_angle, pressure_angle : float
+        [rad], in the normal section; ``z_n = z / (cos^2(beta_b) cos(beta))``.
 
     Raises
     ------
     GeometryError
         Shifts outside the range of the formula (E-ISO6336).
     """
-    cube = math.cos(helix_angle) ** 3
-    one, two = cube / teeth_1, (0.0 if math.isinf(teeth_2) else cube / teeth_2)
-    terms = (1.0, one, two, shift_1, shift_1 * one, shift_2, shift_2 * two, shift_1**2, shift_2**2)
+    virtual = math.cos(base_helix_angle(pressure_angle, helix_angle)) ** 2 * math.cos(helix_angle)
+    pinion, wheel = virtual / teeth_1, (0.0 if math.isinf(teeth_2) else virtual / teeth_2)
+    terms = (
+        1.0, pinion, wheel, shift_1, shift_1 * pinion, shift_2, shift_2 * wheel, shift_1**2, shift_2**2,
+    )  # fmt: skip
     flexibility = sum(c * t for c, t in zip(_C, terms, strict=True))
     if not flexibility > 0.0:
         raise GeometryError(
@@ -382,7 +392,9 @@ def mesh_stiffness_method_b(
         Shifts outside the range of the formula (E-ISO6336).
     """
     rack = basic_rack_factor(dedendum=dedendum, pressure_angle=pressure_angle)
-    solid = theoretical_single_stiffness(teeth_1, teeth_2, shift_1, shift_2, helix_angle=helix_angle)
+    solid = theoretical_single_stiffness(
+        teeth_1, teeth_2, shift_1, shift_2, helix_angle=helix_angle, pressure_angle=pressure_angle
+    )
     single = solid * THEORETICAL_CORRECTION * rack * math.cos(helix_angle)
     return single, single * (0.75 * contact_ratio + 0.25)
 
@@ -390,16 +402,16 @@ def mesh_stiffness_method_b(
 def pair_mesh_stiffness(pair: GearPair, helix_angle: float = 0.0) -> tuple[float, float]:
     """Compute c' and c_gamma_alpha [N/m^2] of a pair with both gears' racks, see `mesh_stiffness_method_b`.
 
-    An internal gear counts as endless, its shift with the sign of the standard; the larger shift stands
-    first of external gears, as the formula has it. Gears with a helix angle [rad] are given by their
-    transverse section; rack and shifts enter as those of the normal section.
+    Gear 1 of the standard is the pinion, whatever comes first in the pair; of gears with as many teeth the
+    one with the larger profile shift, for which the formula is fitted. An internal gear counts as endless,
+    its shift with the sign of the standard. Gears with a helix angle [rad] are given by their transverse
+    section; rack and shifts enter as those of the normal section.
     """
-    (one, two), normal = pair.gears, math.cos(helix_angle)
-    if not two.internal and two.profile_shift > one.profile_shift:
-        one, two = two, one
-    teeth, shift = (math.inf, -two.profile_shift) if two.internal else (two.teeth, two.profile_shift)
+    normal = math.cos(helix_angle)
+    pinion, wheel = sorted(pair.gears, key=lambda gear: (gear.internal, gear.teeth, -gear.profile_shift))
+    teeth, shift = (math.inf, -wheel.profile_shift) if wheel.internal else (wheel.teeth, wheel.profile_shift)
     return mesh_stiffness_method_b(
-        one.teeth, teeth, one.profile_shift / normal, shift / normal, pair.contact_ratio,
-        dedendum=0.5 * (one.rack.dedendum + two.rack.dedendum) / normal,
-        pressure_angle=math.atan(math.tan(one.pressure_angle) * normal), helix_angle=helix_angle,
+        pinion.teeth, teeth, pinion.profile_shift / normal, shift / normal, pair.contact_ratio,
+        dedendum=0.5 * (pinion.rack.dedendum + wheel.rack.dedendum) / normal,
+        pressure_angle=math.atan(math.tan(pinion.pressure_angle) * normal), helix_angle=helix_angle,
     )  # fmt: skip

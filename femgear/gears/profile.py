@@ -124,11 +124,16 @@ def overlap_ratio(face_width: float, normal_module: float, helix_angle: float) -
 
 @dataclass(frozen=True)
 class BasicRack:
-    """Basic rack: addendum, dedendum and fillet radius in modules; the defaults are profile C of ISO 53."""
+    """Basic rack: addendum, dedendum and fillet radius in modules; the defaults are profile C of ISO 53.
+
+    ``stretch`` is how much wider than high the rounded tip is: 1, and ``1/cos(beta)`` in the transverse
+    section of helical teeth, in which the circle of the normal section is an ellipse.
+    """
 
     addendum: float = 1.0
     dedendum: float = 1.25
     root_radius: float = 0.25
+    stretch: float = 1.0
 
 
 ISO_53_C = BasicRack()
@@ -150,11 +155,20 @@ class PinionCutter:
 def transverse_rack(rack: BasicRack, helix_angle: float) -> BasicRack:
     """Make the transverse basic rack of a normal one: coefficients times cos(beta), beta in rad.
 
-    Heights are the same lengths in both sections (ISO 21771, section 4.2). The tool's tip is an ellipse in
-    the transverse section; the circle in its place keeps the radius of the normal section.
+    Heights are the same lengths in both sections (ISO 21771, section 4.2): the rounded tip is an ellipse in
+    the transverse section, as high as the circle of the normal section and ``1/cos(beta)`` times as wide.
     """
     factor = math.cos(helix_angle)
-    return BasicRack(rack.addendum * factor, rack.dedendum * factor, rack.root_radius * factor)
+    heights = (rack.addendum * factor, rack.dedendum * factor, rack.root_radius * factor)
+    return BasicRack(*heights, stretch=rack.stretch / factor)
+
+
+def normal_of_ellipse(angle, stretch: float) -> Any:
+    """Find the direction [rad] of the normal of a stretched circle where that of the circle is ``angle`` [rad].
+
+    Both against the axis in which nothing is stretched, in -pi/2 .. pi/2. A stretch below one leads back.
+    """
+    return np.arctan2(np.sin(angle), stretch * np.cos(angle))
 
 
 @dataclass(frozen=True)
@@ -163,7 +177,8 @@ class RackTip:
 
     ``pitch_radius`` is that of the gear, ``gap_angle`` its half pitch. ``centre_depth`` and ``centre_offset``
     place the rounding's centre under the rolling line and beside the centreline of the rack tooth; the fillet
-    begins at ``end_angle``, see the head of the module.
+    begins at ``end_angle``, see the head of the module. ``rounding`` is half the height of the rounding,
+    whose width is ``stretch`` times that, see `BasicRack`.
     """
 
     pitch_radius: float
@@ -172,6 +187,7 @@ class RackTip:
     rounding: float
     gap_angle: float
     end_angle: float
+    stretch: float = 1.0
 
     @property
     def room(self) -> float:
@@ -181,21 +197,25 @@ class RackTip:
     def fillet_point(self, theta) -> tuple[np.ndarray, np.ndarray]:
         """Compute radius [m] and angle [rad] of fillet points at theta [rad], as `CutterTip.fillet_point`."""
         theta = np.asarray(theta, dtype=float)
+        rounded = normal_of_ellipse(theta, 1.0 / self.stretch)
+        depth = self.centre_depth + self.rounding * np.cos(rounded)
         # tool centreline at tangential travel s from the pitch point; the gear has turned by s / r
-        lateral = -self.centre_depth * np.tan(theta)
+        y = -depth * np.tan(theta)
+        lateral = y + self.stretch * self.rounding * np.sin(rounded)
         travel = (lateral + self.centre_offset) / self.pitch_radius
-        x = self.pitch_radius - self.centre_depth - self.rounding * np.cos(theta)
-        y = lateral - self.rounding * np.sin(theta)
+        x = self.pitch_radius - depth
         return np.hypot(x, y), np.arctan2(y, x) + self.gap_angle - travel
 
     @property
     def junction_roll(self) -> float:
         """Roll length [m] of the gear's involute where the tool's flank ends and its rounding begins.
 
-        Negative for a rack that reaches below the base circle's tangent point: the tooth is undercut.
+        Negative for a rack that reaches below the base circle's tangent point: the tooth is undercut. The
+        rounding ends ``rho (1 - sin(alpha_n))`` above the tip of the tool (ISO 21771, root form diameter).
         """
         sine = math.cos(self.end_angle)  # of the working pressure angle of generation
-        return self.pitch_radius * sine - self.centre_depth / sine - self.rounding
+        rounded = float(normal_of_ellipse(self.end_angle, 1.0 / self.stretch))
+        return self.pitch_radius * sine - (self.centre_depth + self.rounding * math.cos(rounded)) / sine
 
     def undercut_end(self, base_radius: float, base_half_angle: float) -> float:
         """Find the direction ``theta`` [rad] where the fillet of an undercut tooth crosses the involute.
@@ -225,7 +245,8 @@ class CutterTip:
     """Rounded tip of a pinion cutter that generates an internal gear (lengths in m, angles in rad).
 
     As `RackTip`, with the pitch and base radius of the cutter and its distance from the gear;
-    ``centre_radius`` and ``centre_angle`` place the rounding's centre in the frame of the cutter tooth.
+    ``centre_radius`` and ``centre_angle`` place the rounding's centre in the frame of the cutter tooth. A
+    stretched rounding is wider at right angles to the radius through its centre.
     """
 
     pitch_radius: float
@@ -237,6 +258,7 @@ class CutterTip:
     rounding: float
     gap_angle: float
     end_angle: float
+    stretch: float = 1.0
 
     @property
     def room(self) -> float:
@@ -251,16 +273,56 @@ class CutterTip:
         """
         theta = np.asarray(theta, dtype=float)
         r = self.cutter_pitch_radius
-        sine, cosine = np.sin(theta), np.cos(theta)
-        reach = np.sqrt(self.centre_radius**2 - (r * sine) ** 2) - r * cosine  # pitch point to centre
-        cutter_angle = np.arctan2(-reach * sine, r + reach * cosine) + self.centre_angle
+        normal, along, _ = cutter_rounding(r * np.sin(theta), self.centre_radius, self.rounding, self.stretch)
+        reach = along - r * np.cos(theta)  # from the pitch point
+        cutter_angle = normal - theta + self.centre_angle
         travel = cutter_angle * r / self.pitch_radius
-        x = self.pitch_radius + (reach + self.rounding) * cosine
-        y = -(reach + self.rounding) * sine
+        x = self.pitch_radius + reach * np.cos(theta)
+        y = -reach * np.sin(theta)
         return np.hypot(x, y), np.arctan2(y, x) + self.gap_angle - travel
 
     @property
     def junction_roll(self) -> float:
         """Roll length [m] of the gear's involute where the tool's flank ends and its rounding begins."""
-        cutter_roll = roll(self.centre_radius, self.cutter_base_radius) + self.rounding
-        return cutter_roll + self.centre_distance * math.cos(self.end_angle)
+        _, cutter_roll, _ = cutter_rounding(
+            self.cutter_base_radius, self.centre_radius, self.rounding, self.stretch
+        )
+        return float(cutter_roll) + self.centre_distance * math.cos(self.end_angle)
+
+
+def cutter_rounding(distance, centre_radius: float, rounding: float, stretch: float) -> tuple[Any, Any, Any]:
+    """Find the point of a cutter's rounded tip whose normal passes the axis of the cutter at a distance.
+
+    Parameters
+    ----------
+    distance : float or array
+        Between normal and axis [m], from 0 to the centre's radius; beyond it the nearest point is given.
+    centre_radius, rounding, stretch : float
+        As of `CutterTip` [m, m, 1].
+
+    Returns
+    -------
+    normal, along, angle : float or array
+        Angle of the normal against the radius through the centre of the rounding [rad], place of the point
+        along the normal from the foot of the perpendicular from the axis [m], and angle of the point at the
+        axis from that radius [rad].
+    """
+    distance = np.asarray(distance, dtype=float)
+    rounded = np.arcsin(np.minimum(distance / centre_radius, 1.0))
+    if stretch != 1.0:
+        rounded = normal_of_ellipse(rounded, 1.0 / stretch)
+    for _ in range(0 if stretch == 1.0 else 50):
+        normal = normal_of_ellipse(rounded, stretch)
+        radial, lateral = centre_radius + rounding * np.cos(rounded), rounding * stretch * np.sin(rounded)
+        excess = radial * np.sin(normal) - lateral * np.cos(normal) - distance
+        turning = stretch / (stretch**2 * np.cos(rounded) ** 2 + np.sin(rounded) ** 2)
+        along = radial * np.cos(normal) + lateral * np.sin(normal)
+        speed = rounding * np.hypot(np.sin(rounded), stretch * np.cos(rounded))
+        step = excess / np.maximum(along * turning - speed, 1e-3 * centre_radius)
+        rounded = np.clip(rounded - step, 0.0, 0.5 * math.pi)
+        if np.all(np.abs(step) < 1e-15):
+            break
+    normal = normal_of_ellipse(rounded, stretch)
+    radial, lateral = centre_radius + rounding * np.cos(rounded), rounding * stretch * np.sin(rounded)
+    along = radial * np.cos(normal) + lateral * np.sin(normal)
+    return normal, along, np.arctan2(lateral, radial)

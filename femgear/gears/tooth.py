@@ -21,6 +21,9 @@ NEAR = 12.0  # modules from the root circle; elements beyond grow with the dista
 FAR_SHARE = 1.0  # of the same width, far from the teeth
 MOST_CUT_NODES = 400  # the dense matrices of a sector have twice as many rows
 SHORTEST_ROOT = 0.025
+SHARP_RADIUS = 0.2  # fillets that turn more sharply have smaller elements
+SHARP_SIZE = 0.15  # of their radius of curvature: within 1.5 % of the stress on finer grids
+SHARPEST_SIZE = 0.002  # however sharp they are
 GROWTH = 0.11  # increase of the spacing per unit length along a curve
 
 
@@ -164,12 +167,41 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tu
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
     split = length[_base_row(dense)]
     size = FILLET_SIZE * sizes.unit
+    sharp = _sharp_sizes(dense, length, gear, sizes)
     start = min(max(_last_edge(flank), FINEST_SIZE * sizes.unit), size)
-    upper = split * sizes.spacing(split, start, size, largest=size)
-    lower = split + (length[-1] - split) * sizes.spacing(length[-1] - split, size, size, largest=size)
+    upper = split * sizes.spacing(split, start, size, largest=lambda s: np.interp(s, length, sharp))
+    lower = split + (length[-1] - split) * sizes.spacing(
+        length[-1] - split, size, size, largest=lambda s: np.interp(split + s, length, sharp)
+    )
     points = point(np.interp(np.concatenate([upper, lower[1:]]), length, p))
     points[0] = flank[-1]
     return points, len(upper) - 1
+
+
+def _sharp_sizes(points: np.ndarray, length: np.ndarray, gear: Gear, sizes: _Sizes) -> np.ndarray:
+    """Largest element sizes (n,) [m] along a finely sampled fillet: small where it turns sharply, and around."""
+    radius = notch_radius(gear, points) / gear.module
+    finest = np.where(radius < SHARP_RADIUS * (1.0 - 1e-6), SHARP_SIZE * radius, FILLET_SIZE)
+    size = np.clip(finest, SHARPEST_SIZE, FILLET_SIZE) * sizes.unit
+    for order in (slice(None), slice(None, None, -1)):
+        way = np.abs(length[order] - length[order][0])
+        # the smallest of size(s') + growth |s - s'| over the points behind
+        size[order] = way * sizes.growth + np.minimum.accumulate(size[order] - way * sizes.growth)
+    return size
+
+
+def notch_radius(gear: Gear, points: np.ndarray) -> np.ndarray:
+    """Compute the radius of curvature (n,) [m] of a finely sampled fillet (n, 2) [m] from flank to root.
+
+    Infinite where the outline is convex, as flanks are beside the base circle: stresses are small there.
+    """
+    step = np.diff(points @ np.array([1.0, 1j]))
+    turn = np.angle(step[1:] / step[:-1]) * (1.0 if gear.internal else -1.0)
+    radius = np.full(len(points), np.inf)
+    length = 0.5 * (np.abs(step[1:]) + np.abs(step[:-1]))
+    radius[1:-1] = np.divide(length, turn, out=radius[1:-1], where=turn > 1e-12)
+    radius[0], radius[-1] = radius[1], radius[-2]
+    return radius
 
 
 def _base_row(points: np.ndarray) -> int:
@@ -188,7 +220,8 @@ def _root(gear: Gear, fillet: np.ndarray, sizes: _Sizes) -> np.ndarray | None:
     if length < 0.5 * SHORTEST_ROOT * gear.module:
         return None
     edge, largest = _last_edge(fillet), INNER_SIZE * sizes.unit
-    points = _arc(gear.root_radius, start, end, sizes.spacing(length, edge, 2.0 * edge, largest=largest))
+    far = max(2.0 * edge, FILLET_SIZE * sizes.unit)
+    points = _arc(gear.root_radius, start, end, sizes.spacing(length, edge, far, largest=largest))
     points[0] = fillet[-1]
     return points
 

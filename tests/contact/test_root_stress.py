@@ -9,6 +9,7 @@ import pytest
 from validation.planetary import reference_set
 from validation.reference.plane_elasticity import stress
 from validation.reference.root_stress import set_root_stress
+from validation.stress import sharp_root_over_grids
 
 from femgear.contact.bodies import flank_compliance, flank_stations, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
@@ -133,6 +134,14 @@ def test_a_force_at_the_foot_of_the_flank_makes_no_peak(gear):
         assert np.abs(own[0]).max() < own.max() == np.abs(own).max()
         # the largest of all comes from a force at the tip, not at the foot
         assert abs(own.max(axis=0).argmax() - (0 if gear.internal else n - 1)) <= 3
+
+
+@pytest.mark.slow
+def test_roots_of_a_sharp_cutter_do_not_depend_on_the_elements_of_the_flank():
+    """Radii down to 0.018 modules right below the flank: once 21.7 MPa to 64 elements, 18.8 from 96 on."""
+    errors = [row.error for row in sharp_root_over_grids()]
+    assert np.ptp(errors) < 0.01
+    assert np.abs(errors).max() < 0.025
 
 
 @pytest.mark.slow

@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from femgear.gears.gear import Gear
+from femgear.gears.gear import Gear, flank_points
 from femgear.gears.planetary import close_set, virtual_set, virtual_teeth
 from femgear.gears.profile import BasicRack, transverse_rack, transverse_tool
 
@@ -78,3 +79,55 @@ def test_without_a_helix_both_sections_are_the_gears():
         one, other = getattr(gears, name), getattr(virtual, name)
         assert other.rim_radius == pytest.approx(one.rim_radius, rel=1e-14)
         assert other.base_radius == pytest.approx(one.base_radius, rel=1e-14)
+
+
+def test_form_circles_take_the_height_of_the_rounding_in_the_normal_section():
+    """ISO 21771 for rack-shaped tools: 328.991 and 1341.487 mm, with alpha_t 328.958 and 1341.440."""
+    beta, normal = math.radians(10.0), math.radians(20.0)
+    module, angle = transverse_tool(14e-3, normal, beta)
+    rack = transverse_rack(BasicRack(1.0, 1.25, 0.38), beta)
+    for teeth, shift, expected in ((24, 0.48, 328.991), (95, 0.6691, 1341.487)):
+        gear = Gear(teeth, module, angle, shift * math.cos(beta), 0.36, 0.3 * teeth * module, rack=rack)
+        depth = 14e-3 * (1.25 - shift - 0.38 * (1.0 - math.sin(normal)))
+        reference = teeth * module
+        form = math.hypot(
+            reference * math.sin(angle) - 2.0 * depth / math.sin(angle), reference * math.cos(angle)
+        )
+        assert 2.0 * gear.form_radius == pytest.approx(form, rel=1e-12)
+        assert 2e3 * gear.form_radius == pytest.approx(expected, abs=5e-4)
+
+
+@pytest.mark.parametrize("teeth, internal", [(20, False), (30, False), (70, True)])
+def test_the_stretched_tip_touches_the_fillet_and_cuts_no_deeper(teeth, internal):
+    """The tool's ellipse in many positions: nearest to every point of the fillet it is on it."""
+    beta = math.radians(30.0)
+    module, angle = transverse_tool(2e-3, math.radians(20.0), beta)
+    rack = transverse_rack(NORMAL, beta)
+    rim = module * teeth if internal else 0.2 * module * teeth
+    gear = Gear(teeth, module, angle, 0.1, 0.02, rim, internal=internal, rack=rack)
+    tool = gear.tool
+    assert tool.stretch == pytest.approx(1.0 / math.cos(beta))
+    radius, place = tool.fillet_point(np.linspace(0.0, gear.fillet_end, 15))
+    points = radius * np.exp(1j * (place - tool.gap_angle))
+    turned = np.linspace(-0.6, 0.6, 60001)[:, None]
+    if internal:
+        seen = points * np.exp(-1j * turned) - tool.centre_distance
+        seen = seen * np.exp(1j * turned * gear.base_radius / tool.cutter_base_radius)
+        # the rounding's centre lies beside the centreline of the cutter's tooth; its mirror image is the same
+        seen = seen * np.exp(1j * tool.centre_angle) - tool.centre_radius
+        height, side = seen.real, seen.imag
+    else:
+        seen = points * np.exp(1j * turned)
+        height = tool.pitch_radius - tool.centre_depth - seen.real
+        side = seen.imag - tool.pitch_radius * turned + tool.centre_offset
+    distance = np.hypot(side / tool.stretch, height) - tool.rounding
+    assert np.abs(distance.min(axis=0)).max() < 1e-6 * module
+    # and it ends where the flank does, in the flank's direction
+    end = flank_points(gear, np.array([gear.form_roll]))[0]
+    radius, place = tool.fillet_point(gear.fillet_end - np.array([0.0, 1e-7]))
+    fillet = radius * np.exp(1j * place)
+    assert abs(fillet[0] - complex(*end)) < 1e-9 * module
+    sense = 1e-7 if internal else -1e-7
+    flank = flank_points(gear, gear.form_roll + module * np.array([0.0, sense]))
+    flank = complex(*(flank[1] - flank[0]))
+    assert abs(np.angle((fillet[1] - fillet[0]) / flank)) < 1e-4

@@ -8,7 +8,7 @@ import pytest
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle
-from femgear.gears.profile import BasicRack
+from femgear.gears.profile import BasicRack, PinionCutter
 from femgear.gears.tooth import half_sector
 
 ALPHA = math.radians(20.0)
@@ -198,3 +198,17 @@ def test_a_body_too_deep_for_its_sector_is_refused():
     with pytest.raises(GeometryError) as caught:
         half_sector(Gear(400, 1.5e-3, ALPHA, 0.0, 25e-3, 5e-3, name="sun"))
     assert (caught.value.code, caught.value.key) == ("E-GRID", "sun.bore_radius")
+
+
+def test_elements_are_smaller_where_a_fillet_turns_sharply():
+    gear = Gear(
+        61, 4e-3, ALPHA, 0.0, 0.05, 0.14, internal=True, rack=BasicRack(0.9, 1.25, 0.0),
+        cutter=PinionCutter(45),
+    )  # fmt: skip
+    fillet = half_sector(gear).curve("fillet")[::2]
+    step = np.diff(fillet @ np.array([1.0, 1j]))
+    # by the chord of an arc, an element turns by its length over the radius
+    assert np.abs(np.angle(step[1:] / step[:-1])).max() < math.radians(12.0)
+    # nothing else changes: those of an ordinary tool have one size along most of their length
+    ordinary = half_sector(GEARS["sun"]).curve("fillet")[::2]
+    assert np.linalg.norm(np.diff(ordinary, axis=0), axis=1).min() > 0.03 * GEARS["sun"].module

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from femgear.gears.iso6336 import mesh_stiffness_method_b, theoretical_single_stiffness
+from femgear.gears.gear import Gear
+from femgear.gears.iso6336 import mesh_stiffness_method_b, pair_mesh_stiffness, theoretical_single_stiffness
+from femgear.gears.pair import GearPair
+from femgear.gears.profile import BasicRack, transverse_rack, transverse_tool
 from validation.planetary import KISSSOFT, nrel_set
 from validation.rows import REPEATED, Row, printed, within
 
@@ -53,3 +56,61 @@ def nrel_stiffness() -> tuple[Row, ...]:
     ):
         rows.append(within("D6", KISSSOFT, f"{name} [N/(mm um)]", value, UNIT * ours, 1e-3, note=NOTE))
     return tuple(rows)
+
+
+def helical_pair(teeth, shifts, *, module, degrees, distance, rack, tips=(None, None)) -> GearPair:
+    """Make a pair of helical gears from their normal section; lengths in mm."""
+    beta = math.radians(degrees)
+    transverse, angle = transverse_tool(module * 1e-3, math.radians(20.0), beta)
+    gears = (
+        Gear(
+            z, transverse, angle, x * math.cos(beta), 0.1, 0.3 * z * transverse,
+            rack=transverse_rack(rack, beta), tip_diameter=tip and tip * 1e-3,
+        )
+        for z, x, tip in zip(teeth, shifts, tips, strict=True)
+    )  # fmt: skip
+    return GearPair(*gears, distance * 1e-3)
+
+
+def wind_pair() -> GearPair:
+    """Third stage of the published wind gearbox: its pinion has the smaller shift."""
+    return helical_pair(
+        (24, 95), (0.48, 0.6691), module=14, degrees=10, distance=861, rack=BasicRack(1.0, 1.25, 0.38),
+        tips=(380.747, 1395.376),
+    )  # fmt: skip
+
+
+def helical_stiffness() -> tuple[Row, ...]:
+    """Helical pairs of the examples to the standard and of the published report."""
+    source, beta = "ISO/TR 6336-30:2017, worked example 1 (17/103, m_n 8, 15.8 deg)", math.radians(15.8)
+    example = helical_pair(
+        (17, 103), (0.145, 0.0), module=8, degrees=15.8, distance=500, rack=BasicRack(1.0, 1.4, 0.39)
+    )
+    solid = theoretical_single_stiffness(17, 103, 0.145, 0.0, helix_angle=beta)
+    single, mean = pair_mesh_stiffness(example, beta)
+    rounded = "contact ratio from diameters of two decimals there"
+    rows = [
+        printed("E1", source, "c'_th, virtual teeth by the base helix [N/(mm um)]", "17.85584", UNIT * solid),
+        printed("E1", source, "c' [N/(mm um)]", "12.37047", UNIT * single),
+        within("E1", source, "c_gamma_alpha [N/(mm um)]", 17.46485, UNIT * mean, 2e-4, note=rounded),
+    ]
+    kisssoft, note = (
+        "KISSsoft report, NREL 5 MW gearbox, stage 3 (24/95, 10 deg)",
+        "with the printed C_R 0.898",
+    )
+    single, mean = pair_mesh_stiffness(wind_pair(), math.radians(10.0))
+    for name, value, ours in (("c'", "13.832", single), ("c_gamma_alpha", "18.632", mean)):
+        quantity = f"{name}, pinion with the smaller shift [N/(mm um)]"
+        rows.append(printed("D6", kisssoft, quantity, value, 0.898 * UNIT * ours, note=note))
+    return tuple(rows)
+
+
+def form_circles() -> tuple[Row, ...]:
+    """Where the involutes of helical gears begin, root form diameters of ISO 21771."""
+    source = (
+        f"ISO 21771, rack-shaped tools: 24/95, m_n 14, 10 deg, rho 0.38; evaluated independently ({REPEATED})"
+    )
+    return tuple(
+        printed("D5", source, f"root form diameter of {gear.teeth} teeth [mm]", value, 2e3 * gear.form_radius)
+        for gear, value in zip(wind_pair().gears, ("328.991", "1341.487"), strict=True)
+    )

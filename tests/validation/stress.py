@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from femgear.contact.bodies import flank_stations, make_bodies, make_sectors
+from femgear.contact.bodies import flank_stations, make_bodies, make_sectors, station_weights
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.root_stress import root_stress
 from femgear.fe.compliance import node_dofs, symmetric_factor
@@ -19,7 +19,7 @@ from femgear.gears.iso6336 import (
     zone_factor,
 )
 from femgear.gears.planetary import PlanetarySet
-from femgear.gears.profile import BasicRack
+from femgear.gears.profile import BasicRack, PinionCutter
 from femgear.gears.tooth import half_sector
 from validation.contact import HERTZ
 from validation.planetary import ALPHA, KISSSOFT, nrel_set
@@ -107,6 +107,32 @@ def root_against_whole_gear() -> tuple[Row, ...]:
             source = "principal stress of elements, all teeth in one grid"
             rows.append(within("root", source, quantity, 1e-6 * expected, 1e-6 * value, 0.02))
     return tuple(rows)
+
+
+def sharp_root_over_grids() -> tuple[Row, ...]:
+    """Root of a ring that a cutter without rounding made, over numbers of elements of the flank."""
+    gear = sharp_ring()
+
+    def largest(**sizes) -> float:
+        root = root_stress(mirror(mesh_outline(half_sector(gear, **sizes))), gear, STEEL)
+        index, weight = station_weights(0.5 * (root.roll[0] + root.roll[-1]), root.roll)
+        return ROOT_LOAD * float((root.influence[0, : len(root.arc)][:, index] @ weight).max())
+
+    fine, rows = largest(flank_elements=24, refine=3.0), []
+    for count in (12, 24, 48, 64, 96, 128):
+        ours = largest(flank_elements=count)
+        quantity = f"ring of 61 teeth, cutter of 45 without rounding, {count} flank elements: 1 kN [MPa]"
+        source = "elements a third as large everywhere"
+        rows.append(within("root", source, quantity, 1e-6 * fine, 1e-6 * ours, 0.025))
+    return tuple(rows)
+
+
+def sharp_ring() -> Gear:
+    """Ring of a public REXS file whose fillets turn by 65 degrees with radii down to 0.018 modules."""
+    return Gear(
+        61, 4e-3, ALPHA, 0.0, 0.05, 0.14, internal=True, rack=BasicRack(0.9, 1.25, 0.0),
+        cutter=PinionCutter(45),
+    )  # fmt: skip
 
 
 def whole_gear_roots(gear: Gear, roll: float, *, flank_elements: int, refine: float) -> tuple[float, float]:

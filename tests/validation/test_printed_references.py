@@ -70,6 +70,19 @@ def test_helical_pair():
     assert 40 * math.sin(beta) / (3 * math.pi) == pytest.approx(1.0984621, abs=5e-8)
 
 
+def test_root_form_diameters_of_a_helical_pair():
+    # ISO 21771, rack-shaped tool: m_n 14, beta 10 deg, 24/95, x 0.48/0.6691, h_fP 1.25, rho 0.38
+    beta, alpha = math.radians(10), math.radians(20)
+    transverse = math.atan(math.tan(alpha) / math.cos(beta))
+    for z, x, printed in ((24, 0.48, 328.991), (95, 0.6691, 1341.487)):
+        d = 14 * z / math.cos(beta)
+        height = 14 * (1.25 - x - 0.38 * (1 - math.sin(alpha)))
+        root = math.hypot(
+            d * math.sin(transverse) - 2 * height / math.sin(transverse), d * math.cos(transverse)
+        )
+        assert root == pytest.approx(printed, abs=5e-4)
+
+
 def test_shifted_pair_and_limits():
     alpha = math.radians(20)
     target = involute(alpha) + 2 * 0.5 * math.tan(alpha) / 60

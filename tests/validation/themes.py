@@ -74,7 +74,12 @@ THEMES = (
         "ISO 6336",
         "Mesh stiffness of ISO 6336-1",
         "Method B, which the computed mesh stiffness is compared with.",
-        (standard.single_pairs, standard.nrel_stiffness),
+        (
+            standard.single_pairs,
+            standard.nrel_stiffness,
+            standard.helical_stiffness,
+            standard.form_circles,
+        ),
     ),
     Theme(
         "elasticity",
@@ -181,7 +186,7 @@ THEMES = (
         "Stresses of teeth",
         "",
         (stress.nominal_flanks, stress.nominal_roots, stress.hertz_of_teeth),
-        (stress.root_against_whole_gear,),
+        (stress.root_against_whole_gear, stress.sharp_root_over_grids),
     ),
     Theme(
         "rims",

@@ -43,7 +43,7 @@ from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import RoundSection, joint_springs
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import mesh_stiffness_method_b
+from femgear.gears.iso6336 import pair_mesh_stiffness
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, planar_from_set
@@ -325,7 +325,7 @@ def _stage(stage: StageSection) -> PlanetaryStage:
         lumped["stiffness_planet_ring"] = size.mesh_stiffness.planet_ring
     if isinstance(size, GearsSection):
         gears = stage_gears(stage)
-        data = planar_from_set(gears, **_iso_stiffness(size, gears) | lumped)
+        data = planar_from_set(gears, **_iso_stiffness(gears) | lumped)
         return PlanetaryStage(
             data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle
         )
@@ -338,17 +338,12 @@ def _stage(stage: StageSection) -> PlanetaryStage:
     return PlanetaryStage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
 
 
-def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, Any]:
-    """Mean stiffness of both meshes after ISO 6336-1, method B, with C_B of the stage's own rack."""
-    (sun, planet, _), (x_sun, x_planet, x_ring) = given.teeth, given.profile_shifts
-    # the standard's sign of the ring's shift
-    meshes = {
-        "stiffness_sun_planet": (sun, planet, x_sun, x_planet, gears.contact_ratio_sun_planet),
-        "stiffness_planet_ring": (planet, math.inf, x_planet, -x_ring, gears.contact_ratio_planet_ring),
-    }
-    rack = {"dedendum": gears.sun.rack.dedendum, "pressure_angle": given.pressure_angle}
+def _iso_stiffness(gears: PlanetarySet) -> dict[str, float]:
+    """Mean stiffness of both meshes after ISO 6336-1, method B, with C_B of the stage's own rack [N/m]."""
+    names = "stiffness_sun_planet", "stiffness_planet_ring"
     return {
-        name: given.face_width * mesh_stiffness_method_b(*mesh, **rack)[1] for name, mesh in meshes.items()
+        name: gears.sun.face_width * pair_mesh_stiffness(pair)[1]
+        for name, pair in zip(names, gears.kinds, strict=True)
     }
 
 
