@@ -164,7 +164,7 @@ def transverse_rack(rack: BasicRack, helix_angle: float) -> BasicRack:
 
 
 def normal_of_ellipse(angle, stretch: float) -> Any:
-    """Find the direction [rad] of the normal of a stretched circle where that of the circle is ``angle`` [rad].
+    """Find the direction [rad] of a stretched circle's normal where that of the circle is ``angle`` [rad].
 
     Both against the axis in which nothing is stretched, in -pi/2 .. pi/2. A stretch below one leads back.
     """

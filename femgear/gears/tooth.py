@@ -179,7 +179,7 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tu
 
 
 def _sharp_sizes(points: np.ndarray, length: np.ndarray, gear: Gear, sizes: _Sizes) -> np.ndarray:
-    """Largest element sizes (n,) [m] along a finely sampled fillet: small where it turns sharply, and around."""
+    """Largest element sizes (n,) [m] along a finely sampled fillet, small where it turns sharply."""
     radius = notch_radius(gear, points) / gear.module
     finest = np.where(radius < SHARP_RADIUS * (1.0 - 1e-6), SHARP_SIZE * radius, FILLET_SIZE)
     size = np.clip(finest, SHARPEST_SIZE, FILLET_SIZE) * sizes.unit
