@@ -512,6 +512,7 @@ def import_rexs(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("case.toml"),
     stage: str | None = None,
+    load_case: int | None = None,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Write the case of a planetary stage of a REXS file, and say what is assumed and what is not used.
@@ -524,6 +525,8 @@ def import_rexs(
         Case file to write.
     stage
         Id of the planetary stage, where there are several.
+    load_case
+        Number of the load case, from 1. Default: the first, and the speeds of others with its torque.
     force
         Replace the file.
     """
@@ -532,10 +535,11 @@ def import_rexs(
     from femgear.trains.drafts import draft_text
 
     model = read_model(file)
-    tables, remarks = case_tables(model, stage)
+    tables, remarks = case_tables(model, stage, load_case)
     head = f"Written by femgear import {file.name} (REXS {model.version}). What is assumed says so."
     with named(model, stage):
         text = draft_text(tables, remarks, word="assumed", head=[head])
+    _warn(model.findings)
     _write_case(text, output, force=force)
     _say(f"entries that are assumed: {text.count('# assumed')}")
     _say("attributes that are not used:")
@@ -573,7 +577,9 @@ def rexs(
         raise CaseError(message, code="E-OUTPUT", file=str(output), limit=limit)
     data = read_case(case)
     need_set(data)
-    text = model_text(stage_model(data, output.name), "femgear", femgear.__version__)
+    model = stage_model(data, output.name)
+    text = model_text(model, "femgear", femgear.__version__)
+    _warn(model.findings)
     _write_case(text, output, force=force)
     return 0
 

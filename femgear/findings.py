@@ -59,6 +59,7 @@ CATALOGUE = {
     "W-RESIDUAL": (DOUBT, "Static compliance beyond the modes of a casing is missing."),
     "W-RESPONSE": (NOTE, "There are modes alone."),
     "W-RIM": (NOTE, "A rim is thin."),
+    "W-REXS": (DOUBT, "A REXS file holds what the case that was made of it has not, or has otherwise."),
     "W-ROWS": (NOTE, "Tables that no sheet can hold are left out."),
     "W-SEPARATION": (NOTE, "Flanks part at speeds of operation."),
     "W-SETTLED": (DOUBT, "Motions do not repeat within the periods that are allowed."),

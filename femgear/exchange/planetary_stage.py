@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
-from femgear.case.estimates import STEEL, estimates, usual_rim, usual_torque
+from femgear.case.estimates import STEEL, USUAL_STIFFNESS, estimates, usual_rim, usual_torque
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import (
     ANGLE,
@@ -31,9 +31,11 @@ from femgear.case.quantities import (
     Dimension,
     to_si,
 )
-from femgear.case.sections import Case
+from femgear.case.sections import OVER_WIDTH, Case
 from femgear.errors import CaseError, FemgearError
+from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
 from femgear.exchange.rexs import Component, Model, Relation
+from femgear.findings import NOTE
 from femgear.gears.kinematics import MEMBERS, torque_ratios
 
 _POWER = Dimension("a power", "W", "kW", 1e3)
@@ -41,6 +43,8 @@ _GEARS = ("sun", "planet", "ring")
 _RACK = {"addendum": 1.0, "dedendum": 1.25, "root_radius": 0.25}
 _SOFT = 1e15
 """Stiffness up to which a bearing is a spring, the largest of a case [N/m]."""
+RIGID = 10_000
+"""Stiffness of a rigid bearing over that of a mesh."""
 
 
 @dataclass(frozen=True)
@@ -78,13 +82,17 @@ class _Stage:
         return value
 
 
-def case_tables(model: Model, wanted: str | None = None) -> tuple[dict[str, Any], dict[str, str]]:
+def case_tables(
+    model: Model, wanted: str | None = None, load_case: int | None = None
+) -> tuple[dict[str, Any], dict[str, str]]:
     """Read a planetary stage as tables of a case, with remarks by key on what is assumed.
 
-    The id of the stage that is ``wanted`` is needed where there are several.
+    The id of the stage that is ``wanted`` is needed where there are several. Without the number of a load
+    case, from 1, it is the first; further ones with its torque give further speeds. `Model.findings` holds
+    what the case has not.
 
-    CaseError: E-CHOICE: several stages, or not that one. E-REXS: no planetary stage, or one of another form.
-    E-UNIT.
+    CaseError: E-CHOICE: several stages, or not that one; no such load case. E-REXS: no planetary stage, or
+    one of another form. E-UNIT.
     """
     s, remarks = _stage(model, _chosen(model, wanted)), dict[str, str]()
     title = "".join(c for c in s.stage.name or str(s.stage) if c.isprintable())
@@ -94,8 +102,12 @@ def case_tables(model: Model, wanted: str | None = None) -> tuple[dict[str, Any]
     for name in _GEARS:
         _rim(s, name, tables, remarks)
     _supports(s, tables, remarks)
-    tables["operation"] = _operation(s, tables, remarks)
-    if "helix_angle" in tables["set"]:
+    tables["operation"] = _operation(s, tables, remarks, load_case)
+    _modifications(s, tables)
+    _chamfers(s)
+    sections = (tables[name] for name in _GEARS)
+    leads = (one["kind"] in OVER_WIDTH for section in sections for one in section.get("modifications", ()))
+    if "helix_angle" in tables["set"] or any(leads):
         tables["static"], remarks["static.slices"] = {"slices": 25}, "assumed"
     if left := [name for name in ("sun", "ring") if "profile_shift" not in tables[name]]:
         of = f"hence the profile shift of {' and '.join(left)}"
@@ -330,21 +342,36 @@ def _diameter(model: Model, shaft: Component, place: float) -> float | None:
 
 
 def _supports(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
-    """Radial stiffness of the bearings of a planet on its pin, of sun and carrier in the casing."""
+    """Radial stiffness of the bearings of a planet on its pin, of sun and carrier in the casing.
+
+    A rigid bearing becomes a spring of `RIGID` mesh stiffnesses: members of a case have springs.
+    """
     tables["carrier"] = {}
+    width, modulus = to_si(tables["set"]["face_width"], LENGTH), tables["material"]["youngs_modulus"]
+    rigid = min(RIGID * USUAL_STIFFNESS * to_si(modulus, MODULUS) / STEEL * width, _SOFT)
     bearings = {"planet": _beside(s.model, s.shafts["planet"][:1], "outer_part", "shaft")}
     for name in ("sun", "carrier"):
         bearings[name] = _beside(s.model, s.shafts[name], "inner_part", "gear_casing")
     for name, found in bearings.items():
-        springs = (one for one in found if one.type.endswith("bearing"))
+        springs = [one for one in found if one.type.endswith("bearing")]
         values = [k for one in springs if (k := s.model.number(one, "radial_stiffness", STIFFNESS))]
         key = "bearing_stiffness" if name == "planet" else "support_stiffness"
-        if sum(values) > _SOFT:
+        if max(values, default=0.0) > _SOFT:
             many = Counter(f"{one:.3g} N/m" for one in values).items()
             what = ", ".join(f"{n} bearing{'s' * (n > 1)} of {one}" for one, n in many)
-            remarks[f"{name}.{key}"] = f"taken as rigid: {what} in the file"
+            tables[name][key] = f"{rigid:.3g} N/m"
+            remarks[f"{name}.{key}"] = f"rigid: {what} in the file"
+            s.model.remark(
+                f"{name}.{key}",
+                f"{what}: rigid, taken as {rigid:.3g} N/m, {RIGID:,} mesh stiffnesses, which changes natural "
+                "frequencies by less than 0.1 %; real bearings are softer, and move them by more",
+                remedy="give the stiffness of the bearings", severity=NOTE,
+            )  # fmt: skip
         elif values:
             tables[name][key] = _shown(sum(values), STIFFNESS)
+        elif springs:
+            text = f"{len(springs)} bearings without radial_stiffness, such as {springs[0]}: it is estimated"
+            s.model.remark(f"{name}.{key}", text, remedy="give it in the case")
 
 
 def _beside(model: Model, shafts: list[Component], role: str, mate: str) -> list[Component]:
@@ -356,38 +383,141 @@ def _beside(model: Model, shafts: list[Component], role: str, mate: str) -> list
     ]
 
 
-def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> dict[str, Any]:
+def _modifications(s: _Stage, tables: dict[str, Any]) -> None:
+    """Modifications of the flanks of all gears, and findings on those that no case has.
+
+    Looked at from the end z > 0, tooth upwards, the left flank leads a sun that turns counter-clockwise. Left
+    flanks touch left ones, of internal gears too (ISO 21771-1): of planets they are those towards the sun
+    under a positive torque, and right flanks those towards the ring.
+    """
+    operation, model = tables["operation"], s.model
+    ratios = torque_ratios(tables["sun"]["teeth"], tables["ring"]["teeth"])
+    forwards = to_si(operation["torque"], TORQUE) * ratios[operation["input"]] > 0.0
+    for name in _GEARS:
+        flanks = [_flanks_of(s, tables, name, gear) for gear in s.gears[name]]
+        sides = flanks[0]
+        if any(one != sides for one in flanks):
+            first = s.gears[name][0]
+            model.remark(
+                f"{name}.modifications", f"planets have different modifications: all get those of {first}"
+            )
+        for problem in dict.fromkeys(p for one in flanks for flank in one.values() for p in flank.left_out):
+            model.remark(f"{name}.modifications", f"not taken: {problem}")
+        left, right = (sides[side].tables if side in sides else [] for side in ("left", "right"))
+        found = left
+        if left != right and name == "planet":
+            found = [{"flank": "sun side", **one} for one in left]
+            found += [{"flank": "ring side", **one} for one in right]
+        elif left != right:
+            found = left if forwards == (name == "sun") else right
+            model.remark(
+                f"{name}.modifications",
+                f"the flanks of {s.gears[name][0]} differ: taken are those that carry under the torque of "
+                "the case; its back flanks, and flanks under the other sense of torque, get the same",
+            )  # fmt: skip
+        if found:
+            tables[name]["modifications"] = found
+        if any(flank.signs for flank in sides.values()):
+            model.remark(
+                f"{name}.modifications",
+                "slopes and twist are taken with the sign of ISO 1328-1, more material at the tip or at the "
+                "non-datum face; REXS does not define it", remedy="compare with the drawing",
+            )  # fmt: skip
+
+
+def _chamfers(s: _Stage) -> None:
+    """Findings on chamfers of the tips, which end the flanks below the tip circle."""
+    for name in _GEARS:
+        sizes = [s.model.number(one, "tooth_tip_chamfer", LENGTH) or 0.0 for one in s.flanks[name]]
+        if max(sizes, default=0.0) > 0.0:
+            size = _shown(max(sizes), LENGTH)
+            text = f"tooth_tip_chamfer of {size} is not taken: flanks go up to the tip circle"
+            remedy = "give the diameter where the chamfer begins as tip_diameter"
+            s.model.remark(f"{name}.tip_diameter", text, remedy=remedy)
+
+
+def _flanks_of(s: _Stage, tables: dict[str, Any], name: str, gear: Component) -> dict[str, Flank]:
+    """Modifications of the flanks of a gear by side, "left" and "right" as seen from the end z > 0."""
+    module, teeth = to_si(tables["sun"]["module"], LENGTH), tables[name]["teeth"]
+    helix = to_si(tables["set"].get("helix_angle", "0 deg"), ANGLE)
+    angle = math.atan(math.tan(to_si(tables["sun"]["pressure_angle"], ANGLE)) / math.cos(helix))
+    tip = tables[name].get("tip_diameter")
+    up = s.model.text(gear, "datum_face_orientation") != "positive"
+    given = {
+        "width": _width(s, tables, name),
+        "base_radius": 0.5 * teeth * module / math.cos(helix) * math.cos(angle),
+        "tip_diameter": None if tip is None else to_si(tip, LENGTH), "internal": name == "ring", "up": up,
+    }  # fmt: skip
+    # ISO 1328-1 looks at the datum face, from z < 0 where it lies there
+    seen = {"left": "right", "right": "left"} if up else {"left": "left", "right": "right"}
+    return {
+        seen[role]: flank_modifications(s.model, flank, **given)
+        for role in ("left", "right")
+        for flank in s.model.related("flank", role, gear=gear.id)[:1]
+    }
+
+
+def _width(s: _Stage, tables: dict[str, Any], name: str) -> float:
+    """Face width of a gear [m], that of the set where the case gives it none of its own."""
+    return to_si(tables[name].get("face_width", tables["set"]["face_width"]), LENGTH)
+
+
+def _operation(
+    s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wanted: int | None
+) -> dict[str, Any]:
     """Input, fixed member, torque and speeds of the input."""
     coupled = {name: _beside(s.model, s.shafts[name], "inner_part", "gear_casing") for name in MEMBERS}
     held = [name for name in MEMBERS if any(one.type.endswith("coupling") for one in coupled[name])]
     fixed = held[0] if len(held) == 1 else "ring"
     remarks |= {} if len(held) == 1 else {"operation.fixed": "assumed"}
-    said = [_state(s, fixed, given) for given in (s.model.load_cases or ({},))]
-    stands, idle = (any(0.0 in one.values() for one in ones) for ones in zip(*said, strict=True))
-    states = [[{member: one for member, one in values.items() if one} for values in pair] for pair in said]
+    number, given = s.model.chosen_case(wanted)
+    said = [_state(s, fixed, given), *(_state(s, fixed, one) for one in s.model.load_cases)]
+    stands, idle = (0.0 in one.values() for one in said[0])
+    states = [tuple({name: v for name, v in one.items() if v} for one in pair) for pair in said]
     turning, loaded = states[0]
     usual = "carrier" if fixed == "sun" else "sun"
     member = next(iter([*(one for one in turning if one in loaded), *turning, *loaded]), usual)
     ratios = torque_ratios(tables["sun"]["teeth"], tables["ring"]["teeth"])
-    torques, speeds = [], []
-    for turns, loads in states:
-        speed = turns.get(member, 0.0)
-        # the torques of all members follow from one; speeds are positive
-        for by in [one for one in (member, *loads) if one in loads][:1]:
-            torques.append(math.copysign(1.0, speed) * loads[by] * ratios[member] / ratios[by])
-        speeds += [abs(speed)] if speed and abs(speed) not in speeds else []
-    if not torques:
+    torques, speeds = zip(*(_of_member(member, ratios, *state) for state in states), strict=True)
+    torque, taken = torques[0], [speeds[0]]
+    if torque is None:
         width, module = to_si(tables["set"]["face_width"], LENGTH), to_si(tables["sun"]["module"], LENGTH)
         teeth = tables["sun"]["teeth"], tables["planet"]["teeth"]
         on_sun = usual_torque(*teeth, module, width, tables["set"]["planets"])
-        torques = [float(f"{on_sun * abs(ratios[member]):.3g}")]
+        torque = float(f"{on_sun * abs(ratios[member]):.3g}")
         remarks["operation.torque"] = f"assumed: K factor of 1 N/mm^2{'; that of the file is 0' * idle}"
-    elif len(torques) < len(states) or max(torques) - min(torques) > 1e-6 * abs(torques[0]):
-        remarks["operation.torque"] = "assumed: of the first load case that has one; those of the file differ"
+    others = []
+    for i, (other, speed) in enumerate(zip(torques[1:], speeds[1:], strict=True), start=1):
+        alike = other == torques[0] or (
+            other and torques[0] and abs(other - torques[0]) <= 1e-6 * abs(torque)
+        )
+        if i != number and (wanted is not None or not alike):
+            others.append(s.model.case_in_words(i, speed, other))
+        elif i != number:
+            taken.append(speed)
+    if others:
+        s.model.remark(
+            "operation",
+            f"load case {number} of {len(s.model.load_cases)} is taken; others have torques and speeds of "
+            f"their own: {'; '.join(others[:10])}{' ...' * (len(others) > 10)}",
+            remedy=f"--load-case 1 to {len(s.model.load_cases)} takes another",
+        )  # fmt: skip
     remarks |= {} if turning or loaded else {"operation.input": "assumed"}
+    speeds = list(dict.fromkeys(one for one in taken if one))
     remarks |= {} if speeds else {"operation.speeds": f"assumed{'; that of the file is 0' * stands}"}
     shown = [_shown(one, SPEED) for one in speeds or [1000.0 * SPEED.scale]]
-    return {"input": member, "fixed": fixed, "torque": _shown(torques[0], TORQUE), "speeds": shown}
+    return {"input": member, "fixed": fixed, "torque": _shown(torque, TORQUE), "speeds": shown}
+
+
+def _of_member(
+    member: str, ratios: Mapping[str, float], turns: Mapping[str, float], loads: Mapping[str, float]
+) -> tuple[float | None, float]:
+    """Torque [N m] and positive speed [rad/s] of a member; the torques of all members follow from one."""
+    speed = turns.get(member, 0.0)
+    for by in (member, *loads):
+        if by in loads:
+            return math.copysign(1.0, speed) * loads[by] * ratios[member] / ratios[by], abs(speed)
+    return None, abs(speed)
 
 
 def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[str, float], dict[str, float]]:
@@ -441,20 +571,24 @@ def _attribute(value: float | None, unit: str = "none") -> tuple[str, str] | Non
 def stage_model(case: Case, name: str) -> Model:
     """Write gears, material, bearings and operation of a planetary set as a REXS model of version 1.4.
 
-    Masses, estimated stiffnesses, play, errors and modifications of teeth, dynamics and housing are left out.
+    Masses, estimated stiffnesses, play, errors of teeth, dynamics and housing are left out. `Model.findings`
+    holds modifications that REXS has no form for.
     """
     gears, w, a = planetary_set(case), _Writer(), _attribute
     unit, casing = w.add("gear_unit", case.title), w.add("gear_casing", "casing")
     stage, carrier = w.add("planetary_stage", case.title), w.add("planet_carrier", "carrier")
     for whole, part in ((unit, casing), (unit, stage), (stage, carrier)):
         w.relate("assembly", assembly=whole, part=part)
-    (sun, sun_shaft), (ring, ring_shaft) = (_add_gear(w, case, g.name, g) for g in (gears.sun, gears.ring))
+    model = Model(name, "1.4", w.components, (), ())
+    (sun, sun_shaft), (ring, ring_shaft) = (
+        _add_gear(w, case, one.name, one, model) for one in (gears.sun, gears.ring)
+    )
     shafts = {"sun": sun_shaft, "ring": ring_shaft, "carrier": w.add("shaft", "carrier shaft")}
     w.relate("planet_carrier_shaft", planetary_stage=stage, shaft=shafts["carrier"])
     for shaft in (sun_shaft, ring_shaft):
         w.relate("central_shaft", planetary_stage=stage, shaft=shaft)
     for number, angle in enumerate(gears.planet_angles, start=1):
-        planet, shaft = _add_gear(w, case, f"planet {number}", gears.planet)
+        planet, shaft = _add_gear(w, case, f"planet {number}", gears.planet, model)
         pin, stiffness = w.add("shaft", f"pin {number}"), _stiffness(case, "planet", "bearing_stiffness")
         w.relate("planet_shaft", planetary_stage=stage, shaft=shaft)
         w.relate("planet_pin", planetary_stage=stage, shaft=pin)
@@ -468,10 +602,10 @@ def stage_model(case: Case, name: str) -> Model:
             w.relate("assembly", assembly=stage, part=mesh)
             w.relate("stage", stage=mesh, gear_1=pair[0], gear_2=pair[1])
     load_cases = _add_operation(w, case, shafts, casing)
-    return Model(name, "1.4", w.components, tuple(w.relations), load_cases)
+    return replace(model, relations=tuple(w.relations), load_cases=load_cases)
 
 
-def _add_gear(w: _Writer, case: Case, name: str, gear: Any) -> tuple[str, str]:
+def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tuple[str, str]:
     """Add a gear with shaft, flanks, tool and material; ids of gear and shaft."""
     a, section, internal = _attribute, getattr(case, gear.name), gear.internal
     rack, helix, material = section.rack or case.rack, case.helix_angle or 0.0, case.material
@@ -517,7 +651,24 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any) -> tuple[str, str]:
     w.relate("flank", gear=id, **flanks)
     for flank in flanks.values():
         w.relate("manufacturing_step", workpiece=flank, tool=tool, manufacturing_settings=settings)
+    _add_modifications(w, case, gear, flanks, model)
     return id, shaft
+
+
+def _add_modifications(w: _Writer, case: Case, gear: Any, flanks: Mapping[str, str], model: Model) -> None:
+    """Add the modifications of both flanks; the datum face is the end z < 0, as where REXS says nothing."""
+    # looked at from z < 0 the flank towards the sun is the right one, see `_modifications`
+    sides = {"right": "sun side", "left": "ring side"} if gear.name == "planet" else {}
+    known: dict[str, str] = {}
+    for role, flank in flanks.items():
+        parts, left_out = written_modifications(case, gear, sides.get(role, "both"))
+        for kind, attributes in parts:
+            key = f"{kind} {attributes}"
+            if key not in known:
+                known[key] = w.add(kind, "", **attributes)
+            w.relate("reference", origin=flank, referenced=known[key])
+        for one in left_out:
+            model.remark(f"{gear.name}.modifications", f"REXS has no {one.partition(': a ')[2]}: left out")
 
 
 def _stiffness(case: Case, member: str, key: str) -> tuple[str, str] | None:

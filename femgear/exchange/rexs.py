@@ -28,6 +28,7 @@ from xml.etree import ElementTree
 from femgear.case.quantities import Dimension, to_si
 from femgear.case.text import decoded, read_bytes
 from femgear.errors import CaseError
+from femgear.findings import DOUBT, SEVERITIES, Finding
 
 MOST_BYTES = 20_000_000
 """Of a file, and of what a zip holds; those of whole gear units have some hundred kilobytes."""
@@ -87,6 +88,8 @@ class Model:
         Attributes by component id that a load case of the first load spectrum gives.
     used : set of (str, str)
         Types of components and attributes that were asked for.
+    findings : list of Finding
+        What a case that was made of the file does not have, or has otherwise (W-REXS), doubts first.
     """
 
     name: str
@@ -95,6 +98,37 @@ class Model:
     relations: tuple[Relation, ...]
     load_cases: tuple[Mapping[str, Mapping[str, tuple[str, str | None]]], ...] = ()
     used: set[tuple[str, str]] = field(default_factory=set)
+    findings: list[Finding] = field(default_factory=list)
+
+    def remark(self, key: str, text: str, *, remedy: str = "", severity: str = DOUBT) -> None:
+        """Keep a finding on what a case does not have, or has otherwise; the same one once."""
+        finding = Finding("W-REXS", key, text, remedy=remedy, severity=severity)
+        if finding not in self.findings:
+            self.findings.append(finding)
+            self.findings.sort(key=lambda one: -SEVERITIES.index(one.severity))
+
+    def chosen_case(
+        self, wanted: int | None
+    ) -> tuple[int, Mapping[str, Mapping[str, tuple[str, str | None]]]]:
+        """Find number, from 1, and attributes of a load case, by default of the first, if there are any.
+
+        CaseError: no such load case (E-CHOICE).
+        """
+        number, count = 1 if wanted is None else wanted, len(self.load_cases)
+        if wanted is not None and not 1 <= number <= count:
+            raise CaseError(
+                "there is no such load case", code="E-CHOICE", key="--load-case", value=wanted,
+                file=self.name, limit=f"1 to {count}" if count else "a file with load cases",
+                remedy="leave it out, or name one of the file",
+            )  # fmt: skip
+        return number, self.load_cases[number - 1] if count else {}
+
+    def case_in_words(self, number: int, speed: float, torque: float | None) -> str:
+        """Tell number, speed [rad/s], torque [N m] and share of a load case."""
+        shares = (one.get("load_duration_fraction") for one in self.load_cases[number - 1].values())
+        share = next((f", {value} {unit or ''}".rstrip() for value, unit in filter(None, shares)), "")
+        load = "no torque" if torque is None else f"{torque:.6g} N m"
+        return f"{number}: {speed * 30.0 / math.pi:.6g} rpm, {load}{share}"
 
     def related(self, kinds: str | tuple[str, ...], to: str, **role: str) -> list[Component]:
         """List the components in the role `to` of relations that have an id in another role."""

@@ -35,7 +35,8 @@ def test_the_case_of_the_example(tmp_path, monkeypatch, capsys):
 
 def test_attributes_of_the_page_are_those_that_are_read():
     page, folder = (DOCS / "rexs.md").read_text(encoding="utf-8"), DOCS.parent / "femgear" / "exchange"
-    code = (folder / "planetary_stage.py").read_text(encoding="utf-8")
+    files = (folder / f"{name}.py" for name in ("planetary_stage", "flank_modifications"))
+    code = "".join(one.read_text(encoding="utf-8") for one in files)
     named = re.findall(r"`(\w+)`", "".join(line for line in page.splitlines() if line.startswith("| ")))
     assert len(named) > 20 and not [name for name in named if f'"{name}"' not in code]
 
