@@ -3,7 +3,7 @@ Why does one speed show five lobes and another six?
 ===================================================
 
 Equal planets make three or six equal swellings a turn at every speed. One pin a few micrometres off adds
-side bands next to the mesh orders: they break the pattern where the set is quiet, and vanish where it is loud.
+side bands next to the mesh orders: they break the pattern where the set is quiet, not where it is loud.
 """
 
 from pathlib import Path
