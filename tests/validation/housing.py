@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
+from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band, count_lobes
 from femgear.housing.sensor import (
     SensorLines,
     component_lines,
@@ -85,6 +85,16 @@ def first_harmonic() -> tuple[Row, ...]:
     label = "250 rpm, 1st mesh harmonic, Hanning window on the planet-ring forces: "
     rows.append(counted("paper", PAPER, label + "lobes", 3, len(band.lobes.position)))
     return tuple(rows)
+
+
+def unit_forces() -> tuple[Row, ...]:
+    """The ring under constant mesh forces: extremes of its radial deflection around the circumference."""
+    static = reference_dynamics().ring_radial[SLOW, 0]
+    n = np.arange(len(static)) - len(static) // 2
+    deflection = np.real(np.exp(1j * np.outer(2 * np.pi * np.arange(720) / 720, n)) @ static)
+    lobes = count_lobes(np.abs(deflection - deflection.mean()))
+    quantity = "deflection of the ring under equal forces of its meshes: lobes, outwards and inwards"
+    return (counted("paper", PAPER, quantity, 6, len(lobes.position)),)
 
 
 def interpolation() -> tuple[Row, ...]:

@@ -410,6 +410,7 @@ THEMES = (
         (
             housing.symmetry,
             housing.first_harmonic,
+            housing.unit_forces,
             housing.interpolation,
             housing.higher_harmonics,
             housing.resonances,
