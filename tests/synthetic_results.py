@@ -214,6 +214,9 @@ def modes() -> xr.Dataset:
             add({}, hertz, "ring", n, ((n, phase), (-n, np.conj(phase))))
     order = np.argsort(frequency, kind="stable")
     c = np.array(components)[order]
+    # bent without being stretched: du_t/dphi = -u_r
+    n = np.arange(-DIAMETERS, DIAMETERS + 1)
+    along = 1j * c / np.where(n == 0, np.inf, n)
     mc = ("mode", "circumferential")
     return xr.Dataset(
         {
@@ -224,6 +227,8 @@ def modes() -> xr.Dataset:
             "shape": _variable(("dof", "mode"), np.array(shape)[order].T, "kg^-0.5", "mode shape"),
             "ring_shape_real": _variable(mc, c.real, "kg^-0.5", "ring shape"),
             "ring_shape_imag": _variable(mc, c.imag, "kg^-0.5", "ring shape"),
+            "ring_tangential_shape_real": _variable(mc, along.real, "kg^-0.5", "ring shape"),
+            "ring_tangential_shape_imag": _variable(mc, along.imag, "kg^-0.5", "ring shape"),
         },
         coords={
             "dof": dofs,

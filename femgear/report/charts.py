@@ -10,13 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.report.style import thinned
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DIGITS = 6
 """Digits of a coordinate, counted from the largest of its curve: a pixel of one enlarged a hundredfold."""
-_POINTS = 4000
-"""Points of a curve, at most; of more, every step of the abscissa keeps its largest and its smallest."""
+_MOST_CORNERS = 4000
+"""Corners of a filled area, at most."""
+_PIXELS_OF_A_POINT = 1.2
+"""Size of a marker on the page [pixels] over that in print [pt]."""
 _DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
 _MARKERS = {
     "o": "circle",
@@ -176,7 +180,11 @@ def _curve(line, ax: Any) -> dict[str, Any]:
         open_face = str(line.get_markerfacecolor()).lower() in ("none", "white")
         symbol = _MARKERS.get(marker, "circle") + "-open" * open_face
         edge = to_hex(line.get_markeredgecolor()) if open_face else to_hex(line.get_markerfacecolor())
-        found["marker"] = {"symbol": symbol, "size": 1.2 * line.get_markersize(), "color": edge}
+        found["marker"] = {
+            "symbol": symbol,
+            "size": _PIXELS_OF_A_POINT * line.get_markersize(),
+            "color": edge,
+        }
     across = _across(line.get_transform(), ax)
     if across:
         return {**found, **_spread(x, y, across, ax), **_name(line), "hoverinfo": "skip"}
@@ -209,7 +217,7 @@ def _name(artist) -> dict[str, Any]:
 
 def _coordinates(x, y, ax: Any) -> dict[str, Any]:
     """Coordinates of points as they are drawn."""
-    x, y = _thinned(np.asarray(x, float), np.asarray(y, float))
+    x, y = thinned(x, y)
     if ax.name == "polar":
         return _plane(x, y, float(ax.get_rorigin()))
     steps = np.diff(x)
@@ -220,19 +228,6 @@ def _coordinates(x, y, ax: Any) -> dict[str, Any]:
             "y": _numbers(y, ax.get_yscale()),
         }
     return {"x": _numbers(x, ax.get_xscale()), "y": _numbers(y, ax.get_yscale())}
-
-
-def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out points between the largest and the smallest of every step where there are very many."""
-    if len(x) <= _POINTS or np.any(~(np.diff(x) >= 0)):
-        return x, y
-    starts = np.linspace(0, len(x), _POINTS // 2, endpoint=False).astype(int)
-    parts = [slice(*ends) for ends in zip(starts, [*starts[1:], len(x)])]
-    kept = np.array(
-        [sorted((part.start + y[part].argmin(), part.start + y[part].argmax())) for part in parts]
-    )
-    kept = np.unique([0, *kept.ravel(), len(x) - 1])
-    return x[kept], y[kept]
 
 
 def _areas(ax: Any) -> list[dict[str, Any]]:
@@ -255,12 +250,17 @@ def _areas(ax: Any) -> list[dict[str, Any]]:
 
 
 def _points(one, ax: Any) -> dict[str, Any]:
-    """Read scattered points."""
+    """Read scattered points, each of its size, which is that of an area [pt^2]."""
     x, y = np.asarray(one.get_offsets(), float).T
     if one.get_array() is not None or len(one.get_facecolors()) > 1:
         raise _PictureOnly
-    colours = one.get_facecolors() if len(one.get_facecolors()) else one.get_edgecolors()
-    marker = {"size": float(np.sqrt(one.get_sizes()[0])), "color": _colour(colours), "symbol": "circle"}
+    filled = len(one.get_facecolors()) > 0
+    colours = one.get_facecolors() if filled else one.get_edgecolors()
+    sizes = _PIXELS_OF_A_POINT * np.sqrt(np.resize(one.get_sizes(), len(x)))
+    marker: dict[str, Any] = {"size": _numbers(sizes), "color": _colour(colours)}
+    marker["symbol"] = "circle" if filled else "circle-open"
+    if not filled:
+        marker["line"] = {"width": _width(one.get_linewidths()[0])}
     return {"mode": "markers", "marker": marker, **_coordinates(x, y, ax), **_name(one)}
 
 
@@ -276,7 +276,7 @@ def _area(corners, one, ax: Any) -> dict[str, Any]:
     """Read one filled area."""
     if len(one.get_facecolors()) > 1:
         raise _PictureOnly
-    corners = np.asarray(corners, float)[:: 1 + len(corners) // _POINTS]
+    corners = np.asarray(corners, float)[:: 1 + len(corners) // _MOST_CORNERS]
     faces = one.get_facecolors()
     fill = (
         {"fill": "toself", "fillcolor": _colour(faces), "fillopacity": float(faces[0][3])}
@@ -359,19 +359,7 @@ def _words(ax: Any) -> list[dict[str, Any]]:
         if not text.get_text():
             continue
         x, y = getattr(text, "xy", None) or text.get_position()
-        if _across(text.get_transform(), ax):
-            place = {
-                name: value[0]
-                for name, value in _spread([x], [y], _across(text.get_transform(), ax), ax).items()
-            }
-        elif text.get_transform() == ax.transAxes:
-            place = {"x": float(x), "y": float(y), "paper": True}
-        else:
-            place = {name: _numbers([v])[0] for name, v in (("x", x), ("y", y))}
-            if ax.name == "polar":
-                place = {
-                    name: v[0] for name, v in _plane(np.array([x]), np.array([y]), ax.get_rorigin()).items()
-                }
+        place = _place_of(text, x, y, ax)
         shift = (
             text.xyann if hasattr(text, "xyann") and getattr(text, "xycoords", "") == "data" else (0.0, 0.0)
         )
@@ -383,9 +371,26 @@ def _words(ax: Any) -> list[dict[str, Any]]:
                 "align": [text.get_ha(), text.get_va()],
                 "shift": [float(shift[0]), -float(shift[1])],
                 "color": _colour([text.get_color()]),
+                "ground": text.get_bbox_patch() is not None,
             }
         )
     return found
+
+
+def _place_of(text: Any, x, y, ax: Any) -> dict[str, Any]:
+    """Place of a text in the coordinates of the panel, or as shares of its sides."""
+    coordinates = getattr(text, "xycoords", "data")
+    sides = coordinates if isinstance(coordinates, tuple) else ()
+    across = "xy"[sides.index("axes fraction")] if sides.count("axes fraction") == 1 else ""
+    across = across or _across(text.get_transform(), ax)
+    if across:
+        return {name: value[0] for name, value in _spread([x], [y], across, ax).items()}
+    if text.get_transform() == ax.transAxes or coordinates == "axes fraction":
+        return {"x": float(x), "y": float(y), "paper": True}
+    if ax.name == "polar":
+        plane = _plane(np.array([x]), np.array([y]), ax.get_rorigin())
+        return {name: value[0] for name, value in plane.items()}
+    return {name: _numbers([value])[0] for name, value in (("x", x), ("y", y))}
 
 
 def _width(points: float) -> float:

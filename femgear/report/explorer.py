@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.report.style import COLOURS
+from femgear.report.style import GREY
+from femgear.report.waterfall import KIND_COLOURS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +50,7 @@ def explorer(runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None =
     power, part = (np.sum(np.abs(one) ** 2, axis=1) for one in (lines, lines[:, kept]))
     top = float(runup["mesh_frequency"].values.max()) * (_HARMONICS + 0.5)
     kinds = [str(kind) for kind in modes["kind"].values]
-    colours = {kind: COLOURS[i % len(COLOURS)] for i, kind in enumerate(dict.fromkeys(kinds))}
+    colours = {kind: KIND_COLOURS.get(kind.removeprefix("ring, "), GREY) for kind in kinds}
     frequency = modes["frequency"].values
     shown = [i for i in range(len(frequency)) if 1.0 < frequency[i] < top]
     series = {"acceleration": lines} | ({} if pressure is None else {"pressure": pressure})
@@ -79,10 +80,13 @@ def _chosen_speeds(runup: xr.Dataset) -> np.ndarray:
 
 
 def _resonances(runup: xr.Dataset, top: float) -> list[list[Any]]:
-    """Speed [rpm], frequency [Hz], mode, kind and mesh harmonic of the resonances in the picture."""
+    """Speed [rpm], frequency [Hz], mode, kind, mesh harmonic, level [m/s^2] of the resonances in the picture.
+
+    The level is that of the mode at the harmonic alone, r.m.s.
+    """
     if "resonance_speed" not in runup:
         return []
-    names = ("resonance_speed", "frequency", "mode", "kind", "mesh_harmonic")
+    names = ("resonance_speed", "frequency", "mode", "kind", "mesh_harmonic", "resonance_alone")
     rows = zip(*(runup[name].values.tolist() for name in names))
     return [list(row) for row in rows if row[1] < top]
 

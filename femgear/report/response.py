@@ -60,6 +60,10 @@ _BEYOND = 1.1
 _DYNAMIC, _STATIC = "dynamic", "static, harmonics of the excitation"
 _CIRCLE = np.linspace(0.0, 2 * np.pi, 241)
 """Angles of the outline of the ring [rad]; those of the other bodies are every fourth."""
+_MARK = 20
+"""Steps of these angles from one mark in the rim to the next."""
+_RING = ("ring_shape", "ring_tangential_shape")
+"""Radial and tangential displacement of the outer surface of the ring in modes.nc."""
 MODE_CAPTIONS = {
     "mode_shapes": (
         "Mode shapes with mean mesh stiffness, one of every pair of equal frequency: bodies with a mark of "
@@ -98,9 +102,10 @@ def mode_shapes(
     """Draw bodies and outer ring surface in their undeformed (grey) and displaced positions.
 
     The modes have ``shape`` (dof, mode), ``frequency`` [Hz], ``kind``, ``nodal_diameter`` and, where there is
-    an elastic ring, ``ring_shape_real`` and ``ring_shape_imag`` (mode, circumferential). Those ``shown`` are
-    numbers from 0, by default the first twelve frequencies that are no rigid-body motions, each by its first
-    mode; ``scale`` is the largest displacement as a share of the ring's outer radius.
+    an elastic ring, real and imaginary part of ``ring_shape`` and ``ring_tangential_shape`` (mode,
+    circumferential). Those ``shown`` are numbers from 0, by default the first twelve frequencies that are no
+    rigid-body motions, each by its first mode; ``scale`` is the largest displacement as a share of the ring's
+    outer radius.
     """
     first = frequency_groups(modes["frequency"].values)
     elastic = [one for one in first if modes["frequency"].values[one[0]] > 0.0]
@@ -133,7 +138,7 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
     """Draw one mode: bodies with a spoke each, the carrier by its pins, the ring by its outer surface."""
     shape = dict(zip((str(name) for name in modes["dof"].values), modes["shape"].values[:, mode]))
     outer = planetary_set.ring.rim_radius
-    ring = _ring_radial(modes, mode)
+    ring = _ring_motion(modes, mode)
     bodies = _bodies(planetary_set)
     largest = np.abs(ring).max()
     for name, radius in (("ring", outer), *((name, body[1]) for name, body in bodies.items())):
@@ -144,17 +149,12 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
     ax.plot(*xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
     rigid = _motion(shape, "ring")
     shift, turn = factor * (rigid[0] + 1j * rigid[1]), factor * rigid[2]
-    ax.plot(
-        *xy((outer + factor * ring) * circle + shift),
-        color=BLACK,
-        linewidth=1.8,
-        label="ring, outer surface",
-    )
-    if "ring: rotation" in shape:
-        # a rigid ring shows its rotation by a mark in its rim
-        mark = np.array([0.9, 1.0]) * outer
-        ax.plot(*xy(1j * mark), color="0.8", linewidth=1.0)
-        ax.plot(*xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
+    moved = (outer + factor * ring) * circle * np.exp(1j * turn) + shift
+    ax.plot(*xy(moved), color=BLACK, linewidth=1.8, label="ring, outer surface")
+    # motion along the rim is seen by marks in it
+    marks = np.array([[0.93], [1.0]])
+    ax.plot(*xy(marks * outer * circle[:-1:_MARK]), color="0.8", linewidth=1.0)
+    ax.plot(*xy(marks * (moved - shift)[:-1:_MARK] + shift), color=BLACK, linewidth=1.8)
     for name, (centre, radius, colour, text) in bodies.items():
         x, y, turn = _motion(shape, name)
         moved = centre + factor * (x + 1j * y)
@@ -197,13 +197,14 @@ def _motion(shape, name):
     return tuple(float(shape.get(f"{name}: {axis}", 0.0)) for axis in ("x", "y", "rotation"))
 
 
-def _ring_radial(modes, mode):
-    """Compute the radial displacement of the outer surface at the angles of `_CIRCLE`."""
+def _ring_motion(modes, mode):
+    """Compute the displacement of the outer surface at the angles of `_CIRCLE`: radial + i tangential."""
     if "ring_shape_real" not in modes:
         return np.zeros_like(_CIRCLE)
-    n = modes["circumferential"].values
-    value = modes["ring_shape_real"].values[mode] + 1j * modes["ring_shape_imag"].values[mode]
-    return (np.exp(1j * np.outer(_CIRCLE, n)) @ value).real
+    wave = np.exp(1j * np.outer(_CIRCLE, modes["circumferential"].values))
+    parts = (modes[f"{name}_real"].values[mode] + 1j * modes[f"{name}_imag"].values[mode] for name in _RING)
+    radial, tangential = ((wave @ part).real for part in parts)
+    return radial + 1j * tangential
 
 
 def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str) -> Figure:

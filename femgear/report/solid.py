@@ -27,6 +27,12 @@ _MODES = 24
 """Modes that can be chosen."""
 _WAVES = 1e-3
 """Waves around the ring below this share of the largest of a mode are left out."""
+_PIN = 0.6
+"""Radius of a pin over that of the bore of its planet."""
+_AXES = {"x": 1e3, "y": 1e3, "rotation": 1.0}
+"""Coordinates of a body, and what turns them into mm and rad."""
+_HANDS = {"sun": 1, "planet": -1, "ring": -1}
+"""Hand of the teeth over that of the sun: external mates have opposite hands, a ring its planets'."""
 
 
 def solid(
@@ -35,12 +41,16 @@ def solid(
     bodies: Iterable[DeformedBody],
     material: Material,
     modes: xr.Dataset | None = None,
+    *,
+    helix_angle: float = 0.0,
+    backwards: bool = False,
 ) -> dict[str, Any]:
     """Collect what the browser draws of a set in space.
 
     Parameters
     ----------
     planetary_set : PlanetarySet
+        Of helical gears their transverse section.
     grids : dict of str to Grid
         One sector of ``"sun"``, ``"planet"``, ``"ring"``, centred on the origin.
     bodies : iterable of deformed bodies
@@ -48,11 +58,17 @@ def solid(
     material : Material
     modes : xarray.Dataset, optional
         Of modes.nc.
+    helix_angle : float
+        On the reference cylinders [rad], positive where the sun is right-handed.
+    backwards : bool
+        The right flanks of the sun carry: contact runs along the other lines of action.
 
     Returns
     -------
     dict
-        What JSON can hold: lengths in mm, displacements in um, stresses in MPa.
+        What JSON can hold: lengths in mm, displacements in um, stresses in MPa; of modes, displacements in mm
+        and rotations in rad at one amplitude. Sections of a sector turn by its ``twist`` [rad] over the face
+        width, counter-clockwise towards the viewer.
     """
     sectors = {kind: _Sector(grid) for kind, grid in grids.items()}
     found = []
@@ -69,33 +85,35 @@ def solid(
                 "stress": _packed(1e-6 * stress[:, sector.nodes]),
             }
         )
+    gears = (("sun", planetary_set.sun), ("planet", planetary_set.planet), ("ring", planetary_set.ring))
+    packed = {
+        kind: sectors[kind].packed(gear.teeth)
+        | {"twist": _HANDS[kind] * gear.face_width * math.tan(helix_angle) / gear.reference_radius}
+        for kind, gear in gears
+    }
     return {
         "width": 1e3 * planetary_set.sun.face_width,
         "radius": 1e3 * planetary_set.ring.rim_radius,
-        "pins": [1e3 * planetary_set.centre_distance, [float(a) for a in planetary_set.planet_angles]],
-        "sectors": {
-            kind: sectors[kind].packed(gear.teeth)
-            for kind, gear in (
-                ("sun", planetary_set.sun),
-                ("planet", planetary_set.planet),
-                ("ring", planetary_set.ring),
-            )
+        "pins": {
+            "radius": 1e3 * _PIN * float(np.hypot(*sectors["planet"].points.T).min()),
+            "centres": [body["centre"] for body in found if body["kind"] == "planet"],
         },
+        "sectors": packed,
         "bodies": found,
         "modes": [] if modes is None else _modes(modes),
-        "paths": _paths(planetary_set),
+        "paths": _paths(planetary_set, backwards=backwards),
     }
 
 
-def _paths(s: PlanetarySet) -> list[list[float]]:
+def _paths(s: PlanetarySet, *, backwards: bool = False) -> list[list[float]]:
     """Ends (x, y, x, y) [mm] of the paths of contact of all meshes, from the first contact to the last one.
 
     The line of action stands at the working pressure angle to the common tangent of the pitch circles.
     """
-    found = []
+    found, side = [], -1.0 if backwards else 1.0
     for gear, angle, path, sense in (
-        (s.sun, s.working_pressure_angle_sun_planet, s.path_sun_planet, 1.0),
-        (s.ring, s.working_pressure_angle_planet_ring, s.path_planet_ring, -1.0),
+        (s.sun, s.working_pressure_angle_sun_planet, s.path_sun_planet, side),
+        (s.ring, s.working_pressure_angle_planet_ring, s.path_planet_ring, -side),
     ):
         pitch, cosine = gear.base_radius / math.cos(angle), sense * math.cos(angle)
         ends = np.array([[pitch, 0.0]]) + np.array(path)[:, None] * np.array([math.sin(angle), cosine])
@@ -152,26 +170,31 @@ def von_mises(grid: Grid, displacement: np.ndarray, material: Material) -> np.nd
 
 
 def _modes(modes: xr.Dataset) -> list[dict[str, Any]]:
-    """Motions of the bodies and waves around the ring of the first modes that are no rigid motion."""
+    """Motions of the bodies and waves around the ring of the first modes that are no rigid motion.
+
+    In mm and rad: translations of modes.nc are in metres where its rotations are in radians.
+    """
     frequency, names = modes["frequency"].values, [str(name) for name in modes["dof"].values]
     elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))[:_MODES]
     found = []
     for mode in elastic:
         shape = dict(zip(names, modes["shape"].values[:, mode]))
         bodies = dict.fromkeys(name.split(":")[0] for name in names if ": " in name)
-        axes = ("x", "y", "rotation")
-        moved = {body: [float(shape.get(f"{body}: {axis}", 0.0)) for axis in axes] for body in bodies}
+        moved = {
+            body: [factor * float(shape.get(f"{body}: {axis}", 0.0)) for axis, factor in _AXES.items()]
+            for body in bodies
+        }
         title = f"{mode + 1}: {frequency[mode]:.5g} Hz, {modes['kind'].values[mode]}"
         found.append({"title": title, "bodies": moved, "ring": _waves(modes, mode)})
     return found
 
 
 def _waves(modes: xr.Dataset, mode: int) -> list[list[float]]:
-    """Waves around the outer surface of the ring: number, radial and tangential part (real, imaginary)."""
+    """Waves around the outer surface of the ring: number, radial, tangential part [mm] (real, imaginary)."""
     if "ring_shape_real" not in modes:
         return []
     numbers = modes["circumferential"].values
-    parts = np.stack(
+    parts = 1e3 * np.stack(
         [
             modes[f"{name}_{part}"].values[mode]
             for name in ("ring_shape", "ring_tangential_shape")

@@ -26,6 +26,8 @@ WIDTH, SMALL = 8.0, SIZE - 1.5
 """Width of a figure [in] and its smallest text [pt], which is 8 pt on 170 mm of paper."""
 STEMS = 4000
 """Lines of a spectrum that can be told apart, at most."""
+POINTS = 4000
+"""Points of a curve, at most; of more, every step of the abscissa keeps its largest and its smallest."""
 _IDENTICAL, ALIKE = 1e-6, 2e-3
 """Shares of the largest value by which curves differ that are identical, or cannot be told apart."""
 _APART = 0.1
@@ -151,11 +153,51 @@ def _highest(x, amplitude, shown) -> np.ndarray:
     numbers = np.flatnonzero(shown)
     if len(numbers) <= STEMS:
         return numbers
-    column = ((x[numbers] - x[0]) * (STEMS / np.ptp(x))).astype(int)
+    column = np.minimum(((x[numbers] - x[0]) * (STEMS / np.ptp(x))).astype(int), STEMS - 1)
     # the last of a column in ascending order is its highest
     ranked = np.lexsort((amplitude[numbers], column))
     last = np.append(np.diff(column[ranked]) > 0, True)
     return numbers[ranked[last]]
+
+
+def thinned(x, y) -> tuple[np.ndarray, np.ndarray]:
+    """Leave out points of a long curve that lie between the largest and the smallest of every step.
+
+    Steps are of equal numbers of points, far narrower than a pixel of the widest picture. Parts between gaps
+    (nan) stay parts; of more than can be told apart, the highest one of every column is kept. Curves that run
+    backwards stay as they are.
+    """
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    known = np.isfinite(x) & np.isfinite(y)
+    if len(x) <= POINTS or np.any(np.diff(x[known]) < 0.0):
+        return x, y
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    parts = list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+    if len(parts) > STEMS:
+        first = np.array([x[start] for start, _ in parts])
+        highest = np.array([y[start:end].max() for start, end in parts])
+        parts = [parts[i] for i in _highest(first, highest, np.ones(len(parts), bool))]
+    share = POINTS / max(sum(end - start for start, end in parts), 1)
+    kept = [_extremes(y, start, end, max(int(share * (end - start)), 4)) for start, end in parts]
+    gap = np.full(1, np.nan)
+    pieces = [np.append(values[numbers], gap) for values in (x, y) for numbers in kept]
+    if not pieces:
+        return x[:0], y[:0]
+    # no gap after the last part
+    return np.concatenate(pieces[: len(kept)])[:-1], np.concatenate(pieces[len(kept) :])[:-1]
+
+
+def _extremes(y: np.ndarray, start: int, end: int, count: int) -> np.ndarray:
+    """Find the numbers of the points of a part of a curve that are kept, about so many, ends included."""
+    if end - start <= count:
+        return np.arange(start, end)
+    steps = np.linspace(start, end, max(count // 2, 1) + 1).astype(int)
+    kept = [
+        low + place
+        for low, high in zip(steps[:-1].tolist(), steps[1:].tolist())
+        for place in (int(y[low:high].argmin()), int(y[low:high].argmax()))
+    ]
+    return np.unique([start, *kept, end - 1])
 
 
 def mesh_harmonics(ax, step: float, *, words: bool = True) -> None:

@@ -87,7 +87,7 @@ def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset, *, rays: int = _RAYS)
     level = runup["resonance_alone"].values[rows]
     place = runup["resonance_speed"].values[rows], runup["frequency"].values[rows] * 1e-3
     size = 12.0 + 180.0 * level / max(level.max(initial=0.0), np.finfo(float).tiny)
-    ax.scatter(*place, s=size, facecolor="none", edgecolor=BLACK, linewidth=1.3, zorder=3)
+    ax.scatter(*place, s=size, facecolor="none", edgecolor=BLACK, linewidth=1.3, zorder=3, clip_on=False)
     _name_modes(ax, runup.isel(resonance=rows), speed)
     _operating(ax, runup)
     label(ax, "speed of the input [rpm]", "frequency [kHz]")

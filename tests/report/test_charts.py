@@ -10,7 +10,7 @@ import pytest
 
 from femgear.report.charts import chart
 from femgear.report.page import document
-from femgear.report.style import label, new_figure
+from femgear.report.style import label, new_figure, stems
 
 
 def panel(draw, **options):
@@ -53,6 +53,50 @@ def test_long_curves_keep_their_extremes():
     at, found = points(trace)
     assert len(found) <= 4002 and found.max() == 7.0 and found.min() == pytest.approx(y.min(), abs=1e-4)
     assert at[found.argmax()] == pytest.approx(x[54_321], abs=1e-5)
+
+
+@pytest.mark.parametrize("count", (10, 1334, 4000, 30_000))
+def test_lines_of_spectra_stay_lines_however_many_there_are(count):
+    """Every drawn line rises from the floor to its tip; no stem stands higher than one that is drawn."""
+    order, floor = np.arange(1.0, count + 1.0), 1e-4
+    amplitude = np.random.default_rng(3).uniform(2e-4, 1.0, count)
+    amplitude[count // 3] = 5.0
+
+    def draw(ax):
+        stems(ax, order, amplitude, floor, text="lines")
+        ax.set_yscale("log")
+
+    (trace,) = panel(draw)["traces"]
+    x, y = points(trace)
+    rising = np.isfinite(y[:-1]) & np.isfinite(y[1:])
+    at, tip = x[:-1][rising], y[1:][rising]
+    assert len(tip) == (count if count <= 4000 else pytest.approx(4000, abs=2))
+    np.testing.assert_allclose(tip, amplitude[np.rint(at).astype(int) - 1], rtol=1e-5)
+    assert np.all(y[:-1][rising] == floor) and tip.max() == 5.0
+
+
+def test_long_curves_with_gaps_keep_their_parts_and_extremes():
+    x = np.arange(60_001) / 1e4
+    y = np.sin(500 * x)
+    y[[10_000, 10_001, 40_000]] = np.nan
+    y[25_000] = 3.0
+    (trace,) = panel(lambda ax: ax.plot(x, y))["traces"]
+    at, found = points(trace)
+    assert np.isnan(found).sum() == 2 and np.nanmax(found) == 3.0 and 3000 < len(found) < 4100
+    assert np.nanmin(found) == pytest.approx(-1.0, abs=1e-4)
+    known = np.isfinite(found)
+    np.testing.assert_allclose(found[known], y[np.rint(1e4 * at[known]).astype(int)], atol=1e-5)
+
+
+def test_scattered_points_keep_their_sizes():
+    """Areas in pt^2 become diameters in pixels, open ones stay open."""
+
+    def draw(ax):
+        ax.scatter([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], s=[16.0, 64.0, 256.0], facecolor="none", edgecolor="k")
+
+    (trace,) = panel(draw)["traces"]
+    assert trace["marker"]["size"] == pytest.approx([1.2 * 4.0, 1.2 * 8.0, 1.2 * 16.0])
+    assert trace["marker"]["symbol"] == "circle-open" and trace["marker"]["line"]["width"] > 0.0
 
 
 def test_lines_across_bundles_areas_bars_and_stairs():
@@ -115,8 +159,11 @@ def test_words_stand_where_they_stood():
         ax.plot([0.0, 1.0], [0.0, 1.0])
         ax.annotate("peak", (0.5, 0.5), xytext=(0, 7), textcoords="offset points", rotation=90)
         ax.text(0.1, 0.2, "inside", transform=ax.transAxes)
+        ax.set_xlim(0.0, 10.0)
+        ax.annotate("mode 3", (0.1, 0.7), xycoords=("axes fraction", "data"), bbox={"facecolor": "white"})
 
-    peak, inside = panel(draw)["words"]
+    peak, inside, mixed = panel(draw)["words"]
+    assert (mixed["x"], mixed["y"], mixed["ground"]) == (1.0, 0.7, True) and not peak["ground"]
     assert (peak["text"], peak["x"], peak["shift"], peak["angle"]) == ("peak", 0.5, [0.0, -7.0], -90.0)
     assert inside["paper"] and inside["x"] == 0.1
 

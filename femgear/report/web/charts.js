@@ -46,6 +46,8 @@ page.trace = (one, panel, key, seen) => {
   if (one.line) trace.line = { ...one.line, color: page.colour(one.line.color) };
   if (one.mode === "text") trace.textfont = { color: page.colour(one.line.color), size: 11 };
   if (one.marker) trace.marker = { ...one.marker, color: page.colour(one.marker.color) };
+  // markers at the edge of a panel are whole
+  if (one.mode === "markers") trace.cliponaxis = false;
   if (one.fill) { trace.fillcolor = fade(one.fillcolor, one.fillopacity); trace.line = { width: 0 }; trace.mode = "lines"; }
   if (one.type === "heatmap") {
     trace.colorbar = { title: { text: page.clear(one.text), side: "right" }, thickness: 14, len: key.height, y: key.middle };
@@ -59,10 +61,10 @@ page.trace = (one, panel, key, seen) => {
   return trace;
 };
 
-page.axis = (axis, share, other, narrow) => {
+page.axis = (axis, share, other, narrow, pixels) => {
   const found = { domain: share, anchor: other, zeroline: false, gridcolor: page.style("--rule"), linecolor: page.style("--soft"),
     showline: true, ticks: "outside", tickcolor: page.style("--soft"), exponentformat: "power", automargin: true,
-    title: { text: page.clear(axis.title || ""), standoff: 8 }, type: axis.log ? "log" : "linear" };
+    title: { text: page.wrapped(axis.title || "", pixels).text, standoff: 8 }, type: axis.log ? "log" : "linear" };
   if (axis.range) found.range = axis.log ? axis.range.map(Math.log10) : axis.range;
   if (axis.ticks) Object.assign(found, { tickmode: "array", tickvals: axis.ticks, ticktext: axis.texts.map(page.clear) });
   if (axis.log) found.dtick = 1;
@@ -72,38 +74,53 @@ page.axis = (axis, share, other, narrow) => {
   return found;
 };
 
+// room that words at the right end of the panels need beyond it [px]
+page.overhang = (chart, columns, width) => Math.max(20, ...chart.panels.flatMap((panel) => panel.words.map((word) => {
+  if (word.paper || panel.x.hidden || !panel.x.range) return 0;
+  const at = panel.x.log ? Math.log10 : Number, [low, high] = panel.x.range.map(at);
+  const long = word.angle ? 14 : 6.6 * Math.max(...word.text.split("\n").map((line) => line.length));
+  const beyond = { left: long, center: long / 2, right: 0 }[word.align[0]] + word.shift[0];
+  return beyond - (Math.max(0, high - at(word.x)) / (high - low)) * (width / columns) + 6;
+})));
+
 page.arrange = (chart, width) => {
-  const single = width < 620 && chart.columns > 1;
+  const single = width < 620 && chart.columns > 1, hidden = chart.panels.every((panel) => panel.x.hidden);
   const rows = single ? chart.panels.length : chart.rows, columns = single ? 1 : chart.columns;
-  const gaps = { x: 78, y: single ? 86 : 74, left: 70, top: chart.title ? 62 : 36, bottom: 62 };
+  const left = 70, right = page.overhang(chart, columns, width - 90), across = hidden ? 10 : 78;
+  // as much room above the panels as their titles need, and as that of all needs
+  const pixels = (width - left - right + across) / columns - across;
+  const lines = Math.max(1, ...chart.panels.map((panel) => page.wrapped(panel.title, pixels).lines));
+  const title = chart.title ? page.wrapped(chart.title, 0.8 * width) : { text: "", lines: 0 };
+  const gaps = { x: across, y: hidden ? 14 + 16 * lines : (single ? 70 : 58) + 16 * lines, left, right, top: 20 + 16 * lines + (title.lines && 10 + 20 * title.lines), bottom: 62 };
   const ratio = chart.size[1] / chart.size[0];
   const cell = chart.panels[0].square ? Math.min((width - 40) / columns, 460) * 1.02 : single ? 250 : Math.min(Math.max((width * ratio) / rows, 210), 340);
   const height = rows * cell + gaps.top + gaps.bottom;
-  const inner = { w: width - gaps.left - 20, h: height - gaps.top - gaps.bottom };
+  const inner = { w: width - gaps.left - gaps.right, h: height - gaps.top - gaps.bottom };
   const places = chart.panels.map((panel, i) => {
     const [r0, r1, c0, c1] = single ? [i, i + 1, 0, 1] : panel.place;
-    const hidden = panel.x.hidden;
-    const dx = (hidden ? 10 : gaps.x) / inner.w, dy = (hidden ? 46 : gaps.y) / inner.h;
+    const dx = gaps.x / inner.w, dy = gaps.y / inner.h;
     const wide = (1 + dx) / columns, high = (1 + dy) / rows;
     return { x: [c0 * wide, c1 * wide - dx], y: [1 - (r1 * high - dy), 1 - r0 * high] };
   });
-  return { height, places, gaps, inner };
+  return { height, places, gaps, inner, title: title.text };
 };
 
 page.draw = (div) => {
   const chart = page.data.charts[div.dataset.chart], width = Math.max(div.clientWidth, 280);
-  const { height, places, gaps, inner } = page.arrange(chart, width);
+  const { height, places, gaps, inner, title } = page.arrange(chart, width);
   const seen = new Set(), traces = [], notes = [], narrow = width < 620;
-  const layout = { height, width, margin: { l: gaps.left, r: 20, t: gaps.top, b: gaps.bottom }, paper_bgcolor: "rgba(0,0,0,0)",
+  const layout = { height, width, margin: { l: gaps.left, r: gaps.right, t: gaps.top, b: gaps.bottom }, paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: narrow ? 11 : 13, color: page.style("--ink") },
     hovermode: "closest", hoverlabel: { align: "left" }, dragmode: narrow ? false : "zoom",
     legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0 } };
-  if (chart.title) layout.title = { text: page.wrapped(chart.title, width).text, x: 0, xref: "paper", font: { size: 15 } };
+  if (chart.title) layout.title = { text: title, x: 0.01, xref: "container", y: 1, yref: "container", yanchor: "top", pad: { t: 18 }, font: { size: 15 } };
   chart.panels.forEach((panel, i) => {
     const end = i ? String(i + 1) : "", key = { x: "x" + end, y: "y" + end };
     const place = places[i], first = panel.shared ? String(panel.shared + 1) : "";
-    layout["xaxis" + end] = page.axis(panel.x, place.x, key.y, narrow);
-    layout["yaxis" + end] = page.axis(panel.y, place.y, key.x, false);
+    // titles are as long as their axes and the gap beside them; letters of titles are larger than those of words
+    const long = (ends, side, gap) => 0.85 * ((ends[1] - ends[0]) * side + 0.6 * gap);
+    layout["xaxis" + end] = page.axis(panel.x, place.x, key.y, narrow, long(place.x, inner.w, gaps.x));
+    layout["yaxis" + end] = page.axis(panel.y, place.y, key.x, false, long(place.y, inner.h, gaps.y));
     if (panel.shared !== i) layout["xaxis" + end].matches = "x" + first;
     if (panel.square) Object.assign(layout["yaxis" + end], { scaleanchor: key.x, constrain: "domain" });
     key.height = place.y[1] - place.y[0];
@@ -120,13 +137,14 @@ page.draw = (div) => {
       const at = (value, axis) => (axis.log && !word.paper ? Math.log10(value) : value);
       notes.push({ text: page.clear(word.text), ...own, x: at(word.x, panel.x), y: at(word.y, panel.y), showarrow: false, textangle: word.angle,
         xanchor: align[word.align[0]], yanchor: high[word.align[1]] || "middle", xshift: word.shift[0], yshift: -word.shift[1],
-        font: { size: 11, color: page.colour(word.color) } });
+        font: { size: 11, color: page.colour(word.color) }, bgcolor: word.ground ? page.style("--paper") : undefined });
     });
   });
   layout.annotations = notes;
   layout.showlegend = seen.size > 1;
   Plotly.react(div, traces, layout, { displaylogo: false, responsive: false, displayModeBar: "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] });
+  div.style.minHeight = "";
   div.dataset.drawn = String(width);
 };
 

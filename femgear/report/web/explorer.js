@@ -40,32 +40,38 @@ page.explorer = (root) => {
     const re = lines[name][2 * (i * count + k)], im = lines[name][2 * (i * count + k) + 1];
     return { order, re, im, size: Math.hypot(re, im), hertz: order * data.carrier[i] };
   });
-  const look = (title) => ({ paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 62, r: 14, t: 34, b: 50 }, height: 330,
+  const look = (title) => ({ paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 62, r: 14, t: 34, b: 50 }, height: 330, width: part("level").clientWidth,
     font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: 12, color: page.style("--ink") }, showlegend: false, hovermode: "closest",
-    title: { text: page.wrapped(title, root.clientWidth > 800 ? root.clientWidth / 2 - 80 : root.clientWidth - 70).text, x: 0, xref: "paper", font: { size: 13 } } });
+    title: { text: page.wrapped(title, part("level").clientWidth - 76).text, x: 0, xref: "paper", font: { size: 13 } } });
   const axis = (title, more) => ({ title: { text: title }, gridcolor: page.style("--rule"), linecolor: page.style("--soft"), showline: true, zeroline: false,
     exponentformat: "power", automargin: true, ...(more.type === "log" ? { dtick: 1 } : { tickformat: ",~r" }), ...more });
   const quiet = { displaylogo: false, responsive: false, displayModeBar: false };
   const top = Math.max(...data.mesh) * (data.harmonics + 0.5), speeds = [data.speed[0], data.speed[data.speed.length - 1]];
 
+  const below = { showlegend: true, height: 390, legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom" }, margin: { l: 62, r: 14, t: 34, b: 110 } };
   const campbell = () => {
-    const traces = data.modes.map(([number, hertz, kind, colour]) => ({ x: speeds, y: [hertz, hertz], mode: "lines", line: { color: page.colour(colour), width: 1.2 },
-      hovertemplate: `mode ${number}: ${hertz.toFixed(1)} Hz<br>${page.clear(kind)}<extra></extra>` }));
+    const first = new Set();
+    const traces = data.modes.map(([number, hertz, kind, colour]) => {
+      const showlegend = !first.has(kind);
+      first.add(kind);
+      return { x: speeds, y: [hertz, hertz], mode: "lines", name: page.clear(kind), legendgroup: kind, showlegend,
+        line: { color: page.colour(colour), width: 1.4, dash: kind.startsWith("ring, ") ? "dash" : "solid" },
+        hovertemplate: `mode ${number}: ${hertz.toFixed(1)} Hz<br>${page.clear(kind)}<extra></extra>` };
+    });
     for (let h = 1; h <= data.harmonics; h++) {
-      traces.push({ x: data.speed, y: data.mesh.map((one) => h * one), mode: "lines", line: { color: page.colour("#808080"), width: 1, dash: "dot" },
-        hovertemplate: `mesh harmonic ${h}<br>%{x:.5g} rpm, %{y:.5g} Hz<extra></extra>` });
+      traces.push({ x: data.speed, y: data.mesh.map((one) => h * one), mode: "lines", name: "mesh harmonics", legendgroup: "mesh harmonics", showlegend: h === 1,
+        line: { color: page.colour("#808080"), width: 1, dash: "dot" }, hovertemplate: `mesh harmonic ${h}<br>%{x:.5g} rpm, %{y:.5g} Hz<extra></extra>` });
     }
-    const met = data.resonances.filter((one) => one[4] <= data.harmonics);
-    traces.push({ x: met.map((one) => one[0]), y: met.map((one) => one[1]), mode: "markers",
-      marker: { symbol: "circle-open", size: 9, color: page.colour("#d55e00"), line: { width: 2 } },
-      text: met.map(([rpm, hertz, mode, kind, h]) => `${rpm.toFixed(1)} rpm: mode ${mode} (${page.clear(kind)})<br>${hertz.toFixed(1)} Hz, mesh harmonic ${h}`),
+    // circles have areas over the least one in proportion to the level by that mode at that harmonic alone
+    const met = data.resonances.filter((one) => one[4] <= data.harmonics), loudest = Math.max(...met.map((one) => one[5] || 0), 1e-300);
+    traces.push({ x: met.map((one) => one[0]), y: met.map((one) => one[1]), mode: "markers", showlegend: false, name: "resonances",
+      marker: { symbol: "circle-open", size: met.map((one) => Math.sqrt(20 + (300 * (one[5] || 0)) / loudest)), color: page.colour("#d55e00"), line: { width: 2 } },
+      text: met.map(([rpm, hertz, mode, kind, h, alone]) => `${rpm.toFixed(1)} rpm: mode ${mode} (${page.clear(kind)})<br>${hertz.toFixed(1)} Hz, mesh harmonic ${h}`
+        + (alone === undefined ? "" : `<br>alone ${alone.toPrecision(3)} m/s² r.m.s.`)),
       hovertemplate: "%{text}<extra></extra>" });
-    traces.push({ x: [], y: [], mode: "markers", marker: { size: 8, color: page.colour("#d55e00") }, hoverinfo: "skip" });
-    const kinds = [...new Map(data.modes.map((one) => [one[2], one[3]]))];
-    const layout = look("Modes, mesh orders and their resonances (circles)");
-    layout.annotations = kinds.map(([kind, colour], i) => ({ text: page.clear(kind), xref: "paper", yref: "paper", x: 0.01 + (i % 3) * 0.34, y: 0.99 - Math.floor(i / 3) * 0.06,
-      xanchor: "left", yanchor: "top", showarrow: false, font: { color: page.colour(colour), size: 11 }, bgcolor: page.style("--paper") }));
-    Plotly.react(part("campbell"), traces, { ...layout, xaxis: axis("speed [rpm]", { range: speeds }), yaxis: axis("frequency [Hz]", { range: [0, top] }) }, quiet);
+    traces.push({ x: [], y: [], mode: "markers", showlegend: false, marker: { size: 8, color: page.colour("#d55e00") }, hoverinfo: "skip" });
+    Plotly.react(part("campbell"), traces, { ...look("Modes, mesh orders and their resonances (circles, larger for a higher level of that mode alone)"), ...below,
+      xaxis: axis("speed [rpm]", { range: speeds }), yaxis: axis("frequency [Hz]", { range: [0, top] }) }, quiet);
   };
   // an axis of levels with its lower end, some decades or the same in decibels below the largest value
   const scaled = (largest, decades, sum) => chosen().reference
@@ -100,7 +106,7 @@ page.explorer = (root) => {
       const beside = data.order[k] - h * data.teeth, name = `${data.order[k]} = ${h}·${data.teeth}${beside ? (beside > 0 ? " + " : " − ") + Math.abs(beside) : ""}`;
       return { x: data.speed, y: all.map((one) => shownOf([one[k]])), name, mode: "lines", line: { color: page.colour(colours[i]), width: 1.6 }, hovertemplate: `order ${name}<br>%{x:.5g} rpm: %{y:.4g}<extra></extra>` };
     });
-    Plotly.react(part("cuts"), traces, { ...look("Order cuts"), height: 390, showlegend: true, legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom" }, margin: { l: 62, r: 14, t: 34, b: 110 },
+    Plotly.react(part("cuts"), traces, { ...look("Order cuts"), ...below,
       xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(finite([...bands.values()].map((k) => peak[k])), 4, false).axis }, quiet);
   };
   const waterfall = () => {

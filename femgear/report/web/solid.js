@@ -4,6 +4,10 @@
 page.solid = () => {
   const model = page.data.solid, place = document.getElementById("solid-place");
   if (!model || !place) return;
+  if (!model.pins.centres) {
+    place.textContent = "An older femgear wrote these results, with other units of the modes: femgear run draws the set.";
+    return;
+  }
   const unpack = ({ unit, values }) => {
     const bytes = Uint8Array.from(atob(values), (letter) => letter.charCodeAt(0));
     return Float32Array.from(new Int16Array(bytes.buffer), (whole) => whole * unit);
@@ -32,41 +36,57 @@ page.solid = () => {
   };
   const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
 
-  // all copies of a sector, in the frame of the set
-  const bodies = model.bodies.map((body) => {
-    const sector = model.sectors[body.kind], each = sector.points.length / 2, count = sector.count;
-    const rest = new Float32Array(2 * each * count), moved = unpack(body.displacement), field = new Float32Array(moved.length);
-    const triangles = [], walls = [];
+  // all copies of a sector in the frame of the set: both faces, and walls in layers that turn along the helix
+  const LAYER = 0.06;
+  const solidOf = (sector, body, field, stress) => {
+    const each = sector.points.length / 2, count = sector.count, twist = sector.twist || 0;
+    const layers = Math.max(1, Math.ceil(Math.abs(twist) / LAYER)), wall = [...new Set(sector.edges)], rank = new Map(wall.map((i, k) => [i, k]));
+    const faces = 2 * each * count, across = wall.length * count, size = faces + (layers + 1) * across;
+    const rest = new Float32Array(2 * size), moved = new Float32Array(2 * size), position = new Float32Array(3 * size);
+    const node = new Int32Array(size), index = [];
+    const place = (to, k, i, share) => {
+      const turn = (2 * Math.PI * k) / count + body.angle + share * twist, c = Math.cos(turn), s = Math.sin(turn), at = 2 * (k * each + i);
+      const x = sector.points[2 * i], y = sector.points[2 * i + 1];
+      rest[2 * to] = body.centre[0] + c * x - s * y;
+      rest[2 * to + 1] = body.centre[1] + s * x + c * y;
+      moved[2 * to] = c * field[at] - s * field[at + 1];
+      moved[2 * to + 1] = s * field[at] + c * field[at + 1];
+      position[3 * to + 2] = share * model.width;
+      node[to] = k * each + i;
+    };
     for (let k = 0; k < count; k++) {
-      const turn = (2 * Math.PI * k) / count + body.angle, c = Math.cos(turn), s = Math.sin(turn);
       for (let i = 0; i < each; i++) {
-        const x = sector.points[2 * i], y = sector.points[2 * i + 1], at = 2 * (k * each + i);
-        rest[at] = body.centre[0] + c * x - s * y;
-        rest[at + 1] = body.centre[1] + s * x + c * y;
-        field[at] = c * moved[at] - s * moved[at + 1];
-        field[at + 1] = s * moved[at] + c * moved[at + 1];
+        place(k * each + i, k, i, 0.5);
+        place(each * count + k * each + i, k, i, -0.5);
       }
-      for (const i of sector.triangles) triangles.push(k * each + i);
-      for (const i of sector.edges) walls.push(k * each + i);
+      for (let layer = 0; layer <= layers; layer++) {
+        wall.forEach((i, j) => place(faces + layer * across + k * wall.length + j, k, i, 0.5 - layer / layers));
+      }
+      for (let i = 0; i < sector.triangles.length; i += 3) {
+        const [a, b, d] = sector.triangles.slice(i, i + 3).map((one) => k * each + one), back = each * count;
+        index.push(a, b, d, back + a, back + d, back + b);
+      }
+      for (let i = 0; i < sector.edges.length; i += 2) {
+        for (let layer = 0; layer < layers; layer++) {
+          const [a, b] = [sector.edges[i], sector.edges[i + 1]].map((one) => faces + layer * across + k * wall.length + rank.get(one));
+          index.push(a, across + a, b, b, across + a, across + b);
+        }
+      }
     }
-    const nodes = each * count, index = [], half = model.width / 2;
-    for (let i = 0; i < triangles.length; i += 3) {
-      const [a, b, d] = triangles.slice(i, i + 3);
-      index.push(a, b, d, nodes + a, nodes + d, nodes + b);
-    }
-    for (let i = 0; i < walls.length; i += 2) {
-      const [a, b] = walls.slice(i, i + 2);
-      index.push(2 * nodes + a, 3 * nodes + a, 2 * nodes + b, 2 * nodes + b, 3 * nodes + a, 3 * nodes + b);
-    }
-    const position = new Float32Array(12 * nodes), colour = new Float32Array(12 * nodes);
-    for (let i = 0; i < 4 * nodes; i++) position[3 * i + 2] = i % (2 * nodes) < nodes ? half : -half;
-    const shape = new THREE.BufferGeometry();
+    const shape = new THREE.BufferGeometry(), colour = new Float32Array(3 * size);
     shape.setIndex(index);
     shape.setAttribute("position", new THREE.BufferAttribute(position, 3));
     shape.setAttribute("color", new THREE.BufferAttribute(colour, 3));
     group.add(new THREE.Mesh(shape, new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true })));
-    return { ...body, rest, field, stress: unpack(body.stress), nodes, shape, position, colour };
-  });
+    return { ...body, rest, field: moved, stress: Float32Array.from(node, (i) => stress[i]), size, nodes: each * count, shape, position, colour };
+  };
+  const bodies = model.bodies.map((body) => solidOf(model.sectors[body.kind], { about: body.centre, ...body }, unpack(body.displacement), unpack(body.stress)));
+  // the carrier is seen by its pins, which turn about the centre of the set
+  const rim = Array.from({ length: 25 }, (_, i) => (i ? [Math.cos((i * Math.PI) / 12), Math.sin((i * Math.PI) / 12)].map((one) => one * model.pins.radius) : [0, 0])).flat();
+  const round = Array.from({ length: 24 }, (_, i) => [i + 1, ((i + 1) % 24) + 1]);
+  const pin = { count: 1, points: rim, triangles: round.flatMap((one) => [0, ...one]), edges: round.flat() };
+  const still = new Float32Array(rim.length);
+  model.pins.centres.forEach((centre) => bodies.push(solidOf(pin, { name: "carrier", kind: "pin", centre, angle: 0, about: [0, 0] }, still, still)));
 
   // paths of contact and, thinner, their lines of action, in front of the faces
   const stroke = (a, b, c, d, width) => {
@@ -83,31 +103,24 @@ page.solid = () => {
   group.add(new THREE.Mesh(strokes, new THREE.MeshLambertMaterial({ color: 0x000000, emissive: 0x0072b2 })));
 
   const move = (body, field, factor) => {
-    for (let copy = 0; copy < 4; copy++) {
-      for (let i = 0; i < body.nodes; i++) {
-        const to = 3 * (copy * body.nodes + i);
-        body.position[to] = body.rest[2 * i] + factor * field[2 * i];
-        body.position[to + 1] = body.rest[2 * i + 1] + factor * field[2 * i + 1];
-      }
+    for (let i = 0; i < body.size; i++) {
+      body.position[3 * i] = body.rest[2 * i] + factor * field[2 * i];
+      body.position[3 * i + 1] = body.rest[2 * i + 1] + factor * field[2 * i + 1];
     }
     body.shape.attributes.position.needsUpdate = true;
   };
   const paint = (body, values, largest) => {
-    for (let i = 0; i < body.nodes; i++) {
-      const colour = tint(values[i] / largest).map(linear);
-      for (let copy = 0; copy < 4; copy++) body.colour.set(colour, 3 * (copy * body.nodes + i));
-    }
+    for (let i = 0; i < body.size; i++) body.colour.set(tint(values[i] / largest).map(linear), 3 * i);
     body.shape.attributes.color.needsUpdate = true;
   };
   const sizes = (field) => Float32Array.from({ length: field.length / 2 }, (_, i) => Math.hypot(field[2 * i], field[2 * i + 1]));
 
-  // motion of every node in a mode: rigid bodies, and the ring by its waves as a thin bent beam
+  // motion of every node in a mode [mm]: rigid bodies, and the ring by its waves as a thin bent beam
   const modal = (mode, body) => {
-    const field = new Float32Array(2 * body.nodes), [x, y, turn] = mode.bodies[body.name] || [0, 0, 0];
-    const carrier = mode.bodies.carrier || [0, 0, 0], own = body.name in mode.bodies;
-    for (let i = 0; i < body.nodes; i++) {
-      const px = body.rest[2 * i], py = body.rest[2 * i + 1], dx = px - body.centre[0], dy = py - body.centre[1];
-      let u = own ? x - turn * dy : carrier[0], v = own ? y + turn * dx : carrier[1];
+    const field = new Float32Array(2 * body.size), [x, y, turn] = mode.bodies[body.name] || [0, 0, 0];
+    for (let i = 0; i < body.size; i++) {
+      const px = body.rest[2 * i], py = body.rest[2 * i + 1];
+      let u = x - turn * (py - body.about[1]), v = y + turn * (px - body.about[0]);
       if (body.kind === "ring" && mode.ring.length) {
         const angle = Math.atan2(py, px), depth = Math.hypot(px, py) - radius;
         let radial = 0, along = 0, slope = 0;
@@ -144,11 +157,12 @@ page.solid = () => {
     if (choice < 2) {
       state.fields = bodies.map((body) => body.field);
       const values = bodies.map((body, i) => (choice ? sizes(state.fields[i]) : body.stress));
-      const all = Float32Array.from(values.flatMap((one) => [...one])).sort(), top = all[all.length - 1];
+      const all = Float32Array.from(values.flatMap((one, i) => (bodies[i].kind === "pin" ? [] : [...one.subarray(0, bodies[i].nodes)]))).sort(), top = all[all.length - 1];
       // the stress under a point load has no bound: the colours end where three of ten thousand nodes lie above
       const largest = (choice ? top : all[Math.floor(0.9997 * all.length)]) || 1;
       bodies.forEach((body, i) => paint(body, values[i], largest));
-      legend(choice ? "displacement [µm]" : "von Mises stress [MPa]", `${choice ? "" : "above "}${largest.toPrecision(3)}`);
+      const plane = Object.values(model.sectors).some((sector) => sector.twist) ? ", of the transverse section, turned along the helix" : "";
+      legend(choice ? "displacement [µm]" : "von Mises stress [MPa]", `${choice ? "" : "above "}${largest.toPrecision(3)}${plane}`);
       state.factor = (0.03 * radius) / Math.max(...state.fields.map((field) => sizes(field).reduce((a, b) => Math.max(a, b), 1e-12)));
     } else {
       state.fields = bodies.map((body) => modal(model.modes[choice - 2], body));
@@ -186,14 +200,32 @@ page.solid = () => {
     camera.lookAt(0, 0, 0);
     renderer.render(scene, camera);
   });
-  new ResizeObserver(() => {
+  const fit = () => {
     const { clientWidth: w, clientHeight: h } = place;
     renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     renderer.setSize(w, h, false);
     camera.aspect = w / h;
+    // a narrow view shows the whole width of the set
+    camera.fov = 32 / Math.min(1, camera.aspect);
     camera.updateProjectionMatrix();
     renderer.render(scene, camera);
-  }).observe(place);
+  };
+  new ResizeObserver(fit).observe(place);
+  // paper shows what was drawn last: a plain copy stands for the canvas, whose picture may come too late
+  const copy = document.createElement("canvas");
+  addEventListener("beforeprint", () => {
+    place.append(copy);
+    renderer.domElement.style.display = "none";
+    fit();
+    [copy.width, copy.height] = [renderer.domElement.width, renderer.domElement.height];
+    copy.getContext("2d").drawImage(renderer.domElement, 0, 0);
+  });
+  addEventListener("afterprint", () => {
+    copy.remove();
+    renderer.domElement.style.display = "";
+    setTimeout(fit);
+  });
   choose();
+  place.solid = { bodies, state };
 };
 page.parts.push(page.solid);

@@ -58,6 +58,7 @@ from femgear.report.style import (
     new_figure,
     rpm,
     stems,
+    thinned,
 )
 from femgear.report.waterfall import KIND_COLOURS, RUNUP_CAPTIONS, runup_figures
 from femgear.storage.files import write_text
@@ -205,21 +206,20 @@ def _strongest_bands(housing: xr.Dataset) -> list[int]:
 def housing_signal(housing: xr.Dataset) -> Figure:
     """Draw acceleration, velocity and displacement of the sensor of housing.nc at its first speed.
 
-    Over one carrier revolution, or as many as there are until all repeats, the largest and smallest value
-    within a mesh period, and the signal itself over four mesh periods about the largest acceleration.
+    Over one carrier revolution, or as many as there are until all repeats, and over four mesh periods about
+    the largest acceleration.
     """
     lines = stored_lines(housing.isel(speed=0))
     signal, teeth = fixed_sensor_signal(lines), lines.z_ring * lines.turns
     figure, axes = new_figure(rows=3, columns=2, height=6.2, sharex="col")
-    period, turn = len(signal.revolution) // teeth, np.arange(teeth + 1) / lines.z_ring
+    period = len(signal.revolution) // teeth
+    turn = lines.turns * np.arange(teeth * period + 1) / (teeth * period)
     middle = int(np.abs(signal.acceleration).argmax())
     shown = (middle + np.arange(-2 * period, 2 * period + 1)) % len(signal.revolution)
     time = 1e3 * float(signal.seconds[1]) * np.arange(len(shown))
     for (left, right), (name, unit, factor) in zip(zip(axes[::2], axes[1::2]), _QUANTITIES):
         values = factor * getattr(signal, name)
-        # a period has a whole number of samples; the last value closes the steps
-        each = values.reshape(teeth, period)[[*range(teeth), -1]]
-        left.fill_between(turn, each.min(axis=1), each.max(axis=1), color=BLUE, step="post", linewidth=1.0)
+        left.plot(*thinned(turn, np.append(values, values[0])), color=BLUE, linewidth=1.0, label="_")
         right.plot(time, values[shown], color=BLUE, linewidth=1.1, label="_")
         around = values - values.mean()
         size = f"{np.sqrt(np.mean(around**2)):.4g} {unit} r.m.s., {np.ptp(values):.4g} peak to peak"
@@ -568,9 +568,9 @@ FIGURES = STATIC | {
         {
             "housing_signal": (
                 "Acceleration, velocity and displacement of the fixed point during one carrier revolution "
-                "({}): largest and smallest value within a mesh period, and four mesh periods about the "
-                "largest acceleration. The displacement is mostly the static deflection that turns with the "
-                "carrier, the acceleration the meshes. With errors that turn, until all repeats."
+                "({}), and during four mesh periods about the largest acceleration. The displacement is "
+                "mostly the static deflection that turns with the carrier, the acceleration the meshes. With "
+                "errors that turn, until all repeats."
             ),
             "order_spectrum": (
                 "Lines at the fixed sensor ({}): a wave of n nodal diameters at mesh harmonic h is heard at "

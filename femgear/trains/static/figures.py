@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,15 +17,16 @@ import numpy as np
 
 from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.sections import Case
-from femgear.contact.bodies import Sectors, make_sectors
+from femgear.contact.bodies import Sector, Sectors, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
-from femgear.contact.tooth_loads import deformed_set
+from femgear.contact.tooth_loads import DeformedBody, deformed_set
+from femgear.fe.compliance import mirror_nodes
 from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.gears.deviations import SetDeviations, loaded_flanks
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import form_deviation
 from femgear.gears.planetary import GearSet
-from femgear.report.scene import Body, View, assemble_set, deformed_picture, placed, whole_field, write_vtu
+from femgear.report.scene import View, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.solid import SOLID, solid
 from femgear.report.style import (
     ALIKE,
@@ -637,18 +637,19 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     if static is None or not static.cycle.force.any():
         return []
 
-    gears, cycle = _left_flanks_loaded(static, case, drawn.cache)
-    sectors = picture_sectors(drawn, gears)
+    gears, backwards = static.planetary_set, static.sun_torque < 0
+    loaded, order, cycle = _left_flanks_loaded(static, case, drawn.cache)
+    sectors = picture_sectors(drawn, loaded)
     of_kind = {sector.gear.name: sector for sector in sectors.gears}
-    bodies, deformed = [], deformed_set(gears, sectors, cycle)
+    bodies, deformed = [], deformed_set(loaded, sectors, cycle)
+    if backwards:
+        deformed = [_reflected(body, of_kind[body.kind], order) for body in deformed]
     for body in deformed:
         sector = of_kind[body.kind]
         count = sector.gear.teeth
         numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
         moved = whole_field(np.asarray(body.displacement), numbers)
         bodies.append(placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=moved))
-    if static.sun_torque < 0:
-        bodies = [_reflected(body) for body in bodies]
     grid = assemble_set(bodies)
     write_vtu(grid, folder / "deformed_set.vtu")
     title = f"{static.sun_torque:.4g} N m on {gears.gears[0].name.replace('_', ' ')}".replace("-", "−")
@@ -660,7 +661,8 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     if len(gears.kinds) == 1:
         return ["deformed_set.vtu", "deformed_set.png"]
     grids = {kind: sector.grid for kind, sector in of_kind.items()}
-    model = solid(gears, grids, deformed, material_of(case), drawn.data.get("modes"))
+    look: Any = {"helix_angle": case.helix_angle or 0.0, "backwards": backwards}
+    model = solid(gears, grids, deformed, material_of(case), drawn.data.get("modes"), **look)
     write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SOLID)
     return ["deformed_set.vtu", "deformed_set.png", SOLID]
 
@@ -675,10 +677,15 @@ def _mesh_views(gears: GearSet) -> list[View]:
     return views
 
 
-def _left_flanks_loaded(static: StaticResult, case: Case, cache: Path | None = None) -> tuple[Any, MeshCycle]:
-    """The set and its static state at position zero; of a negative torque those of the mirror image."""
+def _left_flanks_loaded(
+    static: StaticResult, case: Case, cache: Path | None = None
+) -> tuple[Any, np.ndarray, MeshCycle]:
+    """The set, its planets in the order of the original, and its static state at position zero.
+
+    Of a negative torque those of the mirror image.
+    """
     if static.sun_torque >= 0:
-        return static.planetary_set, static.cycle
+        return static.planetary_set, np.arange(static.planetary_set.n_planets), static.cycle
     gears, order, deviations = loaded_image(static.planetary_set, static.sun_torque, set_deviations(case))
     width = over_width(case, static.planetary_set, cache=cache)
     cycle = walk_mesh_cycle(
@@ -691,17 +698,23 @@ def _left_flanks_loaded(static: StaticResult, case: Case, cache: Path | None = N
         supports=static_supports(case),
         options=CycleOptions(both_flanks=case.static.back_flanks, **width).mirrored(order),
     )
-    return gears, cycle
+    return gears, order, cycle
 
 
-def _reflected(body: Body) -> Body:
-    """Turn a body to be seen from behind: y reversed, and the triangles turned round with it."""
-    flip = np.array([1.0, -1.0])
-    return replace(
-        body,
-        points=body.points * flip,
-        displacement=body.displacement * flip,
-        triangles=body.triangles[:, [0, 2, 1, 5, 4, 3]],
+def _reflected(body: DeformedBody, sector: Sector, order: np.ndarray) -> DeformedBody:
+    """Turn a body of the mirror image to be seen from behind, as that of the set itself.
+
+    Teeth are numbered the other way round; planet n of the image is planet ``order[n]`` of the set.
+    """
+    kind, _, number = body.name.partition(" ")
+    moved, image = np.asarray(body.displacement), mirror_nodes(sector.grid)
+    teeth = -np.arange(len(moved)) % len(moved)
+    return DeformedBody(
+        f"{kind} {order[int(number) - 1] + 1}" if number.isdecimal() and len(order) > 1 else body.name,
+        body.kind,
+        body.centre * np.array([1.0, -1.0]),
+        -body.angle,
+        moved[teeth][:, image] * np.array([1.0, -1.0]),
     )
 
 

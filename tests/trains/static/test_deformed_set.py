@@ -35,8 +35,8 @@ def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members, more):
     }
     case = with_values(read_case(CASE), changes)
     static = solve_static(case)
-    gears, cycle = _left_flanks_loaded(static, case)
-    order = mirrored_set(static.planetary_set)[1]
+    gears, order, cycle = _left_flanks_loaded(static, case)
+    assert order.tolist() == list(mirrored_set(static.planetary_set)[1])
     start = int(np.argmin(np.abs(static.cycle.position)))
     force = static.cycle.force[:, start]
     assert np.ptp(force[:3]) > 0.05 * force[:3].mean()
