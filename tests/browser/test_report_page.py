@@ -1,12 +1,15 @@
 """The page of a run of every train in Chromium: silent, without requests, accessible, drawn and heard."""
 
+import json
 import math
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from femgear.cli import main
+from femgear.run import open_results
 from femgear.trains.reading import read_case, to_toml, with_value
 
 pytest.importorskip("playwright", reason="make test-browser installs it")
@@ -17,6 +20,24 @@ DEMO = "planetary_27_40_108"
 TRAINS = (DEMO, "nrel_pgb", "helical_30_20_70", "four_stage_reducer", "grc_like_drivetrain", "gear_pair")
 WIDTHS = (1400, 420)
 DRAW = "document.querySelectorAll('.chart').forEach(page.draw)"
+CUT = """() => [...document.querySelectorAll('.chart, .pair > div')].flatMap((div) => {
+    const boxOf = (one) => one.getBoundingClientRect(), frame = boxOf(div.querySelector('.main-svg'));
+    const outside = (one) => one.width && (one.left < frame.left - 1 || one.right > frame.right + 1
+        || one.top < frame.top - 1 || one.bottom > frame.bottom + 1);
+    const texts = [...div.querySelectorAll('.annotation-text, .xtick text, .ytick text, .infolayer text')];
+    const cut = texts.filter((one) => outside(boxOf(one))).map((one) => one.textContent);
+    const titles = [...div.querySelectorAll("text[class^='x'][class$='title']")].map(boxOf);
+    const meet = (a, b) => a.width && b.width && a.left < b.right - 1 && b.left < a.right - 1
+        && a.top < b.bottom - 1 && b.top < a.bottom - 1;
+    const over = titles.filter((a, i) => titles.slice(0, i).some((b) => meet(a, b))).map(() => 'titles meet');
+    return [...cut, ...over].map((text) => `${div.dataset.chart || div.dataset.part}: ${text}`); })"""
+"""Words of charts that stand outside of their frames, and titles of axes that cover one another."""
+EMPTY = """() => Object.entries(page.data.charts || {}).flatMap(([name, { panels }]) => {
+    const known = (y, i) => i && Number.isFinite(y[i]) && Number.isFinite(y[i - 1]);
+    const traces = panels.flatMap((panel) => panel.traces);
+    const curves = traces.filter((one) => (one.mode || '').includes('lines'));
+    return curves.filter(({ y }) => y.length > 1 && !y.some((_, i) => known(y, i))).map(() => name); })"""
+"""Curves of which nothing would be drawn."""
 
 
 @pytest.fixture(scope="session")
@@ -85,6 +106,8 @@ def test_page_is_drawn_and_accessible(opened, name, width, scheme):
     for chart in charts.all():
         assert chart.locator(".main-svg").count() > 0 and chart.locator(".trace, .hm image").count() > 0
     assert tab.evaluate("document.documentElement.scrollWidth") <= width
+    assert tab.evaluate(EMPTY) == []
+    assert tab.evaluate(CUT) == []
     found = Axe().run(tab, options={"resultTypes": ["violations"]}).response["violations"]
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
 
@@ -95,10 +118,70 @@ def test_paper_shows_every_chart_and_every_column(opened, name):
     tab.emulate_media(media="print")
     tab.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert tab.locator(".chart:not([data-drawn])").count() == 0
-    cut = """[...document.querySelectorAll('main table, .chart')].filter(
-        (one) => one.getBoundingClientRect().right > document.documentElement.clientWidth + 1).length"""
-    assert tab.evaluate(cut) == 0
+    # what was drawn for a wide screen is as wide as paper, and nothing is squashed
+    cut = """[...document.querySelectorAll('main :is(table, .chart, svg, canvas, img)')].filter((one) => {
+        const { left, right, width } = one.getBoundingClientRect();
+        const paper = document.body.getBoundingClientRect();
+        return width && (right > paper.right + 1 || left < paper.left - 1);
+    }).map((one) => one.outerHTML.slice(0, 80))"""
+    assert tab.evaluate(cut) == []
+    assert tab.evaluate("document.body.getBoundingClientRect().width") < 18.6 * 96 / 2.54
+    squashed = """[...document.querySelectorAll('#solid-place canvas')].filter((one) => one.clientWidth
+        && Math.abs(one.clientWidth / one.clientHeight - one.width / one.height) > 0.01).length"""
+    assert tab.evaluate(squashed) == 0
+    assert tab.evaluate(CUT) == []
     assert len(tab.pdf()) > 10_000
+
+
+@pytest.mark.parametrize("width", (1400, 1024, 768, 400))
+def test_nothing_of_the_first_screen_is_cut(opened, width):
+    tab = opened(DEMO, width)
+    cut = """() => [...document.querySelectorAll('.top, .top *, h1, nav a')].filter((one) => {
+        const { left, right } = one.getBoundingClientRect();
+        return right > document.documentElement.clientWidth + 1 || left < -1
+            || (one.matches('.wide') && one.scrollWidth > one.clientWidth + 1);
+    }).map((one) => one.outerHTML.slice(0, 80))"""
+    assert tab.evaluate(cut) == []
+    box = tab.locator("#solid-place canvas").bounding_box()
+    assert box["y"] + box["height"] < 900 and box["width"] > 0.35 * min(width, 1152) and box["height"] > 230
+
+
+def test_modes_in_space_move_bodies_as_modes_nc_says(opened, report):
+    """Largest motion of the vertices of every body over the largest of all, at every mode that is shown."""
+    folder = report(DEMO).parent
+    modes, model = open_results(folder)["modes"], json.loads((folder / "solid.json").read_text("utf-8"))
+    tab = opened(DEMO)
+    moved = """(choice) => { const chooser = document.getElementById('solid-view'), found = {};
+        chooser.value = String(choice); chooser.dispatchEvent(new Event('change'));
+        const { bodies, state } = document.getElementById('solid-place').solid;
+        for (const body of bodies) for (let i = 0; i < body.size; i++) {
+            const [x, y] = [0, 1].map((k) => body.position[3 * i + k] - body.rest[2 * i + k]);
+            const radius = Math.hypot(body.rest[2 * i] - body.about[0], body.rest[2 * i + 1] - body.about[1]);
+            const [largest, reach] = found[body.name] || [0, 0], size = Math.hypot(x, y) / state.factor;
+            if (body.kind !== 'ring' || radius > 0.9999 * page.data.solid.radius)
+                found[body.name] = [Math.max(largest, size), Math.max(reach, radius)]; }
+        return found; }"""
+    for choice, mode in enumerate(model["modes"], start=2):
+        number = int(mode["title"].split(":")[0]) - 1
+        shape = dict(zip(modes["dof"].values.tolist(), modes["shape"].values[:, number].tolist()))
+        found = tab.evaluate(moved, choice)
+        wanted = {}
+        for name, (_, reach) in found.items():
+            x, y, turn = (shape.get(f"{name}: {axis}", 0.0) for axis in ("x", "y", "rotation"))
+            wanted[name] = 1e3 * math.hypot(x, y) + abs(turn) * reach
+        wanted["ring"] = 1e3 * outer_surface(modes.isel(mode=number))
+        largest = max(wanted.values())
+        for name, (size, _) in found.items():
+            assert size == pytest.approx(wanted[name], rel=0.03, abs=2e-3 * largest), (mode["title"], name)
+
+
+def outer_surface(mode):
+    """Return the largest displacement of the outer surface of the ring in a mode [m]."""
+    angle = np.linspace(0.0, 2 * np.pi, 1441)
+    wave = np.exp(1j * np.outer(angle, mode["circumferential"].values))
+    parts = ("ring_shape", "ring_tangential_shape")
+    moved = [(wave @ (mode[f"{part}_real"].values + 1j * mode[f"{part}_imag"].values)).real for part in parts]
+    return float(np.hypot(*moved).max())
 
 
 def test_set_in_space_is_drawn_turns_and_moves(opened):
