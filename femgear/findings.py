@@ -73,6 +73,7 @@ CATALOGUE = {
     "W-TAIL": (DOUBT, "The highest harmonics of a response are not small."),
     "W-TEETH": (NOTE, "Radii and teeth have different ratios, or shifted planets no centre distance."),
     "W-THRUST": (DOUBT, "Axial forces tilt the planets, which the model holds upright."),
+    "W-TIP": (NOTE, "Tips are shorter than those of the basic rack."),
     "W-TIP-THIN": (NOTE, "The tooth is thin at its tip."),
     "W-TORQUE": (NOTE, "The torque has an unusual sign or size."),
     "W-UNDERCUT": (NOTE, "The tool cuts into the flank at the root."),

@@ -5,6 +5,7 @@ import errno
 import importlib.util
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -62,7 +63,7 @@ def standard(sun: int, planet: int, ring: int, planets: int = 3) -> str:
         '"18 mm"': '"3 mm"',
         "cutter_teeth = 30": "",
     }
-    text = TEXT
+    text = re.sub(r"(?m)^tip_diameter.*\n", "", TEXT)
     for old, new in changes.items():
         text = text.replace(old, new)
     return text
@@ -120,6 +121,8 @@ def test_check_echoes_negative_ring_teeth(check):  # bad input 32
         (("operation.torque", "0 N m"), "no tooth touches"),  # 24
         (("operation.torque", "-100 N m"), "the other flanks"),  # 25
         (("sun.tip_diameter", "45.6 mm"), "W-CLEARANCE"),  # 40
+        (("sun.tip_diameter", None), "W-TIP"),
+        (("rack.root_radius", 0.3), "W-FILLET"),  # 36
         (("set.backlash", "1 mm"), "W-TIP-THIN"),  # 35
         (("set.planets", 1), "W-PLANETS"),  # 47
         (("set.pin_errors", [{"planet": 1, "tangential": "20 um"}]), "W-WEDGING"),  # 50
@@ -140,13 +143,19 @@ def test_check_flags_undercut_with_the_shift_that_avoids_it(check):  # bad input
     assert code == 0 and "W-UNDERCUT" in out and "x >= 0.2667" in out
 
 
+LONG_TIP = '= 72\ntip_diameter = "105 mm"'
 GEOMETRY = [
     # bad input, text, code, words of the message
     (34, edited(("sun.tip_diameter", "48 mm")), "E-POINTED", "pointed"),
-    (36, edited(("rack.root_radius", 0.6)), "E-ROOT-RADIUS", "<= 0.2716 modules"),
-    (36, edited(("rack.root_radius", 0.38)), "E-FILLET", "planet's root fillet"),
-    (37, edited(("sun.profile_shift", -0.5)), "E-CONTACT-RATIO", "contact ratio 0.8283"),
-    (38, standard(36, 18, 72), "E-INTERFERENCE", "0.3849 mm"),
+    (36, edited(("rack.root_radius", 0.6)), "E-ROOT-RADIUS", "<= 0.3900 modules"),
+    (36, edited(("rack.root_radius", 0.38), ("ring.tip_diameter", "158.8 mm")), "E-FILLET", "planet's root"),
+    (37, edited(("sun.profile_shift", -0.5), ("sun.tip_diameter", None)), "E-CONTACT-RATIO", "ratio 0.8283"),
+    (
+        38,
+        standard(36, 18, 72).replace("= 72", LONG_TIP),
+        "E-INTERFERENCE",
+        "0.3849 mm",
+    ),
     (40, edited(("sun.tip_diameter", "46 mm")), "E-CLEARANCE", "-0.1250 mm"),
     (41, edited(("planet.bore_radius", "30 mm")), "E-RIM", "planet.bore_radius"),
     (41, edited(("ring.outer_radius", "80 mm")), "E-RIM", "ring.outer_radius"),
@@ -181,7 +190,9 @@ def test_refusals_name_what_the_file_gives_and_keys_that_exist(check):
     assert "found:   '0, 121, 240 deg'" in err
     # a shift that was left out is not what the user should change
     for distance, code in (("53 mm", "E-POINTED"), ("56 mm", "E-SHIFT")):
-        text = TEXT.replace("profile_shift = 0.52681\n", "").replace('"51 mm"', f'"{distance}"')
+        long = "54 mm" if code == "E-POINTED" else "45 mm"
+        text = TEXT.replace("profile_shift = 0.52681\n", "").replace("45.08043 mm", long)
+        text = text.replace('"51 mm"', f'"{distance}"')
         _, _, err = check(text.replace("profile_shift = 0.0         # positive", "# positive"))
         assert code in err and ": set.centre_distance: " in err and f"found:   '{distance}'" in err
         assert "closes the set" in err and "not in mm" not in err

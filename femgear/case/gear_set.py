@@ -17,7 +17,7 @@ import numpy as np
 
 from femgear.case.checks import check_floating
 from femgear.case.mistakes import in_terms_of_the_case, rack_at
-from femgear.case.quantities import LENGTH
+from femgear.case.quantities import FREE, LENGTH
 from femgear.case.sections import (
     CarrierErrors,
     Case,
@@ -58,6 +58,7 @@ from femgear.gears.modifications import (
 )
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack, PinionCutter, transverse_rack, transverse_tool
+from femgear.gears.tips import settled_tips
 
 if TYPE_CHECKING:
     from femgear.case.sections import CarrierSection, ModificationSection
@@ -111,7 +112,7 @@ def _closed_set(case: Case) -> PlanetarySet:
     """Gears of a case, closed on their centre distance but not yet checked as a set."""
     ring = case.ring
     left_open = (("sun", case.sun.profile_shift), ("ring", ring.profile_shift))
-    return close_set(
+    closed = close_set(
         gear_of(case, case.sun, "sun", case.sun.bore_radius),
         gear_of(case, case.planet, "planet", case.planet.bore_radius),
         gear_of(case, ring, "ring", ring.outer_radius, internal=True),
@@ -119,16 +120,25 @@ def _closed_set(case: Case) -> PlanetarySet:
         centre_distance=case.set.centre_distance,
         find=tuple(name for name, shift in left_open if shift is None),
     )
+    return settled_tips(closed, free=free_tips(case))
+
+
+def free_tips(case: Any) -> tuple[str, ...]:
+    """List the gears of a case whose tips are to run free of their mates."""
+    return tuple(name for name in case.gear_names if getattr(case, name).tip_diameter == FREE)
 
 
 def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = False) -> Gear:
-    """Make a gear of a case from its section; the rim is its bore or outer radius [m]."""
+    """Make a gear of a case from its section; the rim is its bore or outer radius [m].
+
+    A tip without a diameter is left open, see `femgear.gears.tips.settled_tips`.
+    """
     given, module, pressure_angle = section.rack or case.rack, case.module, case.pressure_angle
     rack = BasicRack(**given.model_dump())
     if case.helix_angle is not None:
         module, pressure_angle = transverse_tool(module, pressure_angle, case.helix_angle)
         rack = transverse_rack(rack, case.helix_angle)
-    cutter = None
+    cutter, tip = None, None if section.tip_diameter == FREE else section.tip_diameter
     if internal and section.cutter_teeth is not None:
         shift = section.cutter_profile_shift * _normal_modules(case)
         cutter = PinionCutter(teeth=section.cutter_teeth, profile_shift=shift)
@@ -142,10 +152,11 @@ def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = 
         internal=internal,
         rack=rack,
         cutter=cutter,
-        tip_diameter=section.tip_diameter,
+        tip_diameter=tip,
         root_diameter=section.root_diameter,
         thickness_allowance=0.5 * case.set.backlash,
         name=name,
+        tip_open=tip is None,
     )
 
 

@@ -383,6 +383,21 @@ def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
     return _Reader(rigid_too, {"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
 
 
+FREE = "free"
+
+
+def LengthOrFree(low: float, high: float) -> _Reader:
+    """Make the reader of a length [m] that may be ``"free"``, which is found; see `Quantity`."""
+    length = Quantity(LENGTH, low, high)
+
+    def free_too(value: object) -> object:
+        return FREE if value == FREE else length.read(value)
+
+    return _Reader(
+        free_too, {"type": "string", "description": f'{length.schema["description"]}, or "{FREE}"'}
+    )
+
+
 def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: str | None = None) -> _Reader:
     """Make the reader of a whole number within a window; 27.0, "27" and true are refused.
 

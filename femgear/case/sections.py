@@ -31,6 +31,7 @@ from femgear.case.quantities import (
     TORQUE,
     TORSION,
     Count,
+    LengthOrFree,
     Number,
     Quantity,
     Section,
@@ -69,6 +70,8 @@ Place = Annotated[float, Quantity(LENGTH, -2.5, 2.5)]
 Points, Pitches = (Values(max_length=most) for most in (MOST_POINTS, 5000))
 Member = Literal["sun", "ring", "carrier"]
 Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
+TipDiameter = Annotated[float | Literal["free"], LengthOrFree(1e-4, 10.0)]
+"""Of a gear; ``"free"`` is the tip that runs free of its mates."""
 Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
 LEFT_OUT: Any = Field(default_factory=lambda: math.nan)
 """Of entries that `femgear.case.estimates` fills in when a case is read: a default that no schema shows."""
@@ -339,7 +342,7 @@ class SunSection(Section):
     misalignment: Misalignment | None = None
     torque_end: End | None = None
     torsion_diameter: Diameter | None = None
-    tip_diameter: Radius | None = None
+    tip_diameter: TipDiameter | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
     modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
@@ -358,7 +361,7 @@ class PlanetSection(Section):
     bearing_clearance: Annotated[float, Quantity(LENGTH, 0.0, 0.002)] = 0.0
     tilt_stiffness: Turning | None = None
     misalignment: Annotated[tuple[PlanetMisalignment, ...], Field(max_length=1000)] = ()
-    tip_diameter: Radius | None = None
+    tip_diameter: TipDiameter | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
     modifications: Annotated[tuple[PlanetModificationSection, ...], Field(max_length=20)] = ()
@@ -376,7 +379,7 @@ class RingSection(Section):
     cutter_profile_shift: Shift = 0.0
     foundation_radial: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)] = LEFT_OUT
     foundation_tangential: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)] = LEFT_OUT
-    tip_diameter: Radius | None = None
+    tip_diameter: TipDiameter | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
     modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()

@@ -608,13 +608,14 @@ def stage_model(case: Case, name: str) -> Model:
 def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tuple[str, str]:
     """Add a gear with shaft, flanks, tool and material; ids of gear and shaft."""
     a, section, internal = _attribute, getattr(case, gear.name), gear.internal
+    tip = 2.0 * gear.tip_radius if section.tip_diameter or gear.tip_shortening else None
     rack, helix, material = section.rack or case.rack, case.helix_angle or 0.0, case.material
     shaft, rim = w.add("shaft", f"{name} shaft"), a(2.0 * gear.rim_radius, "mm")
     id = w.add(
         "ring_gear" if internal else "cylindrical_gear", name, number_of_teeth=a(gear.teeth),
         normal_module=a(case.module, "mm"), face_width=a(case.set.face_width, "mm"),
         helix_angle_reference_diameter=a(helix if gear.name == "sun" else -helix, "deg"),
-        tip_diameter=a(section.tip_diameter, "mm"), root_diameter=a(section.root_diameter, "mm"),
+        tip_diameter=a(tip, "mm"), root_diameter=a(section.root_diameter, "mm"),
         u_coordinate_on_shaft=a(0.0, "mm"), inner_diameter=None if internal else rim,
     )  # fmt: skip
     parts = [id]

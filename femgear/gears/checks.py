@@ -7,65 +7,103 @@ must not have: below the involute, on root fillets, between passing tips.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import fields, replace
 from itertools import pairwise
 
-import numpy as np
-
 from femgear.errors import GeometryError
-from femgear.gears.gear import (
-    Gear,
-    GeometryWarning,
-    half_thickness_angle,
-    tooth_thickness,
-    working_half_angles,
-)
+from femgear.findings import DOUBT, Finding
+from femgear.gears.gear import USUAL_LAND, Gear, GeometryWarning, combined_fault, tooth_thickness
 from femgear.gears.pair import EACH, GearPair, zero_backlash_distance, zero_backlash_shift
 from femgear.gears.planetary import (
     BACKLASH_TOLERANCE,
+    SIGN_TOLERANCE,
     GearSet,
     PlanetarySet,
     assembly_positions,
     feasible_angles,
+    sign_remark,
 )
-from femgear.gears.profile import inv, pressure_angle_at, undercut_shift
+from femgear.gears.profile import undercut_shift
+from femgear.gears.tips import (
+    SEEN,
+    active_limits,
+    allowed_overlap,
+    clearance_shortening,
+    fillet_overlap,
+    largest_tip,
+    settled_tips,
+    tip_margin,
+    typed_diameter,
+)
 
-FILLET_TOLERANCE = 1e-4
-"""Overlap of a tip corner with a root fillet, in modules, that is warned about instead of refused."""
+DOUBTFUL_OVERLAP = 1e-4
+"""Overlap of a tip corner with a root fillet [modules] from which numbers are in doubt."""
+_OF_TIPS = ("E-FILLET", "E-INTERFERENCE", "E-CLEARANCE")
 # backlash of one kind of mesh beyond that of the other, in modules, from which profile shifts do not suit
 _UNEVEN = 0.05
-# overlap [m] below which there is nothing to warn of
-_SEEN = 1e-9
 
 
-def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
+def check_set(planetary: PlanetarySet) -> tuple[Finding, ...]:
     """Check the assembly and the meshes of a planetary set, and list what deserves a warning.
 
     Returns
     -------
-    tuple of GeometryWarning
+    tuple of Finding
         W-PLANETS (one or two planets), W-NEIGHBOURS, W-BACKLASH, W-FILLET, W-CONTACT-RATIO, W-CLEARANCE,
-        W-UNDERCUT, W-TIP-THIN, W-RIM.
+        W-TIP, W-UNDERCUT, W-TIP-THIN, W-RIM.
 
     Raises
     ------
     GeometryError
         E-ASSEMBLY, E-NEIGHBOURS, E-BACKLASH, E-INTERFERENCE, E-FILLET, E-CLEARANCE,
-        E-CONTACT-RATIO.
+        E-CONTACT-RATIO: code and key of the first fault, the message has all.
     """
     found = [*_planets(planetary), *_neighbours(planetary)]
     _assembly(planetary)
     return *found, *check_meshes(planetary)
 
 
-def check_meshes(planetary: GearSet) -> tuple[GeometryWarning, ...]:
+def check_meshes(planetary: GearSet) -> tuple[Finding, ...]:
     """Check the meshes and gears of a set or a pair; see `check_set`, from W-BACKLASH and E-BACKLASH on."""
-    return (
-        *_backlash(planetary),
-        *_interference(planetary),
-        *_clearances(planetary),
-        *_contact_ratios(planetary),
-        *_single_gears(planetary),
-    )
+    found = list(_meshes(planetary))
+    if faults := [one for one in found if isinstance(one, GeometryError)]:
+        error = combined_fault(faults)
+        if any(fault.code in _OF_TIPS for fault in faults) and (tips := _free_tips(planetary)):
+            error.remedy = f"{error.remedy}; {tips}"
+        raise error
+    return tuple(one for one in found if isinstance(one, Finding))
+
+
+def _meshes(s: GearSet) -> Iterator[GeometryError | Finding]:
+    """Faults and warnings of the meshes and gears."""
+    yield from _backlash(s)
+    yield from _interference(s)
+    yield from _clearances(s)
+    yield from _contact_ratios(s)
+    yield from _shortened_tips(s)
+    yield from _single_gears(s)
+
+
+def _free_tips(s: GearSet) -> str:
+    """Tip diameters with which all gears run free of each other, of those that would change; or nothing."""
+    names = [field.name for field in fields(s)][: len(s.gears)]
+    opened = {
+        name: replace(gear, tip_diameter=None, tip_shortening=0.0, tip_open=True)
+        for name, gear in zip(names, s.gears, strict=True)
+    }
+    try:
+        freed = settled_tips(replace(s, **opened), free=names)
+    except GeometryError:
+        return ""
+    if any(isinstance(one, GeometryError) for one in _meshes(freed)):
+        return ""
+    found = [
+        f"{new.name}.tip_diameter = {typed_diameter(new, new.tip_radius) * 1e3:.4f} mm"
+        for new, old in zip(freed.gears, s.gears, strict=True)
+        if abs(new.tip_radius - old.tip_radius) > SEEN
+    ]
+    return f'free of all mates: {", ".join(found)}; or tip_diameter = "free"' if found else ""
 
 
 def tip_clearances(planetary: GearSet) -> dict[str, float]:
@@ -146,17 +184,18 @@ def _backlash(s: GearSet):
         mesh, value = f"{pair.gear_1.name}-{pair.gear_2.name}", pair.backlash
         gear = next(gear for gear, number in zip(pair.gears, numbers, strict=True) if number != EACH)
         if value < -BACKLASH_TOLERANCE * module:
-            raise GeometryError(
+            yield GeometryError(
                 f"{mesh}: the flanks overlap by {-value * 1e6:.3f} um along the line of action at the centre "
-                f"distance of {s.centre_distance * 1e3:.5f} mm (negative backlash)", code="E-BACKLASH",
+                f"distance of {s.centre_distance * 1e3:.5f} mm (negative backlash){other_sign(s)}",
+                code="E-BACKLASH",
                 key=f"{gear.name}.profile_shift", value=gear.profile_shift,
                 limit=f"normal backlash >= -{BACKLASH_TOLERANCE * module * 1e6:.3g} um",
                 remedy=f"let the {gear.name}'s profile shift be found, or give a thickness allowance",
             )  # fmt: skip
-        if value - _asked_play(pair) > least + _UNEVEN * module:
+        elif value - _asked_play(pair) > least + _UNEVEN * module:
             yield GeometryWarning(
                 "W-BACKLASH", "set.centre_distance",
-                f"{mesh}: normal backlash of {value * 1e3:.4f} mm; {_closing(pair)}",
+                f"{mesh}: normal backlash of {value * 1e3:.4f} mm; {_closing(pair)}{other_sign(s)}",
                 f"that of the other meshes within {_UNEVEN:g} modules",
             )  # fmt: skip
         elif value > 0.3 * module:
@@ -188,12 +227,12 @@ def _clearances(s: GearSet):
     for name, value in tip_clearances(s).items():
         gear = next(gear for gear in s.gears if gear.name == name.split()[0])
         if value < 0.0:
-            raise GeometryError(
+            yield GeometryError(
                 f"negative tip clearance, {name}: {value * 1e3:.4f} mm", code="E-CLEARANCE",
                 key=f"{gear.name}.tip_diameter", value=2.0 * gear.tip_radius, limit="clearance >= 0",
                 remedy=f"shorten the tips of the {gear.name} (tip_diameter) or deepen the rack's dedendum",
             )  # fmt: skip
-        if value < 0.1 * gear.module:
+        elif value < 0.1 * gear.module:
             yield GeometryWarning(
                 "W-CLEARANCE", f"{gear.name}.tip_diameter", f"tip clearance, {name}, of {value * 1e3:.4f} mm",
                 ">= 0.1 modules",
@@ -205,13 +244,13 @@ def _contact_ratios(s: GearSet):
     for pair in s.kinds:
         mesh, value = f"{pair.gear_1.name}-{pair.gear_2.name}", pair.contact_ratio
         if value < 1.0:
-            raise GeometryError(
+            yield GeometryError(
                 f"{mesh}: contact ratio {value:.4f}, so contact is lost between teeth",
                 code="E-CONTACT-RATIO", key="set.centre_distance", value=f"contact ratio {value:.4f}",
                 limit="contact ratio >= 1",
                 remedy="lengthen the tips, reduce the working pressure angle or avoid undercut",
             )  # fmt: skip
-        if value < 1.2:
+        elif value < 1.2:
             yield GeometryWarning(
                 "W-CONTACT-RATIO", "set.centre_distance", f"{mesh}: contact ratio {value:.4f}", ">= 1.2",
             )  # fmt: skip
@@ -228,10 +267,11 @@ def _single_gears(s: GearSet):
                 f"{undercut_shift(gear.teeth, gear.pressure_angle):.4f})", f">= {gear.undercut_shift:.4f}",
             )  # fmt: skip
         land = float(tooth_thickness(gear, gear.tip_radius))
-        if land < 0.2 * gear.module:
+        if land < USUAL_LAND * gear.module:
             yield GeometryWarning(
                 "W-TIP-THIN", f"{gear.name}.profile_shift",
-                f"the teeth of the {gear.name} are {land * 1e3:.4f} mm thick at the tip", ">= 0.2 modules",
+                f"the teeth of the {gear.name} are {land * 1e3:.4f} mm thick at the tip",
+                f">= {USUAL_LAND:g} modules",
             )  # fmt: skip
         rim = abs(gear.root_radius - gear.rim_radius)
         height = abs(gear.tip_radius - gear.root_radius)
@@ -259,37 +299,30 @@ def _rim_held(gear: Gear) -> str:
 
 def _interference(s: GearSet):
     """Involute and fillet interference of all meshes, and passing tips of internal ones."""
-    for gear, partner, reach in (limit for pair in s.kinds for limit in _active_limits(pair)):
+    for pair, (gear, partner, reach) in ((p, limit) for p in s.kinds for limit in active_limits(p)):
         if reach < 0.0 and partner.internal:
             allowed = math.hypot(partner.base_radius, partner.tip_roll - reach)
-            raise GeometryError(
+            yield GeometryError(
                 f"involute interference: the {partner.name}'s tip meets the {gear.name} "
                 f"{-reach * 1e3:.4f} mm beyond the end of the line of action, inside the {gear.name}'s base "
                 "circle", code="E-INTERFERENCE", key=f"{partner.name}.tip_diameter",
                 value=2.0 * partner.tip_radius, limit=f"tip diameter {_tip_limit(partner, allowed)} mm",
                 remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
             )  # fmt: skip
+            continue
         excess = reach - gear.form_roll if gear.internal else gear.form_roll - reach
         # undercut has removed the flank that a partner's tip would reach: the path of contact is shorter
         if excess > 0.0 and not gear.undercut:
-            yield from _fillet_contact(gear, partner, reach, s.kinds[0].centre_distance)
+            yield from _fillet_contact(gear, partner, reach, pair)
     for pair in s.kinds:
         if pair.gear_2.internal:
-            check_passing_tips(*pair.gears, pair.centre_distance)
+            yield from _passing_faults(*pair.gears, pair.centre_distance)
 
 
-def _active_limits(pair: GearPair):
-    """Gear, partner and roll length [m] on the gear's flank that the partner's tip reaches, twice."""
-    (one, two), length = pair.gears, pair.centre_distance * math.sin(pair.working_pressure_angle)
-    if two.internal:
-        return (one, two, two.tip_roll - length), (two, one, one.tip_roll + length)
-    return (one, two, length - two.tip_roll), (two, one, length - one.tip_roll)
-
-
-def _fillet_contact(gear: Gear, partner: Gear, reach: float, centre_distance: float):
+def _fillet_contact(gear: Gear, partner: Gear, reach: float, pair: GearPair):
     """Contact of the partner's tip with the gear's root fillet."""
-    overlap = _fillet_overlap(gear, partner, centre_distance)
-    if overlap <= _SEEN:
+    overlap, allowed = fillet_overlap(gear, partner, pair.centre_distance), allowed_overlap(pair)
+    if overlap <= SEEN:
         return
     where = math.hypot(gear.base_radius, max(reach, 0.0))
     below = "" if reach >= 0.0 else f" and {-reach * 1e3:.4f} mm beyond the end of the line of action"
@@ -298,86 +331,70 @@ def _fillet_contact(gear: Gear, partner: Gear, reach: float, centre_distance: fl
         f"{where * 1e3:.4f} mm{below}; the involute {'ends' if gear.internal else 'begins'} at "
         f"{gear.form_radius * 1e3:.4f} mm (overlap {overlap * 1e6:.3f} um)"
     )
-    # the partner's tip then reaches just the end of the gear's involute
-    missing = (reach - gear.form_roll) * (-1.0 if gear.internal or partner.internal else 1.0)
-    limit = _tip_limit(partner, math.hypot(partner.base_radius, partner.tip_roll + missing))
-    if overlap > FILLET_TOLERANCE * gear.module:
-        raise GeometryError(
+    limit = _tip_limit(partner, largest_tip(gear, partner, reach))
+    if overlap > allowed:
+        yield GeometryError(
             message, code="E-FILLET", key="rack.root_radius",
             value=round(gear.tool.rounding / gear.module, 9),
-            limit=f"active profile {'up' if gear.internal else 'down'} to {gear.form_radius * 1e3:.4f} mm",
+            limit=f"overlap <= {allowed * 1e6:.3f} um, or active profile {'up' if gear.internal else 'down'} "
+            f"to {gear.form_radius * 1e3:.4f} mm",
             remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter {limit} mm",
         )  # fmt: skip
-    yield GeometryWarning("W-FILLET", f"{partner.name}.tip_diameter", message, f"{limit} mm")
+    else:
+        yield GeometryWarning(
+            "W-FILLET", f"{partner.name}.tip_diameter",
+            f"{message}; contact is computed on the involutes alone, which this corner would part by as much",
+            f"{limit} mm", severity=DOUBT if overlap > DOUBTFUL_OVERLAP * gear.module else "",
+        )  # fmt: skip
 
 
 def _tip_limit(partner: Gear, radius: float) -> str:
     """Allowed tip diameters in mm, to be typed as they stand: above that of a ring, below that of others."""
-    if partner.internal:
-        return f">= {math.ceil(2e7 * radius) / 1e4:.4f}"
-    return f"<= {math.floor(2e7 * radius) / 1e4:.4f}"
+    return f"{'>=' if partner.internal else '<='} {typed_diameter(partner, radius) * 1e3:.4f}"
 
 
-def _fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
-    """Depth [m] to which the partner's tip corner enters the gear's fillet, as an arc.
-
-    The corner is followed through the mesh from pitch-point contact of the loaded flanks, seen from the gear,
-    and compared with the half-thickness angle of the generated fillet at its radius. Negative (or minus
-    infinity, when it does not get there) without overlap.
-    """
-    internal = gear.internal or partner.internal
-    base = abs(partner.base_radius - gear.base_radius) if internal else partner.base_radius + gear.base_radius
-    eta_gear, eta_partner = working_half_angles(gear, partner, math.acos(base / centre_distance))
-    tip = float(half_thickness_angle(partner, partner.tip_radius))
-    # pitch point on the x axis; the gear's left flank touches there
-    centre = -centre_distance if partner.internal else centre_distance
-    corner = eta_partner - tip if internal else math.pi - eta_partner + tip
-    ratio = (1.0 if internal else -1.0) * gear.teeth / partner.teeth
-    radius, angle = gear.tool.fillet_point(np.linspace(0.0, gear.fillet_end, 4001))
-    order = np.argsort(radius)
-
-    def depth(turn):
-        path = centre + partner.tip_radius * np.exp(1j * (corner + ratio * turn))
-        r, polar = np.abs(path), np.angle(path) - turn + eta_gear
-        arc = r * (np.interp(r, radius[order], angle[order]) - polar)
-        return np.where((r > radius.min()) & (r < radius.max()) & (polar > 0.0), arc, -np.inf), r
-
-    turn, step = np.linspace(-2.0 * gear.pitch_angle, 2.0 * gear.pitch_angle, 4001, retstep=True)
-    for _ in range(3):
-        arc, r = depth(turn)
-        deepest = np.argmax(r) if gear.internal else np.argmin(r)
-        best = turn[np.argmax(arc) if np.any(np.isfinite(arc)) else deepest]
-        turn, step = np.linspace(best - 2.0 * step, best + 2.0 * step, 401, retstep=True)
-    return float(np.max(arc))
+def _shortened_tips(s: GearSet):
+    """Say which tips are shorter than those of the basic rack, and why."""
+    for gear in s.gears:
+        if gear.tip_diameter is not None or gear.tip_shortening <= SEEN:
+            continue
+        clearance = max(clearance_shortening(pair) for pair in s.kinds if gear in pair.gears)
+        further = gear.tip_shortening - clearance
+        why = [f"k = {-clearance / gear.module:.4f} keeps the clearance of the rack (ISO 21771)"]
+        why = why if clearance > SEEN else []
+        if further > SEEN:
+            why += [f"{further * 1e3:.4f} mm let them run free of their mates"]
+        yield Finding(
+            "W-TIP", f"{gear.name}.tip_diameter",
+            f"the tips of the {gear.name} are {gear.tip_shortening * 1e3:.4f} mm shorter than those of the "
+            f"rack, at a diameter of {2e3 * gear.tip_radius:.4f} mm: {' and '.join(why)}",
+            remedy="give tip_diameter where the drawing has another one",
+        )  # fmt: skip
 
 
-def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
-    """Compute the angle [rad] at the ring by which the tip corners of a planet in a ring miss each other.
-
-    ``z1/z2 (phi1 + inv(aa1) - inv(aw)) + inv(aw) - inv(aa2) - phi2`` with the angles phi1, phi2 of the
-    crossing of both tip circles at the two centres (Colbourne, The Geometry of Involute Gears, ch. 8):
-    negative means that the teeth strike each other outside the path of contact. ``inf`` when the tip
-    circles do not cross. The centre distance is in m.
-    """
-    a, tip_1, tip_2 = centre_distance, planet.tip_radius, ring.tip_radius
-    cos_1 = (tip_2**2 - tip_1**2 - a**2) / (2.0 * a * tip_1)
-    cos_2 = (tip_2**2 - tip_1**2 + a**2) / (2.0 * a * tip_2)
-    if abs(cos_1) >= 1.0 or abs(cos_2) >= 1.0:
-        return math.inf
-    working = inv(pressure_angle_at(a, ring.base_radius - planet.base_radius))
-    angle_1 = math.acos(cos_1) + inv(pressure_angle_at(tip_1, planet.base_radius)) - working
-    angle_2 = math.acos(cos_2) + inv(pressure_angle_at(tip_2, ring.base_radius)) - working
-    return angle_1 * planet.teeth / ring.teeth - angle_2
+def other_sign(s: GearSet) -> str:
+    """Remark that an internal gear's profile shift has the sign of ISO 21771, where that closes the set."""
+    pair, ring = s.kinds[-1], s.gears[-1]
+    if not ring.internal or ring.profile_shift == 0.0:
+        return ""
+    needed = zero_backlash_shift(pair.gear_1, ring, pair.centre_distance) + pair.gear_1.profile_shift
+    return sign_remark(ring) if abs(needed + ring.profile_shift) < SIGN_TOLERANCE else ""
 
 
 def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None:
     """Refuse tips that strike each other outside the path of contact (E-INTERFERENCE).
 
-    The centre distance is in m, as for `tip_margin`.
+    The centre distance is in m, as for `tips.tip_margin`.
     """
+    for fault in _passing_faults(planet, ring, centre_distance):
+        raise fault
+
+
+def _passing_faults(planet: Gear, ring: Gear, centre_distance: float) -> Iterator[GeometryError]:
+    """Tips of an internal mesh that strike each other in passing."""
     margin = tip_margin(planet, ring, centre_distance)
     if margin < 0.0:
-        raise GeometryError(
+        yield GeometryError(
             f"the tips of {planet.name} ({planet.teeth} teeth) and {ring.name} ({ring.teeth}) strike each "
             "other outside the path of contact: "
             f"the corners overlap by {-margin * ring.tip_radius * 1e3:.4f} mm",

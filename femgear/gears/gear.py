@@ -9,7 +9,8 @@ import math
 import operator
 import re
 from bisect import bisect_left
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Integral
 
@@ -33,6 +34,14 @@ from femgear.gears.profile import (
 TEETH_RANGE = (5, 5000)
 MODULE_RANGE = (0.05e-3, 0.1)
 PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
+CUTTER_RANGE = 60
+"""Teeth that a pinion cutter may have more or fewer than the usual one, where that cannot make the gear."""
+CUTTER_SHIFTS = (0.0, -0.3, -0.6, -1.0)
+"""Profile shifts of new and worn pinion cutters that are tried in this order [modules]."""
+ROOM_TOLERANCE = 1e-12
+"""Part of a module, or angle [rad], by which the rounding of a tool may be too large for it."""
+USUAL_LAND = 0.2
+"""Tooth thickness at the tip [modules] below which there is a warning."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +74,16 @@ class Gear:
     cutter : PinionCutter, optional
         For internal gears; None takes the cutter of `cutter_of`.
     tip_diameter, root_diameter : float, optional
-        [m]; None takes ``m (z +- 2 (h + x))`` of the basic rack.
+        [m]; None takes ``m (z +- 2 (h + x))`` of the basic rack, the tip less its shortening.
     thickness_allowance : float
         Reduction of the tooth thickness at the reference circle [m], >= 0; root and tip circles stay.
     name : str
         Used in messages only ("sun", "planet", "ring").
+    tip_shortening : float
+        What the tooth is shorter than that of the basic rack [m], where no tip diameter is given.
+    tip_open : bool
+        Whether the tip is still to be found with the mates, see `femgear.gears.tips.settled_tips`: what
+        depends on it is checked once it is settled.
 
     Raises
     ------
@@ -91,12 +105,16 @@ class Gear:
     root_diameter: float | None = None
     thickness_allowance: float = 0.0
     name: str = field(default="gear", compare=False)
+    tip_shortening: float = 0.0
+    tip_open: bool = field(default=False, repr=False)
 
     def __post_init__(self):
         _check_numbers(self)
+        if self.tip_open:
+            return
         _check_circles(self)
-        _check_tool(self)
-        _check_flank(self)
+        if faults := [*_tool_faults(self), *_flank_faults(self)]:
+            raise combined_fault(faults)
 
     @property
     def reference_radius(self) -> float:
@@ -114,7 +132,8 @@ class Gear:
         if self.tip_diameter is not None:
             return 0.5 * self.tip_diameter
         sign = -1.0 if self.internal else 1.0
-        return self.reference_radius + self.module * (sign * self.rack.addendum + self.profile_shift)
+        addendum = self.module * self.rack.addendum - self.tip_shortening
+        return self.reference_radius + sign * addendum + self.module * self.profile_shift
 
     @property
     def root_radius(self) -> float:
@@ -146,6 +165,11 @@ class Gear:
     def tool(self) -> RackTip | CutterTip:
         """Rounded tip of the generating tool, matched to this flank and root circle."""
         return _generating_tool(self)
+
+    @cached_property
+    def found_cutter(self) -> PinionCutter:
+        """Cutter of an internal gear that gives none, see `cutter_of`."""
+        return _suitable_cutter(self) or usual_cutter(self)
 
     @cached_property
     def fillet_end(self) -> float:
@@ -224,13 +248,35 @@ def flank_points(gear: Gear, roll_lengths) -> np.ndarray:
 
 
 def cutter_of(gear: Gear) -> PinionCutter:
-    """Choose the cutter of an internal gear, by default of 30 unshifted teeth or 12 fewer than the gear."""
-    return gear.cutter or PinionCutter(teeth=max(5, min(30, gear.teeth - 12)))
+    """Choose the cutter of an internal gear: its own, else the usual one or the nearest that can make it."""
+    return gear.cutter or gear.found_cutter
+
+
+def usual_cutter(gear: Gear) -> PinionCutter:
+    """Make the cutter that internal gears have by default: 30 unshifted teeth, or 12 fewer than the gear."""
+    return PinionCutter(teeth=max(5, min(30, gear.teeth - 12)))
+
+
+def _suitable_cutter(gear: Gear) -> PinionCutter | None:
+    """Cutter that can make the gear, with the teeth nearest to those of the usual one.
+
+    It is unshifted where any such cutter can, else a worn one, with a negative shift.
+    """
+    usual = usual_cutter(gear).teeth
+    near = range(max(5, usual - CUTTER_RANGE), min(gear.teeth - 5, usual + CUTTER_RANGE) + 1)
+    for shift in CUTTER_SHIFTS:
+        for teeth in sorted(near, key=lambda z: (abs(z - usual), -z)):
+            cutter = PinionCutter(teeth=teeth, profile_shift=shift)
+            if any(_cutter_faults(gear, cutter)):
+                continue
+            if _cutter_tip(gear, cutter).room >= -ROOM_TOLERANCE:
+                return cutter
+    return None
 
 
 def _generating_tool(gear: Gear, rounding: float | None = None) -> RackTip | CutterTip:
     """Tool tip that cuts flank and root circle of a gear; its rounding [modules] is by default the gear's."""
-    return _cutter_tip(gear, rounding) if gear.internal else _rack_tip(gear, rounding)
+    return _cutter_tip(gear, cutter_of(gear), rounding) if gear.internal else _rack_tip(gear, rounding)
 
 
 def _rack_tip(gear: Gear, rounding: float | None) -> RackTip:
@@ -253,12 +299,12 @@ def _rack_tip(gear: Gear, rounding: float | None) -> RackTip:
     )
 
 
-def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
+def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float | None = None) -> CutterTip:
     """Cutter at the centre distance that leaves it no play in the finished gap; lengths in m.
 
     Its shift and that distance give the flank its thickness; its tip radius follows from the root circle.
     """
-    alpha, module, cutter = gear.pressure_angle, gear.module, cutter_of(gear)
+    alpha, module = gear.pressure_angle, gear.module
     if rounding is None:
         rounding = gear.rack.root_radius if cutter.tip_radius is None else cutter.tip_radius
     rounding *= module
@@ -308,6 +354,7 @@ def _check_numbers(gear: Gear) -> None:
         ("rack.root_radius", "E-CUTTER", 0.0, 3.0, " modules", rack_hint),
         ("tip_diameter", "E-TIP", 1e-6, 2000.0, " m", circle_hint),
         ("root_diameter", "E-TIP", 1e-6, 2000.0, " m", circle_hint),
+        ("tip_shortening", "E-TIP", 0.0, 3.0 * gear.module, " m", circle_hint),
     )
     for entry, code, low, high, unit, remedy in limits:
         value = operator.attrgetter(entry)(gear)
@@ -318,7 +365,7 @@ def _check_numbers(gear: Gear) -> None:
         limit = f"{low:.6g} .. {high:.6g}{unit}"
         message = f"{re.sub('[._]', ' ', name)} {value!r}{unit} is "
         message += f"no whole number in {limit}" if broken else f"outside {limit}"
-        _refuse(gear, name, message, code=code, value=value, limit=limit, remedy=remedy)
+        raise _fault(gear, name, message, code=code, value=value, limit=limit, remedy=remedy)
     object.__setattr__(gear, "teeth", operator.index(gear.teeth))
 
 
@@ -337,14 +384,14 @@ def _check_circles(gear: Gear) -> None:
     tip, root, rim = gear.tip_radius, gear.root_radius, gear.rim_radius
     sign = -1.0 if gear.internal else 1.0
     if not (sign * (tip - root) > 0.0 and tip > 0.0):
-        _refuse(
+        raise _fault(
             gear, "tip_diameter",
             f"tip radius {tip * 1e3:.4f} mm and root radius {root * 1e3:.4f} mm leave no tooth", code="E-TIP",
             limit=f"tip diameter {'<' if gear.internal else '>'} {2e3 * root:.4f} mm",
             remedy="correct the tip or root diameter",
         )  # fmt: skip
     if not sign * (root - rim) > 0.0:
-        _refuse(
+        raise _fault(
             gear, "outer_radius" if gear.internal else "bore_radius",
             f"the rim is {sign * (root - rim) * 1e3:.4f} mm thick: root radius {root * 1e3:.4f} mm, "
             f"{'outer' if gear.internal else 'bore'} radius {rim * 1e3:.4f} mm", code="E-RIM",
@@ -352,7 +399,7 @@ def _check_circles(gear: Gear) -> None:
             remedy="enlarge the outer radius" if gear.internal else "reduce the bore radius",
         )  # fmt: skip
     if not tip > gear.base_radius:
-        _refuse(
+        raise _fault(
             gear, "tip_diameter",
             f"the tip circle (radius {tip * 1e3:.4f} mm) lies inside the base circle "
             f"({gear.base_radius * 1e3:.4f} mm), where there is no involute", code="E-TIP",
@@ -361,14 +408,28 @@ def _check_circles(gear: Gear) -> None:
         )  # fmt: skip
 
 
-def _check_tool(gear: Gear) -> None:
-    """Room for the tool's rounding."""
-    if gear.internal:
-        _check_cutter(gear)
+def combined_fault(faults: Sequence[GeometryError]) -> GeometryError:
+    """Make one refusal of all faults: code, key and values of the first, messages and remedies of all."""
+    first, *others = faults
+    if not others:
+        return first
+    also = "; ".join(f"[{fault.code}] {fault.message}" for fault in others)
+    remedies = dict.fromkeys(fault.remedy for fault in faults if fault.remedy)
+    return GeometryError(
+        f"{first.message}; also {also}", code=first.code, key=first.key, value=first.value, limit=first.limit,
+        remedy="; ".join(remedies),
+    )  # fmt: skip
+
+
+def _tool_faults(gear: Gear) -> Iterator[GeometryError]:
+    """Faults of the tool: one that cannot make the flank, and no room for its rounding."""
+    if gear.internal and (faults := list(_cutter_faults(gear, cutter_of(gear)))):
+        yield from faults
+        return
     # a length of the rack is taken in modules; an angle of the cutter is one already
-    if gear.tool.room / (1.0 if gear.internal else gear.module) < -1e-12:
+    if gear.tool.room / (1.0 if gear.internal else gear.module) < -ROOM_TOLERANCE:
         largest, rounding = _largest_rounding(gear), round(gear.tool.rounding / gear.module, 9)
-        _refuse(
+        yield _fault(
             gear, "rack.root_radius",
             f"a tool tip rounding of {rounding:.4f} modules does not fit between the flanks of the tool"
             + ("" if largest > 0.0 else ", nor does any other"), code="E-ROOT-RADIUS", value=rounding,
@@ -377,43 +438,57 @@ def _check_tool(gear: Gear) -> None:
         )  # fmt: skip
 
 
-def _check_cutter(gear: Gear) -> None:
-    cutter = cutter_of(gear)
+def _cutter_faults(gear: Gear, cutter: PinionCutter) -> Iterator[GeometryError]:
+    """Faults of a pinion cutter."""
     if not (is_whole(cutter.teeth) and 5 <= cutter.teeth <= gear.teeth - 5):
-        _refuse(
+        yield _fault(
             gear, "cutter_teeth",
             f"a cutter of {cutter.teeth!r} teeth cannot generate an internal gear of {gear.teeth} teeth",
-            code="E-CUTTER", limit=f"whole number 5 .. {gear.teeth - 5}",
+            code="E-CUTTER", value=cutter.teeth, limit=f"whole number 5 .. {gear.teeth - 5}",
             remedy="choose a smaller cutter; 30 teeth, or 12 fewer than the gear, is the default",
         )  # fmt: skip
+        return
     try:
-        tool = _cutter_tip(gear)
+        tool = _cutter_tip(gear, cutter)
     except GeometryError:
-        _refuse(
+        yield _fault(
             gear, "profile_shift",
             f"a cutter of {cutter.teeth} teeth with shift {cutter.profile_shift:.4f} finds no working "
             f"pressure angle for a flank shifted by {gear.profile_shift:.4f}", code="E-CUTTER",
             limit="inv(alpha_w0) >= 0 between cutter and gear",
             remedy="increase the profile shift, or take a cutter with fewer teeth or a smaller shift",
         )  # fmt: skip
+        return
     if not tool.centre_radius > tool.cutter_base_radius:
-        _refuse(
+        yield _fault(
             gear, "cutter_teeth",
             f"the rounding of the cutter's tip is centred at {tool.centre_radius * 1e3:.4f} mm, inside the "
             f"cutter's base circle of {tool.cutter_base_radius * 1e3:.4f} mm", code="E-CUTTER",
-            limit="tip radius - rounding > base radius of the cutter",
-            remedy="choose a cutter with more teeth, or a smaller root_radius",
+            value=cutter.teeth, limit="tip radius - rounding > base radius of the cutter",
+            remedy=f"{_better_cutter(gear)}, or give a smaller root_radius",
         )  # fmt: skip
     start = tool.centre_distance * math.cos(tool.end_angle)  # gear roll at the cutter's base tangent point
     if gear.tip_roll < start:
         least = math.hypot(gear.base_radius, start)
-        _refuse(
+        yield _fault(
             gear, "cutter_teeth",
             f"a cutter of {cutter.teeth} teeth has no involute for the flank below {least * 1e3:.4f} mm; the "
-            f"tip circle is at {gear.tip_radius * 1e3:.4f} mm", code="E-CUTTER",
+            f"tip circle is at {gear.tip_radius * 1e3:.4f} mm", code="E-CUTTER", value=cutter.teeth,
             limit=f"tip radius >= {least * 1e3:.4f} mm",
-            remedy="choose a cutter with more teeth or enlarge the tip diameter",
+            remedy=f"{_better_cutter(gear)}, or give a tip_diameter of {_up(2e3 * least)} mm or more",
         )  # fmt: skip
+
+
+def _better_cutter(gear: Gear) -> str:
+    """What to do about the teeth of a given cutter: the nearest number that would do."""
+    if gear.cutter is not None and (other := _suitable_cutter(replace(gear, cutter=None, tip_open=True))):
+        return f"choose a cutter with {other.teeth} teeth"
+    return "choose a cutter with more teeth"
+
+
+def _up(millimetres: float) -> str:
+    """Length in mm with four decimals, rounded up so that it can be typed as it stands."""
+    return f"{math.ceil(1e4 * millimetres) / 1e4:.4f}"
 
 
 def _largest_rounding(gear: Gear) -> float:
@@ -422,19 +497,39 @@ def _largest_rounding(gear: Gear) -> float:
     return max(first - 1, 0) / 1e4
 
 
-def _check_flank(gear: Gear) -> None:
-    """A tooth with a top land and a flank."""
+def tip_radius_at_land(gear: Gear, land: float) -> float:
+    """Find the tip radius [m] at which a tooth is ``land`` thick [m], by bisection.
+
+    Teeth of external gears get thinner from the base circle outwards, those of internal gears from the root
+    circle inwards; the end of that range stands where they are thinner even there.
+    """
+    thin, thick = gear.tip_radius, gear.root_radius if gear.internal else gear.base_radius
+    if gear.internal:
+        thin = max(thin, gear.base_radius)
+    for _ in range(60):
+        middle = 0.5 * (thin + thick)
+        thin, thick = (middle, thick) if tooth_thickness(gear, middle) < land else (thin, middle)
+    return thick
+
+
+def _flank_faults(gear: Gear) -> Iterator[GeometryError]:
+    """Faults of the tooth: no top land, no flank."""
     half = half_thickness_angle(gear, gear.tip_radius)
     if half <= 0.0:
-        _refuse(
+        free = tip_radius_at_land(gear, USUAL_LAND * gear.module)
+        word = "least" if gear.internal else "most"
+        yield _fault(
             gear, "profile_shift",
             f"the tooth is pointed below its tip circle: thickness {2e3 * half * gear.tip_radius:.4f} mm at "
             f"the tip radius {gear.tip_radius * 1e3:.4f} mm", code="E-POINTED", limit="tip thickness > 0",
-            remedy="change the profile shift or give a tip_diameter that cuts the point off",
+            remedy=f"change the profile shift or give a tip_diameter of at {word} {2e3 * free:.4f} mm, which "
+            f"leaves {USUAL_LAND:g} modules at the tip",
         )  # fmt: skip
+    if gear.internal and any(_cutter_faults(gear, cutter_of(gear))):
+        return  # no tool, no fillet
     sign = -1.0 if gear.internal else 1.0
     if not sign * (gear.tip_roll - gear.form_roll) > 0.0:
-        _refuse(
+        yield _fault(
             gear, "tip_diameter",
             f"no involute is left between the fillet (radius {gear.form_radius * 1e3:.4f} mm) and the tip "
             f"(radius {gear.tip_radius * 1e3:.4f} mm)", code="E-TIP",
@@ -443,14 +538,14 @@ def _check_flank(gear: Gear) -> None:
         )  # fmt: skip
 
 
-def _refuse(gear: Gear, entry: str, message: str, *, code: str, value=None, limit: str | None, remedy: str):
-    """Refuse a gear for an entry of the case, whose value is by default that of the gear."""
-    if value is None and entry == "cutter_teeth":
-        value = cutter_of(gear).teeth
-    elif value is None:
+def _fault(
+    gear: Gear, entry: str, message: str, *, code: str, value=None, limit: str | None, remedy: str
+) -> GeometryError:
+    """Make the refusal of a gear for an entry of the case, whose value is by default that of the gear."""
+    if value is None:
         values = {"tip_diameter": 2.0 * gear.tip_radius, "profile_shift": gear.profile_shift}
         value = values.get(entry, gear.rim_radius)
     key = entry if entry.startswith("rack.") else f"{gear.name}.{entry}"
-    raise GeometryError(
+    return GeometryError(
         f"{gear.name}: {message}", code=code, key=key, value=value, limit=limit, remedy=remedy
     )

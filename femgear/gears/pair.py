@@ -108,17 +108,18 @@ class GearPair:
     def path(self) -> tuple[float, float]:
         """Path coordinates [m] of first (gear 2's tip) and last (gear 1's tip) contact, 0 at the pitch point.
 
-        Undercut shortens the path to what is left of the involute.
+        The path ends where an involute ends: undercut shortens it, and so does a tip that reaches into the
+        fillet of its mate.
         """
         one, two = (gear.base_radius * math.tan(self.working_pressure_angle) for gear in self.gears)
-        start, end = _undercut_roll(self.gear_1) - one, self.gear_1.tip_roll - one
+        start, end = self.gear_1.form_roll - one, self.gear_1.tip_roll - one
         if self.gear_2.internal:
-            return max(self.gear_2.tip_roll - two, start), end
-        return max(two - self.gear_2.tip_roll, start), min(end, two - _undercut_roll(self.gear_2))
+            return max(self.gear_2.tip_roll - two, start), min(end, self.gear_2.form_roll - two)
+        return max(two - self.gear_2.tip_roll, start), min(end, two - self.gear_2.form_roll)
 
     @property
     def contact_ratio(self) -> float:
-        """Transverse contact ratio from the tip circles (and from what undercut leaves)."""
+        """Transverse contact ratio from the tip circles, on the involutes alone, see `path`."""
         start, end = self.path
         return (end - start) / self.base_pitch
 
@@ -242,8 +243,3 @@ def zero_backlash_shift(one: Gear, two: Gear, centre_distance: float) -> float:
     """
     alpha, working = one.pressure_angle, working_pressure_angle(one, two, centre_distance)
     return _tooth_sum(one, two) * (inv(working) - inv(alpha)) / (2.0 * math.tan(alpha))
-
-
-def _undercut_roll(gear: Gear) -> float:
-    """Roll length [m] where an undercut flank ends, minus infinity without undercut."""
-    return gear.form_roll if gear.undercut else -math.inf

@@ -23,6 +23,8 @@ from femgear.gears.profile import BasicRack
 
 BACKLASH_TOLERANCE = 1e-4
 """Normal backlash, in modules, that counts as none: what four decimals of profile shifts leave open."""
+SIGN_TOLERANCE = 2e-3
+"""Profile shift, or part of a module, by which sets may fail to close with the other sign of the shift."""
 ASSEMBLY_TOLERANCE = 1e-6
 """Part of a tooth pitch by which planet angles may miss an assembly position."""
 
@@ -109,12 +111,12 @@ class PlanetarySet:
 
     @property
     def contact_ratio_sun_planet(self) -> float:
-        """Transverse contact ratio from the tip circles (and from what undercut leaves)."""
+        """Transverse contact ratio from the tip circles, on the involutes alone, see `GearPair.path`."""
         return self.kinds[0].contact_ratio
 
     @property
     def contact_ratio_planet_ring(self) -> float:
-        """Transverse contact ratio from the tip circles (and from what undercut leaves)."""
+        """Transverse contact ratio from the tip circles, on the involutes alone, see `GearPair.path`."""
         return self.kinds[1].contact_ratio
 
     @property
@@ -406,8 +408,28 @@ def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -
         raise GeometryError(
             f"sun and planet run at a centre distance of {first * 1e3:.5f} mm, planet and ring at "
             f"{second * 1e3:.5f} mm (tooth numbers {sun.teeth} + 2 x {planet.teeth} = "
-            f"{sun.teeth + 2 * planet.teeth}, ring {ring.teeth})", code="E-COAXIAL",
+            f"{sun.teeth + 2 * planet.teeth}, ring {ring.teeth}){_other_sign(first, planet, ring)}",
+            code="E-COAXIAL",
             key="set.centre_distance", limit="one centre distance for both meshes",
             remedy="give centre_distance and let the profile shifts of sun or ring be found",
         )  # fmt: skip
     return first
+
+
+def _other_sign(distance: float, planet: Gear, ring: Gear) -> str:
+    """Remark that the meshes run at one centre distance [m] with the other sign of the ring's shift."""
+    turned = replace(ring, profile_shift=-ring.profile_shift, tip_open=True)
+    try:
+        other = zero_backlash_distance(planet, turned)
+    except GeometryError:
+        return ""
+    closes = ring.profile_shift != 0.0 and abs(other - distance) < SIGN_TOLERANCE * ring.module
+    return sign_remark(ring) if closes else ""
+
+
+def sign_remark(ring: Gear) -> str:
+    """Say that the profile shift of an internal gear has the opposite sign, which would close the set."""
+    return (
+        f"; the set closes with {ring.name}.profile_shift = {0.0 - ring.profile_shift:g}: femgear counts the "
+        "shift positive outwards, the opposite of ISO 21771"
+    )

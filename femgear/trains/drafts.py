@@ -6,7 +6,6 @@ What is not known is estimated from the gears, and every line that holds an esti
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from textwrap import wrap
@@ -24,12 +23,9 @@ from femgear.case.estimates import (
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import ANGLE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
 from femgear.case.sections import FaceWidth, Module
-from femgear.errors import CaseError, GeometryError
+from femgear.errors import CaseError
 from femgear.gears.phasing import neighbouring_teeth
 from femgear.trains.reading import parse_case
-
-_SHORTEST = 0.7
-"""Addendum in modules below which tips are not shortened further."""
 
 
 def draft_text(
@@ -54,7 +50,7 @@ def draft_text(
         Tables that make no case.
     """
     tables, notes = deepcopy(dict(tables)), dict(remarks)
-    case = _case_of(tables, notes, word)
+    case = parse_case(case_text.write(tables))
     for key, one in (estimates(case) if hasattr(case, "gear_names") else {}).items():
         section, last = key.rpartition(".")[::2]
         model = _section(case, section)
@@ -70,28 +66,6 @@ def draft_text(
     ordered = {name: tables[name] for name in type(case).model_fields if name in tables}
     lines = [f"# {line}".rstrip() for one in head for line in wrap(one, 105) or [""]]
     return "\n".join([*lines, case_text.write(ordered, notes)])
-
-
-def _case_of(tables: dict[str, Any], notes: dict[str, str], word: str) -> Any:
-    """Read tables as a case; tips whose height nothing gives are shortened until they run free."""
-    while True:
-        try:
-            return parse_case(case_text.write(tables))
-        except GeometryError as error:
-            tip = re.search(r"the (\w+)'s tip|and (\w+) \(\d+\) strike", error.message)
-            name = (tip[1] or tip[2]) if tip else ""
-            if error.code not in ("E-FILLET", "E-INTERFERENCE") or not name:
-                raise
-            where = f"{name}.rack" if "rack" in tables[name] else "rack"
-            rack = dict(tables[name].get("rack", tables.get("rack", {})))
-            addendum = rack.get("addendum", 1.0)
-            given = "addendum" in rack and not notes.get(f"{where}.addendum", "").startswith(word)
-            if given or "tip_diameter" in tables[name] or addendum < _SHORTEST:
-                raise
-            tables[name]["rack"] = {**rack, "addendum": round(addendum - 0.05, 2)}
-            said = {key: notes[f"{where}.{key}"] for key in rack if f"{where}.{key}" in notes}
-            notes |= {f"{name}.rack.{key}": one for key, one in said.items()}
-            notes[f"{name}.rack.addendum"] = f"{word}: tips as long as run free of their mates"
 
 
 def _section(case: Any, key: str) -> Any:

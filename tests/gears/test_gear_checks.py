@@ -151,12 +151,19 @@ def test_negative_play_names_the_gear_whose_shift_is_wrong():
     )
 
 
-@pytest.mark.parametrize(("rho", "refused"), [(0.25, False), (0.26, False), (0.30, True), (0.38, True)])
+@pytest.mark.parametrize(
+    ("rho", "refused"), [(0.25, False), (0.26, False), (0.38, False), (0.30, True), (0.38, True)]
+)
 def test_ring_tip_on_planet_fillet(rho, refused, mesh_gaps):
-    """Against placed outlines: the largest overlap over one mesh period is the one that is told."""
+    """Against placed outlines: the largest overlap over one mesh period is the one that is told.
+
+    Up to 0.005 modules it is a warning with its size; tips 0.1 mm longer overlap by more.
+    """
     rack = BasicRack(root_radius=rho)
     made = [replace(g, rack=rack) for g in (REFERENCE.sun, REFERENCE.planet, REFERENCE.ring)]
     s = close_set(*made, planet_angles=(0.0,), centre_distance=51e-3, find=("sun",))
+    if refused:
+        s = replace(s, ring=replace(s.ring, tip_diameter=2.0 * s.ring.tip_radius - 0.2e-3))
     overlap = -min(np.min(mesh_gaps(s, tau)[1, 0]) for tau in np.linspace(0.0, 1.0, 121))
     if refused:
         error = refusal(s)
@@ -167,8 +174,13 @@ def test_ring_tip_on_planet_fillet(rho, refused, mesh_gaps):
         allowed = float(error.remedy.split(">= ")[1].split(" mm")[0]) * 1e-3
         assert check_set(replace(s, ring=replace(s.ring, tip_diameter=allowed + 1e-7)))[0].code == "W-PLANETS"
     else:
-        assert overlap < 1e-4 * s.planet.module
-        assert ("W-FILLET" in codes(s)) == (overlap > 1e-9)
+        assert overlap < 0.005 * s.planet.module
+        said = [one for one in check_set(s) if one.code == "W-FILLET"]
+        assert len(said) == (overlap > 1e-9)
+        for finding in said:
+            told = float(finding.text.split("overlap ")[1].split(" um")[0]) * 1e-6
+            assert told == pytest.approx(overlap, rel=0.05, abs=2e-8)  # it lasts for few positions
+            assert finding.severity == ("doubt" if overlap > 1e-4 * s.planet.module else "note")
 
 
 def test_sun_tip_on_planet_fillet_is_refused():

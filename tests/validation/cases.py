@@ -31,6 +31,7 @@ teeth = 27
 module = "1.5 mm"
 pressure_angle = "20 deg"
 profile_shift = 0.52681
+tip_diameter = "45.08043 mm"
 bore_radius = "9 mm"
 mass = "0.22 kg"
 inertia = "1e-4 kg m^2"
@@ -39,6 +40,7 @@ support_stiffness = "5e7 N/m"
 [planet]
 teeth = 40
 profile_shift = 0.0
+tip_diameter = "63 mm"
 bore_radius = "18 mm"
 mass = "0.355 kg"
 inertia = "2.17e-4 kg m^2"

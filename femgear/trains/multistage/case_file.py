@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
@@ -41,11 +42,13 @@ from femgear.case.sections import (
 from femgear.case.text import CaseFile, ReadCase, described
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import RoundSection, joint_springs
+from femgear.findings import Finding
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import pair_mesh_stiffness
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
+from femgear.gears.tips import settled_tips
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, planar_from_set
 from femgear.trains.multistage.model import (
     Member,
@@ -66,8 +69,6 @@ _ENTRIES = {
 }  # fmt: skip
 _REMEDIES = {
     "E-COAXIAL": "choose teeth with sun + 2 planet = ring, or profile shifts that close the set",
-    "E-FILLET": "reduce the addendum of that gear",
-    "E-POINTED": "change the profile shift of that gear, or reduce its addendum",
 }
 
 
@@ -263,8 +264,7 @@ def _named(make, key: str, section):
     try:
         return make(section)
     except FemgearError as error:
-        entry = (error.key or "").removeprefix("set.").replace("torsional_support", "torsional_stiffness")
-        entry = _ENTRIES.get(entry.rpartition(".")[2], entry)
+        entry = _entry(error.key or "")
         remedy, value = _REMEDIES.get(error.code, error.remedy), error.value
         raise CaseError(
             error.message, code=error.code, key=f"{key}.{entry}" if entry else key,
@@ -291,7 +291,11 @@ def _coupling(one: CouplingSection) -> StageCoupling:
 
 
 def stage_gears(stage: StageSection) -> PlanetarySet:
-    """Make the gears of a stage that has some; the rims have no effect on anything computed here."""
+    """Make the gears of a stage that has some; the rims have no effect on anything computed here.
+
+    Tips are those of the basic rack with the stage's addenda, shortened as of other cases that leave the tips
+    out, see `femgear.gears.tips.settled_tips`.
+    """
     given = stage.gears
     assert given is not None
     sun, planet, ring = (0.5 * given.module * z for z in given.teeth)
@@ -299,15 +303,31 @@ def stage_gears(stage: StageSection) -> PlanetarySet:
     gears = [
         Gear(
             z, given.module, given.pressure_angle, shift, given.face_width, rim, internal=name == "ring",
-            rack=BasicRack(addendum=addendum), name=name,
+            rack=BasicRack(addendum=addendum), name=name, tip_open=True,
         )
         for name, z, shift, rim, addendum in zip(
             ("sun", "planet", "ring"), given.teeth, given.profile_shifts, rims, given.addendum
         )
     ]  # fmt: skip
-    closed = close_set(*gears, planet_angles=stage.angles)
+    closed = settled_tips(close_set(*gears, planet_angles=stage.angles))
     check_set(closed)
     return closed
+
+
+def stage_warnings(case: MultistageCase) -> Iterator[Finding]:
+    """List what deserves a look in the gears of every stage that has some."""
+    for n, stage in enumerate(case.stage):
+        for finding in check_set(stage_gears(stage)) if stage.gears else ():
+            # the rims are made up
+            if finding.code != "W-RIM":
+                key = f"stage[{n}].{_entry(finding.key)}"
+                yield replace(finding, key=key, text=f"stage {n + 1}: {finding.text}")
+
+
+def _entry(key: str) -> str:
+    """Entry of a stage, for the one of a planetary set that a check of gears names."""
+    entry = key.removeprefix("set.").replace("torsional_support", "torsional_stiffness")
+    return _ENTRIES.get(entry.rpartition(".")[2], entry)
 
 
 def _stage(stage: StageSection) -> PlanetaryStage:

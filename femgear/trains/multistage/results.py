@@ -16,7 +16,7 @@ from femgear.findings import Finding
 from femgear.gears.planetary import mesh_names
 from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
 from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, mode_entries
-from femgear.trains.multistage.case_file import MultistageCase, multistage_of
+from femgear.trains.multistage.case_file import MultistageCase, multistage_of, stage_warnings
 from femgear.trains.multistage.model import (
     MultistageSet,
     mean_mesh_stiffness,
@@ -219,6 +219,7 @@ def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
 
 def multistage_warnings(case: MultistageCase) -> Iterator[Finding]:
     """List what is allowed but deserves a look."""
+    yield from stage_warnings(case)
     response = case.response
     if response is not None and (case.operation is None or not case.geared):
         text = "without operation, or gears of every stage, there are modes alone"

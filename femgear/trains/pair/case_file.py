@@ -15,6 +15,7 @@ from femgear.case.gear_set import (
     checked_set,
     driving_torque,
     flank_form,
+    free_tips,
     gear_of,
     made_deviations,
     pitch_of,
@@ -44,6 +45,7 @@ from femgear.case.sections import (
     Speed,
     StaticSection,
     Stiffness,
+    TipDiameter,
     speed_range,
 )
 from femgear.case.text import CaseFile, ReadCase
@@ -52,6 +54,7 @@ from femgear.findings import Finding
 from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import SetDeviations, no_deviations
 from femgear.gears.pair import GearPair, close_pair
+from femgear.gears.tips import settled_tips
 from femgear.trains.rigid import listed, strength_entries
 
 
@@ -84,7 +87,7 @@ class GearSection(Section):
     mass: Mass = LEFT_OUT
     inertia: Inertia = LEFT_OUT
     bearing_stiffness: Stiffness | None = None
-    tip_diameter: Radius | None = None
+    tip_diameter: TipDiameter | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
     modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
@@ -163,8 +166,9 @@ def _(case: PairCase) -> GearPair:
         centre_distance=case.set.centre_distance,
         find=tuple(name for name in case.gear_names if getattr(case, name).profile_shift is None),
     )
-    check_meshes(pair)
-    return pair
+    settled = settled_tips(pair, free=free_tips(case))
+    check_meshes(settled)
+    return settled
 
 
 @made_deviations.register

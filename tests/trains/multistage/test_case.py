@@ -92,6 +92,15 @@ def test_text_of_a_case_gives_it_again(case, printed):
         assert parse_case(to_toml(one)) == one
 
 
+@pytest.mark.parametrize(("addendum", "code"), [(1.0, "W-FILLET"), (1.2, "W-TIP"), (0.9, "")])
+def test_findings_of_the_gears_name_the_stage(case, addendum, code):
+    """Tips of the ring that overlap fillets by 1.5 um are warned about, longer ones shortened."""
+    assert not list(registry.train_of(case).case_warnings(case))
+    changed = with_value(case, "stage[1].gears.addendum", [1.0, 1.0, addendum])
+    found = [(one.code, one.key) for one in registry.train_of(case).case_warnings(changed)]
+    assert found == [(code, "stage[1].gears.addendum")][: len(code)]
+
+
 @pytest.mark.parametrize(
     ("key", "value", "code", "named"),
     [
@@ -110,8 +119,8 @@ def test_text_of_a_case_gives_it_again(case, printed):
         ),
         ("stage[1].gears.teeth", [21, 33, 86], "E-COAXIAL", "stage[1].gears.profile_shifts"),
         ("stage[1].planets", 7, "E-NEIGHBOURS", "stage[1].planets"),
-        ("stage[1].gears.addendum", [1.0, 1.0, 1.0], "E-FILLET", "stage[1].gears.addendum"),
-        ("stage[1].gears.profile_shifts", [3.0, 0.0, 0.0], "E-POINTED", "stage[1].gears.profile_shifts"),
+        ("stage[1].gears.addendum", [0.3, 0.3, 0.3], "E-CONTACT-RATIO", "stage[1].gears.profile_shifts"),
+        ("stage[1].gears.profile_shifts", [3.0, 0.0, 0.0], "E-COAXIAL", "stage[1].gears.profile_shifts"),
         ("stage[1].fixed", "planet", "E-CHOICE", "stage[1].fixed"),
         ("stage[1].fixed", "carrier", "E-MECHANISM", "stage[1].carrier.torsional_stiffness"),
         ("stage[1].planet_angles", ["0 deg", "0 deg"], "E-RANGE", "stage[1].planet_angles"),
