@@ -308,6 +308,7 @@ def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
         tip_diameter=moved(gear.tip_diameter),
         root_diameter=moved(gear.root_diameter),
         thickness_allowance=gear.thickness_allowance * factor,
+        tip_shortening=gear.tip_shortening,
         name=gear.name,
     )
     return replace(made, rim_radius=made.root_radius + gear.rim_radius - gear.root_radius)

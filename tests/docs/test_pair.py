@@ -43,7 +43,7 @@ def test_the_internal_pair_can_be_solved():
     entries = dict(line.split(" = ") for line in block.strip().splitlines())
     changes = {f"gear_2.{key}": int(v) if v.isdigit() else v.strip('"') for key, v in entries.items()}
     changes |= {"gear_2.bore_radius": None, "static.positions": 8}
-    changes |= {"set.centre_distance": "54 mm", "gear_1.profile_shift": 0.0}
+    changes |= {"set.centre_distance": "54 mm", "gear_1.profile_shift": 0.0, "gear_1.tip_diameter": None}
     assert solve_static(with_values(read_case(CASE), changes)).cycle.stiffness.min() > 0.0
 
 

@@ -6,7 +6,6 @@ static.nc of a helical case holds spur gears, and its table sets the helical num
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,13 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.gears import profile
 from femgear.gears.planetary import virtual_teeth
 from femgear.report.tables import Block
 from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
-from femgear.trains.helical.model import HelicalSet, SectionStiffness, contact_ratios
+from femgear.trains.helical.model import HelicalSet, SectionStiffness
 from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
 
 if TYPE_CHECKING:
@@ -158,35 +156,8 @@ def _attributes(result: HelicalModesResult) -> dict:
 
 
 def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block, ...]:
-    """Tabulate helix, contact ratios, bodies and supports of a case with its transverse section."""
-    return _teeth(case, planetary), Block(
-        "Helical model", _BODIES, tuple(_bodies(case)), _model(case, planetary)
-    )
-
-
-def _teeth(case: HelicalCase, s: PlanetarySet) -> Block:
-    helical, normal = case.helical, case.sun
-    beta = helical.helix_angle
-    base = profile.base_helix_angle(normal.pressure_angle, beta)
-    ratios = contact_ratios(s, helix_angle=beta, face_width=case.set.face_width)
-    rows = [
-        (name, *(f"{value:.4f}" for value in values))
-        for name, values in (
-            ("transverse contact ratio", ratios[:, 0]),
-            ("overlap ratio", ratios[:, 1]),
-            ("total contact ratio", ratios.sum(axis=1)),
-        )
-    ]
-    other = "left" if helical.hand == "right" else "right"
-    notes = (
-        f"helix angle {math.degrees(beta):.6g} deg, on the base cylinder {math.degrees(base):.6g} deg; sun "
-        f"{helical.hand}-handed, planets and ring {other}-handed",
-        f"normal module {normal.module * 1e3:.6g} mm, normal pressure angle "
-        f"{math.degrees(normal.pressure_angle):.6g} deg; gears, meshes and static solution are those of the "
-        f"transverse section: module {s.sun.module * 1e3:.6g} mm, pressure angle "
-        f"{math.degrees(s.sun.pressure_angle):.6g} deg, profile shifts and racks in transverse modules",
-    )
-    return Block("Helix", ("", "sun-planet", "planet-ring"), tuple(rows), notes)
+    """Tabulate bodies and supports of a case with its transverse section."""
+    return (Block("Helical model", _BODIES, tuple(_bodies(case)), _model(case, planetary)),)
 
 
 def _bodies(case: HelicalCase) -> Iterator[tuple[str, ...]]:
@@ -216,9 +187,10 @@ def _model(case: HelicalCase, s: PlanetarySet) -> tuple[str, ...]:
         text = f"mesh stiffness: of the static solution, teeth as stiff as those of virtual gears {teeth}"
     else:
         text = "mesh stiffness: of the static solution, teeth of the transverse section"
+    section = "gears, meshes and static solution are those of the transverse section"
     slices = "one slice" if helical.slices == 1 else f"{helical.slices} slices"
     points = helical.contact_points.replace("_", " ")
-    return text, f"{slices} over the face width; forces act at the {points}"
+    return section, text, f"{slices} over the face width; forces act at the {points}"
 
 
 def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None) -> Block:

@@ -143,7 +143,9 @@ def _describe_case(case: PairCase) -> tuple[Block, ...]:
     }
     shown = [operation.speeds[i] for i in chosen(len(operation.speeds))]
     notes = [f"torque on gear 1 {operation.torque:.6g} N m, on gear 2 {-operation.torque / ratio:.6g} N m"]
-    return describe_gears(gears), describe_meshes(gears), tabulate("Operation", shown, columns, notes)
+    helix = case.helix_angle
+    speeds = tabulate("Operation", shown, columns, notes)
+    return describe_gears(gears, helix), describe_meshes(gears, helix), speeds
 
 
 def _describe_static(results: Results) -> Block:

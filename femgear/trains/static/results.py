@@ -24,10 +24,11 @@ from femgear.contact.slices import PARTS as SLICES
 from femgear.findings import Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
-from femgear.gears.gear import tooth_thickness
+from femgear.gears.gear import Gear, tooth_thickness
 from femgear.gears.iso6336 import bending_face_factor
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_set, phasing_table
+from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.report.style import family
 from femgear.report.tables import Block, chosen, tabulate
 from femgear.storage.results import coordinates, dataset, declared
@@ -710,8 +711,8 @@ def describe_set(case: Case) -> tuple[Block, ...]:
     """Tabulate geometry, phasing and operation of a planetary set."""
     planetary = planetary_set(case)
     return (
-        describe_gears(planetary),
-        describe_meshes(planetary),
+        describe_gears(planetary, case.helix_angle),
+        describe_meshes(planetary, case.helix_angle),
         _harmonics(planetary),
         _neighbours(planetary),
         _operation(case, planetary),
@@ -734,16 +735,22 @@ def load_warnings(case: Any) -> Iterator[Finding]:
         yield Finding("W-TORQUE", "operation.torque", text)
 
 
-def describe_gears(s: GearSet) -> Block:
-    """Tabulate diameters and teeth of all gears."""
+def describe_gears(s: GearSet, helix_angle: float | None = None) -> Block:
+    """Tabulate diameters and teeth of all gears; of helical ones, helix in rad, numbers of both sections."""
+    normal = 1.0 if helix_angle is None else math.cos(helix_angle)
+    transverse = "" if helix_angle is None else "transverse "
     rows = {
         "teeth": lambda g: str(g.teeth),
-        "profile shift": lambda g: f"{g.profile_shift:.5f}",
+        "profile shift" if helix_angle is None else "profile shift [normal modules]": lambda g: (
+            f"{g.profile_shift / normal:.5f}"
+        ),
         "reference diameter [mm]": lambda g: f"{2e3 * g.reference_radius:.4f}",
         "tip diameter [mm]": lambda g: f"{2e3 * g.tip_radius:.4f}",
         "root diameter [mm]": lambda g: f"{2e3 * g.root_radius:.4f}",
         "start of involute, diameter [mm]": lambda g: f"{2e3 * g.form_radius:.4f}",
-        "tooth thickness at the tip [mm]": lambda g: f"{1e3 * float(tooth_thickness(g, g.tip_radius)):.4f}",
+        f"{transverse}tooth thickness at the tip [mm]": lambda g: (
+            f"{1e3 * float(tooth_thickness(g, g.tip_radius)):.4f}"
+        ),
         "bore or outer diameter [mm]": lambda g: f"{2e3 * g.rim_radius:.4f}",
     }
     columns: dict[str, Any] = {"": lambda name: name}
@@ -751,8 +758,10 @@ def describe_gears(s: GearSet) -> Block:
     angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in s.planet_angles[:12])
     first = s.gears[0]
     notes = (
-        f"module {first.module * 1e3:.6g} mm, pressure angle {math.degrees(first.pressure_angle):.6g} deg, "
-        f"face width {first.face_width * 1e3:.6g} mm, centre distance {s.centre_distance * 1e3:.6g} mm",
+        *_helix(first, helix_angle),
+        f"{transverse}module {first.module * 1e3:.6g} mm, {transverse}pressure angle "
+        f"{math.degrees(first.pressure_angle):.6g} deg, face width {first.face_width * 1e3:.6g} mm, "
+        f"centre distance {s.centre_distance * 1e3:.6g} mm",
         *[f"{s.n_planets} planet{'s' * (s.n_planets > 1)} at {angles} deg"][: len(s.kinds) - 1],
         *[
             f"profile shift of the {gear.name}: positive moves the flank outwards (the opposite of ISO 21771)"
@@ -763,8 +772,41 @@ def describe_gears(s: GearSet) -> Block:
     return tabulate("Gears", rows, columns, notes)
 
 
-def describe_meshes(s: GearSet) -> Block:
-    """Tabulate what the geometry says of every kind of mesh."""
+def _helix(gear: Gear, helix_angle: float | None) -> Iterator[str]:
+    """Write helix angle [rad], module and pressure angle of the normal section; nothing of spur teeth."""
+    if helix_angle is None:
+        return
+    angle = math.atan(math.tan(gear.pressure_angle) * math.cos(helix_angle))
+    base = base_helix_angle(angle, helix_angle)
+    yield (
+        f"helix angle {math.degrees(abs(helix_angle)):.6g} deg, on the base cylinder "
+        f"{math.degrees(abs(base)):.6g} deg; {gear.name.replace('_', ' ')} "
+        f"{'right' if helix_angle > 0.0 else 'left'}-handed; normal module "
+        f"{gear.module * math.cos(helix_angle) * 1e3:.6g} mm, normal pressure angle "
+        f"{math.degrees(angle):.6g} deg"
+    )
+
+
+def _contact_ratio_rows(s: GearSet, helix_angle: float | None) -> Iterator[tuple[str, ...]]:
+    """Rows of contact ratios; ``eps_gamma = eps_alpha + eps_beta`` of helical teeth (ISO 21771, 5.4)."""
+    ratios = [pair.contact_ratio for pair in s.kinds]
+    if helix_angle is None:
+        yield ("contact ratio", *(f"{ratio:.4f}" for ratio in ratios))
+        return
+    first = s.gears[0]
+    overlap = overlap_ratio(first.face_width, first.module * math.cos(helix_angle), helix_angle)
+    yield ("transverse contact ratio", *(f"{ratio:.4f}" for ratio in ratios))
+    yield ("overlap ratio", *(f"{overlap:.4f}" for _ in ratios))
+    yield ("total contact ratio", *(f"{ratio + overlap:.4f}" for ratio in ratios))
+
+
+def describe_meshes(s: GearSet, helix_angle: float | None = None) -> Block:
+    """Tabulate what the geometry says of every kind of mesh; the helix angle of helical teeth in rad."""
+    transverse, normal = "", 1.0
+    if helix_angle is not None:
+        # play along the tooth normal, of which the base helix leaves a part in the transverse section
+        angle = math.atan(math.tan(s.gears[0].pressure_angle) * math.cos(helix_angle))
+        transverse, normal = "transverse ", math.cos(base_helix_angle(angle, helix_angle))
     n, phases = s.n_planets, [f"{phase:.4f}" for phase in s.mesh_phases]
     more = ", ..." if n > 6 else ""
     clearance = iter(f"{1e3 * value:.3f}" for value in tip_clearances(s).values())
@@ -776,17 +818,18 @@ def describe_meshes(s: GearSet) -> Block:
     names = [f"{pair.gear_1.name}-{pair.gear_2.name}" for pair in s.kinds]
     rows = (
         (
-            "working pressure angle [deg]",
+            f"{transverse}working pressure angle [deg]",
             *(f"{math.degrees(pair.working_pressure_angle):.4f}" for pair in s.kinds),
         ),
-        ("contact ratio", *(f"{pair.contact_ratio:.4f}" for pair in s.kinds)),
-        ("normal backlash [um]", *(f"{round(pair.backlash * 1e6, 2) + 0.0:.2f}" for pair in s.kinds)),
+        *_contact_ratio_rows(s, helix_angle),
+        ("normal backlash [um]", *(f"{round(normal * one.backlash * 1e6, 2) + 0.0:.2f}" for one in s.kinds)),
         ("tip clearances [mm]", *(f"{next(clearance)}, {next(clearance)}" for _ in s.kinds)),
         ("single contact, first gear [mm]", *(first for first, _ in alone)),
         ("single contact, second gear [mm]", *(second for _, second in alone)),
         *[("mesh phases [periods]", *of_kinds)][: len(of_kinds) - 1],
     )
-    note = "single contact: diameters between which one tooth pair carries, from root to tip of a gear"
+    pair = "pair of the transverse section" if transverse else "pair"
+    note = f"single contact: diameters between which one tooth {pair} carries, from root to tip of a gear"
     return Block("Meshes", ("", *names), rows, (note,))
 
 

@@ -77,7 +77,9 @@ def test_gears_are_those_of_the_transverse_section(case):
     assert math.tan(gears.sun.pressure_angle) == pytest.approx(math.tan(math.radians(20.0)) / cosine)
     assert gears.sun.profile_shift == pytest.approx(0.2 * cosine)
     # addendum and shift are the same lengths in both sections
-    assert gears.sun.tip_radius == pytest.approx(gears.sun.reference_radius + 1.2 * 1.6e-3)
+    assert gears.sun.root_radius == pytest.approx(gears.sun.reference_radius - 1.05 * 1.6e-3)
+    free = planetary_set(with_value(wide, "sun.tip_diameter", None)).sun
+    assert free.tip_radius + free.tip_shortening == pytest.approx(free.reference_radius + 1.2 * 1.6e-3)
     cutter = with_value(with_value(case, "ring.cutter_teeth", 30), "ring.cutter_profile_shift", 0.1)
     assert planetary_set(cutter).ring.cutter.profile_shift == pytest.approx(0.1 * cosine)
 
@@ -243,7 +245,7 @@ def test_errors_that_turn_are_refused(case):
 
 def test_virtual_gears_that_cannot_be_made_are_refused(case):
     # a round tool tip that fits between the flanks of the transverse section alone
-    blunt = with_value(case, "rack", {"root_radius": 0.4, "addendum": 0.7})
+    blunt = with_value(case, "rack", {"root_radius": 0.46, "addendum": 0.7})
     gears = planetary_set(blunt)
     with pytest.raises(CaseError, match="E-GEOMETRY") as info:
         check_helical_case(blunt, gears)
@@ -256,12 +258,12 @@ def test_refusals_of_the_gears_say_that_they_are_of_the_transverse_section(case)
         planetary_set(with_value(with_value(case, "sun.profile_shift", 2.5), "ring.profile_shift", None))
     assert "in the transverse section" in info.value.message
     with pytest.raises(GeometryError, match=r"0\.931411 times those of the file") as info:
-        planetary_set(with_value(case, "rack.root_radius", 0.47))
+        planetary_set(with_value(case, "rack.root_radius", 0.6))
     # found and allowed are coefficients of the file
-    assert info.value.value == 0.47
+    assert info.value.value == 0.6
     limit = float(info.value.limit.split()[1])
     planetary_set(with_value(case, "rack.root_radius", limit))
-    with pytest.raises(GeometryError, match="E-FILLET") as info:
+    with pytest.raises(GeometryError, match="E-ROOT-RADIUS") as info:
         planetary_set(with_value(case, "rack.root_radius", limit + 1e-4))
     assert info.value.value == pytest.approx(limit + 1e-4)
 
@@ -269,13 +271,17 @@ def test_refusals_of_the_gears_say_that_they_are_of_the_transverse_section(case)
 def test_check_tells_helix_and_contact_ratios(case):
     gears = planetary_set(case)
     blocks = {block.title: block for block in HELICAL.describe(case)}
-    rows = {row[0]: row[1:] for row in blocks["Helix"].rows}
+    rows = {row[0]: row[1:] for row in blocks["Meshes"].rows}
     assert rows["overlap ratio"] == ("1.8102", "1.8102")
     assert rows["transverse contact ratio"] == (
         f"{gears.contact_ratio_sun_planet:.4f}",
         f"{gears.contact_ratio_planet_ring:.4f}",
     )
-    notes = " ".join(blocks["Helix"].notes)
+    total = float(rows["total contact ratio"][0])
+    assert total == pytest.approx(gears.contact_ratio_sun_planet + 1.8102, abs=2e-4)
+    assert "transverse working pressure angle [deg]" in rows
+    notes = " ".join(blocks["Gears"].notes)
+    assert "normal module 1.6 mm" in notes and "transverse module 1.71782 mm" in notes
     assert "helix angle 21.3442 deg, on the base cylinder 20 deg" in notes and "sun right-handed" in notes
     assert any("virtual gears 37/25/87" in note for note in blocks["Helical model"].notes)
 

@@ -30,7 +30,9 @@ KINDS = pytest.mark.parametrize("kind", [{}, INTERNAL], ids=["external", "intern
 
 
 def helical(kind, angle, **more):
-    inside = {"gear_2.outer_radius": "110 mm", "gear_2.tip_diameter": None} if kind else {}
+    tips = {"gear_1.tip_diameter": None, "gear_2.tip_diameter": None}
+    inside = {"gear_2.outer_radius": "110 mm"} if kind else {}
+    inside |= tips
     return pair_case({**kind, **OPEN, **inside, "set.helix_angle": f"{angle} deg", **more})
 
 

@@ -23,8 +23,10 @@ STEEL, TAU = Material(206e9, 0.3, 7850.0), np.arange(8) / 8
 INTERNAL = {
     "gear_2.teeth": 60, "gear_2.bore_radius": None, "gear_2.outer_radius": "100 mm",
     "gear_2.cutter_teeth": 30, "set.centre_distance": "54 mm", "gear_1.profile_shift": 0.0,
-    "gear_2.tip_diameter": "175 mm",
+    "gear_1.tip_diameter": "78 mm", "gear_2.tip_diameter": "175 mm",
 }  # fmt: skip
+LARGE_TIPS = {"gear_1.tip_diameter": 159.6, "gear_2.tip_diameter": 230.7572}
+"""Twice those of the case [mm]."""
 
 
 def pair_case(changes=None):
@@ -80,7 +82,7 @@ def test_a_negative_torque_is_the_mirror_image(changes):
 
 def test_twice_the_size_under_eight_times_the_torque():
     case = {"set.module": 6, "set.face_width": 40, "set.centre_distance": 183, "gear_1.bore_radius": 30}
-    large = {key: f"{value} mm" for key, value in {**case, "gear_2.bore_radius": 50}.items()}
+    large = {key: f"{value} mm" for key, value in {**case, "gear_2.bore_radius": 50, **LARGE_TIPS}.items()}
     one, two = solve_static(pair_case()), solve_static(pair_case({**large, "operation.torque": "1600 N m"}))
     np.testing.assert_allclose(two.cycle.deflection, 2.0 * one.cycle.deflection, rtol=1e-6)
     np.testing.assert_allclose(two.cycle.stiffness, 2.0 * one.cycle.stiffness, rtol=1e-6)
@@ -122,8 +124,12 @@ def test_a_displaced_tooth_of_gear_2(changes, sign):
     ("changes", "code", "key"),
     [
         ({"set.centre_distance": "80 mm"}, "E-CENTRE-DISTANCE", "set.centre_distance"),
-        ({**INTERNAL, "gear_1.teeth": 62}, "E-RANGE", "gear_2.teeth"),
-        ({**INTERNAL, "gear_1.teeth": 55, "set.centre_distance": "7.5 mm"}, "E-INTERFERENCE", "gear_2.teeth"),
+        ({**INTERNAL, "gear_1.teeth": 62, "gear_1.tip_diameter": None}, "E-RANGE", "gear_2.teeth"),
+        (
+            {**INTERNAL, "gear_1.teeth": 55, "gear_1.tip_diameter": None, "set.centre_distance": "7.5 mm"},
+            "E-INTERFERENCE",
+            "gear_2.teeth",
+        ),
         ({"gear_1.bore_radius": "34 mm"}, "E-RIM", "gear_1.bore_radius"),
         ({"gear_2.profile_shift": 0.4}, "E-BACKLASH", "gear_1.profile_shift"),
         ({"gear_1.profile_shift": None}, "E-KEY-MISSING", "gear_1.profile_shift"),
