@@ -245,7 +245,7 @@ def test_errors_that_turn_are_refused(case):
 
 def test_virtual_gears_that_cannot_be_made_are_refused(case):
     # a round tool tip that fits between the flanks of the transverse section alone
-    blunt = with_value(case, "rack", {"root_radius": 0.46, "addendum": 0.7})
+    blunt = with_value(case, "rack", {"root_radius": 0.445, "addendum": 0.7})
     gears = planetary_set(blunt)
     with pytest.raises(CaseError, match="E-GEOMETRY") as info:
         check_helical_case(blunt, gears)
