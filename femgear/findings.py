@@ -41,6 +41,7 @@ CATALOGUE = {
     "W-GROWTH": (DOUBT, "The free motion grows: a parametric resonance."),
     "W-HELIX": (DOUBT, "The helix angle lies outside what is validated."),
     "W-JOURNAL": (NOTE, "Lines of a journal were damaged and are left out."),
+    "W-KINK": (DOUBT, "A stress stands at a kink, or at an end of what was searched."),
     "W-LIFTED": (NOTE, "Parts of the face width never carry."),
     "W-LOAD": (NOTE, "Without load nothing keeps the flanks on one side."),
     "W-MOTION": (DOUBT, "A member moves far enough to change contact points and arms."),

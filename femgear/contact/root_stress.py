@@ -51,9 +51,12 @@ from femgear.fe.grid import Grid
 from femgear.gears.gear import Gear
 from femgear.gears.pair import EACH
 from femgear.gears.planetary import GearSet
+from femgear.gears.tooth import root_notches
 
 LOADED, BACK = 0, 1
 """Root of the loaded flank and of the back flank in `RootCycle.stress`."""
+NOTCH_REACH = 0.05
+"""Modules around a corner of the root within which stresses depend on the grid: its points are left out."""
 _WAVES = 9
 """Wave numbers at which responses are computed; between them they are interpolated, within 0.1 %."""
 
@@ -63,8 +66,9 @@ class _RootStress:
     """Tangential stress along the tooth roots of one gear per unit flank load.
 
     The root of a flank runs from the end of the flank along the fillet and the root arc to the middle of
-    the gap. ``influence[k, a, b]`` is the stress at root point ``a`` of tooth ``i`` per unit inward normal
-    force at station ``b`` of tooth ``i - k``, positive in tension; the left flank first, then the right.
+    the gap, without what is nearer to a corner (`gears.tooth.root_notches`) than `NOTCH_REACH`.
+    ``influence[k, a, b]`` is the stress at root point ``a`` of tooth ``i`` per unit inward normal force at
+    station ``b`` of tooth ``i - k``, positive in tension; the left flank first, then the right.
     The critical section of ISO 6336-3 is where the slope is 30 deg (60 deg for internal gears).
     """
 
@@ -279,12 +283,16 @@ def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:
     end, beside = (n - 1, n - 2) if gear.internal else (0, 1)
     for side in (LEFT, RIGHT):
         influence[0, side, 0, side, end] = influence[0, side, 0, side, beside]
+    points, (notches, _) = along.points[order], root_notches(gear)
+    away = np.linalg.norm(points[:, None] - notches, axis=-1).min(axis=1, initial=np.inf)
+    kept = away > NOTCH_REACH * gear.module
+    kept = kept if kept.any() else ~kept
     return _RootStress(
         roll=stations.roll,
-        arc=np.abs(along.arc - along.arc[order][0])[order],
-        points=along.points[order],
-        slope=np.arccos(np.clip(np.abs(along.tangents[order, 0]), 0.0, 1.0)),
-        influence=influence.reshape(gear.teeth, 2 * m, 2 * n),
+        arc=np.abs(along.arc - along.arc[order][0])[order][kept],
+        points=points[kept],
+        slope=np.arccos(np.clip(np.abs(along.tangents[order, 0]), 0.0, 1.0))[kept],
+        influence=influence[:, :, kept].reshape(gear.teeth, 2 * int(kept.sum()), 2 * n),
     )
 
 

@@ -1,8 +1,8 @@
 """Nominal tooth stresses and mesh stiffness after ISO 6336, for orientation beside what is computed.
 
 sigma_H0 (part 2) and sigma_F0 (part 3, method B) of spur gears with tooth contact factors only: no
-application, dynamic or face load factors. The formulas are those of ISO 6336-2:2006 and ISO 6336-3:2006; for
-contact ratios of two and above the later factor f_eps of ISO 6336-3:2019 is not applied. In the formulas here
+application, dynamic or face load factors. The formulas are those of ISO 6336-2:2006 and ISO 6336-3:2006, with
+the factor f_eps of ISO 6336-3:2019 for contact ratios of two and above. In the formulas here
 teeth and diameters of internal gears are negative and profile shifts have the sign of the standard, which for
 internal gears is minus that of `gear.Gear`. `mesh_stiffness_method_b` (part 1) is the mesh stiffness of
 sets that are given by their teeth alone.
@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, cutter_of
@@ -33,7 +35,7 @@ class NominalRootStress:
     stress : float
         sigma_F0 [Pa].
     form, correction : float
-        Y_F and Y_S.
+        Y_F, with f_eps, and Y_S.
     arm, chord, fillet_radius : float
         Bending moment arm h_Fe, thickness of the tooth s_Fn and rho_F at the critical section [m].
     load_angle : float
@@ -117,7 +119,8 @@ def nominal_contact_stress(
 def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: float) -> NominalRootStress:
     """Compute the nominal root stress sigma_F0 [Pa] of a gear, ``F_t/(b m) Y_F Y_S``.
 
-    The load acts at the outer point of single pair contact; rim, deep-tooth and helix factors are 1. The
+    The load acts at the outer point of single pair contact, from a contact ratio of two on with the part
+    `load_distribution_factor` of it; rim, deep-tooth and helix factors are 1. The
     critical section is where the tangent of the fillet stands at 30 deg (internal gears 60 deg) to the
     centreline of the tooth; the fillet of an internal gear enters through the equivalent rack radius rho_fPv
     of its pinion cutter (ISO 6336-3, section 6.2).
@@ -142,6 +145,7 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
             limit="all > 0", remedy="the root of this tooth is outside the range of method B",
         )  # fmt: skip
     form = 6.0 * arm * math.cos(angle) / (chord**2 * math.cos(gear.pressure_angle))
+    form *= load_distribution_factor(contact_ratio)
     correction = stress_correction(chord / arm, 0.5 * chord / fillet)
     m = gear.module
     nominal = tangential_force / (gear.face_width * m)
@@ -155,6 +159,15 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
         load_angle=angle,
         load_radius=radius,
     )
+
+
+def load_distribution_factor(contact_ratio: float) -> float:
+    """Compute f_eps of spur teeth (ISO 6336-3:2019): 0.7 where two pairs or more always carry, else 1.
+
+    At a contact ratio of two and above no pair carries alone at the point that the standard goes on to call
+    the outer point of single pair contact, a contact ratio less one base pitches below the tip.
+    """
+    return 1.0 if contact_ratio < 2.0 else 0.7
 
 
 def stress_correction(slenderness: float, notch: float) -> float:
@@ -210,13 +223,24 @@ def single_pair_factor(
     low, high, pitch = *path, gear_1.base_pitch
     if high - low >= 2.0 * pitch:
         return 1.0
+    inner, outer, middle = (
+        relative_curvature(gear_1, gear_2, working_angle=working_angle, path=place)
+        for place in (high - pitch, low + pitch, 0.0)
+    )
+    return math.sqrt(max(inner, outer, middle) / middle)
 
-    def curvature(x: float) -> float:
-        one = gear_1.base_radius * math.tan(working_angle) + x
-        two = gear_2.base_radius * math.tan(working_angle) + (x if gear_2.internal else -x)
-        return 1.0 / one + (-1.0 if gear_2.internal else 1.0) / two
 
-    return math.sqrt(max(curvature(high - pitch), curvature(low + pitch), curvature(0.0)) / curvature(0.0))
+def relative_curvature(gear_1: Gear, gear_2: Gear, *, working_angle: float, path):
+    """Compute the sum of the curvatures of two flanks in contact [1/m], that of an internal gear negative.
+
+    At path coordinates [m] (float or array), 0 at the pitch point and positive outwards on gear 1; the
+    working pressure angle in rad. Infinite where a flank begins at its base circle.
+    """
+    roll_1 = np.maximum(gear_1.base_radius * math.tan(working_angle) + path, 0.0)
+    roll_2 = gear_2.base_radius * math.tan(working_angle) + (path if gear_2.internal else -path)
+    with np.errstate(divide="ignore"):
+        curvature = 1.0 / np.asarray(roll_1) + (-1.0 if gear_2.internal else 1.0) / np.maximum(roll_2, 0.0)
+    return curvature if curvature.ndim else float(curvature)
 
 
 def bending_face_factor(contact_factor, face_width: float, tooth_height: float):

@@ -24,6 +24,8 @@ SHORTEST_ROOT = 0.025
 SHARP_RADIUS = 0.2  # fillets that turn more sharply have smaller elements
 SHARP_SIZE = 0.15  # of their radius of curvature: within 1.5 % of the stress on finer grids
 SHARPEST_SIZE = 0.002  # however sharp they are
+ROOT_RADIUS_LIMIT = SHARPEST_SIZE / SHARP_SIZE
+"""Radius of curvature of a root [modules] below which elements do not follow it."""
 GROWTH = 0.11  # increase of the spacing per unit length along a curve
 
 
@@ -145,7 +147,8 @@ def _last_edge(points: np.ndarray) -> float:
 def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tuple[np.ndarray, int]:
     """Fillet from the flank's end to the root circle, spaced by arc length; row where the tooth base ends.
 
-    Bits of involute or root arc that are too short for an edge of their own belong to it.
+    Bits of involute or root arc that are too short for an edge of their own belong to it, and the root arc
+    belongs to a fillet that is.
     """
     corner = float(gear.tool.fillet_point(0.0)[1])
     land = math.pi / gear.teeth - corner
@@ -159,17 +162,24 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tu
         return np.where(p[:, None] < 0.0, involute, generated)
 
     p = np.linspace(0.0, 1.0, 2001)
+    short = np.linalg.norm(np.diff(point(p[[0, -1]]), axis=0)) < SHORTEST_ROOT * gear.module
+    if short:
+        p = np.array([0.0, 0.5, 1.0])
     if end_roll > gear.form_roll:
         p = np.concatenate([np.linspace(-1.0, 0.0, 200, endpoint=False), p])
-    if land * gear.root_radius < SHORTEST_ROOT * gear.module:
-        p = np.concatenate([p, np.linspace(1.0, 2.0, 20)[1:]])
+    if short or land * gear.root_radius < SHORTEST_ROOT * gear.module:
+        p = np.concatenate([p, np.linspace(1.0, 2.0, 500 if short else 20)[1:]])
     dense = point(p)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
-    split = length[_base_row(dense)]
+    corner_rows = (p >= 0.0) & (p <= 1.0) & short
+    # a corner needs a vertex, that of the flank's end where no involute belongs to the fillet
+    split = length[int(corner_rows.argmax()) if short else _base_row(dense)]
     size = FILLET_SIZE * sizes.unit
-    sharp = _sharp_sizes(dense, length, gear, sizes)
+    sharp = _sharp_sizes(dense, length, gear, sizes, corner_rows)
     start = min(max(_last_edge(flank), FINEST_SIZE * sizes.unit), size)
-    upper = split * sizes.spacing(split, start, size, largest=lambda s: np.interp(s, length, sharp))
+    upper = np.zeros(1)
+    if split > 0.0:
+        upper = split * sizes.spacing(split, start, size, largest=lambda s: np.interp(s, length, sharp))
     lower = split + (length[-1] - split) * sizes.spacing(
         length[-1] - split, size, size, largest=lambda s: np.interp(split + s, length, sharp)
     )
@@ -178,10 +188,16 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tu
     return points, len(upper) - 1
 
 
-def _sharp_sizes(points: np.ndarray, length: np.ndarray, gear: Gear, sizes: _Sizes) -> np.ndarray:
-    """Largest element sizes (n,) [m] along a finely sampled fillet, small where it turns sharply."""
+def _sharp_sizes(
+    points: np.ndarray, length: np.ndarray, gear: Gear, sizes: _Sizes, corner: np.ndarray
+) -> np.ndarray:
+    """Largest element sizes (n,) [m] along a finely sampled fillet, small where it turns sharply.
+
+    ``corner`` (n,) are the rows of a fillet so short that it is a corner.
+    """
     radius = notch_radius(gear, points) / gear.module
     finest = np.where(radius < SHARP_RADIUS * (1.0 - 1e-6), SHARP_SIZE * radius, FILLET_SIZE)
+    finest[corner] = SHARPEST_SIZE
     size = np.clip(finest, SHARPEST_SIZE, FILLET_SIZE) * sizes.unit
     for order in (slice(None), slice(None, None, -1)):
         way = np.abs(length[order] - length[order][0])
@@ -202,6 +218,37 @@ def notch_radius(gear: Gear, points: np.ndarray) -> np.ndarray:
     radius[1:-1] = np.divide(length, turn, out=radius[1:-1], where=turn > 1e-12)
     radius[0], radius[-1] = radius[1], radius[-2]
     return radius
+
+
+def root_notches(gear: Gear) -> tuple[np.ndarray, float]:
+    """Find where the root of a left flank turns more sharply than elements can follow, and how sharply.
+
+    Returns
+    -------
+    notches : (k, 2) array
+        Points in the tooth frame [m], beside which stresses have no limit or depend on the grid.
+    radius : float
+        Smallest radius of curvature of flank end, fillet and root arc [m]; corners are rounded over a fifth
+        of `ROOT_RADIUS_LIMIT`.
+    """
+    limit = ROOT_RADIUS_LIMIT * gear.module
+    step = 0.2 * limit
+    inner, outer = gear.form_roll, gear.tip_roll
+    beside = inner + math.copysign(min(0.1 * gear.module, 0.5 * abs(outer - inner)), outer - inner)
+    corner = float(gear.tool.fillet_point(0.0)[1])
+    radius, angle = gear.tool.fillet_point(gear.fillet_end * np.linspace(1.0, 0.0, 4001))
+    parts = (
+        flank_points(gear, np.linspace(beside, inner, 200)),
+        np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]),
+        _arc(gear.root_radius, corner, max(corner, math.pi / gear.teeth), np.linspace(0.0, 1.0, 200)),
+    )
+    points = np.vstack(parts)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    # equal steps: what is shorter than one counts as a corner
+    even = np.linspace(0.0, length[-1], max(8, math.ceil(length[-1] / step)))
+    points = np.column_stack([np.interp(even, length, column) for column in points.T])
+    found = notch_radius(gear, points)
+    return points[found < limit], float(found.min())
 
 
 def _base_row(points: np.ndarray) -> int:

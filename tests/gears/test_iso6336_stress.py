@@ -17,9 +17,11 @@ from femgear.gears.iso6336 import (
     elasticity_factor,
     nominal_contact_stress,
     nominal_root_stress,
+    relative_curvature,
     stress_correction,
     zone_factor,
 )
+from femgear.gears.profile import BasicRack
 
 FORCE = 285900.438
 STEEL = {"youngs_modulus": 206e9, "poisson_ratio": 0.3}
@@ -138,3 +140,32 @@ def test_numbers_outside_the_method_are_refused(nrel):
         with pytest.raises(GeometryError) as caught:
             nominal_root_stress(nrel.sun, contact_ratio=ratio, tangential_force=1.0)
         assert caught.value.code == "E-ISO6336"
+
+
+def test_two_pairs_share_the_load_from_a_contact_ratio_of_two_on():
+    """f_eps of ISO 6336-3:2019; 40/50 teeth, addendum 1.25: 105.5 and 105.1 MPa by finite elements."""
+    rack = BasicRack(1.25, 1.5, 0.2)
+    gear = Gear(40, 3e-3, math.radians(20), 0.0, 0.02, 0.025, rack=rack)
+    below, above = (
+        nominal_root_stress(gear, contact_ratio=ratio, tangential_force=200 / 0.06) for ratio in (1.9999, 2.0)
+    )
+    assert above.form / below.form == pytest.approx(0.7, abs=1e-3)
+    high = nominal_root_stress(gear, contact_ratio=2.113, tangential_force=200 / 0.06).stress
+    assert high == pytest.approx(105.5e6, rel=0.02)
+
+
+@pytest.mark.parametrize("tooth_pair", [(20, 40, False), (20, 60, True)])
+def test_relative_curvature_is_that_of_both_flanks(tooth_pair):
+    """1/rho_1 +- 1/rho_2 with radii measured along the line of action from the base circles."""
+    z_1, z_2, internal = tooth_pair
+    alpha = math.radians(20)
+    gears = [
+        Gear(z_1, 2e-3, alpha, 0.0, 0.02, 0.01),
+        Gear(z_2, 2e-3, alpha, 0.0, 0.02, 0.1 if internal else 0.02, internal=internal),
+    ]
+    rho = [0.5 * 2e-3 * z * math.sin(alpha) for z in (z_1, z_2)]
+    for path in (-2e-3, 0.0, 3e-3):
+        one, two = rho[0] + path, rho[1] + (path if internal else -path)
+        expected = 1.0 / one + (-1.0 if internal else 1.0) / two
+        assert relative_curvature(*gears, working_angle=alpha, path=path) == pytest.approx(expected)
+    assert math.isinf(relative_curvature(*gears, working_angle=alpha, path=-rho[0]))

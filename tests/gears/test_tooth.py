@@ -9,7 +9,7 @@ import pytest
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 from femgear.gears.profile import BasicRack, PinionCutter
-from femgear.gears.tooth import half_sector
+from femgear.gears.tooth import half_sector, root_notches
 
 ALPHA = math.radians(20.0)
 GEARS = {
@@ -212,3 +212,27 @@ def test_elements_are_smaller_where_a_fillet_turns_sharply():
     # nothing else changes: those of an ordinary tool have one size along most of their length
     ordinary = half_sector(GEARS["sun"]).curve("fillet")[::2]
     assert np.linalg.norm(np.diff(ordinary, axis=0), axis=1).min() > 0.03 * GEARS["sun"].module
+
+
+def test_corners_of_roots_are_found():
+    """Where a sharp cutter ends its flank at the pitch point the fillet has no length."""
+    corner = Gear(
+        80, 2e-3, ALPHA, 0.5, 0.02, 0.16, internal=True, rack=BasicRack(root_radius=0.0),
+        cutter=PinionCutter(60),
+    )  # fmt: skip
+    notches, radius = root_notches(corner)
+    assert radius < 0.003 * 2e-3
+    assert np.abs(np.hypot(*notches.T) - corner.root_radius).max() < 0.003 * 2e-3
+    # its outline has the root arc in the place of the fillet, to the cut, and a vertex in the corner
+    curves = dict(half_sector(corner).curves)
+    assert "root" not in curves
+    x, y = curves["fillet"][[0, -1]].T
+    assert np.hypot(x, y) == pytest.approx(corner.root_radius, rel=1e-8)
+    assert math.atan2(y[0], x[0]) == pytest.approx(math.pi / 80)
+    assert math.dist((x[1], y[1]), notches[0]) < 0.003 * 2e-3
+    for name, gear in GEARS.items():
+        notches, radius = root_notches(gear)
+        # undercut flanks end in a ridge, which carries nothing
+        assert not len(notches), name
+        if name in ("sun", "planet", "ring"):
+            assert radius == pytest.approx(0.25 * gear.module, rel=0.2)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import Entries
-from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
 from femgear.findings import Finding
@@ -84,8 +84,6 @@ _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with th
 _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
 _FORMS = ("sun", "planet_sun_side", "planet_ring_side", "ring")
 _HEARD = {"microphone [dB(A)]": "pressure_level", "sound power [dB(A)]": "power_level"}
-_KINKED = 1.3
-"""Contact pressure of flanks with kinks over sigma_H0 that is told."""
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
 _SUPPORTED = {
@@ -449,7 +447,6 @@ def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> I
     where = _where(results.static, ", static")
     yield f"largest root stress{where}", f"{root[worst] * 1e-6:.1f} MPa, {parts[worst]}"
     yield f"largest contact pressure{where}", _kinds("{:.1f} MPa", contact * 1e-6)
-    notes += _at_kinks(results, contact, nominals)
     if results.case.helix_angle is not None:
         notes.append("no safeties of helical teeth: nominal stresses of ISO 6336 are those of spur teeth")
         return
@@ -482,22 +479,6 @@ def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> I
         missing = "" if "K_v" in known else "; K_gamma and K_v were not computed"
         wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "K_Hβ" in known else ""
         notes.append(f"long life, every other factor of ISO 6336-2 and -3 is 1{missing}{wide}")
-
-
-def _at_kinks(results: Results, contact: np.ndarray, nominal: np.ndarray) -> Iterator[str]:
-    """Say why pressures (2,) are far above sigma_H0 (2,) at the kinks where linear reliefs begin.
-
-    Under a kink pressure has no limit (K. L. Johnson, Contact Mechanics, 1985, section 5.2, blunt wedges).
-    """
-    given, back = set_deviations(results.case), driving_torque(results.case) < 0
-    laws = ([one for form in given.mesh_forms(k, back) for one in form.profile] for k in range(len(KINDS)))
-    kinked = [any(getattr(one, "power", 2.0) <= 1.0 for one in found) for found in laws]
-    high = kinked & (contact > _KINKED * nominal * np.sqrt(shares(results.static)[0]))
-    if high.any() and "slice_load" not in results.static:
-        yield (
-            f"contact pressure of {' and '.join(np.array(KINDS)[high])}: a linear relief begins with a kink, "
-            'under which pressure has no limit and grows with the cells; shape = "parabolic" makes none'
-        )
 
 
 def _operating_points(results: Results, factors: np.ndarray) -> Block:

@@ -19,16 +19,17 @@ from femgear.case.checks import steep_helix
 from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
-from femgear.contact.root_stress import BACK, LOADED, RootCycle
+from femgear.contact.root_stress import BACK, LOADED, NOTCH_REACH, RootCycle
 from femgear.contact.slices import PARTS as SLICES
 from femgear.findings import Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import Gear, tooth_thickness
-from femgear.gears.iso6336 import bending_face_factor
+from femgear.gears.iso6336 import bending_face_factor, relative_curvature
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_set, phasing_table
 from femgear.gears.profile import base_helix_angle, overlap_ratio
+from femgear.gears.tooth import ROOT_RADIUS_LIMIT, root_notches
 from femgear.report.style import family
 from femgear.report.tables import Block, chosen, tabulate
 from femgear.storage.results import coordinates, dataset, declared
@@ -148,6 +149,18 @@ STRESS_VARIABLES = {
     "load_cycle_share": ("mesh load_bin", "1", _CYCLE_SHARE),
     "load_cycles": ("mesh gear", "1", _CYCLES),
     "loaded_contact_ratio": ("mesh", "1", "mesh periods a tooth pair is loaded"),
+    "root_worst_load": ("mesh gear", "N", "load of its tooth pair then"),
+    "root_notch_radius": ("mesh gear", "m", "smallest radius of curvature of the root"),
+    "contact_worst_path": (
+        "mesh",
+        "m",
+        "path of the tooth pair with the largest pressure, from the pitch point",
+    ),
+    "contact_worst_load": ("mesh", "N", "its load, in slices that of the slice times their number"),
+    "contact_worst_curvature": ("mesh", "1", "relative curvature there over that at the pitch point"),
+    "contact_start": ("mesh gear", "m", "distance from the base circle at which contact begins, radially"),
+    "relief_kink": ("mesh", "1", "whether reliefs of the mesh begin with a kink"),
+    "iso_contact_ratio_factor": ("mesh", "1", "contact ratio factor Z_eps in it, ISO 6336-2"),
     "iso_contact_stress": ("mesh", "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
     "iso_root_stress": ("mesh gear", "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
 }
@@ -160,6 +173,10 @@ _HARMONICS, _ROWS = 6, 8
 """Harmonics whose phasing is listed, and neighbouring sets."""
 _DISTANCE, _TOLERANCE = 3, 0.02
 """How far teeth and ratio of neighbouring sets may lie away."""
+DIFFERS = 1.3
+"""Largest stress of finite elements over the nominal one, or that over it, for which a reason is given."""
+_KINKED = 1.3
+"""Largest pressure over that of Hertz with a kink in the contact that is told."""
 UNEQUAL = 1.03
 """Share over the equal one with which planets are no longer taken as alike."""
 SIDES = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
@@ -283,18 +300,20 @@ class NominalStresses:
     """Nominal stresses after ISO 6336 with equal load on all planets and no load factors.
 
     ``contact`` (2,) is sigma_H0 of sun-planet and planet-ring [Pa] (ISO 6336-2, method B), ``root`` (2, 2)
-    sigma_F0 of gear 1 and gear 2 of both [Pa] (ISO 6336-3, method B); ``message`` tells why a value is NaN,
-    of gears outside the range of the method.
+    sigma_F0 of gear 1 and gear 2 of both [Pa] (ISO 6336-3, method B), ``contact_ratio_factor`` (2,) Z_eps;
+    ``message`` tells why a value is NaN, of gears outside the range of the method.
     """
 
     contact: np.ndarray
     root: np.ndarray
+    contact_ratio_factor: np.ndarray
     message: str
 
     @classmethod
     def of_none(cls, gears: GearSet, message: str) -> NominalStresses:
         """Give none of a set of gears, and why."""
-        return cls(np.full(len(gears.kinds), np.nan), np.full((len(gears.kinds), 2), np.nan), message)
+        missing = np.full(len(gears.kinds), np.nan)
+        return cls(missing, np.full((len(gears.kinds), 2), np.nan), missing, message)
 
 
 @dataclass(frozen=True)
@@ -320,6 +339,8 @@ class StressResult:
     closes : bool
         Whether the record repeats after its end. Where it does not, a tooth that the end of the record cuts
         off is followed on from the beginning of the record.
+    relief_kinks : tuple of bool
+        Whether flanks of both kinds of mesh have reliefs that begin with a kink; empty for none.
     """
 
     planetary_set: PlanetarySet
@@ -332,11 +353,13 @@ class StressResult:
     nominal: NominalStresses
     sun_torque: float
     closes: bool
+    relief_kinks: tuple[bool, ...] = ()
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of stress.nc."""
         cycle, edges = self.cycle, self.spectrum.edges
         values: dict[str, Any] = root_values(self.roots) | self._worst() | self._ranges() | self._loads()
+        values |= self._contacts()
         values["contact_pressure"] = cycle.max_pressure
         if cycle.pressure is not None:
             values |= {
@@ -363,6 +386,8 @@ class StressResult:
             "sun_torque": self.sun_torque,
             "mesh_periods": cycle.periods,
             "repeats": int(self.closes),
+            "module": self.planetary_set.gears[0].module,
+            "nominal_load": self._nominal_load,
             "load_counting": _COUNTING,
             "iso": self.nominal.message,
         }
@@ -376,9 +401,66 @@ class StressResult:
             slot, at, point = root.worst
             instant = position[(first * each + at) % len(position)]
             place = root.arc[point], root.slope[point]
-            rows.append((root.tension[slot, at], *place, instant, root.path[slot, at]))
-        names = ("root_worst", *(f"root_worst_{name}" for name in ("arc", "slope", "position", "path")))
-        return dict(zip(names, (_by_gear(column) for column in zip(*rows)), strict=True))
+            rows.append((root.tension[slot, at], *place, instant, root.path[slot, at], root.load[slot, at]))
+        parts = ("arc", "slope", "position", "path", "load")
+        names = ("root_worst", *(f"root_worst_{name}" for name in parts))
+        found = dict(zip(names, (_by_gear(column) for column in zip(*rows)), strict=True))
+        notches = [[root_notches(gear)[1] for gear in pair.gears] for pair in self.planetary_set.kinds]
+        return found | {"root_notch_radius": np.repeat(notches, self.planetary_set.n_planets, axis=0)}
+
+    @property
+    def _nominal_load(self) -> float:
+        """Load of a mesh along the line of action under equal shares [N]."""
+        s = self.planetary_set
+        return abs(self.sun_torque) / (s.n_planets * s.gears[0].base_radius)
+
+    def _contacts(self) -> dict[str, np.ndarray]:
+        """Place, load and curvature of the tooth pair with the largest pressure of every mesh."""
+        s = self.planetary_set
+        rows, starts = [], []
+        for mesh, pair in enumerate(pair for pair in s.kinds for _ in range(s.n_planets)):
+            angle, (low, high) = pair.working_pressure_angle, pair.path
+            place, load = self._most_pressed(mesh)
+            at, pitch = (
+                relative_curvature(*pair.gears, working_angle=angle, path=path)
+                for path in (float(np.clip(place, low, high)), 0.0)
+            )
+            rows.append((place, load, at / pitch))
+            one, two = (gear.base_radius * math.tan(angle) for gear in pair.gears)
+            rolls = one + low, (two + low if pair.gear_2.internal else two - high)
+            starts.append(
+                [
+                    math.hypot(gear.base_radius, roll) - gear.base_radius
+                    for gear, roll in zip(pair.gears, rolls, strict=True)
+                ]
+            )
+        names = "contact_worst_path", "contact_worst_load", "contact_worst_curvature"
+        kinks = self.relief_kinks or (False,) * len(s.kinds)
+        return dict(zip(names, np.array(rows).T, strict=True)) | {
+            "contact_start": np.array(starts),
+            "relief_kink": np.repeat(np.array(kinks, dtype=int), s.n_planets),
+        }
+
+    def _most_pressed(self, mesh: int) -> tuple[float, float]:
+        """Path [m] and load [N] of the tooth pair of a mesh with the largest pressure off the flank ends."""
+        cycle, pair = self.cycle, self.planetary_set.kinds[mesh // self.planetary_set.n_planets]
+        if cycle.slice_pressure is not None and cycle.slice_load is not None:
+            found = np.unravel_index(cycle.slice_pressure[mesh].argmax(), cycle.slice_pressure[mesh].shape)
+            tooth, piece, position = (int(one) for one in found)
+            ahead = 0.0 if self.influences.ahead is None else self.influences.ahead[piece]
+            path = cycle.path[mesh, tooth, position] + ahead * self.planetary_set.base_pitch
+            return float(path), float(cycle.slice_load[mesh, tooth, piece, position])
+        position = int(cycle.max_pressure[mesh].argmax())
+        path, load = cycle.path[mesh, :, position], cycle.tooth_load[mesh, :, position]
+        curvature = relative_curvature(
+            *pair.gears, working_angle=pair.working_pressure_angle, path=np.clip(path, *pair.path)
+        )
+        if cycle.pressure is None:
+            tooth = int(np.argmax(load * curvature))  # that of Hertz is largest for the same one
+        else:
+            pressure = cycle.pressure[mesh, :, :, position].max(axis=1)
+            tooth = int(np.abs(pressure - cycle.max_pressure[mesh, position]).argmin())
+        return float(path[tooth]), float(load[tooth])
 
     def _ranges(self) -> dict[str, np.ndarray]:
         """Stress ranges over a turn, of single teeth where they differ, and the history of planets' roots."""
@@ -421,6 +503,7 @@ class StressResult:
             "load_cycle_share": spectrum.engagements,
             "load_cycles": spectrum.cycles,
             "loaded_contact_ratio": spectrum.duration,
+            "iso_contact_ratio_factor": np.repeat(nominal.contact_ratio_factor, N),
             "iso_contact_stress": np.repeat(nominal.contact, N),
             "iso_root_stress": np.repeat(nominal.root, N, axis=0),
         }
@@ -508,6 +591,65 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if ((back > 0) & ~(force > 0)).any():
         text = "some meshes carry on their back flanks alone: planets work against one another"
         yield Finding("W-BACK", "", text)
+
+
+def stress_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """List which stresses of stress.nc stand at a kink or at an end of what was searched."""
+    module, seen = float(data.attrs["module"]), set[str]()
+    for mesh, name in enumerate(data["mesh"].values):
+        titles = SIDES.get(family(name), tuple(str(name).split("-")))
+        for number, title in enumerate(titles):
+            one = data.isel(mesh=mesh, gear=number)
+            gear = title.split(",")[0].replace(" ", "_")
+            radius, worst = float(one["root_notch_radius"]), float(one["root_worst"])
+            if radius < ROOT_RADIUS_LIMIT * module and gear not in seen:
+                seen.add(gear)
+                yield Finding(
+                    "W-KINK", f"{gear}.rack.root_radius",
+                    f"the root of the {gear.replace('_', ' ')} has a corner (a radius below "
+                    f"{1e6 * ROOT_RADIUS_LIMIT * module:.3g} um): there the stress has no limit. Root "
+                    f"stresses are those {1e3 * NOTCH_REACH * module:.3g} mm from it and farther; the "
+                    f"largest, {1e-6 * worst:.1f} MPa, grows towards it",
+                    remedy="give the rounding of the tool as root_radius",
+                )  # fmt: skip
+            elif worst > 0.0 and float(one["root_worst_arc"]) <= 0.0 and title not in seen:
+                seen.add(title)
+                yield Finding(
+                    "W-KINK", "",
+                    f"the largest root stress of the {title}, {1e-6 * worst:.1f} MPa, stands at the end of "
+                    "the flank, where the root begins: it may be larger on the flank above",
+                )  # fmt: skip
+    yield from _kinked_reliefs(data)
+
+
+def _kinked_reliefs(data: xr.Dataset) -> Iterator[Finding]:
+    """Name the kinds of mesh whose pressure at the kink of a linear relief is far above that of Hertz.
+
+    Under a kink pressure has no limit (K. L. Johnson, Contact Mechanics, 1985, section 5.2, blunt wedges).
+    """
+    if "slice" in data.sizes or data.attrs["nominal_load"] == 0.0:
+        return  # slices have the pressure of Hertz
+    excess = _over_hertz(data)
+    names = [family(str(name)) for name in data["mesh"].values]
+    for kind in dict.fromkeys(names):
+        largest = max(one for one, name in zip(excess, names, strict=True) if name == kind)
+        kinked = any(data["relief_kink"].values[[name == kind for name in names]])
+        if kinked and largest > _KINKED:
+            yield Finding(
+                "W-KINK", "",
+                f"contact pressure of {kind}: a linear relief begins with a kink, under which pressure has "
+                f"no limit and grows with the cells; {largest:.2f} times that of Hertz for the same load",
+                remedy='shape = "parabolic" makes no kink',
+            )  # fmt: skip
+
+
+def _over_hertz(data: xr.Dataset) -> np.ndarray:
+    """Largest pressure of every mesh over that of Hertz for load and curvature; 0 without sigma_H0."""
+    load, curvature = data["contact_worst_load"].values, data["contact_worst_curvature"].values
+    hertz = data["iso_contact_stress"].values / data["iso_contact_ratio_factor"].values
+    hertz = hertz * np.sqrt(load / data.attrs["nominal_load"] * curvature)
+    largest = data["contact_pressure"].values.max(axis=1)
+    return np.divide(largest, hertz, out=np.zeros(len(hertz)), where=hertz > 0.0)
 
 
 def _more_slices(data: xr.Dataset, module: float) -> str:
@@ -660,6 +802,7 @@ def describe_stress(data: xr.Dataset) -> Block:
     ]
     if data.attrs.get("iso"):
         notes.append(f"not by ISO 6336: {data.attrs['iso']}")
+    notes += _reasons(data)
     if "root_face_factor" in data:
         header = *header, "K_Fbeta", "by ISO"
         contact = [(*row, "-", "-") for row in contact]
@@ -670,6 +813,46 @@ def describe_stress(data: xr.Dataset) -> Block:
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
     return Block("Stresses", header, (*contact, *roots), tuple(notes))
+
+
+def _reasons(data: xr.Dataset) -> Iterator[str]:
+    """Say why stresses differ from nominal ones by more than `DIFFERS`, factor by factor."""
+    names, nominal_load = [str(name) for name in data["mesh"].values], float(data.attrs["nominal_load"])
+    if nominal_load == 0.0:
+        return
+    excess = _over_hertz(data)
+    for kind in dict.fromkeys(map(family, names)):
+        meshes = [i for i, name in enumerate(names) if family(name) == kind]
+        mesh = meshes[int(data["contact_pressure"].values[meshes].max(axis=1).argmax())]
+        one = data.isel(mesh=mesh)
+        ratio = float(one["contact_pressure"].max() / one["iso_contact_stress"])
+        if ratio > DIFFERS or 0.0 < ratio < 1.0 / DIFFERS:
+            curvature, load = float(one["contact_worst_curvature"]), float(one["contact_worst_load"])
+            ends = sorted(zip(one["contact_start"].values, kind.split("-")))
+            near = f"; on the {ends[0][1]} contact begins {1e3 * ends[0][0]:.2g} mm above the base circle"
+            yield (
+                f"contact {kind}, FE/ISO = {ratio:.2f}: x {math.sqrt(curvature):.2f} by the relative "
+                f"curvature where the pressure is largest, {curvature:.2f} times that of the pitch point"
+                f"{near if curvature > DIFFERS else ''}; x {math.sqrt(load / nominal_load):.2f} by the load "
+                f"of the tooth pair, {load / nominal_load:.2f} of the nominal one; x "
+                f"{1.0 / float(one['iso_contact_ratio_factor']):.2f}: sigma_H0 has Z_eps; x "
+                f"{excess[mesh]:.2f} by all else (kinks and ends of flanks, deformation of the teeth)"
+            )
+        for number, title in enumerate(SIDES.get(kind, tuple(kind.split("-")))):
+            mesh = meshes[int(data["root_worst"].values[meshes, number].argmax())]
+            one = data.isel(mesh=mesh, gear=number)
+            ratio = float(one["root_worst"] / one["iso_root_stress"])
+            if ratio > DIFFERS or 0.0 < ratio < 1.0 / DIFFERS:
+                share = float(one["root_worst_load"]) / nominal_load
+                rest = (
+                    f"x {ratio / share:.2f} by all else" if share > 0.0 else "the tooth itself is not loaded"
+                )
+                radius = float(one["root_notch_radius"]) / data.attrs["module"]
+                yield (
+                    f"root {title}, FE/ISO = {ratio:.2f}: x {share:.2f} by the load of the tooth pair; "
+                    f"{rest}: its place, rim and neighbouring teeth, which ISO 6336-3 takes in part, the "
+                    f"notch, sharpest radius {radius:.3f} modules"
+                )
 
 
 def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:

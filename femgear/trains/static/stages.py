@@ -36,7 +36,7 @@ from femgear.contact.width_waves import width_waves, with_held_ring
 from femgear.errors import CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import foundation
 from femgear.gears.deviations import common_period
-from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
+from femgear.gears.iso6336 import contact_ratio_factor, nominal_contact_stress, nominal_root_stress
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
@@ -48,6 +48,7 @@ from femgear.trains.static.results import (
     describe_static,
     describe_stress,
     static_warnings,
+    stress_warnings,
 )
 
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
@@ -307,6 +308,19 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
         else NominalStresses.of_none(gears, "helical teeth: nominal stresses are those of spur teeth"),
         sun_torque=static.sun_torque,
         closes=closes,
+        relief_kinks=relief_kinks(case),
+    )
+
+
+def relief_kinks(case: Case) -> tuple[bool, ...]:
+    """Tell of every kind of mesh whether a relief of its loaded flanks begins with a kink."""
+    given, back = set_deviations(case), driving_torque(case) < 0
+    kinds = range(len(planetary_set(case).kinds))
+    return tuple(
+        any(
+            getattr(law, "power", 2.0) <= 1.0 for form in given.mesh_forms(kind, back) for law in form.profile
+        )
+        for kind in kinds
     )
 
 
@@ -321,6 +335,7 @@ def nominal_stresses(
     # torque over reference radius: the same at all gears
     force = abs(sun_torque) / (s.n_planets * s.gears[0].reference_radius)
     contact, root, messages = np.full(len(s.kinds), math.nan), np.full((len(s.kinds), 2), math.nan), []
+    ratio_factor = contact.copy()
     for i, pair in enumerate(s.kinds):
         one, two = pair.gears
         small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
@@ -331,6 +346,7 @@ def nominal_stresses(
         )
         try:
             contact[i] = nominal_contact_stress(small, large, working_angle=angle, **load, **elastic)
+            ratio_factor[i] = contact_ratio_factor(pair.contact_ratio)
         except GeometryError as error:
             messages.append(f"{one.name}-{two.name}: {error.message}")
         for j, gear in enumerate((one, two)):
@@ -338,7 +354,7 @@ def nominal_stresses(
                 root[i, j] = nominal_root_stress(gear, **load).stress
             except GeometryError as error:
                 messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
-    return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
+    return NominalStresses(contact, root, ratio_factor, "; ".join(dict.fromkeys(messages)))
 
 
 def ring_foundation(case: Case, sector: Sector):
@@ -487,6 +503,7 @@ STRESS = Stage(
         "iso": result.nominal.message,
     },
     describe=lambda results: describe_stress(results.stress),
+    warnings=stress_warnings,
     wanted=lambda case: case.static.stresses,
     unavailable=lambda case: (
         "" if case.helix_angle is None or case.static.slices > 1 else "helical teeth need static.slices = 25"

@@ -15,7 +15,8 @@ from femgear.contact.tooth_loads import loaded_teeth
 from femgear.gears.gear import half_thickness_angle
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static import stages as static_stages
-from femgear.trains.static.stages import nominal_stresses, solve_static, solve_stress
+from femgear.trains.static.results import describe_stress, stress_warnings
+from femgear.trains.static.stages import nominal_stresses, relief_kinks, solve_static, solve_stress
 
 FILE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 P, N = 16, 3
@@ -341,3 +342,64 @@ def test_an_elastic_ring_is_on_its_foundation(reference):
     soft, hard = (static_stages._influences(one, static).ring.influence for one in (elastic, hard))
     assert np.abs(hard - held).max() < 1e-3 * np.abs(held).max()
     assert np.abs(soft - held).max() > 0.05 * np.abs(held).max()
+
+
+def test_a_linear_relief_begins_with_a_kink_that_is_told_where_the_pressure_is_high(reference):
+    """Only where it is far above that of Hertz, and a parabolic relief has none."""
+    case, _, result = reference
+    relief = {"kind": "tip relief", "amount": "4 um", "start_diameter": "43 mm"}
+    kinks = {
+        shape: relief_kinks(with_value(case, "sun.modifications", [relief | {"shape": shape}]))
+        for shape in ("linear", "parabolic")
+    }
+    assert kinks == {"linear": (True, False), "parabolic": (False, False)}
+    data = replace(result, relief_kinks=kinks["linear"]).dataset()
+    assert not list(stress_warnings(data))
+    high = data.assign(contact_pressure=1.5 * data.contact_pressure)
+    (finding,) = stress_warnings(high)
+    assert finding.code == "W-KINK" and "contact pressure of sun-planet: a linear relief" in finding.text
+    assert not list(stress_warnings(high.assign(relief_kink=0 * high.relief_kink)))
+
+
+def test_the_largest_pressure_is_that_of_hertz_for_its_place_and_load(reference):
+    """sigma_H0 without Z_eps times the roots of load and relative curvature; cells and windows 2 %."""
+    _, static, result = reference
+    data, pair = result.dataset(), static.planetary_set.kinds[0]
+    path = float(data.contact_worst_path[0])
+    assert pair.path[0] < path < pair.path[1]
+    roll = [gear.base_radius * math.tan(pair.working_pressure_angle) for gear in pair.gears]
+    there = 1.0 / (roll[0] + path) + 1.0 / (roll[1] - path)
+    assert float(data.contact_worst_curvature[0]) == pytest.approx(there / (1 / roll[0] + 1 / roll[1]))
+    modulus = 206e9 / (2.0 * (1.0 - 0.3**2))
+    load = float(data.contact_worst_load[0]) / static.planetary_set.sun.face_width
+    hertz = math.sqrt(load * modulus / math.pi * there)
+    assert float(data.contact_pressure[0].max()) == pytest.approx(hertz, rel=0.02)
+
+
+def test_why_stresses_differ_from_the_nominal_ones_is_told_beyond_30_percent(reference):
+    data = reference[2].dataset()
+    told = [note for note in describe_stress(data).notes if "FE/ISO =" in note]
+    beside = {row[0]: row[3] for row in describe_stress(data).rows}
+    named = {name for name, ratio in beside.items() if not 1 / 1.3 < float(ratio) < 1.3}
+    assert {note.split(", FE/ISO")[0] for note in told} == named
+    ratio = float(data.contact_pressure[:3].max() / data.iso_contact_stress[0])
+    high = data.assign(contact_pressure=1.6 / ratio * data.contact_pressure)
+    (note,) = (note for note in describe_stress(high).notes if note.startswith("contact sun-planet"))
+    assert "FE/ISO = 1.60" in note
+    # the factors are the ratio
+    factors = [float(part.split()[0].rstrip(":")) for part in note.split(" x ")[1:]]
+    assert math.prod(factors) == pytest.approx(1.6, rel=0.02)
+    low = data.assign(root_worst=0.5 * data.root_worst)
+    assert any(note.startswith("root sun, FE/ISO = 0.") for note in describe_stress(low).notes)
+
+
+def test_a_corner_of_the_root_is_told_with_the_entry_that_rounds_it(reference):
+    data = reference[2].dataset()
+    corner = data.assign(root_notch_radius=data.root_notch_radius.copy())
+    corner.root_notch_radius[3:, 1] = 1e-6
+    (finding,) = stress_warnings(corner)
+    assert finding.code == "W-KINK" and finding.key == "ring.rack.root_radius"
+    end = data.assign(root_worst_arc=data.root_worst_arc.copy())
+    end.root_worst_arc[0, 0] = 0.0
+    (finding,) = stress_warnings(end)
+    assert finding.code == "W-KINK" and "end of the flank" in finding.text and "sun" in finding.text
