@@ -445,17 +445,25 @@ def export(
 
 def _write_case(text: str, path: Path, *, force: bool) -> None:
     """Write a file that no other one is lost for, under a name whose results femgear run can write."""
-    from femgear.storage.files import checked_name, write_text
+    from femgear.storage.files import write_text
 
-    for name in (path.name, _results_folder(path).name):
-        checked_name(name)
-    if path.exists() and not force:
-        raise CaseError(
-            "the file is there already", code="E-OUTPUT", file=str(path), limit="a new file",
-            remedy="name another one with -o, or add --force",
-        )  # fmt: skip
+    _need_new([path], force=force)
     write_text(text, path)
     _say(f"written: {path}")
+
+
+def _need_new(paths: Sequence[Path], *, force: bool) -> None:
+    """Refuse files that are there already, and names under which femgear run could write no results."""
+    from femgear.storage.files import checked_name
+
+    for path in paths:
+        for name in (path.name, _results_folder(path).name):
+            checked_name(name)
+        if path.exists() and not force:
+            raise CaseError(
+                "the file is there already", code="E-OUTPUT", file=str(path), limit="a new file",
+                remedy="name another one with -o, or add --force",
+            )  # fmt: skip
 
 
 @app.command
@@ -515,7 +523,10 @@ def import_rexs(
     load_case: int | None = None,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Write the case of a planetary stage of a REXS file, and say what is assumed and what is not used.
+    """Write the cases of the stages of a REXS file; say what they have not, what is assumed and not used.
+
+    Of several stages each becomes a case with its id in the name, NAME_28.toml. NAME.toml is the drivetrain
+    of parallel stages, or the planetary stage where there is one.
 
     Parameters
     ----------
@@ -524,24 +535,25 @@ def import_rexs(
     output
         Case file to write.
     stage
-        Id of the planetary stage, where there are several.
+        Id of the only stage to take.
     load_case
         Number of the load case, from 1. Default: the first, and the speeds of others with its torque.
     force
-        Replace the file.
+        Replace the files.
     """
-    from femgear.exchange.planetary_stage import case_tables, named
     from femgear.exchange.rexs import read_model
-    from femgear.trains.drafts import draft_text
+    from femgear.trains.imports import case_drafts
 
     model = read_model(file)
-    tables, remarks = case_tables(model, stage, load_case)
-    head = f"Written by femgear import {file.name} (REXS {model.version}). What is assumed says so."
-    with named(model, stage):
-        text = draft_text(tables, remarks, word="assumed", head=[head])
+    drafts = case_drafts(model, output.stem, stage=stage, load_case=load_case)
     _warn(model.findings)
-    _write_case(text, output, force=force)
-    _say(f"entries that are assumed: {text.count('# assumed')}")
+    paths = [output.with_name(f"{output.stem}{one.suffix}{output.suffix}") for one in drafts]
+    _need_new(paths, force=force)
+    for draft, path in zip(drafts, paths, strict=True):
+        _write_case(draft.text, path, force=force)
+        if len(drafts) > 1:
+            _say(f"         {draft.words}")
+    _say(f"entries that are assumed: {sum(one.text.count('# assumed') for one in drafts)}")
     _say("attributes that are not used:")
     for line in model.unused():
         _say(textwrap.shorten(f"  {line}", 110, placeholder=" ..."))

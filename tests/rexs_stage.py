@@ -140,3 +140,61 @@ class Gearbox:
         else:
             path.write_text(self.json() if path.suffix == ".rexsj" else self.xml(), encoding="utf-8")
         return path
+
+
+class ParallelUnit(Gearbox):
+    """Two spur stages 25/50 and 20/60 on three shafts, each in two bearings; 100 N m at 1500 rpm."""
+
+    def __init__(self):
+        self.version, self.components, self.relations = "1.4", {}, []
+        self.add(1, "gear_unit")
+        self.components[1]["name"] = "two stages"
+        self.add(2, "gear_casing")
+        self.relate("assembly", assembly=1, part=2)
+        self.add(3, "material", density=(7.85, "kg / dm^3"), elastic_modulus=(206000.0, "N / mm^2"),
+                 poisson_ratio=(0.3, NONE))  # fmt: skip
+        for number, (length, diameter) in enumerate(((160.0, 30.0), (120.0, 40.0), (200.0, 55.0)), start=1):
+            shaft = 10 * number
+            self.add(shaft, "shaft")
+            self.add(shaft + 1, "shaft_section", u_coordinate_on_shaft=(0.0, MM), length=(length, MM),
+                     outer_diameter_begin=(diameter, MM), outer_diameter_end=(diameter, MM))  # fmt: skip
+            self.relate("assembly", assembly=shaft, part=shaft + 1)
+            self.relate("reference", origin=shaft, referenced=3)
+            for bearing, place in ((shaft + 2, 10.0), (shaft + 3, length - 10.0)):
+                self.add(bearing, "concept_bearing", radial_stiffness=(2e8, "N / m"),
+                         u_coordinate_on_shaft_inner_side=(place, MM))  # fmt: skip
+                self.relate("side", assembly=bearing, inner_part=shaft, outer_part=2)
+        self.components[10]["attributes"] |= {"rotational_speed": (1500.0, "1 / min")}
+        self.add(5, "external_load", torque_around_u_axis=(100.0, "N m"), u_coordinate_on_shaft=(0.0, MM))
+        self.relate("assembly", assembly=10, part=5)
+        self.wheel(41, 10, 25, 2.0, 24.0, 80.0)
+        self.wheel(42, 20, 50, 2.0, 24.0, 35.0)
+        self.wheel(43, 20, 20, 3.0, 36.0, 85.0)
+        self.wheel(44, 30, 60, 3.0, 36.0, 100.0)
+        self.mesh(51, 41, 42, 75.0, 0.0)
+        self.mesh(52, 43, 44, 120.0, 90.0)
+
+    def wheel(self, id, shaft, teeth, module, width, place, type="cylindrical_gear"):
+        self.add(id, type, number_of_teeth=(teeth, NONE), normal_module=(module, MM), face_width=(width, MM),
+                 u_coordinate_on_shaft=(place, MM))  # fmt: skip
+        self.relate("assembly", assembly=shaft, part=id)
+        for side in (1000, 2000):
+            self.add(side + id, "cylindrical_gear_flank", normal_pressure_angle=(20.0, DEG),
+                     addendum_modification_coefficient=(0.0, NONE))  # fmt: skip
+        self.relate("flank", gear=id, left=1000 + id, right=2000 + id)
+
+    def mesh(self, id, first, second, distance, angle):
+        self.add(id, "cylindrical_stage", center_distance=(distance, MM),
+                 rotating_angle_around_neg_u_axis=(angle, DEG))  # fmt: skip
+        self.relate("assembly", assembly=1, part=id)
+        self.relate("stage", stage=id, gear_1=first, gear_2=second)
+
+
+def both_units():
+    """The planetary stage of `Gearbox`, and the two spur stages beside it with ids from 50000."""
+    box, unit = Gearbox("1.4"), ParallelUnit()
+    box.components |= {50000 + id: one for id, one in unit.components.items()}
+    box.relations += [
+        (type, {role: 50000 + id for role, id in roles.items()}) for type, roles in unit.relations
+    ]
+    return box

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -34,11 +34,11 @@ from femgear.case.quantities import (
 from femgear.case.sections import OVER_WIDTH, Case
 from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
+from femgear.exchange.gear_unit import gears_of, loads_on, power_flow, stage_components, with_values
 from femgear.exchange.rexs import Component, Model, Relation
 from femgear.findings import NOTE
 from femgear.gears.kinematics import MEMBERS, torque_ratios
 
-_POWER = Dimension("a power", "W", "kW", 1e3)
 _GEARS = ("sun", "planet", "ring")
 _RACK = {"addendum": 1.0, "dedendum": 1.25, "root_radius": 0.25}
 _SOFT = 1e15
@@ -96,23 +96,27 @@ def case_tables(
     """
     s, remarks = _stage(model, _chosen(model, wanted)), dict[str, str]()
     title = "".join(c for c in s.stage.name or str(s.stage) if c.isprintable())
-    tables = {"format": 1, "title": title[:200], "set": _set(s, remarks), "material": _material(s, remarks)}
-    tables |= {name: _gear(s, name, remarks) for name in _GEARS}
-    _racks(s, tables, remarks)
-    for name in _GEARS:
-        _rim(s, name, tables, remarks)
+    tables = {"format": 1, "title": title[:200]} | gear_tables(s, remarks)
     _supports(s, tables, remarks)
     tables["operation"] = _operation(s, tables, remarks, load_case)
-    _modifications(s, tables)
-    _chamfers(s)
-    sections = (tables[name] for name in _GEARS)
-    leads = (one["kind"] in OVER_WIDTH for section in sections for one in section.get("modifications", ()))
-    if "helix_angle" in tables["set"] or any(leads):
-        tables["static"], remarks["static.slices"] = {"slices": 25}, "assumed"
+    operation = tables["operation"]
+    ratios = torque_ratios(tables["sun"]["teeth"], tables["ring"]["teeth"])
+    forwards = to_si(operation["torque"], TORQUE) * ratios[operation["input"]] > 0.0
+    add_modifications(s, tables, remarks, {"sun": forwards, "ring": not forwards})
     if left := [name for name in ("sun", "ring") if "profile_shift" not in tables[name]]:
         of = f"hence the profile shift of {' and '.join(left)}"
         remarks["set.centre_distance"] = f"assumed: no play at the distance of the file, {of}"
     return tables, remarks
+
+
+def gear_tables(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
+    """Tables of what the gears of a stage share, of their material, and of each, without modifications."""
+    tables = {"set": _set(s, remarks), "material": _material(s, remarks)}
+    tables |= {name: _gear(s, name, remarks) for name in s.gears}
+    _racks(s, tables, remarks)
+    for name in s.gears:
+        _rim(s, name, tables, remarks)
+    return tables
 
 
 _ATTRIBUTES = {
@@ -129,9 +133,15 @@ def named(model: Model, wanted: str | None = None) -> Iterator[None]:
     try:
         yield
     except FemgearError as error:
-        s = _stage(model, _chosen(model, wanted))
+        mesh = model.components.get(wanted or "")
+        s = (
+            pair_stage(model, mesh)
+            if mesh and mesh.type == "cylindrical_stage"
+            else _stage(model, _chosen(model, wanted))
+        )
+        names = {"gear_1": "sun", "gear_2": [*s.gears][-1]}
         for one in {error, *error.problems}:
-            path = (one.key or "").split(".")
+            path = [names.get(part, part) for part in (one.key or "").split(".")]
             one.file, attribute = model.name, _ATTRIBUTES.get(path[-1], path[-1])
             near = [*s.gears.get(path[0], ()), *s.flanks.get(path[0], ())] or model.components.values()
             read = [m for m in near if attribute in m.attributes and (m.type, attribute) in model.used]
@@ -195,38 +205,61 @@ def _stage(model: Model, stage: Component) -> _Stage:
     return _Stage(model, stage, [mesh for mesh, _ in meshes], sun_meshes, gears, flanks, shafts)
 
 
-def _shown(value: float, dimension: Dimension) -> str:
+def pair_stage(model: Model, mesh: Component) -> _Stage:
+    """Find gears, flanks and shafts of two gears: gear 1 as "sun", gear 2 as "planet", internal as "ring".
+
+    CaseError: other numbers of gears (E-REXS).
+    """
+    pair = gears_of(model, mesh)
+    if len(pair) != 2 or pair[0].type == "ring_gear":
+        kinds = ", ".join(map(str, pair)) or "none"
+        model.refuse(
+            "a stage of two gears is needed", str(mesh), limit=f"an external gear and its mate, not {kinds}"
+        )
+    wheel = "ring" if pair[1].type == "ring_gear" else "planet"
+    gears = {"sun": [pair[0]], wheel: [pair[1]]}
+    flanks = {
+        name: [one for side in ("left", "right") for one in model.related("flank", side, gear=gear.id)]
+        for name, (gear,) in gears.items()
+    }
+    shafts = {name: model.related("assembly", "assembly", part=gear.id) for name, (gear,) in gears.items()}
+    return _Stage(model, mesh, [mesh], [], gears, flanks, shafts)
+
+
+def shown(value: float, dimension: Dimension) -> str:
     return f"{float(f'{value / dimension.scale:.12g}')!r} {dimension.shown}".replace(".0 ", " ")
 
 
 def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     """Section of what the gears share; planet angles where planets are not equally spaced."""
-    found: dict[str, Any] = {"planets": len(s.gears["planet"])}
+    found: dict[str, Any] = {"planets": len(s.gears["planet"])} if s.sun_meshes else {}
     if (distance := s.common(s.meshes, "center_distance", LENGTH)) is not None:
-        found["centre_distance"] = _shown(distance, LENGTH)
-    given = [s.common(s.gears[name], "face_width", LENGTH) for name in _GEARS]
+        found["centre_distance"] = shown(distance, LENGTH)
+    given = [s.common(s.gears[name], "face_width", LENGTH) for name in s.gears]
     widths = {one for one in given if one is not None}
     width = s.common(s.meshes, "common_face_width", LENGTH)
     if width is None:
         width = min(widths) if widths else s.needed(s.gears["sun"], "face_width", LENGTH)
-    found["face_width"] = _shown(width, LENGTH)
+    found["face_width"] = shown(width, LENGTH)
     if len(widths) > 1:
-        remarks["set.face_width"] = f"assumed: of all gears; the widest has {_shown(max(widths), LENGTH)}"
+        remarks["set.face_width"] = f"assumed: of all gears; the widest has {shown(max(widths), LENGTH)}"
     turned = [s.model.number(mesh, "rotating_angle_around_neg_u_axis", ANGLE) for mesh in s.sun_meshes]
     angles = sorted(one % math.tau for one in turned if one is not None)
     if len(angles) < len(turned):
         remarks["set.planets"] = "assumed: equally spaced"
-    else:
+    elif s.sun_meshes:
         steps = [b - a for a, b in pairwise((*angles, angles[0] + math.tau))]
         if max(steps) - min(steps) > 1e-6:
-            found["planet_angles"] = [_shown(one - angles[0], ANGLE) for one in angles]
+            found["planet_angles"] = [shown(one - angles[0], ANGLE) for one in angles]
     helix = "helix_angle_reference_diameter"
-    sun, *others = (s.common(s.gears[name], helix, ANGLE) or 0.0 for name in _GEARS)
-    if max(abs(sun + one) for one in others) > 1e-9:
+    sun, *others = (s.common(s.gears[name], helix, ANGLE) or 0.0 for name in s.gears)
+    # an internal gear has the hand of its mate
+    hand = -1.0 if [*s.gears] == ["sun", "ring"] else 1.0
+    if max(abs(sun + hand * one) for one in others) > 1e-9:
         limit = "equal ones, that of the sun with the other sign"
         s.model.refuse("helix angles do not match", f"{s.gears['sun'][0]}, {helix}", limit=limit)
     if sun:
-        found["helix_angle"] = _shown(sun, ANGLE)
+        found["helix_angle"] = shown(sun, ANGLE)
         remarks["set.helix_angle"] = "assumed: a positive one is right-handed"
     return found
 
@@ -244,14 +277,14 @@ def _material(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
         values = [s.model.number(one, attribute, dimension) for ones in made.values() for one in ones[:1]]
         known = [one for one in values if one is not None]
         value = known[0] if known else usual
-        found[key] = _shown(value, dimension) if dimension else value
-        if len(known) < len(_GEARS) or max(known) - min(known) > 1e-9 * abs(value):
+        found[key] = shown(value, dimension) if dimension else value
+        if len(known) < len(s.gears) or max(known) - min(known) > 1e-9 * abs(value):
             what = "of all gears; those of the file differ" if known else "steel"
             remarks[f"material.{key}"] = f"assumed: {what}"
     for key, attribute in (("root", "endurance_limit_root"), ("contact", "endurance_limit_flank")):
-        values = [s.common((s.gears[name][0], *made[name][:1]), attribute, STRESS) for name in _GEARS]
+        values = [s.common((s.gears[name][0], *made[name][:1]), attribute, STRESS) for name in s.gears]
         if known := [one for one in values if one is not None and None not in values]:
-            found[f"{key}_stress_limit"] = _shown(min(known), STRESS)
+            found[f"{key}_stress_limit"] = shown(min(known), STRESS)
             if max(known) > min(known):
                 remarks[f"material.{key}_stress_limit"] = "assumed: of all gears, the lowest of the file"
     return found
@@ -265,9 +298,9 @@ def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
         s.model.refuse(f"{teeth:g} is no number of teeth", f"{gears[0]}, number_of_teeth")
     found: dict[str, Any] = {"teeth": round(teeth)}
     if name == "sun":
-        found["module"] = _shown(s.needed(every, "normal_module", LENGTH), LENGTH)
+        found["module"] = shown(s.needed(every, "normal_module", LENGTH), LENGTH)
         angle = s.common((one for ones in s.flanks.values() for one in ones), "normal_pressure_angle", ANGLE)
-        found["pressure_angle"] = _shown(math.radians(20.0) if angle is None else angle, ANGLE)
+        found["pressure_angle"] = shown(math.radians(20.0) if angle is None else angle, ANGLE)
         remarks |= {"sun.pressure_angle": "assumed"} if angle is None else {}
     shift = s.common(s.flanks[name], "addendum_modification_coefficient")
     if shift is not None:
@@ -276,14 +309,14 @@ def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
         found["profile_shift"], remarks["planet.profile_shift"] = 0.0, "assumed"
     for key in ("tip_diameter", "root_diameter"):
         if (diameter := s.common(gears, key, LENGTH, sign=False)) is not None:
-            found[key] = _shown(diameter, LENGTH)
+            found[key] = shown(diameter, LENGTH)
     return found
 
 
 def _racks(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
     """Basic racks from flanks and tools: that of the sun for all, of others where they differ."""
     module, number = to_si(tables["sun"]["module"], LENGTH), s.model.number
-    for name in _GEARS:
+    for name in s.gears:
         said = {"addendum": s.common(s.flanks[name], "addendum_coefficient_basic_profile")}
         for tool in _tools(s, name)[:1]:
             radius = number(tool, "tip_radius", LENGTH)
@@ -324,9 +357,9 @@ def _rim(s: _Stage, name: str, tables: dict[str, Any], remarks: dict[str, str]) 
         given = _diameter(s.model, shaft, place)
     radius, key = 0.5 * (given or 0.0), f"{name}.{'outer' if internal else 'bore'}_radius"
     fits = radius > root if internal else 0.0 < radius < root
-    section[key.partition(".")[2]] = _shown(radius if fits else usual, LENGTH)
+    section[key.partition(".")[2]] = shown(radius if fits else usual, LENGTH)
     if not fits:
-        why = f"; {_shown(given, LENGTH)} of its shaft do not fit its root circle" if given else ""
+        why = f"; {shown(given, LENGTH)} of its shaft do not fit its root circle" if given else ""
         remarks[key] = f"assumed: a rim of {'four' if internal else 'three'} modules{why}"
 
 
@@ -347,34 +380,46 @@ def _supports(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> Non
     A rigid bearing becomes a spring of `RIGID` mesh stiffnesses: members of a case have springs.
     """
     tables["carrier"] = {}
+    bearings = {"planet": bearings_between(s.model, s.shafts["planet"][:1], "outer_part", "shaft")}
+    for name in ("sun", "carrier"):
+        bearings[name] = bearings_between(s.model, s.shafts[name], "inner_part", "gear_casing")
+    for name, found in bearings.items():
+        key = "bearing_stiffness" if name == "planet" else "support_stiffness"
+        add_bearings(s, tables, remarks, name, key, found)
+
+
+def add_bearings(
+    s: _Stage, tables: dict[str, Any], remarks: dict[str, str], name: str, key: str, found: list[Component]
+) -> None:
+    """Add the radial stiffness of bearings to a member; rigid ones are `RIGID` mesh stiffnesses."""
     width, modulus = to_si(tables["set"]["face_width"], LENGTH), tables["material"]["youngs_modulus"]
     rigid = min(RIGID * USUAL_STIFFNESS * to_si(modulus, MODULUS) / STEEL * width, _SOFT)
-    bearings = {"planet": _beside(s.model, s.shafts["planet"][:1], "outer_part", "shaft")}
-    for name in ("sun", "carrier"):
-        bearings[name] = _beside(s.model, s.shafts[name], "inner_part", "gear_casing")
-    for name, found in bearings.items():
-        springs = [one for one in found if one.type.endswith("bearing")]
-        values = [k for one in springs if (k := s.model.number(one, "radial_stiffness", STIFFNESS))]
-        key = "bearing_stiffness" if name == "planet" else "support_stiffness"
-        if max(values, default=0.0) > _SOFT:
-            many = Counter(f"{one:.3g} N/m" for one in values).items()
-            what = ", ".join(f"{n} bearing{'s' * (n > 1)} of {one}" for one, n in many)
-            tables[name][key] = f"{rigid:.3g} N/m"
-            remarks[f"{name}.{key}"] = f"rigid: {what} in the file"
-            s.model.remark(
-                f"{name}.{key}",
-                f"{what}: rigid, taken as {rigid:.3g} N/m, {RIGID:,} mesh stiffnesses, which changes natural "
-                "frequencies by less than 0.1 %; real bearings are softer, and move them by more",
-                remedy="give the stiffness of the bearings", severity=NOTE,
-            )  # fmt: skip
-        elif values:
-            tables[name][key] = _shown(sum(values), STIFFNESS)
-        elif springs:
-            text = f"{len(springs)} bearings without radial_stiffness, such as {springs[0]}: it is estimated"
-            s.model.remark(f"{name}.{key}", text, remedy="give it in the case")
+    springs = [one for one in found if is_bearing(one)]
+    values = [k for one in springs if (k := s.model.number(one, "radial_stiffness", STIFFNESS))]
+    if max(values, default=0.0) > _SOFT:
+        many = Counter(f"{one:.3g} N/m" for one in values).items()
+        what = ", ".join(f"{n} bearing{'s' * (n > 1)} of {one}" for one, n in many)
+        tables[name][key] = f"{rigid:.3g} N/m"
+        remarks[f"{name}.{key}"] = f"rigid: {what} in the file"
+        s.model.remark(
+            f"{name}.{key}",
+            f"{what}: rigid, taken as {rigid:.3g} N/m, {RIGID:,} mesh stiffnesses, which changes natural "
+            "frequencies by less than 0.1 %; real bearings are softer, and move them by more",
+            remedy="give the stiffness of the bearings", severity=NOTE,
+        )  # fmt: skip
+    elif values:
+        tables[name][key] = shown(sum(values), STIFFNESS)
+    elif springs:
+        text = f"{len(springs)} bearings without radial_stiffness, such as {springs[0]}: it is estimated"
+        s.model.remark(f"{name}.{key}", text, remedy="give it in the case")
 
 
-def _beside(model: Model, shafts: list[Component], role: str, mate: str) -> list[Component]:
+def is_bearing(part: Component) -> bool:
+    """Tell whether a component is a bearing of any type, such as rolling_bearing_with_catalog_geometry."""
+    return "bearing" in part.type
+
+
+def bearings_between(model: Model, shafts: list[Component], role: str, mate: str) -> list[Component]:
     """Bearings and couplings that join shafts, in a role, with a component of a type."""
     other = "inner_part" if role == "outer_part" else "outer_part"
     joints = (one for shaft in shafts for one in model.related("side", "assembly", **{role: shaft.id}))
@@ -383,17 +428,18 @@ def _beside(model: Model, shafts: list[Component], role: str, mate: str) -> list
     ]
 
 
-def _modifications(s: _Stage, tables: dict[str, Any]) -> None:
-    """Modifications of the flanks of all gears, and findings on those that no case has.
+def add_modifications(
+    s: _Stage, tables: dict[str, Any], remarks: dict[str, str], forwards: Mapping[str, bool]
+) -> None:
+    """Add the modifications of the flanks of all gears, and findings on those that no case has.
 
     Looked at from the end z > 0, tooth upwards, the left flank leads a sun that turns counter-clockwise. Left
     flanks touch left ones, of internal gears too (ISO 21771-1): of planets they are those towards the sun
-    under a positive torque, and right flanks those towards the ring.
+    under a positive torque, and right flanks those towards the ring. ``forwards`` tells of gears with one
+    mate whether their left flanks carry; planets have both.
     """
-    operation, model = tables["operation"], s.model
-    ratios = torque_ratios(tables["sun"]["teeth"], tables["ring"]["teeth"])
-    forwards = to_si(operation["torque"], TORQUE) * ratios[operation["input"]] > 0.0
-    for name in _GEARS:
+    model = s.model
+    for name in s.gears:
         flanks = [_flanks_of(s, tables, name, gear) for gear in s.gears[name]]
         sides = flanks[0]
         if any(one != sides for one in flanks):
@@ -405,11 +451,11 @@ def _modifications(s: _Stage, tables: dict[str, Any]) -> None:
             model.remark(f"{name}.modifications", f"not taken: {problem}")
         left, right = (sides[side].tables if side in sides else [] for side in ("left", "right"))
         found = left
-        if left != right and name == "planet":
+        if left != right and name not in forwards:
             found = [{"flank": "sun side", **one} for one in left]
             found += [{"flank": "ring side", **one} for one in right]
         elif left != right:
-            found = left if forwards == (name == "sun") else right
+            found = left if forwards[name] else right
             model.remark(
                 f"{name}.modifications",
                 f"the flanks of {s.gears[name][0]} differ: taken are those that carry under the torque of "
@@ -424,13 +470,19 @@ def _modifications(s: _Stage, tables: dict[str, Any]) -> None:
                 "non-datum face; REXS does not define it", remedy="compare with the drawing",
             )  # fmt: skip
 
+    sections = (tables[name] for name in s.gears)
+    leads = (one["kind"] in OVER_WIDTH for section in sections for one in section.get("modifications", ()))
+    if "helix_angle" in tables["set"] or any(leads):
+        tables["static"], remarks["static.slices"] = {"slices": 25}, "assumed"
+    _chamfers(s)
+
 
 def _chamfers(s: _Stage) -> None:
     """Findings on chamfers of the tips, which end the flanks below the tip circle."""
-    for name in _GEARS:
+    for name in s.gears:
         sizes = [s.model.number(one, "tooth_tip_chamfer", LENGTH) or 0.0 for one in s.flanks[name]]
         if max(sizes, default=0.0) > 0.0:
-            size = _shown(max(sizes), LENGTH)
+            size = shown(max(sizes), LENGTH)
             text = f"tooth_tip_chamfer of {size} is not taken: flanks go up to the tip circle"
             remedy = "give the diameter where the chamfer begins as tip_diameter"
             s.model.remark(f"{name}.tip_diameter", text, remedy=remedy)
@@ -466,7 +518,9 @@ def _operation(
     s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wanted: int | None
 ) -> dict[str, Any]:
     """Input, fixed member, torque and speeds of the input."""
-    coupled = {name: _beside(s.model, s.shafts[name], "inner_part", "gear_casing") for name in MEMBERS}
+    coupled = {
+        name: bearings_between(s.model, s.shafts[name], "inner_part", "gear_casing") for name in MEMBERS
+    }
     held = [name for name in MEMBERS if any(one.type.endswith("coupling") for one in coupled[name])]
     fixed = held[0] if len(held) == 1 else "ring"
     remarks |= {} if len(held) == 1 else {"operation.fixed": "assumed"}
@@ -479,34 +533,43 @@ def _operation(
     member = next(iter([*(one for one in turning if one in loaded), *turning, *loaded]), usual)
     ratios = torque_ratios(tables["sun"]["teeth"], tables["ring"]["teeth"])
     torques, speeds = zip(*(_of_member(member, ratios, *state) for state in states), strict=True)
-    torque, taken = torques[0], [speeds[0]]
+    torque = torques[0]
     if torque is None:
         width, module = to_si(tables["set"]["face_width"], LENGTH), to_si(tables["sun"]["module"], LENGTH)
         teeth = tables["sun"]["teeth"], tables["planet"]["teeth"]
         on_sun = usual_torque(*teeth, module, width, tables["set"]["planets"])
         torque = float(f"{on_sun * abs(ratios[member]):.3g}")
         remarks["operation.torque"] = f"assumed: K factor of 1 N/mm^2{'; that of the file is 0' * idle}"
-    others = []
-    for i, (other, speed) in enumerate(zip(torques[1:], speeds[1:], strict=True), start=1):
-        alike = other == torques[0] or (
-            other and torques[0] and abs(other - torques[0]) <= 1e-6 * abs(torque)
-        )
-        if i != number and (wanted is not None or not alike):
-            others.append(s.model.case_in_words(i, speed, other))
-        elif i != number:
-            taken.append(speed)
-    if others:
-        s.model.remark(
-            "operation",
-            f"load case {number} of {len(s.model.load_cases)} is taken; others have torques and speeds of "
-            f"their own: {'; '.join(others[:10])}{' ...' * (len(others) > 10)}",
-            remedy=f"--load-case 1 to {len(s.model.load_cases)} takes another",
-        )  # fmt: skip
+    speeds = speeds_of_cases(s.model, number, torques, speeds, alone=wanted is not None)
     remarks |= {} if turning or loaded else {"operation.input": "assumed"}
-    speeds = list(dict.fromkeys(one for one in taken if one))
     remarks |= {} if speeds else {"operation.speeds": f"assumed{'; that of the file is 0' * stands}"}
-    shown = [_shown(one, SPEED) for one in speeds or [1000.0 * SPEED.scale]]
-    return {"input": member, "fixed": fixed, "torque": _shown(torque, TORQUE), "speeds": shown}
+    texts = dict.fromkeys(shown(one, SPEED) for one in speeds or [1000.0 * SPEED.scale])
+    return {"input": member, "fixed": fixed, "torque": shown(torque, TORQUE), "speeds": [*texts]}
+
+
+def speeds_of_cases(
+    model: Model, number: int, torques: Sequence[float | None], speeds: Sequence[float], *, alone: bool
+) -> list[float]:
+    """List the speeds of the load case of a number [rad/s], and of those with its torque unless ``alone``.
+
+    Torques [N m] and speeds are those of this load case, then of all. A finding lists the cases left out.
+    """
+    taken, others, own = [speeds[0]], [], torques[0]
+    for i, (torque, speed) in enumerate(zip(torques[1:], speeds[1:], strict=True), start=1):
+        alike = torque == own or (torque and own and abs(torque - own) <= 1e-6 * abs(own))
+        if i != number and alike and not alone:
+            taken.append(speed)
+        elif i != number:
+            others.append(model.case_in_words(i, speed, torque))
+    if others:
+        count = len(model.load_cases)
+        model.remark(
+            "operation",
+            f"load case {number} of {count} is taken; others have torques and speeds of their own: "
+            f"{'; '.join(others[:10])}{' ...' * (len(others) > 10)}",
+            remedy=f"--load-case 1 to {count} takes another",
+        )  # fmt: skip
+    return list(dict.fromkeys(one for one in taken if one))
 
 
 def _of_member(
@@ -521,19 +584,23 @@ def _of_member(
 
 
 def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[str, float], dict[str, float]]:
-    """Speeds [rad/s] and torques [N m] of members in a load case; powers give torques at their speed."""
+    """Speeds [rad/s] and torques [N m] of members in a load case; powers give torques at their speed.
+
+    Where the shafts of the stage say nothing of one of them, it is what flows through the unit.
+    """
     model, turns, loads = s.model, {}, {}
     for name, shaft in ((m, one) for m in MEMBERS if m != fixed for one in s.shafts[m]):
-        now = replace(shaft, attributes={**shaft.attributes, **given.get(shaft.id, {})})
-        speed = model.number(now, "rotational_speed", SPEED)
+        speed = model.number(with_values(shaft, given), "rotational_speed", SPEED)
         turns |= {} if speed is None else {name: turns.get(name) or speed}
-        for part in model.related("assembly", "part", assembly=shaft.id):
-            if part.type == "external_load":
-                load = replace(part, attributes={**part.attributes, **given.get(part.id, {})})
-                torque = model.number(load, "torque_around_u_axis", TORQUE)
-                power = model.number(load, "power", _POWER)
-                torque = power / speed if power is not None and speed and not torque else torque
-                loads |= {} if torque is None else {name: loads.get(name, 0.0) + torque}
+        for torque in loads_on(model, shaft, given):
+            loads |= {} if torque is None else {name: loads.get(name, 0.0) + torque}
+    if (not turns or not loads) and len(stage_components(model)) > 1:
+        flow = power_flow(model, given)
+        if not turns:
+            members = ((name, one.id) for name in MEMBERS if name != fixed for one in s.shafts[name][:1])
+            turns = {name: flow.speed[id] for name, id in members if id in flow.speed}
+        if not loads and s.stage.id in flow.torque:
+            loads = {"sun": -flow.torque[s.stage.id]}
     return turns, loads
 
 

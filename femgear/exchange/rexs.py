@@ -100,11 +100,13 @@ class Model:
     used: set[tuple[str, str]] = field(default_factory=set)
     findings: list[Finding] = field(default_factory=list)
 
-    def remark(self, key: str, text: str, *, remedy: str = "", severity: str = DOUBT) -> None:
+    def remark(
+        self, key: str, text: str, *, remedy: str = "", severity: str = DOUBT, first: bool = False
+    ) -> None:
         """Keep a finding on what a case does not have, or has otherwise; the same one once."""
         finding = Finding("W-REXS", key, text, remedy=remedy, severity=severity)
         if finding not in self.findings:
-            self.findings.append(finding)
+            self.findings.insert(0 if first else len(self.findings), finding)
             self.findings.sort(key=lambda one: -SEVERITIES.index(one.severity))
 
     def chosen_case(

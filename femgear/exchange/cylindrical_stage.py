@@ -1,0 +1,103 @@
+"""Two gears of a REXS file as the tables of a pair case.
+
+What a planetary stage and two gears have in common is read by `femgear.exchange.planetary_stage`, to which
+gear 1 is the sun and gear 2 a planet, or the ring where it is internal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from femgear.case.estimates import usual_torque
+from femgear.case.quantities import LENGTH, SPEED, TORQUE, to_si
+from femgear.exchange.gear_unit import power_flow, shaft_of, turning
+from femgear.exchange.planetary_stage import (
+    add_bearings,
+    add_modifications,
+    bearings_between,
+    gear_tables,
+    pair_stage,
+    shown,
+    speeds_of_cases,
+)
+from femgear.exchange.rexs import Component, Model
+
+_NAMES = {"sun": "gear_1", "planet": "gear_2", "ring": "gear_2"}
+
+
+def pair_tables(
+    model: Model, mesh: Component, load_case: int | None = None
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Read two gears as tables of a pair case, with remarks by key on what is assumed.
+
+    Torque and speeds follow from the power that flows through the unit; load cases are taken as by
+    `femgear.exchange.planetary_stage.case_tables`.
+
+    CaseError: E-CHOICE: no such load case. E-REXS, E-UNIT.
+    """
+    stage, remarks, before = pair_stage(model, mesh), dict[str, str](), len(model.findings)
+    known = list(model.findings)
+    read = gear_tables(stage, remarks)
+    for name in stage.gears:
+        found = bearings_between(model, stage.shafts[name], "inner_part", "gear_casing")
+        add_bearings(stage, read, remarks, name, "bearing_stiffness", found)
+    if "profile_shift" not in read["sun"] and "centre_distance" not in read["set"]:
+        read["sun"]["profile_shift"], remarks["sun.profile_shift"] = 0.0, "assumed"
+    elif "profile_shift" not in read["sun"]:
+        remarks["set.centre_distance"] = (
+            "assumed: no play at this distance, hence the profile shift of gear 1"
+        )
+    operation = _operation(model, mesh, read, remarks, load_case)
+    forwards = to_si(operation["torque"], TORQUE) > 0.0
+    add_modifications(stage, read, remarks, dict.fromkeys(stage.gears, forwards))
+    if before < len(model.findings):
+        model.findings[:] = [
+            one if one in known else replace(one, key=_renamed(f"{mesh.id}: {one.key}"))
+            for one in model.findings
+        ]
+    title = f"{mesh.name or 'stage'}, {' and '.join(one.name or str(one) for (one,) in stage.gears.values())}"
+    tables: dict[str, Any] = {"format": 1, "model": "pair"}
+    tables["title"] = "".join(c for c in title if c.isprintable())[:200]
+    shared = {key: read["sun"].pop(key) for key in ("module", "pressure_angle")}
+    tables |= {key: one for key, one in read.items() if key not in _NAMES}
+    tables["set"] = {**shared, **read["set"]}
+    tables |= {_NAMES[name]: read[name] for name in stage.gears} | {"operation": operation}
+    return tables, {_renamed(key): text for key, text in remarks.items()}
+
+
+def _renamed(key: str) -> str:
+    """Key of a pair case for that of a planetary one."""
+    where, _, rest = key.rpartition(": ")
+    section, dot, last = rest.partition(".")
+    name = "set" if rest in ("sun.module", "sun.pressure_angle") else _NAMES.get(section, section)
+    return f"{where}: {name}{dot}{last}" if where else f"{name}{dot}{last}"
+
+
+def _operation(
+    model: Model, mesh: Component, read: dict[str, Any], remarks: dict[str, str], wanted: int | None
+) -> dict[str, Any]:
+    """Torque on gear 1, positive where it drives in its sense of rotation, and its speeds."""
+    number, given = model.chosen_case(wanted)
+    gear = pair_stage(model, mesh).gears["sun"][0]
+    shaft = shaft_of(model, gear)
+    torques, speeds = [], []
+    for case in (given, *model.load_cases):
+        flow = power_flow(model, case)
+        speed = flow.speed.get(shaft.id, 0.0) if shaft else 0.0
+        by_mesh = flow.torque.get(mesh.id)
+        torques.append(None if not by_mesh else -by_mesh * turning(speed))
+        speeds.append(abs(speed))
+    torque = torques[0]
+    if torque is None:
+        width, module = to_si(read["set"]["face_width"], LENGTH), to_si(read["sun"]["module"], LENGTH)
+        teeth = [read[name]["teeth"] for name in read if name in _NAMES]
+        torque = float(f"{usual_torque(teeth[0], teeth[1], module, width):.3g}")
+        remarks["operation.torque"] = "assumed: K factor of 1 N/mm^2"
+        model.remark(
+            "operation.torque", "the file does not determine the torque: that of a K factor is taken"
+        )
+    taken = speeds_of_cases(model, number, torques, speeds, alone=wanted is not None)
+    remarks |= {} if taken else {"operation.speeds": "assumed"}
+    texts = dict.fromkeys(shown(one, SPEED) for one in taken or [1000.0 * SPEED.scale])
+    return {"torque": shown(torque, TORQUE), "speeds": [*texts]}

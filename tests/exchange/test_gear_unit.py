@@ -1,0 +1,85 @@
+"""Power that flows through the stages of a REXS gear unit, against ratios in closed form."""
+
+import math
+
+import pytest
+from rexs_stage import NONE, Gearbox, ParallelUnit, both_units
+
+from femgear.exchange.gear_unit import power_flow, stage_components, stage_in_words, unit_stages
+from femgear.exchange.rexs import read_model
+
+RPM = math.pi / 30.0
+
+
+def flow_of(box, tmp_path, given=None):
+    model = read_model(box.write(tmp_path / "unit.rexs"))
+    flow = power_flow(model, given or {})
+    return {int(id): one / RPM for id, one in flow.speed.items()}, {
+        int(id): one for id, one in flow.torque.items()
+    }
+
+
+def test_two_parallel_stages(tmp_path):
+    speed, torque = flow_of(ParallelUnit(), tmp_path)
+    assert speed == pytest.approx({10: 1500.0, 20: -750.0, 30: 250.0})
+    # gear 1 is braked by its mesh; the mesh of gear 3 brakes shaft 2, which turns the other way
+    assert torque == pytest.approx({51: -100.0, 52: 200.0})
+
+
+def test_it_does_not_matter_where_speed_and_torque_are_given(tmp_path):
+    box = ParallelUnit()
+    del box.components[10]["attributes"]["rotational_speed"]
+    box.components[30]["attributes"]["rotational_speed"] = (250.0, "1 / min")
+    box.relations.remove(("assembly", {"assembly": 10, "part": 5}))
+    box.relate("assembly", assembly=30, part=5)
+    speed, torque = flow_of(box.set(5, torque_around_u_axis=(-600.0, "N m")), tmp_path)
+    assert speed == pytest.approx({10: 1500.0, 20: -750.0, 30: 250.0})
+    assert torque == pytest.approx({51: -100.0, 52: 200.0})
+
+
+def test_both_ends_of_a_chain_may_be_given(tmp_path):
+    box = ParallelUnit()
+    box.add(6, "external_load", torque_around_u_axis=(-600.0, "N m"))
+    box.relate("assembly", assembly=30, part=6)
+    assert flow_of(box, tmp_path)[1] == pytest.approx({51: -100.0, 52: 200.0})
+    # those that do not balance determine nothing
+    assert flow_of(box.set(6, torque_around_u_axis=(-500.0, "N m")), tmp_path)[1] == {}
+
+
+def test_what_nothing_determines_is_missing(tmp_path):
+    box = ParallelUnit()
+    del box.components[10]["attributes"]["rotational_speed"]
+    assert flow_of(box.set(5, torque_around_u_axis=None), tmp_path) == ({}, {})
+
+
+def test_internal_gears_keep_the_sense(tmp_path):
+    box = ParallelUnit()
+    box.components[44]["type"] = "ring_gear"
+    speed, torque = flow_of(box, tmp_path)
+    assert speed[30] == pytest.approx(-250.0) and torque[52] == pytest.approx(200.0)
+
+
+def test_couplings_join_shafts_and_hold_them(tmp_path):
+    box = ParallelUnit()
+    box.add(60, "shaft")
+    box.add(61, "coupling")
+    box.relate("side", assembly=61, inner_part=60, outer_part=10)
+    box.relations.remove(("assembly", {"assembly": 10, "part": 5}))
+    box.relate("assembly", assembly=60, part=5)
+    assert flow_of(box, tmp_path)[1] == pytest.approx({51: -100.0, 52: 200.0})
+
+
+def test_a_planetary_stage_and_what_stands_beside_it(tmp_path):
+    speed, torque = flow_of(both_units(), tmp_path)
+    # Willis: a ring that is held, 17/61 teeth
+    assert speed[4] == pytest.approx(1500.0 * 17 / 78) and speed[62] == 0.0
+    assert torque == pytest.approx({9: -1591.5494309, 50051: -100.0, 50052: 200.0})
+
+
+def test_stages_are_listed_without_the_meshes_of_planets(tmp_path):
+    model = read_model(both_units().write(tmp_path / "unit.rexs"))
+    words = [stage_in_words(model, one) for one in stage_components(model)]
+    assert words[0].startswith("planetary_stage 9") and len(words) == 3 and "25/50" in words[1]
+    assert next(set(one.arms) for one in unit_stages(model)) == {"34", "62", "4"}
+    box = Gearbox().set(58, number_of_teeth=("0", NONE))
+    assert unit_stages(read_model(box.write(tmp_path / "none.rexs"))) == []

@@ -1,0 +1,177 @@
+"""Cases of the stages of REXS files: pairs, planetary stages and the drivetrain of parallel shafts."""
+
+import math
+from pathlib import Path
+
+import pytest
+from rexs_stage import DEG, NONE, Gearbox, ParallelUnit, both_units
+
+from femgear import cli
+from femgear.case.gear_set import planetary_set
+from femgear.errors import CaseError, FemgearError
+from femgear.exchange.rexs import read_model
+from femgear.findings import DOUBT
+from femgear.trains.drivetrain.model import case_model
+from femgear.trains.imports import case_drafts
+from femgear.trains.reading import parse_case, read_case
+
+
+def drafts_of(box, tmp_path, **options):
+    model = read_model(box.write(tmp_path / "unit.rexs"))
+    return {one.suffix: one for one in case_drafts(model, "unit", **options)}, model.findings
+
+
+def written(box, tmp_path, monkeypatch, *more):
+    """Run femgear import in a folder; what it printed decides nothing."""
+    monkeypatch.chdir(tmp_path)
+    box.write(Path("unit.rexs"))
+    assert cli.main(["import", "unit.rexs", "-o", "unit.toml", *more]) == 0
+
+
+def test_two_parallel_stages_are_a_drivetrain_and_two_pairs(tmp_path, monkeypatch, capsys):
+    written(ParallelUnit(), tmp_path, monkeypatch)
+    told = capsys.readouterr()
+    assert all(f"written: unit{suffix}.toml" in told.out for suffix in ("", "_51", "_52"))
+    assert "inertia of motor and load" in told.err
+    chain = read_case("unit.toml")
+    model = case_model(chain)
+    assert chain.operation.speed == pytest.approx(1500 * math.pi / 30)
+    ends = {name: model.ratio[name] for name in ("gear 41", "gear 42", "gear 44")}
+    assert ends == pytest.approx({"gear 41": 1.0, "gear 42": -0.5, "gear 44": 1.0 / 6.0})
+    # 25 teeth at 1500 rpm, 20 teeth at 750 rpm
+    lines = model.frequencies(chain.operation.speed)[model.mesh_base] / (2.0 * math.pi)
+    assert sorted(lines) == pytest.approx([250.0, 625.0])
+    assert [one.torque for one in chain.operation.torque] == [100.0, None]
+    # a shaft of 30 mm from the load over bearings and gear: four bodies; twist of 140 mm between the bearings
+    beams = [one for one in chain.shaft if set(one.between) <= {"bearing 12", "gear 41", "bearing 13"}]
+    assert sum(1.0 / one.springs.torsion for one in beams) == pytest.approx(
+        0.14 / (206e9 / 2.6 * math.pi * 0.03**4 / 32.0), rel=1e-6
+    )
+    first, second = read_case("unit_51.toml"), read_case("unit_52.toml")
+    assert (first.operation.torque, second.operation.torque) == (100.0, pytest.approx(200.0))
+    assert [
+        one * 30 / math.pi for one in (*first.operation.speeds, *second.operation.speeds)
+    ] == pytest.approx([1500.0, 750.0])
+    assert planetary_set(second).centre_distance == 0.12 and second.gear_2.teeth == 60
+    # two bearings of 2e8 N/m
+    assert first.gear_1.bearing_stiffness == 4e8
+
+
+def test_planetary_and_parallel_stages(tmp_path):
+    found, findings = drafts_of(both_units(), tmp_path)
+    assert list(found) == ["", "_50051", "_50052"]
+    planetary, first = parse_case(found[""].text), parse_case(found["_50051"].text)
+    assert planetary.sun.teeth == 17 and planetary.operation.torque == pytest.approx(1591.5494309)
+    assert first.gear_1.teeth == 25 and first.operation.torque == 100.0
+    assert any("no drivetrain" in one.text for one in findings)
+
+
+def test_one_stage_of_several(tmp_path):
+    found, findings = drafts_of(both_units(), tmp_path, stage="50052")
+    assert list(found) == [""] and parse_case(found[""].text).gear_2.teeth == 60
+    assert findings[0].severity == DOUBT
+    assert all(words in findings[0].text for words in ("not taken", "planetary_stage 9", "25/50"))
+    with pytest.raises(CaseError, match="E-CHOICE") as caught:
+        drafts_of(both_units(), tmp_path, stage="7")
+    assert caught.value.key == "--stage" and "planetary_stage 9" in caught.value.limit
+
+
+def test_a_stage_that_makes_no_case_is_said_first(tmp_path):
+    box = ParallelUnit()
+    box.components[44]["attributes"]["tip_diameter"] = (1.0, "mm")
+    found, findings = drafts_of(box, tmp_path)
+    assert list(found) == ["_51"]
+    assert "cylindrical_stage 52 20/60" in findings[0].text and "not taken" in findings[0].text
+    bevel = ParallelUnit()
+    bevel.components[52]["type"] = "bevel_stage"
+    found, findings = drafts_of(bevel, tmp_path)
+    assert list(found) == ["_51"] and "bevel_stage 52" in findings[0].text
+    for one in (41, 43):
+        box.components[one]["attributes"]["tip_diameter"] = (1.0, "mm")
+    with pytest.raises(FemgearError, match="E-TIP") as caught:
+        drafts_of(box, tmp_path)
+    assert caught.value.file == str(tmp_path / "unit.rexs")
+
+
+def test_a_unit_of_one_pair(tmp_path):
+    box = ParallelUnit()
+    del box.components[52]
+    box.relations = [one for one in box.relations if 52 not in one[1].values()]
+    found, _ = drafts_of(box, tmp_path)
+    assert list(found) == [""]
+    assert parse_case(found[""].text).operation.torque == 100.0
+
+
+def test_an_internal_pair(tmp_path):
+    box = ParallelUnit().set(44, number_of_teeth=(60, NONE))
+    box.components[44]["type"] = "ring_gear"
+    box = box.set(52, center_distance=(60.0, "mm"))
+    box.components[31]["attributes"] |= {
+        "outer_diameter_begin": (220.0, "mm"), "outer_diameter_end": (220.0, "mm")
+    }  # fmt: skip
+    for flank in (1044, 2044):
+        box = box.set(flank, addendum_coefficient_basic_profile=(0.8, NONE))
+    found, _ = drafts_of(box, tmp_path)
+    case = parse_case(found["_52"].text)
+    assert case.gear_2.internal and case.gear_2.outer_radius == pytest.approx(0.11)
+    assert "" not in found  # no drivetrain of internal gears
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_thrust_of_helical_gears_has_its_sense(tmp_path, sense):
+    """A right-handed pinion that drives counter-clockwise is pushed along its axis, its wheel against it."""
+    box = ParallelUnit().set(10, rotational_speed=(sense * 1500.0, "1 / min"))
+    box = box.set(5, torque_around_u_axis=(sense * 100.0, "N m"))
+    box = box.set(41, helix_angle_reference_diameter=(10.0, DEG))
+    box = box.set(42, helix_angle_reference_diameter=(-10.0, DEG))
+    box = box.set(51, center_distance=(75.0 / math.cos(math.radians(10.0)), "mm"))
+    found, _ = drafts_of(box, tmp_path)
+    assert f'helix_angle = "{-sense * 10:g} deg"' in found[""].text
+    assert parse_case(found["_51"].text).static.slices == 25
+
+
+def test_load_cases_of_pairs(tmp_path):
+    case = """<load_case id="{0}">
+    <component id="10"><attribute id="rotational_speed" unit="1 / min">{1}</attribute></component>
+    <component id="5"><attribute id="torque_around_u_axis" unit="N m">{2}</attribute></component>
+    </load_case>"""
+    spectrum = "".join(case.format(*one) for one in ((1, 1000, 50), (2, 3000, 80)))
+    path = tmp_path / "unit.rexs"
+    text = (
+        ParallelUnit().xml().replace("</model>", f'<load_spectrum id="1">{spectrum}</load_spectrum></model>')
+    )
+    path.write_text(text, encoding="utf-8")
+    model = read_model(path)
+    second = {one.suffix: parse_case(one.text) for one in case_drafts(model, "u", load_case=2) if one.suffix}
+    assert second["_52"].operation.torque == pytest.approx(160.0)
+    assert [one * 30 / math.pi for one in second["_52"].operation.speeds] == pytest.approx([1500.0])
+    assert any(one.key == "52: operation" and "1: 500 rpm, 100 N m" in one.text for one in model.findings)
+    with pytest.raises(CaseError, match="no such load case"):
+        case_drafts(read_model(path), "u", load_case=3)
+
+
+def test_files_that_are_there_are_kept(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("unit_52.toml").write_text("mine", encoding="utf-8")
+    ParallelUnit().write(Path("unit.rexs"))
+    assert cli.main(["import", "unit.rexs", "-o", "unit.toml"]) == 2
+    assert "unit_52.toml" in capsys.readouterr().err and not Path("unit.toml").exists()
+    assert Path("unit_52.toml").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_planetary_stage_takes_what_flows_through_the_unit(tmp_path):
+    """The torque acts on a spur pinion whose wheel sits on the shaft of the sun."""
+    box = Gearbox("1.4")
+    box.relations.remove(("assembly", {"assembly": 34, "part": 38}))
+    del box.components[34]["attributes"]["rotational_speed"]
+    box.add(700, "shaft", rotational_speed=(-3000.0, "1 / min"))
+    box.relate("assembly", assembly=700, part=38)
+    ParallelUnit.wheel(box, 701, 700, 20, 3.0, 30.0, 0.0)
+    ParallelUnit.wheel(box, 702, 34, 40, 3.0, 30.0, 80.0)
+    ParallelUnit.mesh(box, 710, 701, 702, 90.0, 0.0)
+    box = box.set(38, torque_around_u_axis=(-100.0, "N m"))
+    found, _ = drafts_of(box, tmp_path)
+    operation = parse_case(found[""].text).operation
+    assert operation.input == "sun" and operation.torque == pytest.approx(200.0)
+    assert operation.speeds[0] * 30 / math.pi == pytest.approx(1500.0)
+    assert parse_case(found["_710"].text).operation.torque == pytest.approx(100.0)
