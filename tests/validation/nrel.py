@@ -31,7 +31,7 @@ from published.wind_turbine_response import (
 )
 
 from femgear.errors import ConvergenceError
-from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import side_bands
 from femgear.trains.rigid import gear_set_modes
@@ -288,3 +288,37 @@ def extended() -> tuple[Row, ...]:
         note = "truncation of load over k(t)"
         rows.append(information("PG-B", source, f"{name} 3 mesh harmonics", None, few, note=note))
     return tuple(rows)
+
+
+def weight_against_stiffness() -> tuple[Row, ...]:
+    """R.m.s. motion of set B by its weight and by k(t), at resonances of mesh harmonics."""
+    problem = extended_problem_b()
+    reduction = drive_reduction(problem)
+    outputs = np.zeros((2, len(problem.system.M)))
+    outputs[0, 0] = outputs[1, 3] = 1.0  # x of carrier and ring
+    rows = []
+    for speed, mode in ((18.0, "2nd, 40.8 Hz"), (36.0, "1st, 40.8 Hz"), (138.0, "1st, 156.9 Hz")):
+        frequency = 2.0 * math.pi * speed / 60.0 * np.array([1.0, TEETH_B[1]])
+        solution = solve_harmonic_balance(
+            problem, frequency, orders=side_bands(3, 8, 3), reduction=reduction, stability=False
+        )
+        lines = np.abs(displacements(problem, solution, outputs, reduction=reduction)) ** 2 / 2.0
+        carrier, mesh = solution.orders.T
+        for name, chosen in (("weight", (mesh == 0) & (carrier != 0)), ("k(t)", mesh != 0)):
+            for member, share in zip(("carrier", "ring"), lines):
+                quantity = f"set B, {speed:g} rpm ({mode}): {member} x by {name}, r.m.s. [um]"
+                size = 1e6 * math.sqrt(share[chosen].sum())
+                rows.append(information("PG-B", "definition", quantity, None, size))
+    return tuple(rows)
+
+
+def ring_motion() -> tuple[Row, ...]:
+    """Set A: largest r.m.s. motion of the ring over the frequency, with clearance over without."""
+    largest = []
+    for clearance in (0.0, 400e-6):
+        problem = bearing_problem_a(clearance)
+        branch = weight_branch(problem, (10.0, 180.0), harmonics=5, largest=0.03)
+        largest.append(float(member_rms(problem, branch.solutions, "ring")[:, 0].max()))
+    note = "the clearance that the printed number belongs to is not legible"
+    quantity = "set A, ring x, largest r.m.s. over the frequency: clearance of 400 um over none"
+    return (information("PG-A", PAPER, quantity, 4.6, largest[1] / largest[0], note=note),)

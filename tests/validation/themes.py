@@ -300,11 +300,13 @@ THEMES = (
         (nrel.frequencies, nrel.linear_peak),
         slow_parts=(
             nrel.ring_resonance,
+            nrel.ring_motion,
             nrel.wedging,
             nrel.folds,
             nrel.small_plays,
             nrel.sun_support,
             nrel.extended,
+            nrel.weight_against_stiffness,
         ),
     ),
     Theme(
