@@ -103,12 +103,17 @@ class Planets:
     """A set whose planets may be 3, 4, 5 or 6: (36 + 84)/N is whole, and six of them fit."""
 
     @cached_property
-    def bodies(self):
-        from femgear.contact.bodies import make_bodies, make_sectors
+    def material(self):
         from femgear.fe.elasticity import Material
 
-        material = Material(206e9, 0.3, 7850.0)
-        return make_bodies(make_sectors(self.gears(3), material, flank_elements=24, cache=None), material)
+        return Material(206e9, 0.3, 7850.0)
+
+    @cached_property
+    def bodies(self):
+        from femgear.contact.bodies import make_bodies, make_sectors
+
+        sectors = make_sectors(self.gears(3), self.material, flank_elements=24, cache=None)
+        return make_bodies(sectors, self.material)
 
     @staticmethod
     def gears(n_planets):
@@ -213,8 +218,8 @@ def test_growth_of_slices_over_planets(benchmark, planets, medians, n_planets):
     from femgear.contact.width_waves import width_waves
 
     gears = planets.gears(n_planets)
-    sectors = make_sectors(gears, planets.bodies.material, flank_elements=6, refine=0.5)
-    waves = width_waves(sectors, planets.bodies.material, 25)
+    sectors = make_sectors(gears, planets.material, flank_elements=6, refine=0.5)
+    waves = width_waves(sectors, planets.material, 25)
     options = {"positions": 16, "options": CycleOptions(waves=waves, slices=25)}
     cycle = benchmark.pedantic(
         walk_mesh_cycle, args=(gears, planets.bodies), kwargs={"sun_torque": 100.0} | options, rounds=3,

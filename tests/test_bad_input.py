@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from validation.reference.plane_elasticity import edge_load
 
-from femgear.case.gear_set import material_of, planetary_set, set_deviations
+from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.cli import main
 from femgear.contact.bodies import flank_load_columns, flank_stations, make_sectors
@@ -324,7 +324,7 @@ def test_a_refusal_names_quantity_and_line(change, key, line_with, words, tmp_pa
 def test_a_grid_that_a_thin_rim_spoils_names_the_rim(tmp_path):
     case = read_case(case_of(tmp_path, edited(('outer_radius = "100 mm"', 'outer_radius = "82.9 mm"'))))
     with pytest.raises(GridError) as caught:
-        make_sectors(planetary_set(case), material_of(case))
+        make_sectors(planetary_set(case), materials_of(case))
     assert caught.value.key == "ring.outer_radius"
     assert "rim is 0.017 modules thick" in caught.value.remedy
 

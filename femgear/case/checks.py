@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any
 
-from femgear.case.quantities import ANGLE, SPEED
+from femgear.case.quantities import ANGLE, LENGTH, SPEED
 from femgear.case.sections import (
     LARGEST_DEVIATION,
     ROUNDING,
@@ -19,6 +19,7 @@ from femgear.case.sections import (
     Case,
     GearErrors,
     check_published,
+    face_width,
 )
 from femgear.errors import CaseError, GeometryError
 from femgear.findings import Finding
@@ -35,11 +36,42 @@ VALIDATED_HELIX = math.radians(30.0)
 
 def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
     """List the refusals of entries that do not go together; `more` are those of the train."""
+    if missing := list(check_face_widths(case)):
+        return missing
     checks = (
         _check_operation, _check_set, _check_supports, _check_ends, _check_numbers, _check_deviations
     )  # fmt: skip
     problems = [problem for check in checks for problem in check(case)] + list(more)
     return problems or list(check_published(case))
+
+
+def check_face_widths(case: Any) -> Iterator[CaseError]:
+    """Refuse gears without a face width, and different ones of meshes where contact takes one width.
+
+    Slices over the width, and back flanks beside the drive flanks, take meshes of one common face width.
+    """
+    try:
+        widths = [face_width(case, name) for name in case.gear_names]
+    except CaseError as error:
+        yield error
+        return
+    common = [min(pair) for pair in pairwise(widths)]
+    least = min(common)
+    if max(common) == least:
+        return
+    helical_slices = getattr(getattr(case, "helical", None), "slices", 1)
+    for key, given in (
+        ("static.slices", case.static.slices > 1),
+        ("static.back_flanks", case.static.back_flanks),
+        ("helical.slices", helical_slices > 1),
+    ):
+        if given:
+            shown = [LENGTH.show(one) for one in common]
+            yield CaseError(
+                f"sun and planets have {shown[0]} of their faces in common, planets and ring {shown[1]}",
+                code="E-CHOICE", key=key, limit="meshes of one common face width",
+                remedy=f'give planet.face_width = "{LENGTH.show(least)}", or leave {key} out',
+            )  # fmt: skip
 
 
 def _check_operation(case: Case):
@@ -283,7 +315,7 @@ def _amounts(case: Case):
     yield from _error_amounts("carrier.errors", case.carrier.errors)
     if case.ring.errors is not None and case.ring.errors.ovality is not None:
         yield "ring.errors.ovality", case.ring.errors.ovality.amplitude
-    width = case.set.face_width
+    width = max(face_width(case, name) for name in case.gear_names)
     for name in ("sun", "carrier"):
         if (askew := getattr(case, name).misalignment) is not None:
             yield f"{name}.misalignment", width * _largest((askew.x, askew.y))

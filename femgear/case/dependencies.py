@@ -26,7 +26,13 @@ _KEPT = 4
 FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"})
 """Entries that do nothing but separate flanks: no grid knows them, and derivatives reach them."""
 
-_WORDS = {"format", "title", "housing", "runup", *(f"material.{n}_stress_limit" for n in ("root", "contact"))}
+_GEARS = ("sun", "planet", "ring", "gear_1", "gear_2")
+_LIMITS = {
+    f"{of}material.{name}_stress_limit"
+    for of in ("", *(f"{gear}." for gear in _GEARS))
+    for name in ("root", "contact")
+}
+_WORDS = {"format", "title", "housing", "runup", *_LIMITS}
 """No stage before housing and run-up depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _WIDTH = {"tilt_stiffness", "misalignment", "torque_end", "torsion_diameter"}

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import FOUNDATION, INERTIA, MASS, STIFFNESS, TORSION, Dimension, Section
-from femgear.case.sections import MaterialSection
+from femgear.case.sections import gear_material
 from femgear.findings import Finding
 from femgear.gears.gear import Gear
+from femgear.gears.iso6336 import material_factor
 
-STEEL = 206e9
-"""Modulus of elasticity of the gears that `USUAL_STIFFNESS` is given for [Pa], of ISO 6336-1."""
 USUAL_STIFFNESS = 20e9
 """Mesh stiffness per face width c_gamma of steel gears [N/m^2], 20 N/(mm um): DIN 3990-1:1987, method C."""
 SUPPORT_SHARE = 0.2
@@ -66,9 +66,9 @@ def gear_cylinder(gear: Gear, density: float) -> tuple[float, float, float]:
     return cylinder(inner, outer, gear.face_width, density)
 
 
-def mesh_stiffness(material: MaterialSection, width: float) -> float:
-    """Estimate the stiffness of a mesh of a face width [m] in N/m; that of steel by the modulus."""
-    return USUAL_STIFFNESS * material.youngs_modulus / STEEL * width
+def mesh_stiffness(modulus_1: float, modulus_2: float, width: float) -> float:
+    """Estimate the stiffness [N/m] of a mesh of gears of Young's moduli [Pa] over a common face width [m]."""
+    return USUAL_STIFFNESS * material_factor(modulus_1, modulus_2) * width
 
 
 def usual_torque(teeth: int, mate: int, module: float, width: float, meshes: int = 1) -> float:
@@ -95,17 +95,18 @@ def estimates(case: Any) -> dict[str, Estimate]:
 
     Of planetary sets and pairs. GeometryError: gears that cannot be made, see `planetary_set`.
     """
-    gears, density = planetary_set(case), case.material.density
-    bodies = {gear.name: (gear_cylinder(gear, density), _words(gear)) for gear in gears.gears}
-    width, stiffness = case.set.face_width, SUPPORT_SHARE * mesh_stiffness(case.material, case.set.face_width)
+    gears = planetary_set(case)
+    materials = {name: gear_material(case, name) for name in case.gear_names}
+    bodies = {
+        gear.name: (gear_cylinder(gear, materials[gear.name].density), _words(gear)) for gear in gears.gears
+    }
     if "ring" in bodies:
         radius = gears.centre_distance + gears.planet.rim_radius
-        how = "two discs of half the face width, out to the far side of the planets' bores"
-        bodies["carrier"] = cylinder(0.0, radius, width, density), how
-    line = 1e-9 * mesh_stiffness(case.material, 1.0)
-    share = f"{SUPPORT_SHARE:g} of a mesh stiffness of {line:.3g} N/(mm um) times the face width"
+        how = "two discs of half the planets' face width, out to the far side of their bores"
+        bodies["carrier"] = cylinder(0.0, radius, gears.planet.face_width, case.material.density), how
     found = {}
     for name, ((mass, polar, diametral), how) in bodies.items():
+        stiffness, width, share = _support(gears, materials, name)
         own = {"mass": Estimate(mass, MASS, how), "inertia": Estimate(polar, INERTIA, how)}
         support = "support" if name in ("sun", "ring", "carrier") else "bearing"
         own[f"{support}_stiffness"] = Estimate(stiffness, STIFFNESS, share)
@@ -119,11 +120,28 @@ def estimates(case: Any) -> dict[str, Estimate]:
         }
         found |= {f"helical.{name}.{key}": one for key, one in spatial.items()}
     if "ring" in bodies:
-        area = 2.0 * math.pi * gears.ring.rim_radius * width
+        stiffness, _, share = _support(gears, materials, "ring")
+        area = 2.0 * math.pi * gears.ring.rim_radius * gears.ring.face_width
         how = f"over the outer surface {share}"
         foundation = Estimate(stiffness / area, FOUNDATION, how)
         found |= {f"ring.foundation_{name}": foundation for name in ("radial", "tangential")}
     return found
+
+
+def _support(gears: Any, materials: dict[str, Any], name: str) -> tuple[float, float, str]:
+    """Stiffness of the support of a member [N/m], width of its meshes [m], and what they are made from.
+
+    A mean over the meshes of the member; the carrier has those of its planets.
+    """
+    moduli = [one.youngs_modulus for one in materials.values()]
+    meshes = [*zip(pairwise(materials), pairwise(moduli), gears.mesh_widths, strict=True)]
+    name = "planet" if name == "carrier" else name
+    own = [(pair, width) for names, pair, width in meshes if name in names]
+    stiffness = SUPPORT_SHARE * sum(mesh_stiffness(*pair, width) for pair, width in own) / len(own)
+    width = sum(width for _, width in own) / len(own)
+    line = 1e-9 * stiffness / (SUPPORT_SHARE * width)
+    share = f"{SUPPORT_SHARE:g} of a mesh stiffness of {line:.3g} N/(mm um) times the face width"
+    return stiffness, width, share
 
 
 def _places(name: str) -> tuple[str, ...]:

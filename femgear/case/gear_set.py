@@ -24,6 +24,8 @@ from femgear.case.sections import (
     GearErrors,
     RingErrors,
     SunSection,
+    face_width,
+    gear_material,
 )
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.fe.elasticity import Material
@@ -61,7 +63,7 @@ from femgear.gears.profile import BasicRack, PinionCutter, transverse_rack, tran
 from femgear.gears.tips import settled_tips
 
 if TYPE_CHECKING:
-    from femgear.case.sections import CarrierSection, ModificationSection
+    from femgear.case.sections import CarrierSection, MaterialSection, ModificationSection
 
 _PLAY = 1e-9
 """Play below which there is no back side [m]: what rounding leaves of none."""
@@ -147,7 +149,7 @@ def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = 
         module=module,
         pressure_angle=pressure_angle,
         profile_shift=(section.profile_shift or 0.0) * _normal_modules(case),
-        face_width=case.set.face_width,
+        face_width=face_width(case, name),
         rim_radius=rim,
         internal=internal,
         rack=rack,
@@ -409,8 +411,9 @@ def with_shafts(case: Case) -> Case:
     """Compute the support stiffness [N/m] that shafts give their members, and set it in the case.
 
     The member stands on the free end of a stepped cantilever, its face rigidly coupled to the axis, which may
-    tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft is of the material of the
-    gears. GeometryError: parts that make no shaft (E-SHAFT), with file and line.
+    tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft of the sun is of its
+    material, that of the carrier of the section ``material``. GeometryError: parts that make no shaft
+    (E-SHAFT), with file and line.
     """
     found = {}
     for name in _ON_SHAFTS:
@@ -418,7 +421,7 @@ def with_shafts(case: Case) -> Case:
         if not section.support_shaft:
             continue
         try:
-            stiffness = _stiffness(_steps(section), material_of(case))
+            stiffness = _stiffness(_steps(section), _shaft_material(case, name))
         except FemgearError as error:
             error.key = f"{name}.support_shaft"
             error.file = case.location(error.key)
@@ -433,7 +436,7 @@ def shaft_lines(case: Case) -> tuple[str, ...]:
     for name in _ON_SHAFTS:
         section = getattr(case, name)
         if section.support_shaft:
-            beam = 1.0 / timoshenko_flexibility(_steps(section), material_of(case))[0, 0]
+            beam = 1.0 / timoshenko_flexibility(_steps(section), _shaft_material(case, name))[0, 0]
             lines.append(
                 f"support of the {name} from its shaft: {section.support_stiffness * 1e-6:.4g} N/um "
                 f"(as a beam {beam * 1e-6:.4g})"
@@ -441,9 +444,23 @@ def shaft_lines(case: Case) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def material_of(case: Case) -> Material:
-    """Take the material of the gears of a case: elasticity [Pa] and density [kg/m^3]."""
-    return Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+def materials_of(case: Any) -> tuple[Material, ...]:
+    """Take the materials of the gears of a case in the order of its set: elasticity and density."""
+    return tuple(material_of(case, name) for name in case.gear_names)
+
+
+def material_of(case: Any, gear: str) -> Material:
+    """Take the material of a gear of a case: elasticity [Pa] and density [kg/m^3]."""
+    return _elastic(gear_material(case, gear))
+
+
+def _shaft_material(case: Case, member: str) -> Material:
+    """Material of the shaft of a member: that of a gear, or for the carrier that of the case."""
+    return _elastic(gear_material(case, member) if member in case.gear_names else case.material)
+
+
+def _elastic(section: MaterialSection) -> Material:
+    return Material(section.youngs_modulus, section.poisson_ratio, section.density)
 
 
 def _steps(section: SunSection | CarrierSection) -> tuple[ShaftStep, ...]:

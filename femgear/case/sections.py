@@ -271,14 +271,15 @@ class SetSection(Section):
     """What the gears share.
 
     ``centre_distance`` may be left out (the profile shifts give it), and so may the profile shift of the sun,
-    of the ring or of both (they are found so that the meshes have no play). ``backlash`` is the play of each
+    of the ring or of both (they are found so that the meshes have no play). ``face_width`` is that of gears
+    that give none of their own. ``backlash`` is the play of each
     mesh on the reference circles: half of it is taken from the tooth thickness of every gear. With a
     ``helix_angle``, positive for a right-handed sun, module, racks and shifts are of the normal section.
     """
 
     planets: Annotated[int, Count(1, 1000, remedy="usual: 3 to 6")]
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-3, 10.0)] | None = None
-    face_width: FaceWidth
+    face_width: FaceWidth | None = None
     planet_angles: Annotated[tuple[Angle, ...], at_most(1000)] | None = None
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
     pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
@@ -293,30 +294,46 @@ class RackSection(Section):
     root_radius: Annotated[float, Number(0.0, 1.0)] = 0.25
 
 
+_YoungsModulus = Annotated[float, Quantity(MODULUS, 1e9, 1e12)]
+_PoissonRatio = Annotated[
+    float,
+    Number(
+        -1.0,
+        0.5,
+        open_low=True,
+        open_high=True,
+        note="0.5 is incompressible, beyond it no material is stable",
+    ),
+]
+_Density = Annotated[float, Quantity(DENSITY, 100.0, 25000.0)]
+_StressLimit = Annotated[float, Quantity(STRESS, 1e6, 5e9)]
+
+
 class MaterialSection(Section):
     """Isotropic elastic material of all gears; its strength, where it is known, gives safeties.
 
     ``root_stress_limit`` and ``contact_stress_limit`` are sigma_Flim and sigma_Hlim of ISO 6336-5.
     """
 
-    youngs_modulus: Annotated[float, Quantity(MODULUS, 1e9, 1e12)]
-    poisson_ratio: Annotated[
-        float,
-        Number(
-            -1.0,
-            0.5,
-            open_low=True,
-            open_high=True,
-            note="0.5 is incompressible, beyond it no material is stable",
-        ),
-    ]
-    density: Annotated[float, Quantity(DENSITY, 100.0, 25000.0)]
-    root_stress_limit: Annotated[float, Quantity(STRESS, 1e6, 5e9)] | None = None
-    contact_stress_limit: Annotated[float, Quantity(STRESS, 1e6, 5e9)] | None = None
+    youngs_modulus: _YoungsModulus
+    poisson_ratio: _PoissonRatio
+    density: _Density
+    root_stress_limit: _StressLimit | None = None
+    contact_stress_limit: _StressLimit | None = None
+
+
+class GearMaterialSection(Section):
+    """Material of one gear: what it leaves out is that of the section ``material``."""
+
+    youngs_modulus: _YoungsModulus | None = None
+    poisson_ratio: _PoissonRatio | None = None
+    density: _Density | None = None
+    root_stress_limit: _StressLimit | None = None
+    contact_stress_limit: _StressLimit | None = None
 
 
 class ShaftPart(Section):
-    """One part of a stepped shaft of the material of the gears."""
+    """One part of a stepped shaft of the material of its member."""
 
     length: Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
     outer_diameter: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
@@ -334,6 +351,8 @@ class SunSection(Section):
     pressure_angle: PressureAngle
     profile_shift: Shift | None = None
     bore_radius: Radius
+    face_width: FaceWidth | None = None
+    material: GearMaterialSection | None = None
     mass: Mass = LEFT_OUT
     inertia: Inertia = LEFT_OUT
     support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)] | None = None
@@ -355,6 +374,8 @@ class PlanetSection(Section):
     teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
     profile_shift: Shift = 0.0
     bore_radius: Radius
+    face_width: FaceWidth | None = None
+    material: GearMaterialSection | None = None
     mass: Mass = LEFT_OUT
     inertia: Inertia = LEFT_OUT
     bearing_stiffness: Stiffness = LEFT_OUT
@@ -375,6 +396,8 @@ class RingSection(Section):
     teeth: Annotated[int, Count(10, 5000, note=_MANY_TEETH, signed=True)]
     profile_shift: Shift | None = None
     outer_radius: Radius
+    face_width: FaceWidth | None = None
+    material: GearMaterialSection | None = None
     cutter_teeth: Annotated[int, Count(5, 1000)] | None = None
     cutter_profile_shift: Shift = 0.0
     foundation_radial: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)] = LEFT_OUT
@@ -671,6 +694,27 @@ class MeshStiffnessSection(Section):
 
     sun_planet: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
     planet_ring: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
+
+
+def face_width(case: Any, gear: str) -> float:
+    """Find the face width of a gear of a case [m], its own or that of the section ``set``.
+
+    CaseError: E-KEY-MISSING: neither is given.
+    """
+    width = getattr(case, gear).face_width or case.set.face_width
+    if width is None:
+        raise CaseError(
+            f"the face width of the {gear.replace('_', ' ')} is missing", code="E-KEY-MISSING",
+            key="set.face_width", remedy=f"give set.face_width, or {gear}.face_width and that of all others",
+        )  # fmt: skip
+    return width
+
+
+def gear_material(case: Any, gear: str) -> MaterialSection:
+    """Find the material of a gear of a case: its own entries, and for others those of ``material``."""
+    own = getattr(case, gear).material
+    given = {} if own is None else own.model_dump(exclude_none=True)
+    return case.material.model_copy(update=given)
 
 
 def output_member(case: Case) -> str:

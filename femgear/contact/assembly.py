@@ -32,7 +32,6 @@ from femgear.contact.flank_pairs import (
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
 from femgear.contact.supports import MovingMembers
 from femgear.errors import ContactError
-from femgear.fe.elasticity import Material
 from femgear.gears.deviations import SetDeviations
 from femgear.gears.pair import EACH
 from femgear.gears.planetary import GearSet
@@ -387,8 +386,10 @@ def mesh_windows(
     turns = (np.ceil(middle - _SAME) if ends else np.floor(middle + _SAME)).astype(int)
     tau, turns = tau.ravel(), np.repeat(turns, tau.size // len(tau))
     N, pairs = planetary_set.n_planets, mesh_pairs(planetary_set)
-    line_load = share / bodies.face_width
-    widths = [WIDTH * _contact_half_width(pair, line_load, bodies.material) for pair in pairs]
+    widths = [
+        WIDTH * _contact_half_width(pair, share / width, modulus)
+        for pair, width, modulus in zip(pairs, bodies.widths, bodies.contact_moduli, strict=True)
+    ]
     found, teeth = [], []
     for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
         phase, clearance = flank_side(planetary_set, direction)
@@ -411,7 +412,7 @@ def mesh_windows(
 
 def first_windows(planetary_set: GearSet, bodies: Bodies, sun_torque: float) -> tuple[float, float]:
     """Share [N] and nearest [m] of the first windows under a torque [N m], as `mesh_windows` takes them."""
-    s, width = planetary_set, bodies.face_width
+    s, width = planetary_set, min(bodies.widths)
     # without torque what one micrometre of wedging may carry
     share = sun_torque / (s.gears[0].base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
     rough = share / (ROUGH_STIFFNESS * width)
@@ -658,25 +659,28 @@ def _tooth_pairs(planetary_set, pairs, phase, direction, passed) -> tuple[np.nda
     return zeta, side_teeth(planetary_set, index, direction)
 
 
-def _contact_half_width(pair: FlankPair, line_load: float, material: Material) -> float:
-    """Largest Hertzian half width on the path of contact [m] of one tooth pair under `line_load` [N/m]."""
+def _contact_half_width(pair: FlankPair, line_load: float, modulus: float) -> float:
+    """Largest Hertzian half width on the path of contact [m] of one tooth pair under `line_load` [N/m].
+
+    ``modulus`` is the contact modulus of both flanks [Pa].
+    """
     begin, end = pair.path
     zeta = np.linspace(begin, end, 51)[1:-1]
     rho_1, rho_2 = pair.pitch_roll_1 + zeta, pair.pitch_roll_2 - pair.sign * zeta
     radius = (rho_1 * rho_2 / (rho_2 + pair.sign * rho_1)).max()
-    modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
     return hertz_half_width(line_load, radius, modulus)
 
 
-def _window_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
+def _window_compliance(width: float, cells: int, bodies: Bodies, kind: int) -> np.ndarray:
     """Half-plane compliance of both flanks between the cells of a window, shape (4, cells, cells) [m/N]."""
-    material, centre = bodies.material, width * cell_centres(cells)
-    half = 0.5 * width * np.diff(cell_edges(cells))
-    distance = centre[:, :, None] - centre[:, None, :]
-    constants = material.shear_modulus, material.poisson_ratio
-    # of both cells of a pair: reciprocal between cells of different widths
-    loaded = surface_displacement(distance, half[:, :, None], *constants)
-    return (loaded + surface_displacement(distance, half[:, None, :], *constants)) / bodies.face_width
+    centre, half = width * cell_centres(cells), 0.5 * width * np.diff(cell_edges(cells))
+    distance, yielding = centre[:, :, None] - centre[:, None, :], []
+    for flank in bodies.mates[kind]:
+        constants = flank.corner.shear_modulus, flank.corner.poisson_ratio
+        # of both cells of a pair: reciprocal between cells of different widths
+        loaded = surface_displacement(distance, half[:, :, None], *constants)
+        yielding.append(0.5 * (loaded + surface_displacement(distance, half[:, None, :], *constants)))
+    return (yielding[0] + yielding[1]) / bodies.widths[kind]
 
 
 def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int) -> MeshWindows:
@@ -694,7 +698,8 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
         of_gears = name in ("roll", "at_edge")
         whole = np.concatenate([getattr(w, name) for w in found], axis=int(of_gears))
         parts[name] = whole if name == "cell" else whole[:, *places] if of_gears else whole[places]
-    area = parts["cell"] * cells * bodies.face_width
+    of_kind = mesh // gears.n_planets % len(gears.kinds)
+    area = parts["cell"] * cells * np.array(bodies.widths)[of_kind]
     listed = ListedPairs(
         near=np.concatenate([w.near for w in found]),
         gap=np.concatenate([w.gap.min(axis=-1) for w in found]),
@@ -708,7 +713,10 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
         tooth=tooth[:, mesh[:, None], take],
         turns=turns,
         local=np.stack(
-            [_window_compliance(w.cell[0] * cells, cells, bodies) for w in found[: len(gears.kinds)]]
+            [
+                _window_compliance(w.cell[0] * cells, cells, bodies, kind)
+                for kind, w in enumerate(found[: len(gears.kinds)])
+            ]
         ),
         cell_area=area[:, None, None] * np.diff(cell_edges(cells)),
         listed=listed,
@@ -753,8 +761,8 @@ def _corner_part(setup: MeshWindows, bodies: Bodies, mesh, position, pair, polyn
             # cells beyond the end of a flank are no candidates
             away = np.maximum(away, 1e-12)
             parts.append(flank.corner.surface(away[:, :, None], away[:, None, :]))
-        total[rows] = parts[0] + parts[1]
-    return total / bodies.face_width
+        total[rows] = (parts[0] + parts[1]) / bodies.widths[kind]
+    return total
 
 
 def _window_polynomials(cells: int) -> np.ndarray:

@@ -255,8 +255,8 @@ class _ActiveSets:
         Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
         """
         found, meshes = self.found, self.found.setup.meshes
-        width, material = found.bodies.face_width, found.bodies.material
-        modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
+        kind = found.setup.kind(np.arange(len(found.approach)))[:, None]
+        width, modulus = np.array(found.bodies.widths)[kind], found.bodies.contact_moduli[kind]
         share = self.given.sum() / found.setup.n_planets
         gap = np.where(found.candidate, found.gap, np.inf)
         smallest = gap.min(axis=-1).reshape(len(gap), len(found.approach), -1)

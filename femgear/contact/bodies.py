@@ -13,7 +13,9 @@ The contact solution adds half plane and corner at the surface under its pressur
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,13 @@ from femgear.fe.compliance import (
     mirrored_columns,
     tooth_compliance,
 )
-from femgear.fe.elasticity import BoundaryStress, Material, stiffness, tangential_stress
+from femgear.fe.elasticity import (
+    BoundaryStress,
+    Material,
+    material_of_each,
+    stiffness,
+    tangential_stress,
+)
 from femgear.fe.grid import Grid, mirror
 from femgear.fe.meshing import mesh_outlines
 from femgear.gears.gear import Gear, tooth_thickness
@@ -106,8 +114,8 @@ class FlankCompliance:
         Depth under each station at which body and half plane are joined [m].
     corner : TipCorner
         What was taken out for the corner at the tip.
-    local : (n, n) array
-        What was taken out in all [m/N].
+    local : (2, n, n) array
+        What was taken out in all within the left and the right flank [m/N].
     unknowns : int
         Degrees of freedom of the whole body that the sector stands for.
     root : ObservedRoot, optional
@@ -132,18 +140,18 @@ class FlankCompliance:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Flank compliances of the three kinds of gears and their common material.
+    """Flank compliances of the three kinds of gears, and what pairs of them have in common.
 
-    ``helical`` are the stiffnesses of helical teeth over those of spur teeth of the same transverse section,
-    of every kind of mesh, see `helical_stiffness`, at a base helix angle [rad]. A pair has its gears 1 and 2
-    in place of sun and planet, and no ring.
+    ``widths`` are the face widths that both gears of every kind of mesh have in common [m], ``helical`` the
+    stiffnesses of helical teeth over those of spur teeth of the same transverse section, of every kind of
+    mesh, see `helical_stiffness`, at a base helix angle [rad]. A pair has its gears 1 and 2 in place of sun
+    and planet, and no ring.
     """
 
     sun: FlankCompliance
     planet: FlankCompliance
     ring: Any
-    material: Material
-    face_width: float
+    widths: tuple[float, ...]
     helical: tuple[float, ...] = (1.0, 1.0)
     base_helix_angle: float = 0.0
 
@@ -164,6 +172,20 @@ class Bodies:
         """Compliances of the gears in the order of the set."""
         return self.sun, self.planet, self.ring
 
+    @property
+    def mates(self) -> tuple[tuple[FlankCompliance, FlankCompliance], ...]:
+        """Both gears of every kind of mesh."""
+        return tuple(pairwise(body for body in self.gears if body is not None))
+
+    @property
+    def contact_moduli(self) -> np.ndarray:
+        """Contact modulus E* of every kind of mesh [Pa], ``1/E*`` the sum of ``(1 - nu) / (2 mu)``."""
+        yielding = [
+            sum((1.0 - body.corner.poisson_ratio) / (2.0 * body.corner.shear_modulus) for body in pair)
+            for pair in self.mates
+        ]
+        return 1.0 / np.array(yielding)
+
 
 def helical_stiffness(base_helix_angle: float, *, internal: bool) -> float:
     """Compute the stiffness of helical teeth over that of straight teeth of the same transverse section.
@@ -178,7 +200,7 @@ def helical_stiffness(base_helix_angle: float, *, internal: bool) -> float:
 
 def make_sectors(
     planetary_set: GearSet,
-    material: Material,
+    material: Material | Sequence[Material],
     *,
     flank_elements: int = 24,
     refine: float = 1.0,
@@ -186,8 +208,10 @@ def make_sectors(
 ) -> Sectors:
     """Mesh one sector of each gear and assemble its stiffness matrix.
 
-    ``flank_elements`` are the element edges along a flank, ``refine`` divides all element sizes, ``cache`` is
-    the folder of generated grids.
+    ``material`` is that of all gears or one for each, ``flank_elements`` are the element edges along a flank,
+    ``refine`` divides all element sizes, ``cache`` is the folder of generated grids. Teeth are as wide as the
+    face that they have in common with their mates (ISO 6336-1 has the stiffness of a pair for that width), of
+    two mates the wider one; bodies below them have their own width.
     """
     gears = planetary_set.gears
     halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in gears]
@@ -200,42 +224,67 @@ def make_sectors(
             error.key = f"{thin.name}.{'outer' if thin.internal else 'bore'}_radius"
             error.remedy = f"the rim is {rim:.2g} modules thick; give it {_THIN:g} or more"
         raise
-    sectors = []
-    for gear, grid in zip(gears, grids, strict=True):
+    sectors, materials = [], material_of_each(material, len(gears))
+    widths = flank_widths([gear.face_width for gear in gears])
+    for gear, grid, own, teeth in zip(gears, grids, materials, widths, strict=True):
         whole = mirror(grid)
         state: Any = RING_STATE if gear.internal else TEETH_STATE
-        matrix = stiffness(whole, material, state=state, thickness=gear.face_width)
+        thickness: Any = gear.face_width
+        if max(teeth) < thickness:
+            thickness = {"tooth": max(teeth), "body": thickness}
+        matrix = stiffness(whole, own, state=state, thickness=thickness)
         sectors.append(Sector(gear, whole, matrix))
     return Sectors(*sectors)
 
 
+def flank_widths(widths: Sequence[float]) -> list[tuple[float, float]]:
+    """Find the face width [m] that the left and the right flank of each gear have in common with their mates.
+
+    Of face widths of gears in the order of a set, each of which meshes with the next: of a planet the left
+    flank carries against the sun, the right one against the ring (`flank_pairs.acting_flanks`).
+    """
+    common = [min(pair) for pair in pairwise(widths)]
+    return [*zip([common[0], *common], [*common, common[-1]], strict=True)]
+
+
 def make_bodies(
-    sectors: Sectors, material: Material, *, depth: float | None = None, ring_foundation=None
+    sectors: Sectors,
+    material: Material | Sequence[Material],
+    *,
+    depth: float | None = None,
+    ring_foundation=None,
 ) -> Bodies:
     """Compute the flank compliances, sun and planets held at their bores and the ring at its outer surface.
 
     Parameters
     ----------
+    material : Material or one for each gear
+        Those of the sectors.
     depth : float, optional
         Largest depth at which body and half plane are joined [m].
     ring_foundation : (2n, 2n) sparse matrix, optional
         Stiffness of an elastic foundation of the ring, which then is not held [N/m].
     """
-    # roots of internal gears need a solution of their own: no sector of one plane state, see `root_stress`
+    # roots of sectors of two plane states or widths need a solution of their own, see `root_stress`
+    own = [s.gear.face_width for s in sectors.gears]
+    widths = flank_widths(own)
     found = [
         flank_compliance(
             s.grid,
             s.gear,
-            material,
+            one,
             s.stiffness,
             depth=depth,
-            root_state=None if s.gear.internal else TEETH_STATE,
+            root_state=None if s.gear.internal or max(teeth) < s.gear.face_width else TEETH_STATE,
             foundation=ring_foundation if s.gear.internal else None,
+            widths=teeth,
         )
-        for s in sectors.gears
+        for s, one, teeth in zip(
+            sectors.gears, material_of_each(material, len(sectors.gears)), widths, strict=True
+        )
     ]
     ring = found[2] if len(found) > 2 else None
-    return Bodies(found[0], found[1], ring, material, face_width=sectors.sun.gear.face_width)
+    return Bodies(found[0], found[1], ring, tuple(min(pair) for pair in pairwise(own)))
 
 
 def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:
@@ -257,6 +306,7 @@ def flank_compliance(
     depth: float | None = None,
     root_state: str | None = None,
     foundation=None,
+    widths: tuple[float, float] | None = None,
 ) -> FlankCompliance:
     """Compute the regular flank compliance of a whole gear from the grid of one sector.
 
@@ -275,6 +325,8 @@ def flank_compliance(
         otherwise the displacements of the stations themselves.
     foundation : (2n, 2n) sparse matrix, optional
         Stiffness that supports the rim [N/m], the bore or the outer surface of a ring; held without it.
+    widths : (float, float), optional
+        Over which the left and the right flank touch their mates [m]; the face width without it.
     """
     stations, depths, loads, observations = observed_flanks(grid, gear, depth)
     along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
@@ -283,7 +335,9 @@ def flank_compliance(
         grid, stiffness, count=gear.teeth, rim="rim", loads=loads, observations=observations
     )
     compliance, further = _seen(free.supported(foundation), len(stations.roll))
-    found = _without_half_plane(gear, material, stations, depths, compliance, len(grid.points))
+    found = _without_half_plane(
+        gear, material, stations, depths, compliance, len(grid.points), widths or (gear.face_width,) * 2
+    )
     if along is None:
         return replace(found, surface=further, free=free)
     return replace(found, root=ObservedRoot(along, stations, further))
@@ -388,7 +442,7 @@ def observed_flanks(grid, gear, depth=None):
     return stations, depths, flank_load_columns(grid, stations), seen
 
 
-def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:
+def _without_half_plane(gear, material, stations, depths, compliance, nodes, widths) -> FlankCompliance:
     """Take the local parts at both depths out of a compliance (teeth, 2n, 2n) that went on to the surface."""
     arc = stations.roll**2 / (2 * gear.base_radius)
     offset = arc[:, None] - arc[None, :]
@@ -401,7 +455,7 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> 
         + corner.depth(away[:, None], factor * depths, loaded[None, :])
         for factor in (1.0, 2.0)
     )
-    local = (2.0 * once - twice) / gear.face_width
+    local = np.array([(2.0 * once - twice) / width for width in widths])
     return FlankCompliance(
         roll=stations.roll,
         base_radius=gear.base_radius,
@@ -414,11 +468,11 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> 
 
 
 def regular_compliance(compliance: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """Compliance (teeth, 2n, 2n) without the local part (n, n) on the same flank, made reciprocal [m/N]."""
-    regular, n = compliance.copy(), len(local)
+    """Compliance (teeth, 2n, 2n) without the local part (2, n, n) on each flank, made reciprocal [m/N]."""
+    regular, n = compliance.copy(), local.shape[-1]
     for side in (LEFT, RIGHT):
         block = slice(side * n, (side + 1) * n)
-        regular[0, block, block] -= local
+        regular[0, block, block] -= local[side]
     # reciprocity holds for the exact field; the two depths break it by the size of the discretisation error
     return 0.5 * (regular + np.roll(regular[::-1], 1, axis=0).transpose(0, 2, 1))
 

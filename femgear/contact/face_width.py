@@ -151,7 +151,7 @@ def _by_tilts(tilting: TiltingMembers | None, sliced: SliceState, tilts: np.ndar
 
 def _of_pairs(found: Candidates, state: BatchState, laws: PairLaws, sliced: SliceState) -> dict[str, Any]:
     """Loads and pressures of tooth pairs in slices, by the names of `MeshCycle`."""
-    (P, S, W), rows, width = sliced.force.shape, len(found.position), found.bodies.face_width
+    (P, S, W), rows, width = sliced.force.shape, len(found.position), found.bodies.widths[0]
     contact, spur = sliced.contact_width(found, laws), P == rows
     _check_lines(sliced.force if spur else None, contact, width, S)
     # pressures are those of the laws, which fall between their forces beside the plane state

@@ -301,8 +301,8 @@ def root_waves(
 ) -> np.ndarray:
     """Compute the root stress influences (K, teeth, 2 m, 2 n) of loads ``cos(kz)`` across the width [Pa/N].
 
-    Loads are those over the whole width; see the head of the module. Wave numbers (K,) [1/m]; other arguments
-    as in `root_stress`.
+    Loads are those over the face width of the gear; see the head of the module. Wave numbers (K,) [1/m];
+    other arguments as in `root_stress`.
     """
     along, stations = root_functionals(grid, gear, material, state="plane strain"), flank_stations(grid, gear)
     loads, columns = (

@@ -184,7 +184,7 @@ def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) ->
     """
     if supports == UPRIGHT:
         return None
-    s, N, width = planetary_set, planetary_set.n_planets, planetary_set.sun.face_width
+    s, N, width = planetary_set, planetary_set.n_planets, planetary_set.mesh_widths[0]
     along = 2.0 * (np.arange(slices) + 0.5) / slices - 1.0
     tilts = _one_side(s, Supports(supports.sun, supports.carrier, supports.planet), False)
     free = tilts.approach[:, tilts.free]

@@ -20,11 +20,16 @@ load by ``ln(k/2) + gamma``.
 
 The slices of helical teeth are each at a position of its own, ahead of the one before; their contacts are not
 beside one another on the flanks, and ``h_m`` holds between the places where they are.
+
+The width b is the one that all meshes have in common; what wider gears have beyond its ends is left out of
+``h_m - h_0``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -44,7 +49,7 @@ from femgear.contact.bodies import (
 )
 from femgear.contact.local_compliance import depth_displacement, tip_corner
 from femgear.fe.compliance import condense_sector, tooth_compliance
-from femgear.fe.elasticity import Material, stiffness, wave_stiffness
+from femgear.fe.elasticity import Material, material_of_each, stiffness, wave_stiffness
 from femgear.gears.pair import EACH
 
 _WAVES = 9
@@ -67,11 +72,18 @@ class WidthWaves:
     bodies: tuple[Bodies, ...]
 
     @property
+    def width(self) -> float:
+        """Face width that all meshes have in common [m]."""
+        return self.bodies[0].widths[0]
+
+    @property
     def local(self) -> np.ndarray:
-        """What the half spaces of both flanks yield beside the load, of spur teeth [m/N], (M,)."""
-        material, width = self.bodies[0].material, self.bodies[0].face_width
-        factor = 2 * (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * width)
-        return -factor * (np.log(self.wave_number / 2) + np.euler_gamma)
+        """What the half spaces of both flanks of every kind of mesh yield beside the load [m/N], (M, kinds).
+
+        Of spur teeth.
+        """
+        factor = 2.0 / (np.pi * self.bodies[0].contact_moduli * self.width)
+        return -factor * (np.log(self.wave_number / 2) + np.euler_gamma)[:, None]
 
 
 def wave_displacement(x, depth, wave_number: float, material: Material) -> np.ndarray:
@@ -88,39 +100,51 @@ def wave_displacement(x, depth, wave_number: float, material: Material) -> np.nd
 
 
 def width_waves(
-    sectors: Sectors, material: Material, slices: int, ring_foundation=None, helical=(1.0, 1.0)
+    sectors: Sectors,
+    material: Material | Sequence[Material],
+    slices: int,
+    ring_foundation=None,
+    helical=(1.0, 1.0),
 ) -> WidthWaves:
     """Compute the compliance to the waves of as many slices, from sector grids that may be coarse.
 
-    ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over the face width, which otherwise is held;
-    ``helical`` as in `Bodies`.
+    ``material`` is that of the sectors, or one for each; ``ring_foundation`` (2n, 2n) [N/m] that of the ring
+    over its face width, which otherwise is held; ``helical`` as in `Bodies`.
     """
-    width, ring = sectors.sun.gear.face_width, sectors.ring
+    common = tuple(min(pair) for pair in pairwise(one.gear.face_width for one in sectors.gears))
+    width, ring = min(common), sectors.ring
+    sun_material, planet_material, *ring_material = material_of_each(material, len(sectors.gears))
     wave_number = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
-    of_gears = [_wave_compliance(one, None, material, wave_number) for one in (sectors.sun, sectors.planet)]
+    of_gears = [
+        _wave_compliance(one, None, of, wave_number, width)
+        for one, of in ((sectors.sun, sun_material), (sectors.planet, planet_material))
+    ]
     of_ring: Any = [None] * len(wave_number)
     if ring is not None:
-        of_ring = _wave_compliance(ring, ring_foundation, material, wave_number)
+        of_ring = _wave_compliance(ring, ring_foundation, ring_material[0], wave_number, width)
     return WidthWaves(
         wave_number,
         tuple(
-            Bodies(sun, planet, ring, material, width, helical)
+            Bodies(sun, planet, ring, common, helical)
             for sun, planet, ring in zip(*of_gears, of_ring, strict=True)
         ),
     )
 
 
-def with_held_ring(waves: WidthWaves, sectors: Sectors) -> WidthWaves:
-    """Exchange the ring for that which is held at its outer surface."""
-    rings = _wave_compliance(sectors.ring, None, waves.bodies[0].material, waves.wave_number)
+def with_held_ring(waves: WidthWaves, sectors: Sectors, material: Material) -> WidthWaves:
+    """Exchange the ring, of this material, for that which is held at its outer surface."""
+    rings = _wave_compliance(sectors.ring, None, material, waves.wave_number, waves.width)
     bodies = (replace(one, ring=ring) for one, ring in zip(waves.bodies, rings, strict=True))
     return replace(waves, bodies=tuple(bodies))
 
 
 def _wave_compliance(
-    sector: Sector, foundation, material: Material, wave_number: np.ndarray
+    sector: Sector, foundation, material: Material, wave_number: np.ndarray, width: float
 ) -> list[FlankCompliance]:
-    """Flank compliance of a gear to every wave, less that to a uniform load, beyond the half space."""
+    """Flank compliance of a gear to every wave, less that to a uniform load, beyond the half space.
+
+    Loads are those over a width [m].
+    """
     gear, grid, mu = sector.gear, sector.grid, material.shear_modulus
     stations, depths, loads, observations = observed_flanks(grid, gear)
 
@@ -149,8 +173,8 @@ def _wave_compliance(
             - depth_displacement(offset, depth, mu, material.poisson_ratio)
             for depth in (depths, 2 * depths)
         )
-        local = (2 * once - twice) / gear.face_width
-        regular = regular_compliance(change / gear.face_width, local)
+        local = np.tile((2 * once - twice) / width, (2, 1, 1))
+        regular = regular_compliance(change / width, local)
         found.append(
             FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0)
         )
@@ -173,7 +197,7 @@ def slice_compliance(found: Candidates, rows: np.ndarray, waves: WidthWaves, sli
     setup, W, (P, each) = found.setup, len(found.mesh), rows.shape
     if slices == 1:
         return np.zeros((setup.images, P, 1, W, 1, W))
-    wanted = np.pi / waves.bodies[0].face_width * np.arange(1, slices)
+    wanted = np.pi / waves.width * np.arange(1, slices)
     # weights of the waves that were computed in those of the slices, which are cubics between them
     between = CubicSpline(np.log(waves.wave_number), np.eye(len(waves.wave_number)))(np.log(wanted))
     T = cosines(slices)[1:]
@@ -183,8 +207,8 @@ def slice_compliance(found: Candidates, rows: np.ndarray, waves: WidthWaves, sli
     windows = found.position[place], found.mesh, found.pair[place]
     known = np.array([body_compliance(middle, one, *windows)[..., 0, :, 0] for one in waves.bodies])
     change = np.tensordot(between, known, 1)
-    local = replace(waves, wave_number=wanted).local[:, None]
-    local = local / waves.bodies[0].of_kinds(setup.kind(found.mesh))
+    kind = setup.kind(found.mesh)
+    local = replace(waves, wave_number=wanted).local[:, kind] / waves.bodies[0].of_kinds(kind)
     change[:, 0][..., range(W), range(W)] += local[:, None]
     return np.einsum("ms,mt,mipvw->ipsvtw", T, T, change, optimize=True)
 
@@ -242,8 +266,6 @@ def _add_along(across, setup, body: FlankCompliance, table, windows, members, ge
 def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) -> None:
     """Add what the half spaces of both flanks yield between the contacts of one tooth pair in all slices."""
     mesh, pair, position, piece = windows
-    material = waves.bodies[0].material
-    factor = (1 - material.poisson_ratio) / (np.pi * material.shear_modulus * waves.bodies[0].face_width)
     for number in np.unique(mesh):
         members = np.flatnonzero(mesh == number)
         one, two = (members[rows] for rows in np.triu_indices(len(members)))
@@ -251,12 +273,15 @@ def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) ->
         one, two, local = one[same], two[same], np.zeros(len(p))
         shape = over[:, np.abs(piece[one] - piece[two])] + over[:, piece[one] + piece[two] + 1]
         for gear, body in enumerate(setup.gears.mates[setup.kind(number)]):
+            flank = waves.bodies[0].gears[body]
             rolls = (setup.roll[gear, number, position[p, w], pair[p, w], 1] for w in (one, two))
-            arcs = [roll**2 / (2 * waves.bodies[0].gears[body].base_radius) for roll in rolls]
-            local += (shape * _beside(np.abs(arcs[0] - arcs[1]), wave_number[:, None])).sum(axis=0)
-        across[p, one, two] += factor * local
+            arcs = [roll**2 / (2 * flank.base_radius) for roll in rolls]
+            factor = (1 - flank.corner.poisson_ratio) / (np.pi * flank.corner.shear_modulus * waves.width)
+            beside = _beside(np.abs(arcs[0] - arcs[1]), wave_number[:, None])
+            local += factor * (shape * beside).sum(axis=0)
+        across[p, one, two] += local
         off = one != two
-        across[p[off], two[off], one[off]] += factor * local[off]
+        across[p[off], two[off], one[off]] += local[off]
 
 
 def _beside(distance, wave_number) -> np.ndarray:

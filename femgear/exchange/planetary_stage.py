@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
-from femgear.case.estimates import STEEL, USUAL_STIFFNESS, estimates, usual_rim, usual_torque
+from femgear.case.estimates import USUAL_STIFFNESS, estimates, usual_rim, usual_torque
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import (
     ANGLE,
@@ -37,6 +37,7 @@ from femgear.exchange.flank_modifications import Flank, flank_modifications, wri
 from femgear.exchange.gear_unit import gears_of, loads_on, power_flow, stage_components, with_values
 from femgear.exchange.rexs import Component, Model, Relation
 from femgear.findings import NOTE
+from femgear.gears.iso6336 import STEEL
 from femgear.gears.kinematics import MEMBERS, torque_ratios
 
 _GEARS = ("sun", "planet", "ring")

@@ -13,7 +13,7 @@ cubic over the arc length.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +48,13 @@ class Material:
         """Shear modulus ``E / (2 (1 + nu))`` [Pa]."""
         return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
 
+    def contact_modulus(self, mate: Material) -> float:
+        """Contact modulus E* with a mate [Pa], ``1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2``.
+
+        K. L. Johnson, Contact Mechanics, 1985, eq. 4.20.
+        """
+        return 1.0 / sum((1.0 - one.poisson_ratio**2) / one.youngs_modulus for one in (self, mate))
+
     def lame(self, state: str) -> tuple[float, float]:
         """Lame constants [Pa] that make ``sigma = lambda tr(eps) I + 2 mu eps`` hold in the plane.
 
@@ -57,6 +64,11 @@ class Material:
         E, nu = self.youngs_modulus, self.poisson_ratio
         lam = {"plane strain": E * nu / ((1 + nu) * (1 - 2 * nu)), "plane stress": E * nu / (1 - nu**2)}
         return lam[state], self.shear_modulus
+
+
+def material_of_each(material: Material | Sequence[Material], count: int) -> tuple[Material, ...]:
+    """Give the material of each of so many bodies, from one of them all or one for each."""
+    return (material,) * count if isinstance(material, Material) else tuple(material)
 
 
 def basis(grid: Grid, *, order: int = 4):

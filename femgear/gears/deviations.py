@@ -235,21 +235,23 @@ def lead_separation(
 ) -> np.ndarray:
     """Compute the separation (2N, ..., slices) [m] of the flanks of every mesh over the width.
 
-    Means over equal slices, by the modifications of both flanks along the lead and by axes askew, which
-    displace a section as a motion of the member by slope times z would. The roll lengths (2, 2N, ...) [m] on
-    gear 1 and 2 of every mesh are those halfway along the profiles when left out.
+    Means over equal slices of the common width of both gears, by the modifications of both flanks along the
+    lead and by axes askew, which displace a section as a motion of the member by slope times z would. The
+    roll lengths (2, 2N, ...) [m] on gear 1 and 2 of every mesh are those halfway along the profiles when left
+    out.
     """
     d, s, fine = deviations, planetary_set, 16
     N, gears = s.n_planets, [pair.gears for pair in s.kinds]
-    width = s.gears[0].face_width
-    place = width * ((np.arange(slices * fine) + 0.5) / (slices * fine) - 0.5)
+    across = (np.arange(slices * fine) + 0.5) / (slices * fine) - 0.5
     apart = -misaligned_approach(d, s, back=back)
     found = []
     for mesh in range(len(apart)):
+        place = s.mesh_widths[mesh // N] * across
         removed = apart[mesh] * place
         for i, form in enumerate(d.mesh_forms(mesh // N, back=back)):
-            height = 0.0 if rolls is None else profile_height(gears[mesh // N][i], rolls[i][mesh])[..., None]
-            removed = removed + lead_deviation(form, width, place, height)
+            gear = gears[mesh // N][i]
+            height = 0.0 if rolls is None else profile_height(gear, rolls[i][mesh])[..., None]
+            removed = removed + lead_deviation(form, gear.face_width, place, height)
         found.append(removed)
     found = np.array(found)
     return found.reshape(*found.shape[:-1], slices, fine).mean(axis=-1)

@@ -22,6 +22,8 @@ from femgear.gears.profile import base_helix_angle, inv
 
 # coefficients C1 .. C9 of the minimum flexibility q', ISO 6336-1:2019, eq. 82 (gears of one module depth)
 _C = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)
+STEEL = 206e9
+"""Young's modulus of the steel for which part 1 gives the stiffness of teeth [Pa]."""
 THEORETICAL_CORRECTION = 0.8
 """C_M: measured over theoretical stiffness of solid gears."""
 
@@ -62,9 +64,31 @@ def zone_factor(pressure_angle: float, working_angle: float) -> float:
     return math.sqrt(2.0 / math.tan(working_angle)) / math.cos(pressure_angle)
 
 
-def elasticity_factor(youngs_modulus: float, poisson_ratio: float) -> float:
-    """Compute Z_E = ``sqrt(E / (2 pi (1 - nu^2)))`` [Pa^0.5] of one material, E in Pa (ISO 6336-2, 7)."""
-    return math.sqrt(youngs_modulus / (2.0 * math.pi * (1.0 - poisson_ratio**2)))
+def elasticity_factor(
+    youngs_modulus: float, poisson_ratio: float, mate: tuple[float, float] | None = None
+) -> float:
+    """Compute Z_E = ``1/sqrt(pi ((1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2))`` [Pa^0.5] (ISO 6336-2, section 7).
+
+    Young's modulus [Pa] and Poisson's ratio of one gear, and of its mate where that has others.
+    """
+    pair = (youngs_modulus, poisson_ratio), mate or (youngs_modulus, poisson_ratio)
+    return 1.0 / math.sqrt(math.pi * sum((1.0 - nu**2) / modulus for modulus, nu in pair))
+
+
+def root_face_width(face_width: float, common: float, module: float) -> float:
+    """Find the face width b_F at the root of a tooth [m] (ISO 6336-3, section 5).
+
+    Of a gear that is wider than the face in common with its mate, at most one module beyond each end of that.
+    """
+    return min(face_width, common + 2.0 * module)
+
+
+def material_factor(modulus_1: float, modulus_2: float) -> float:
+    """Compute E/E_St of two gears, with which the stiffness of their teeth grows (ISO 6336-1, method B).
+
+    ``E = 2 E_1 E_2/(E_1 + E_2)``, Young's moduli in Pa.
+    """
+    return 2.0 * modulus_1 / (modulus_1 + modulus_2) * modulus_2 / STEEL
 
 
 def contact_ratio_factor(contact_ratio: float) -> float:
@@ -82,6 +106,7 @@ def nominal_contact_stress(
     tangential_force: float,
     youngs_modulus: float,
     poisson_ratio: float,
+    mate: tuple[float, float] | None = None,
 ) -> float:
     """Compute the nominal contact stress sigma_H0 [Pa] of a gear pair (ISO 6336-2, section 5).
 
@@ -101,6 +126,8 @@ def nominal_contact_stress(
         F_t at the reference circle [N]: torque over reference radius, not negative.
     youngs_modulus, poisson_ratio : float
         Of both gears [Pa, 1].
+    mate : (float, float), optional
+        Those of one of them, where they differ.
 
     Raises
     ------
@@ -108,7 +135,7 @@ def nominal_contact_stress(
         Contact ratio outside the range of the method (E-ISO6336).
     """
     zone = zone_factor(gear_1.pressure_angle, working_angle)
-    elasticity = elasticity_factor(youngs_modulus, poisson_ratio)
+    elasticity = elasticity_factor(youngs_modulus, poisson_ratio, mate)
     ratio = contact_ratio_factor(contact_ratio)
     u = (-gear_2.teeth if gear_2.internal else gear_2.teeth) / gear_1.teeth
     width = min(gear_1.face_width, gear_2.face_width)
@@ -116,7 +143,9 @@ def nominal_contact_stress(
     return zone * elasticity * ratio * math.sqrt(line)
 
 
-def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: float) -> NominalRootStress:
+def nominal_root_stress(
+    gear: Gear, *, contact_ratio: float, tangential_force: float, common_width: float | None = None
+) -> NominalRootStress:
     """Compute the nominal root stress sigma_F0 [Pa] of a gear, ``F_t/(b m) Y_F Y_S``.
 
     The load acts at the outer point of single pair contact, from a contact ratio of two on with the part
@@ -129,6 +158,8 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
     ----------
     contact_ratio, tangential_force : float
         As for `nominal_contact_stress`, with its mate [1, N].
+    common_width : float, optional
+        Face width that both have in common, where its mate is narrower [m]; see `root_face_width`.
 
     Raises
     ------
@@ -148,7 +179,8 @@ def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: f
     form *= load_distribution_factor(contact_ratio)
     correction = stress_correction(chord / arm, 0.5 * chord / fillet)
     m = gear.module
-    nominal = tangential_force / (gear.face_width * m)
+    width = root_face_width(gear.face_width, common_width or gear.face_width, m)
+    nominal = tangential_force / (width * m)
     return NominalRootStress(
         stress=nominal * form * correction,
         form=form,

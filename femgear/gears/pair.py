@@ -118,6 +118,16 @@ class GearPair:
         return max(two - self.gear_2.tip_roll, start), min(end, two - self.gear_2.form_roll)
 
     @property
+    def face_width(self) -> float:
+        """Face width that both gears have in common [m]: the smaller one, in the middle of the wider."""
+        return min(gear.face_width for gear in self.gears)
+
+    @property
+    def mesh_widths(self) -> tuple[float]:
+        """Common face width of the only kind of mesh [m]."""
+        return (self.face_width,)
+
+    @property
     def contact_ratio(self) -> float:
         """Transverse contact ratio from the tip circles, on the involutes alone, see `path`."""
         start, end = self.path

@@ -89,6 +89,12 @@ class PlanetarySet:
         return GearPair(self.sun, self.planet, a), GearPair(self.planet, self.ring, a)
 
     @property
+    def mesh_widths(self) -> tuple[float, float]:
+        """Common face width of the gears of both kinds of mesh [m]."""
+        first, second = self.kinds
+        return first.face_width, second.face_width
+
+    @property
     def rotation_approach(self) -> np.ndarray:
         """Approach of the drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
         return rotation_approach(self.n_planets)

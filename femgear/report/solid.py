@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,7 +39,7 @@ def solid(
     planetary_set: PlanetarySet,
     grids: dict[str, Grid],
     bodies: Iterable[DeformedBody],
-    material: Material,
+    materials: Mapping[str, Material],
     modes: xr.Dataset | None = None,
     *,
     helix_angle: float = 0.0,
@@ -55,7 +55,8 @@ def solid(
         One sector of ``"sun"``, ``"planet"``, ``"ring"``, centred on the origin.
     bodies : iterable of deformed bodies
         With displacements (teeth, n, 2) [m] in the frame of every sector.
-    material : Material
+    materials : mapping of str to Material
+        Of the same gears.
     modes : xarray.Dataset, optional
         Of modes.nc.
     helix_angle : float
@@ -74,7 +75,7 @@ def solid(
     found = []
     for body in bodies:
         sector, moved = sectors[body.kind], np.asarray(body.displacement)
-        stress = np.stack([von_mises(grids[body.kind], one, material) for one in moved])
+        stress = np.stack([von_mises(grids[body.kind], one, materials[body.kind]) for one in moved])
         found.append(
             {
                 "name": body.name,

@@ -205,7 +205,7 @@ def _solve(solved: DesignBasis, load: float, position: np.ndarray, numbers):
             outside |= solved.contact == "profile" and bool(missed.any())
         return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
 
-    return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * gears.sun.face_width))
+    return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * min(gears.mesh_widths)))
 
 
 def _answer(problem, state, members) -> dict:

@@ -210,7 +210,7 @@ def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     """Tables of a drivetrain: motor, shaft, the pair, shaft and load."""
     case = parse_case(case_text.write(pair))
     gears: Any = planetary_set(case)
-    known, width = estimates(case), case.set.face_width
+    known, width = estimates(case), planetary_set(case).mesh_widths[0]
     bearing, ratio = known["gear_1.bearing_stiffness"], gears.gear_2.teeth / gears.gear_1.teeth
     tilt = Estimate(
         0.75 * bearing.value * width**2, TORSION, "the bearing's stiffness over three face widths"
@@ -218,7 +218,9 @@ def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     how = "cylinder of the wheel's radius and four face widths"
     rotor = cylinder(0.0, gears.gear_2.reference_radius, 4.0 * width, case.material.density)
     rotors = [Estimate(value, one, how) for value, one in zip(rotor, (MASS, INERTIA, INERTIA), strict=True)]
-    stiffness = Estimate(mesh_stiffness(case.material, width), STIFFNESS, "20 N/(mm um) times the face width")
+    modulus = case.material.youngs_modulus
+    mesh = mesh_stiffness(modulus, modulus, width)
+    stiffness = Estimate(mesh, STIFFNESS, "20 N/(mm um) times the face width")
     tables: dict[str, Any] = {"format": 1, "model": "drivetrain", "title": pair["title"]}
     tables |= {"body": [], "shaft": [], "parallel": [], "bearing": []}
 

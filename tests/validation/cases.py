@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
+    from femgear.fe.elasticity import Material
     from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
     from femgear.trains.static.results import StaticResult
 
@@ -68,6 +69,13 @@ def reference_case() -> Case:
     from femgear.trains.reading import parse_case
 
     return parse_case(CASE, name="reference set")
+
+
+def reference_material() -> Material:
+    """Material of the gears of the reference set."""
+    from femgear.case.gear_set import material_of
+
+    return material_of(reference_case(), "ring")
 
 
 @cache

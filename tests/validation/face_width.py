@@ -340,7 +340,7 @@ def sun_like_pair(width: float = WIDTH) -> SunLikePair:
     waves, k = width_waves(coarse, STEEL, SLICES), np.pi / width * np.arange(1, SLICES)
     known = [_regular(one.sun, roll, width) for one in waves.bodies]
     change = 2 * CubicSpline(np.log(waves.wave_number), known)(np.log(k))
-    change = np.append(0.0, change + width * replace(waves, wave_number=k).local)
+    change = np.append(0.0, change + width * replace(waves, wave_number=k).local[:, 0])
     waves_of_width = T.T @ (change[:, None] * T)
     across = {"mirror": waves_of_width, "free": waves_of_width + 2 * (free - mirror)}
     fine = make_bodies(make_sectors(gears, STEEL, flank_elements=12), STEEL).sun

@@ -185,7 +185,7 @@ def tooth_stiffness(helix: float, mesh: int, flank_elements: int = 8) -> dict[st
     docs/helical.md.
     """
     case = _case(helix)
-    gears, material = planetary_set(case), material_of(case)
+    gears, material = planetary_set(case), material_of(case, "sun")
     sectors = make_sectors(gears, material, flank_elements=flank_elements, refine=flank_elements / 12)
     two = (sectors.sun, sectors.planet) if mesh == 0 else (sectors.planet, sectors.ring)
     pair, angle = mesh_pairs(gears)[mesh], base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
@@ -273,7 +273,7 @@ def root_stresses() -> tuple[Row, ...]:
     rows, source = [], "helical teeth in three dimensions"
     for helix in (20.0, 30.0):
         case = _case(helix)
-        gears, material = planetary_set(case), material_of(case)
+        gears, material = planetary_set(case), material_of(case, "sun")
         angle = base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
         for sector in make_sectors(gears, material, flank_elements=8).gears:
             gear = sector.gear

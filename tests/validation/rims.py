@@ -24,7 +24,7 @@ from femgear.contact.bodies import (
 from femgear.contact.flank_pairs import LEFT, RIGHT
 from femgear.contact.local_compliance import surface_displacement
 from femgear.fe.compliance import mirror_nodes
-from validation.cases import reference_case
+from validation.cases import reference_case, reference_material
 from validation.rows import Row, at_most, information
 from validation.whole_gear import (
     Held,
@@ -175,7 +175,7 @@ def ring_comparison(*, flank_elements: int = 8, refine: float = 0.5) -> Comparis
     """All loads of the thin ring of `static_with` at one position; the sizes are those of the whole gear."""
     static = static_with(thin=True)
     gears, section = static.planetary_set, reference_case().ring
-    N, material = gears.n_planets, static.bodies.material
+    N, material = gears.n_planets, reference_material()
     loads = loads_of(gears, static.cycle, POSITION, [(N + n, 1, LEFT) for n in range(N)])
     other = make_sectors(gears, material, flank_elements=flank_elements, refine=refine).ring
     held = Held(section.foundation_radial, section.foundation_tangential)
@@ -187,7 +187,7 @@ def ring_comparison(*, flank_elements: int = 8, refine: float = 0.5) -> Comparis
 def planet_comparison(*, flank_elements: int = 8, refine: float = 0.5) -> Comparison:
     """Sun-side loads of planet 1, seen on the flanks that meet the ring."""
     static = static_with(thin=True)
-    gears, material = static.planetary_set, static.bodies.material
+    gears, material = static.planetary_set, reference_material()
     N, cycle = gears.n_planets, static.cycle
     loads = loads_of(gears, cycle, POSITION, [(0, 1, LEFT)])
     seen = loads_of(gears, cycle, POSITION, [(N, 0, RIGHT)]).tooth, RIGHT

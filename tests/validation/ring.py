@@ -13,7 +13,7 @@ import numpy as np
 from femgear.contact.bodies import RING_STATE, active_flank_load
 from femgear.fe.elasticity import mass, stiffness
 from femgear.fe.reduction import cyclic_modes, sector_basis
-from validation.cases import PAPER, reference_modes, reference_static
+from validation.cases import PAPER, reference_material, reference_modes, reference_static
 from validation.reference.annulus import annulus_frequencies
 from validation.rows import Row, at_most, information, within
 from validation.whole_ring import free_modes, whole_grid
@@ -69,7 +69,7 @@ def _annulus_sector(inner: float, outer: float, count: int):
 def plain_annulus() -> tuple[Row, ...]:
     """An annulus without teeth through the cyclic reduction that the ring takes."""
     static = reference_static()
-    ring, material = static.planetary_set.ring, static.bodies.material
+    ring, material = static.planetary_set.ring, reference_material()
     grid = _annulus_sector(ring.root_radius, ring.rim_radius, ring.teeth)
     node = np.argmin(np.hypot(*(grid.points - [ring.root_radius, 0.0]).T))
     load = np.zeros((2 * grid.n_nodes, 1))
@@ -86,7 +86,7 @@ def plain_annulus() -> tuple[Row, ...]:
 
 def _exact(inner: float) -> np.ndarray:
     static = reference_static()
-    ring, material = static.planetary_set.ring, static.bodies.material
+    ring, material = static.planetary_set.ring, reference_material()
     return annulus_frequencies(inner, ring.rim_radius, material, nodal_diameters=DIAMETERS)[:, 0]
 
 
@@ -94,7 +94,7 @@ def _toothed(tooth_stiffness: float, tooth_mass: float) -> np.ndarray:
     """Natural frequencies of the free ring with shares of the thickness of its teeth."""
     static = reference_static()
     sector, width = static.sectors.ring, static.planetary_set.ring.face_width
-    material = static.bodies.material
+    material = reference_material()
     K = stiffness(
         sector.grid,
         material,
@@ -110,7 +110,11 @@ def _tooth_data() -> tuple[float, float, float]:
     """Mass of a tooth over that of the annulus sector, radius of its centre [m], radius of an annulus
     with the area of the body that carries the teeth (it reaches up into the fillets)."""
     static = reference_static()
-    sector, ring, material = static.sectors.ring, static.planetary_set.ring, static.bodies.material
+    sector, ring, material = (
+        static.sectors.ring,
+        static.planetary_set.ring,
+        reference_material(),
+    )
     outer, root = ring.rim_radius, ring.root_radius
     M = mass(sector.grid, material, {"tooth": 1.0, "body": NOTHING})
     moved, x = (np.zeros(2 * sector.grid.n_nodes) for _ in range(2))
@@ -180,7 +184,7 @@ def _sector_modes(gear, diameters, state, *, refine: float = 1.0) -> np.ndarray:
 
     static = reference_static()
     grid = mirror(mesh_outline(half_sector(gear, refine=refine)))
-    material, width = static.bodies.material, gear.face_width
+    material, width = reference_material(), gear.face_width
     K = stiffness(grid, material, state=state, thickness=width)
     load = active_flank_load(grid, static.planetary_set, 1.0)
     basis = sector_basis(
@@ -206,7 +210,7 @@ def _sector_modes(gear, diameters, state, *, refine: float = 1.0) -> np.ndarray:
 
 def _whole_modes(grid, diameters, state) -> np.ndarray:
     """The same of a whole ring, the mean of the two modes of a pair, which its grid splits a little."""
-    found, number = free_modes(grid, reference_static().bodies.material, state, count=16)
+    found, number = free_modes(grid, reference_material(), state, count=16)
     return np.array([found[number == n][: 1 if n == 0 else 2].mean() for n in diameters])
 
 

@@ -12,7 +12,7 @@ from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.solve import solve_contact
 from femgear.gears.iso6336 import mesh_stiffness_method_b
-from validation.cases import reference_static
+from validation.cases import reference_material, reference_static
 from validation.reference.closed_form import share_load
 from validation.reference.tangent import mesh_tangent_matrix
 from validation.rows import Row, at_most, counted, information, within
@@ -129,7 +129,7 @@ def _walk(bodies, **options):
 def numerical_parameters() -> tuple[Row, ...]:
     """Joining depth, positions and pressure cells varied, the grids kept."""
     static = reference_static()
-    material, module = static.bodies.material, static.planetary_set.sun.module
+    material, module = reference_material(), static.planetary_set.sun.module
     rows = []
     for factor in (1 / 3, 0.7, 1.3, 3.0):
         bodies = make_bodies(static.sectors, material, depth=factor * 0.25 * module)
@@ -148,8 +148,8 @@ def element_size() -> tuple[Row, ...]:
         ("flank elements halved", {"flank_elements": 48}),
         ("flank elements quartered, all others halved", {"flank_elements": 48, "refine": 2.0}),
     ):
-        sectors = make_sectors(static.planetary_set, static.bodies.material, **options)
-        rows.extend(_changes(label, _walk(make_bodies(sectors, static.bodies.material))))
+        sectors = make_sectors(static.planetary_set, reference_material(), **options)
+        rows.extend(_changes(label, _walk(make_bodies(sectors, reference_material()))))
     return tuple(rows)
 
 

@@ -89,7 +89,7 @@ def flank_bodies(*, flank_elements: int = 24, refine: float = 1.0) -> Bodies:
         for gear, grid in zip(gears, map(mirror, grids), strict=True)
     )
     # no ring mesh takes part
-    return Bodies(sun=sun, planet=planet, ring=planet, material=STEEL, face_width=s.sun.face_width)
+    return Bodies(sun=sun, planet=planet, ring=planet, widths=s.mesh_widths)
 
 
 def femgear_contact(bodies: Bodies, fraction: float, *, cells: int = 36) -> PairContact:
@@ -103,7 +103,7 @@ def femgear_contact(bodies: Bodies, fraction: float, *, cells: int = 36) -> Pair
     cells : int
         Pressure cells in the contact window.
     """
-    s, force = reference_set(), LINE_LOAD * bodies.face_width
+    s, force = reference_set(), LINE_LOAD * bodies.widths[0]
     setup = mesh_windows(
         s, bodies, share=force, positions=64, cells=cells, nearest=math.inf, contact="profile"
     )
@@ -113,7 +113,7 @@ def femgear_contact(bodies: Bodies, fraction: float, *, cells: int = 36) -> Pair
     problem = assemble_contact(replace(setup, near=only), bodies, position)
     # the planets are held, the sun turns: the other motions would be without restraint
     state = solve_contact(problem.H, problem.gap, problem.G[:, -1:], [force])
-    pressure, cell = state.loads / problem.area, problem.area / bodies.face_width
+    pressure, cell = state.loads / problem.area, problem.area / bodies.widths[0]
     return PairContact(
         approach=float(state.motions[0]),
         peak_pressure=float(pressure.max()),

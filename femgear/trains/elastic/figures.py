@@ -445,7 +445,7 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     static, case = drawn.results.get("static"), drawn.case
     if static is None:
         return []
-    gears, material = static.planetary_set, material_of(case)
+    gears, material = static.planetary_set, material_of(case, "ring")
     sector = picture_sectors(drawn, gears).ring
     load = active_flank_load(sector.grid, gears, 1.0)
     basis = sector_basis(

@@ -239,7 +239,7 @@ def _ring_of_case(
         ring_model(
             gears,
             sector,
-            mass(sector.grid, material_of(case), gears.ring.face_width),
+            mass(sector.grid, material_of(case, "ring"), gears.ring.face_width),
             ring_foundation(case, sector),
             (bodies[0].ring, bodies[1].ring),
             max_diameter=max_nodal_diameter(case),

@@ -21,16 +21,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from femgear.case.gear_set import material_of
+from femgear.case.gear_set import materials_of
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError
 from femgear.gears import profile
+from femgear.gears.iso6336 import material_factor
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import virtual_set
 from femgear.solvers.linear.modal import solve_modes
@@ -60,9 +62,9 @@ _FLANK_ELEMENTS, _POSITIONS = 8, 16
 _TRIAL = 1e8
 # entries of the supports that helical teeth ask for, their directions, and what they take up
 _AXES = {"axial_stiffness": ("axial", "thrust"), "tilt_stiffness": ("tilt", "tilting moments")}
-# c' of steel teeth [N/m^2] and Young's modulus of steel [Pa] (ISO 6336-1, method B); what teeth give way by
+# c' of steel teeth [N/m^2] (ISO 6336-1, method B); what teeth give way by
 # before nothing is left of their contact [modules]
-_TOOTH, _STEEL, _MOST = 14e9, 206e9, 0.25
+_TOOTH, _MOST = 14e9, 0.25
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -166,21 +168,21 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
         ),
         contact_points=helical.contact_points,
         slices=helical.slices,
-        face_width=case.set.face_width,
+        face_width=min(gears.mesh_widths),
     )
 
 
-def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_width: float) -> np.ndarray:
+def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float) -> np.ndarray:
     """Compute the transverse and overlap contact ratio (2, 2) of the sun-planet and the planet-ring mesh.
 
     ``eps_gamma = eps_alpha + eps_beta``, ``eps_beta = b sin|beta| / (pi m_n)`` (ISO 21771, sections 5.4.2.3
-    and 5.4.4); a row is one mesh. The gears are those of the transverse section; helix angle [rad] and the
-    face width that both gears of a mesh have in common [m].
+    and 5.4.4); a row is one mesh. The gears are those of the transverse section, ``b`` is the
+    face width that both gears of a mesh have in common; helix angle in rad.
     """
     s = planetary_set
     normal_module = s.sun.module * math.cos(helix_angle)
-    overlap = profile.overlap_ratio(face_width, normal_module, helix_angle)
-    return np.array([[s.contact_ratio_sun_planet, overlap], [s.contact_ratio_planet_ring, overlap]])
+    overlap = [profile.overlap_ratio(width, normal_module, helix_angle) for width in s.mesh_widths]
+    return np.array([[s.contact_ratio_sun_planet, s.contact_ratio_planet_ring], overlap]).T
 
 
 def helical_excitation(
@@ -379,28 +381,28 @@ def shared_load(record: MeshExcitation) -> MeshExcitation:
 
 
 def _line_load(case: HelicalCase, gears: PlanetarySet) -> float:
-    """Load a width of each sun mesh in the transverse section, which is that a length of contact line [N/m].
+    """Largest load a width of a mesh in the transverse section, which is that a length of contact line [N/m].
 
     ``F_n / (b / cos beta_b)`` with ``F_n = F_t / cos beta_b``.
     """
     sun = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
-    return abs(sun) / (gears.n_planets * gears.sun.base_radius * gears.sun.face_width)
+    return abs(sun) / (gears.n_planets * gears.sun.base_radius * min(gears.mesh_widths))
 
 
 def _pair_stiffness(case: HelicalCase, gears: PlanetarySet, load: float, cache: Path | None) -> np.ndarray:
     """Mean stiffness of a tooth pair per width (2,) of the meshes of one planet [N/m^2]."""
-    material = material_of(case)
-    sectors = make_sectors(gears, material, flank_elements=_FLANK_ELEMENTS, cache=cache)
-    width = gears.sun.face_width
+    materials = materials_of(case)
+    sectors = make_sectors(gears, materials, flank_elements=_FLANK_ELEMENTS, cache=cache)
+    widths = np.array(gears.mesh_widths)
     cycle = walk_mesh_cycle(
         gears,
-        make_bodies(sectors, material),
-        sun_torque=load * width * gears.sun.base_radius,
+        make_bodies(sectors, materials),
+        sun_torque=load * widths.min() * gears.sun.base_radius,
         positions=_POSITIONS,
         contact=case.static.contact,
     )
     ratios = np.array([gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring])
-    return cycle.stiffness.mean(axis=1) / (width * ratios)
+    return cycle.stiffness.mean(axis=1) / (widths * ratios)
 
 
 def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
@@ -421,7 +423,8 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
 
 def _check_torque(case: HelicalCase, gears: PlanetarySet) -> None:
     """A load under which teeth would give way by a large part of their height has no static solution."""
-    stiffness = _TOOTH * case.material.youngs_modulus / _STEEL
+    moduli = [one.youngs_modulus for one in materials_of(case)]
+    stiffness = _TOOTH * min(material_factor(*pair) for pair in pairwise(moduli))
     share = _line_load(case, gears) / (stiffness * gears.sun.module)
     if share > _MOST:
         raise CaseError(

@@ -126,9 +126,8 @@ def solve_helical_modes(
             section = section or section_stiffness(case, gears, cache=cache)
             factor = section.factor
         sense, cycle, beta = rotation_sense(case, gears), static.cycle, case.helical.helix_angle
-        overlap = contact_ratios(gears, helix_angle=beta, face_width=case.set.face_width)[0, 1]
         # contact in slices has the helix in it
-        overlap = 0.0 if in_contact else overlap
+        overlap = np.repeat(contact_ratios(gears, helix_angle=beta)[:, 1], gears.n_planets) * (not in_contact)
         base = profile.base_helix_angle(case.sun.pressure_angle, beta)
         spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, mesh_backlash(gears))
         record = normal_record(spur, factor, base, reversed_time=sense < 0)

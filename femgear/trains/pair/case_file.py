@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from femgear.case.checks import check_gear_deviations, check_speeds, check_torque
+from femgear.case.checks import check_face_widths, check_gear_deviations, check_speeds, check_torque
 from femgear.case.csv_columns import embed_profiles
 from femgear.case.gear_set import (
     checked_set,
@@ -31,6 +31,7 @@ from femgear.case.sections import (
     DynamicsSection,
     FaceWidth,
     GearErrors,
+    GearMaterialSection,
     Inertia,
     MachineSection,
     Mass,
@@ -62,14 +63,15 @@ class SetSection(Section):
     """What both gears share.
 
     ``centre_distance`` may be left out (the profile shifts give it), and so may, where it is given, one of
-    the profile shifts (it is found so that the mesh has no play). ``backlash`` is the play on the reference
-    circles: half of it is taken from the tooth thickness of either gear. With a ``helix_angle``, positive for
-    a right-handed gear 1, module, pressure angle, racks and shifts are of the normal section.
+    the profile shifts (it is found so that the mesh has no play). ``face_width`` is that of
+    a gear that gives none of its own. ``backlash`` is the play on the reference circles: half of it is taken
+    from the tooth thickness of either gear. With a ``helix_angle``, positive for a right-handed gear 1,
+    module, pressure angle, racks and shifts are of the normal section.
     """
 
     module: Module
     pressure_angle: PressureAngle
-    face_width: FaceWidth
+    face_width: FaceWidth | None = None
     centre_distance: Annotated[float, Quantity(LENGTH, 1e-4, 20.0)] | None = None
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
     helix_angle: Annotated[float, Quantity(ANGLE, -LARGEST_HELIX, LARGEST_HELIX)] = 0.0
@@ -84,6 +86,8 @@ class GearSection(Section):
     teeth: Annotated[int, Count(5, 5000)]
     profile_shift: Shift | None = None
     bore_radius: Radius
+    face_width: FaceWidth | None = None
+    material: GearMaterialSection | None = None
     mass: Mass = LEFT_OUT
     inertia: Inertia = LEFT_OUT
     bearing_stiffness: Stiffness | None = None
@@ -221,6 +225,7 @@ def cross_check(case: PairCase) -> Iterator[CaseError]:
             "both gears stand on fixed axes", code="E-CHOICE", key="static.members",
             value=case.static.members, limit="'fixed'", remedy="leave static.members out",
         )  # fmt: skip
+    yield from check_face_widths(case)
     yield from check_torque(case.operation.torque)
     yield from check_speeds(case) if case.operation.speeds else ()
     yield from check_gear_deviations(case)

@@ -19,13 +19,13 @@ import numpy as np
 
 from femgear.case.checks import runup_range
 from femgear.case.dependencies import check_entries, modal_entries, static_entries
-from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.errors import ConvergenceError, GeometryError
 from femgear.findings import Finding
 from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import common_period
-from femgear.gears.iso6336 import pair_mesh_stiffness
+from femgear.gears.iso6336 import material_factor, pair_mesh_stiffness
 from femgear.gears.pair import GearPair
 from femgear.report.tables import Block, chosen, describe_modes, tabulate
 from femgear.solvers.continuation.branches import frequency_response_curve
@@ -110,8 +110,8 @@ _TOLD = ("converged", "residual", "iterations", "tail", "spectral_radius")
 """What a response tells of every speed."""
 
 
-_STEEL, _FULL_LOAD = 206e9, 100e3
-"""Young's modulus [Pa] and least load [N/m] for which the stiffness of ISO 6336-1 is given."""
+_FULL_LOAD = 100e3
+"""Least load [N/m] for which the stiffness of ISO 6336-1 is given."""
 
 
 def iso_stiffness(case: PairCase) -> tuple[float, float]:
@@ -122,9 +122,9 @@ def iso_stiffness(case: PairCase) -> tuple[float, float]:
     over that of steel, and to the fourth root of loads below 100 N/mm at the reference circle.
     """
     gears = cast(GearPair, planetary_set(case))
-    first = gears.gears[0]
-    load = abs(case.operation.torque) / (first.reference_radius * first.face_width)
-    factor = case.material.youngs_modulus / _STEEL * min(1.0, load / _FULL_LOAD) ** 0.25
+    load = abs(case.operation.torque) / (gears.gear_1.reference_radius * gears.face_width)
+    moduli = (one.youngs_modulus for one in materials_of(case))
+    factor = material_factor(*moduli) * min(1.0, load / _FULL_LOAD) ** 0.25
     try:
         single, mean = pair_mesh_stiffness(gears, case.helix_angle or 0.0)
     except GeometryError:
@@ -153,7 +153,7 @@ def _describe_static(results: Results) -> Block:
     case, data = results.case, results.static
     block = describe_static(data)
     single, mean = (1e-9 * value for value in iso_stiffness(case))
-    found = 1e-9 * float(data.mesh_stiffness.mean()) / case.set.face_width
+    found = 1e-9 * float(data.mesh_stiffness.mean()) / data.attrs["face_width"]
     words = f"mean k over face width {found:.3f} N/(mm um); ISO 6336-1, method B: "
     standard = f"c' = {single:.3f}, c_gamma_alpha = {mean:.3f} N/(mm um)"
     return replace(block, notes=(*block.notes, words + (standard if mean > 0 else "out of range")))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case.gear_set import material_of, planetary_set, set_deviations
+from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.sections import Case
 from femgear.contact.bodies import Sector, Sectors, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
@@ -592,10 +592,16 @@ def _static_figures(drawn: Drawn) -> dict[str, Figure]:
     sharing = {"load_sharing": load_sharing(static)} if len(_kinds(static)) > 1 else {}
     return over_width | {
         "static_transmission_error": static_transmission_error(static),
-        "mesh_stiffness": mesh_stiffness(static, face_width=planetary_set(drawn.case).gears[0].face_width),
+        "mesh_stiffness": mesh_stiffness(static, face_width=_one_width(planetary_set(drawn.case))),
         **sharing,
         "tooth_loads": tooth_loads(static),
     }
+
+
+def _one_width(gears: GearSet) -> float | None:
+    """Face width that all meshes have in common [m]; None where that of others differs."""
+    least = min(gears.mesh_widths)
+    return least if least == max(gears.mesh_widths) else None
 
 
 def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
@@ -628,7 +634,7 @@ def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
 
 def picture_sectors(drawn: Drawn, gears: GearSet) -> Sectors:
     """Make sectors of some thousand nodes: pictures need no converged stresses, and files stay small."""
-    return make_sectors(gears, material_of(drawn.case), flank_elements=6, refine=0.35, cache=drawn.cache)
+    return make_sectors(gears, materials_of(drawn.case), flank_elements=6, refine=0.35, cache=drawn.cache)
 
 
 def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
@@ -662,7 +668,8 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         return ["deformed_set.vtu", "deformed_set.png"]
     grids = {kind: sector.grid for kind, sector in of_kind.items()}
     look: Any = {"helix_angle": case.helix_angle or 0.0, "backwards": backwards}
-    model = solid(gears, grids, deformed, material_of(case), drawn.data.get("modes"), **look)
+    materials = dict(zip(grids, materials_of(case), strict=True))
+    model = solid(gears, grids, deformed, materials, drawn.data.get("modes"), **look)
     write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SOLID)
     return ["deformed_set.vtu", "deformed_set.png", SOLID]
 

@@ -213,7 +213,7 @@ class StaticResult:
         cycle, gears = self.cycle, self.planetary_set
         bodies = [body for body in self.bodies.gears if body is not None]
         kinds = {f"{pair.gear_1.name}_{pair.gear_2.name}": pair for pair in gears.kinds}
-        variables, width = STATIC_VARIABLES, gears.gears[0].face_width
+        variables, width = STATIC_VARIABLES, min(gears.mesh_widths)
         if cycle.slice_load is not None:
             variables = variables | SLICE_VARIABLES
         values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in variables}
@@ -276,7 +276,7 @@ class StaticResult:
         gear = self.planetary_set.gears[0]
         slope = math.tan(self.base_helix_angle) / math.cos(gear.pressure_angle)
         normal_module = gear.module * math.cos(math.atan(slope))
-        return (_ENDS[0] + _ENDS[1] * slope**2) * normal_module / gear.face_width
+        return (_ENDS[0] + _ENDS[1] * slope**2) * normal_module / min(self.planetary_set.mesh_widths)
 
     def _over_width(self, width: float) -> dict[str, Any]:
         """Coordinate of the slices, where there are any."""
@@ -375,7 +375,7 @@ class StressResult:
         }
         if cycle.slice_load is not None:
             values |= self._over_width()
-            width = self.planetary_set.gears[0].face_width
+            width = min(self.planetary_set.mesh_widths)
             coords["slice"] = _slice_places(width, cycle.slice_load.shape[2])
         if "planet_root_stress" in values:
             n = values["planet_root_stress"].shape[1]
@@ -484,7 +484,7 @@ class StressResult:
         assert factor is not None
         heights = [[abs(gear.tip_radius - gear.root_radius) for gear in pair.gears] for pair in s.kinds]
         highest = np.repeat(np.max(heights, axis=1), s.n_planets)
-        width = s.gears[0].face_width
+        width = min(s.mesh_widths)
         return {
             "root_over_width": _by_gear([root.history().over_width for root in self.roots]),
             "root_face_factor": _by_gear([root.face_load_factor for root in self.roots]),

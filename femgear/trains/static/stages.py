@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,9 +18,23 @@ from typing import Any
 import numpy as np
 
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
-from femgear.case.gear_set import driving_torque, material_of, planetary_set, set_deviations
+from femgear.case.gear_set import (
+    driving_torque,
+    material_of,
+    materials_of,
+    planetary_set,
+    set_deviations,
+)
 from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES, Case
-from femgear.contact.bodies import Bodies, Sector, Sectors, helical_stiffness, make_bodies, make_sectors
+from femgear.contact.bodies import (
+    Bodies,
+    Sector,
+    Sectors,
+    flank_widths,
+    helical_stiffness,
+    make_bodies,
+    make_sectors,
+)
 from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.root_stress import (
     RootStresses,
@@ -34,9 +49,14 @@ from femgear.contact.supports import RIGID, UPRIGHT, Supports, WidthSupports, ti
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
 from femgear.contact.width_waves import width_waves, with_held_ring
 from femgear.errors import CaseError, ContactError, GeometryError
-from femgear.fe.elasticity import foundation
+from femgear.fe.elasticity import Material, foundation, material_of_each
 from femgear.gears.deviations import common_period
-from femgear.gears.iso6336 import contact_ratio_factor, nominal_contact_stress, nominal_root_stress
+from femgear.gears.iso6336 import (
+    contact_ratio_factor,
+    nominal_contact_stress,
+    nominal_root_stress,
+    root_face_width,
+)
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
@@ -147,10 +167,10 @@ def flank_compliances(
 
     The gears are those of the case; ``cache`` is the folder of generated grids.
     """
-    material = material_of(case)
-    sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
+    materials = materials_of(case)
+    sectors = make_sectors(gears, materials, flank_elements=case.static.flank_elements, cache=cache)
     foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
-    bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
+    bodies = make_bodies(sectors, materials, depth=case.static.depth, ring_foundation=foundation)
     base, softer = _helical(case, gears)
     return sectors, replace(bodies, helical=softer, base_helix_angle=base)
 
@@ -174,7 +194,8 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
     """
     static, count, first = case.static, case.static.slices, gears.gears[0]
     where, overlap = {"code": "E-SLICES", "file": case.location("static.slices")}, _overlap(case, gears)
-    least, most = math.ceil(_PER_OVERLAP * abs(overlap)) + 1, int(4 * first.face_width / first.module)
+    width = min(gears.mesh_widths)
+    least, most = math.ceil(_PER_OVERLAP * abs(overlap)) + 1, int(4 * width / first.module)
     needed, other = max(min(SLICES, most), least), ", or leave static.slices out"
     other = "" if case.set.helix_angle else other
     if case.set.helix_angle and count < max(2, _PER_OVERLAP * abs(overlap)):
@@ -205,7 +226,7 @@ def check_slices(case: Case, gears: PlanetarySet) -> None:
     if static.members == "elastic" and case.planet.bearing_clearance:
         remedy = f"leave planet.bearing_clearance out{other}"
         raise CaseError("slices know no clearance", key="planet.bearing_clearance", remedy=remedy, **where)
-    if first.face_width < 0.25 * count * first.module:
+    if width < 0.25 * count * first.module:
         raise CaseError(
             "slices are thinner than a quarter of the module", key="static.slices", value=count,
             limit=f"at most {most}", remedy=f"use at most {most} slices{other}", **where,
@@ -238,17 +259,17 @@ def over_width(
     static, count = case.static, case.static.slices
     if count < 2:
         return {}
-    material = material_of(case)
+    materials = materials_of(case)
     # half as fine as in the plane: K_H-beta changes by less than 2e-3
-    sectors = make_sectors(gears, material, flank_elements=6, refine=0.5, cache=cache)
+    sectors = make_sectors(gears, materials, flank_elements=6, refine=0.5, cache=cache)
     elastic = static.members == "elastic"
     foundation = ring_foundation(case, sectors.ring) if elastic or loaded else None
-    waves = width_waves(sectors, material, count, foundation, _helical(case, gears)[1])
+    waves = width_waves(sectors, materials, count, foundation, _helical(case, gears)[1])
     supports = width_supports(case, gears)
     found: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": supports}
     if overlap := _overlap(case, gears):
         found["ahead"] = slices_ahead(overlap, count)
-    return found | ({"held_waves": with_held_ring(waves, sectors)} if loaded else {})
+    return found | ({"held_waves": with_held_ring(waves, sectors, materials[-1])} if loaded else {})
 
 
 def record_positions(case: Case, gears: PlanetarySet) -> int:
@@ -272,7 +293,7 @@ def _overlap(case: Case, gears: PlanetarySet) -> float:
     if case.helix_angle is None:
         return 0.0
     first = gears.gears[0]
-    ratio = overlap_ratio(first.face_width, first.module * math.cos(case.helix_angle), case.helix_angle)
+    ratio = overlap_ratio(min(gears.mesh_widths), first.module * math.cos(case.helix_angle), case.helix_angle)
     return math.copysign(ratio, case.helix_angle)
 
 
@@ -301,9 +322,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
         first_period=first,
         ranges=ranges,
         spectrum=load_spectrum(teeth, gears.mates, closes=closes),
-        nominal=nominal_stresses(
-            gears, static.sun_torque, case.material.youngs_modulus, case.material.poisson_ratio
-        )
+        nominal=nominal_stresses(gears, static.sun_torque, materials_of(case))
         if case.helix_angle is None
         else NominalStresses.of_none(gears, "helical teeth: nominal stresses are those of spur teeth"),
         sun_torque=static.sun_torque,
@@ -325,33 +344,34 @@ def relief_kinks(case: Case) -> tuple[bool, ...]:
 
 
 def nominal_stresses(
-    planetary_set: PlanetarySet, sun_torque: float, youngs_modulus: float, poisson_ratio: float
+    planetary_set: PlanetarySet, sun_torque: float, material: Material | Sequence[Material]
 ) -> NominalStresses:
     """Compute sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
 
-    The torque on the sun may have either sign [N m]; Young's modulus [Pa] and Poisson's ratio [1].
+    The torque on the sun may have either sign [N m]; the material is that of all gears or one for each.
     """
     s = planetary_set
     # torque over reference radius: the same at all gears
     force = abs(sun_torque) / (s.n_planets * s.gears[0].reference_radius)
+    elastic = [(one.youngs_modulus, one.poisson_ratio) for one in material_of_each(material, len(s.gears))]
     contact, root, messages = np.full(len(s.kinds), math.nan), np.full((len(s.kinds), 2), math.nan), []
     ratio_factor = contact.copy()
     for i, pair in enumerate(s.kinds):
         one, two = pair.gears
         small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
         load = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
-        angle, elastic = (
-            pair.working_pressure_angle,
-            {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio},
-        )
+        (modulus, ratio), mate = (elastic[number] for number in s.mates[i])
         try:
-            contact[i] = nominal_contact_stress(small, large, working_angle=angle, **load, **elastic)
+            contact[i] = nominal_contact_stress(
+                small, large, working_angle=pair.working_pressure_angle, youngs_modulus=modulus,
+                poisson_ratio=ratio, mate=mate, **load,
+            )  # fmt: skip
             ratio_factor[i] = contact_ratio_factor(pair.contact_ratio)
         except GeometryError as error:
             messages.append(f"{one.name}-{two.name}: {error.message}")
         for j, gear in enumerate((one, two)):
             try:
-                root[i, j] = nominal_root_stress(gear, **load).stress
+                root[i, j] = nominal_root_stress(gear, common_width=pair.face_width, **load).stress
             except GeometryError as error:
                 messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
     return NominalStresses(contact, root, ratio_factor, "; ".join(dict.fromkeys(messages)))
@@ -389,7 +409,8 @@ def width_supports(case: Case, gears: PlanetarySet) -> WidthSupports:
     sun, carrier, rigidity = case.sun, case.carrier, None
     if sun.torque_end is not None:
         outer = sun.torsion_diameter or 2.0 * gears.sun.root_radius
-        rigidity = material_of(case).shear_modulus * np.pi / 32 * (outer**4 - (2.0 * sun.bore_radius) ** 4)
+        shear = material_of(case, "sun").shear_modulus
+        rigidity = shear * np.pi / 32 * (outer**4 - (2.0 * sun.bore_radius) ** 4)
         if rigidity <= 0.0:
             raise CaseError(
                 "the sun has no section to twist", code="E-RANGE", key="sun.torsion_diameter",
@@ -416,22 +437,30 @@ def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
 def _influences(case: Case, static: StaticResult, progress: Progress = silent) -> RootStresses:
     """Find the root influences of the bodies as the static solution holds them, and of waves over the width.
 
-    External gears were observed with their flanks; only an internal one, whose contact has two plane states,
-    is solved again.
+    External gears were observed with their flanks; an internal one, whose contact has two plane states, and
+    one that is wider than its mates are solved again. The tooth of the latter is at its root as wide as
+    ISO 6336-3 takes it, and stresses of a plane body under given forces go by its width.
     """
-    found, loads, material, ahead = [], static.cycle.slice_load, material_of(case), None
-    for i, (sector, body) in enumerate(zip(static.sectors.gears, static.bodies.gears, strict=False)):
+    found, loads, ahead, width = [], static.cycle.slice_load, None, min(static.planetary_set.mesh_widths)
+    common = flank_widths([one.gear.face_width for one in static.sectors.gears])
+    parts = zip(static.sectors.gears, static.bodies.gears, materials_of(case), common, strict=False)
+    for i, (sector, body, material, of_flanks) in enumerate(parts):
         progress("stress", i, len(static.sectors.gears) + 1)
         gear, support = sector.gear, None
         if gear.internal:
             support = ring_foundation(case, sector) if case.static.members == "elastic" else None
+        assert body is not None
+        if body.root is None:
             found.append(root_stress(sector.grid, gear, material, foundation=support))
         else:
-            assert body is not None and body.root is not None
             found.append(observed_root_stress(gear, body.root))
+        narrower = [gear.face_width / root_face_width(gear.face_width, one, case.module) for one in of_flanks]
+        if max(narrower) > 1.0:
+            loaded = np.repeat(narrower, len(found[-1].roll))
+            found[-1] = replace(found[-1], influence=found[-1].influence * loaded)
         if loads is not None:
-            waves = computed_waves(loads.shape[2]) * np.pi / gear.face_width
-            waves = root_waves(sector.grid, gear, material, waves, foundation=support)
+            waves = computed_waves(loads.shape[2]) * np.pi / width
+            waves = max(narrower) * root_waves(sector.grid, gear, material, waves, foundation=support)
             # helical teeth are weaker than straight ones as they are softer: within 1 %
             weaker = 1.0 / helical_stiffness(static.base_helix_angle, internal=gear.internal)
             one = found[-1]

@@ -65,7 +65,7 @@ def test_normal_gears_of_the_shipped_case_have_the_printed_base_radii(case):
     np.testing.assert_allclose(radii, [0.024, 0.016, 0.056], rtol=1e-9)
     data = helical_data(case, gears, np.full(8, 1e8))
     assert math.degrees(data.base_helix_angle) == pytest.approx(20.0, abs=1e-7)
-    ratios = contact_ratios(gears, helix_angle=case.helical.helix_angle, face_width=case.set.face_width)
+    ratios = contact_ratios(gears, helix_angle=case.helical.helix_angle)
     assert ratios[:, 1] == pytest.approx(25 * math.tan(math.radians(20)) / (math.pi * 1.6))
 
 

@@ -321,9 +321,9 @@ def test_data_of_a_geared_set():
     )  # fmt: skip
     assert np.abs(mesh_directions(data).T @ rigid_motions(data)).max() < 1e-12
     assert data.column_stiffness == pytest.approx(np.repeat([0.25e9, 0.5e9], 4 * gears.n_planets))
-    ratios = contact_ratios(gears, helix_angle=math.radians(8.0), face_width=0.1)
+    ratios = contact_ratios(gears, helix_angle=math.radians(8.0))
     axial_pitch = math.pi * gears.sun.module / math.tan(math.radians(8.0))
-    assert ratios[:, 1] == pytest.approx(0.1 / axial_pitch, rel=1e-12)
+    assert ratios[:, 1] == pytest.approx(gears.sun.face_width / axial_pitch, rel=1e-12)
     assert ratios[:, 0] == pytest.approx([gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring])
 
 

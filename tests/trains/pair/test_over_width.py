@@ -97,7 +97,7 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
     for mesh, (one, two) in enumerate((("sun", "planet"), ("planet", "ring"))):
 
         def of_pair(found, one=one, two=two):
-            return Bodies(getattr(found, one), getattr(found, two), None, STEEL, s.sun.face_width)
+            return Bodies(getattr(found, one), getattr(found, two), None, (s.sun.face_width,))
 
         pair = GearPair(getattr(s, one), getattr(s, two), s.centre_distance)
         crosswise = replace(waves, bodies=tuple(map(of_pair, waves.bodies)))

@@ -54,7 +54,7 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs():
     )
     for mesh, ((one, body_1), (two, body_2)) in enumerate(sets):
         cycle = walk_mesh_cycle(
-            GearPair(one, two, s.centre_distance), Bodies(body_1, body_2, None, STEEL, one.face_width),
+            GearPair(one, two, s.centre_distance), Bodies(body_1, body_2, None, (one.face_width,)),
             sun_torque=force * one.base_radius, positions=TAU + s.mesh_phases[mesh],
         )  # fmt: skip
         for name in ("deflection", "stiffness", "force"):

@@ -12,6 +12,7 @@ from validation.reference.root_stress import set_root_stress
 from femgear.contact.flank_pairs import LEFT, RIGHT
 from femgear.contact.root_stress import LOADED, body_stress, root_stress_cycle
 from femgear.contact.tooth_loads import loaded_teeth
+from femgear.fe.elasticity import Material
 from femgear.gears.gear import half_thickness_angle
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static import stages as static_stages
@@ -20,6 +21,8 @@ from femgear.trains.static.stages import nominal_stresses, relief_kinks, solve_s
 
 FILE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 P, N = 16, 3
+
+STEEL = Material(206e9, 0.3, 7850.0)
 
 
 def coarse(**changes):
@@ -86,7 +89,7 @@ def test_field_of_a_body_is_that_of_the_root_cycles(reference, reversed_torque):
 def test_influences_are_those_of_solutions_of_their_own(reference):
     """Sun and planet are observed with their flanks; each gear alone gives the same to rounding."""
     _, static, result = reference
-    alone = set_root_stress(static.sectors, static.bodies.material)
+    alone = set_root_stress(static.sectors, STEEL)
     for kind in ("sun", "planet", "ring"):
         found, expected = (getattr(one, kind).influence for one in (result.influences, alone))
         assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
@@ -299,14 +302,14 @@ def test_one_planet():
     assert len(result.ranges) == 4 and result.ranges[1].history is not None
     # one planet carries the whole torque
     assert result.nominal.root[0, 0] == pytest.approx(
-        nominal_stresses(result.planetary_set, 100.0, 206e9, 0.3).root[0, 0]
+        nominal_stresses(result.planetary_set, 100.0, STEEL).root[0, 0]
     )
 
 
 def test_nominal_stresses_scale_as_the_standard_says(reference):
     """sigma_F0 with the force, sigma_H0 with its root; a set of three shares the torque in three."""
     gears, nominal = reference[1].planetary_set, reference[2].nominal
-    twice = nominal_stresses(gears, 200.0, 206e9, 0.3)
+    twice = nominal_stresses(gears, 200.0, STEEL)
     assert twice.root == pytest.approx(2.0 * nominal.root, rel=1e-12)
     assert twice.contact == pytest.approx(math.sqrt(2.0) * nominal.contact, rel=1e-12)
     # Hertz at the pitch point with Z_eps: rho_1 rho_2/(rho_2 + rho_1) of sun and planet, F_b/b
@@ -325,7 +328,7 @@ def test_outside_the_range_of_the_standard_there_is_no_number(reference, monkeyp
     gears = reference[1].planetary_set
     ratio = property(lambda pair: 2.6 if pair.gear_2.internal else 1.5)
     monkeypatch.setattr(type(gears.kinds[0]), "contact_ratio", ratio)
-    found = nominal_stresses(gears, 100.0, 206e9, 0.3)
+    found = nominal_stresses(gears, 100.0, STEEL)
     assert np.isfinite(found.contact[0]) and np.isfinite(found.root[0]).all()
     assert np.isnan(found.contact[1]) and np.isnan(found.root[1]).all()
     assert "planet-ring" in found.message and "2.6" in found.message
