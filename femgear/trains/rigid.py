@@ -63,8 +63,15 @@ def entries_without_effect(data: dict, others: Sequence[str] = ()) -> list[str]:
 
 
 def strength_entries(data: dict) -> list[str]:
-    """List the limits of the material, from which elastic sets alone find safeties."""
-    return [f"material.{key}" for key in data["material"] if key.endswith("_stress_limit")]
+    """List the limits of the materials, from which elastic sets alone find safeties."""
+    tables = {"material": data["material"]} | {
+        f"{gear}.material": data[gear]["material"]
+        for gear in ("sun", "planet", "ring", "gear_1", "gear_2")
+        if "material" in data.get(gear, {})
+    }
+    return [
+        f"{name}.{key}" for name, table in tables.items() for key in table if key.endswith("_stress_limit")
+    ]
 
 
 def flank_entries(data: dict) -> list[str]:

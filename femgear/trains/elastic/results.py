@@ -16,6 +16,7 @@ import numpy as np
 from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.quantities import RPM
+from femgear.case.sections import gear_material
 from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
 from femgear.findings import Finding
 from femgear.gears.iso6336 import contact_safety, root_safety, single_pair_factor
@@ -66,6 +67,7 @@ from femgear.trains.static.results import UNEQUAL, shares
 if TYPE_CHECKING:
     import xarray as xr
 
+    from femgear.case.sections import Case
     from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
@@ -82,6 +84,8 @@ _FEW, _CUTS = 4, 24
 _FIRST, _STRONGEST = 6, 4
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
+_PARTS = ("sun", "planet, sun side", "planet, ring side", "ring")
+"""Flanks in the order of their meshes."""
 _FORMS = ("sun", "planet_sun_side", "planet_ring_side", "ring")
 _HEARD = {"microphone [dB(A)]": "pressure_level", "sound power [dB(A)]": "power_level"}
 _NEAR, _COUNTS = 10.0, 0.05
@@ -435,8 +439,7 @@ def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> Iterator[tuple[str, str]]:
     """Rows of the largest stresses, and of the safeties of ISO 6336 with known load factors (2,)."""
-    stress, material = results.stress, results.case.material
-    parts = ("sun", "planet, sun side", "planet, ring side", "ring")
+    stress = results.stress
 
     def largest(name: str) -> np.ndarray:
         return np.array([half.max(axis=0) for half in np.split(stress[name].values, 2)])
@@ -445,40 +448,76 @@ def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> I
     contact, worst = largest("contact_pressure").reshape(2, -1).max(axis=1), int(root.argmax())
     nominals, factors = largest("iso_contact_stress"), np.prod([np.ones(2), *known.values()], axis=0)
     where = _where(results.static, ", static")
-    yield f"largest root stress{where}", f"{root[worst] * 1e-6:.1f} MPa, {parts[worst]}"
+    yield f"largest root stress{where}", f"{root[worst] * 1e-6:.1f} MPa, {_PARTS[worst]}"
     yield f"largest contact pressure{where}", _kinds("{:.1f} MPa", contact * 1e-6)
     if results.case.helix_angle is not None:
         notes.append("no safeties of helical teeth: nominal stresses of ISO 6336 are those of spur teeth")
         return
-    limits = material.root_stress_limit, material.contact_stress_limit
-    over = " ".join(known)
-    if limits[0] is not None:
-        safe = [
-            root_safety(limits[0], one, factors[i // 2], reversed_bending=i in (1, 2))
-            for i, one in enumerate(nominal)
-        ]
-        yield "safety S_F, ISO 6336-3", ", ".join(f"{part} {one:.2f}" for part, one in zip(parts, safe))
+    yield from _safeties(results.case, nominal, nominals, factors, " ".join(known), notes)
+
+
+def _safeties(
+    case: Case, root: np.ndarray, contact: np.ndarray, factors: np.ndarray, over: str, notes: list[str]
+) -> Iterator[tuple[str, str]]:
+    """Rows of S_F and S_H of ISO 6336, each gear with the limits of its own material.
+
+    Of sigma_F0 (4,) of `_PARTS` and sigma_H0 (2,) of both kinds of mesh [Pa], with the products (2,) of the
+    load factors, which ``over`` names.
+    """
+    limits = {name: gear_material(case, name) for name in case.gear_names}
+    of_parts = [limits[part.split(",")[0]] for part in _PARTS]
+    flims, hlims = (
+        [getattr(one, f"{kind}_stress_limit") for one in of_parts] for kind in ("root", "contact")
+    )
+    safe = [
+        None if limit is None else root_safety(limit, root[i], factors[i // 2], reversed_bending=i in (1, 2))
+        for i, limit in enumerate(flims)
+    ]
+    if any(flims):
+        yield "safety S_F, ISO 6336-3", _of_parts(safe)
         notes.append(
-            f"S_F = 2 sigma_Flim Y_M/({f'sigma_F0 {over}'.rstrip()}): sigma_Flim = {1e-6 * limits[0]:g} MPa "
+            f"S_F = 2 sigma_Flim Y_M/({f'sigma_F0 {over}'.rstrip()}): sigma_Flim = {_limits(flims)} "
             "of ISO 6336-5 (Y_ST = 2), not the permissible sigma_FP; Y_M = 0.7 for planets (bent both ways)"
         )
-    if limits[1] is not None:
-        single = [
-            single_pair_factor(*pair.gears, working_angle=pair.working_pressure_angle, path=pair.path)
-            for pair in planetary_set(results.case).kinds
+    if any(hlims):
+        single = np.array(
+            [
+                single_pair_factor(*pair.gears, working_angle=pair.working_pressure_angle, path=pair.path)
+                for pair in planetary_set(case).kinds
+            ]
+        )
+        safe = [
+            None if limit is None else contact_safety(limit, (contact * single)[i // 2], factors[i // 2])
+            for i, limit in enumerate(hlims)
         ]
-        safe = [contact_safety(limits[1], *one) for one in zip(nominals * single, factors)]
-        yield "safety S_H, ISO 6336-2", _kinds("{:.2f}", safe)
+        one_limit = len(set(hlims)) == 1
+        yield "safety S_H, ISO 6336-2", _kinds("{:.2f}", safe[::2]) if one_limit else _of_parts(safe)
         notes.append(
             f"S_H = sigma_Hlim/(Z sigma_H0{f' sqrt({over})' * bool(over)}): sigma_Hlim = "
-            f"{1e-6 * limits[1]:g} MPa of ISO 6336-5, not the permissible sigma_HP; Z: larger of Z_B, Z_D"
+            f"{_limits(hlims)} of ISO 6336-5, not the permissible sigma_HP; Z: larger of Z_B, Z_D"
         )
-    if None in limits:
-        notes.append("material.root_stress_limit and contact_stress_limit would give safeties")
-    if limits != (None, None):
-        missing = "" if "K_v" in known else "; K_gamma and K_v were not computed"
-        wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "K_Hβ" in known else ""
+    if None in (*flims, *hlims):
+        which = "" if not any((*flims, *hlims)) else " of all gears"
+        notes.append(f"material.root_stress_limit and contact_stress_limit{which} would give safeties")
+    if any((*flims, *hlims)):
+        missing = "" if "K_v" in over.split() else "; K_gamma and K_v were not computed"
+        wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "K_Hβ" in over.split() else ""
         notes.append(f"long life, every other factor of ISO 6336-2 and -3 is 1{missing}{wide}")
+
+
+def _of_parts(values: list[float | None]) -> str:
+    """Write a number, where there is one, of every one of `_PARTS`."""
+    return ", ".join(f"{part} {'-' if one is None else f'{one:.2f}'}" for part, one in zip(_PARTS, values))
+
+
+def _limits(limits: list[float | None]) -> str:
+    """Write the limits of the materials [Pa] of `_PARTS`, one where they are the same for all gears."""
+    if len(set(limits)) == 1:
+        return f"{1e-6 * (limits[0] or 0.0):g} MPa"
+    of_gears = {part.split(",")[0]: limit for part, limit in zip(_PARTS, limits)}
+    return ", ".join(
+        f"{'none' if limit is None else f'{1e-6 * limit:g} MPa'} ({gear})" for gear, limit in of_gears.items()
+    )
 
 
 def _operating_points(results: Results, factors: np.ndarray) -> Block:

@@ -76,6 +76,7 @@ from femgear.trains.static.figures import FIGURES
 from femgear.trains.static.results import (
     StaticResult,
     describe_gears,
+    describe_materials,
     describe_meshes,
     describe_static,
     load_warnings,
@@ -145,7 +146,7 @@ def _describe_case(case: PairCase) -> tuple[Block, ...]:
     notes = [f"torque on gear 1 {operation.torque:.6g} N m, on gear 2 {-operation.torque / ratio:.6g} N m"]
     helix = case.helix_angle
     speeds = tabulate("Operation", shown, columns, notes)
-    return describe_gears(gears, helix), describe_meshes(gears, helix), speeds
+    return describe_gears(gears, helix), *describe_materials(case), describe_meshes(gears, helix), speeds
 
 
 def _describe_static(results: Results) -> Block:

@@ -19,6 +19,8 @@ from femgear.case.checks import steep_helix
 from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
+from femgear.case.sections import face_width, gear_material
+from femgear.contact.bodies import flank_widths
 from femgear.contact.root_stress import BACK, LOADED, NOTCH_REACH, RootCycle
 from femgear.contact.slices import PARTS as SLICES
 from femgear.findings import Finding
@@ -895,6 +897,7 @@ def describe_set(case: Case) -> tuple[Block, ...]:
     planetary = planetary_set(case)
     return (
         describe_gears(planetary, case.helix_angle),
+        *describe_materials(case),
         describe_meshes(planetary, case.helix_angle),
         _harmonics(planetary),
         _neighbours(planetary),
@@ -911,11 +914,58 @@ def set_warnings(case: Case) -> Iterator[Finding]:
 def load_warnings(case: Any) -> Iterator[Finding]:
     """List what deserves a look in the deviations and the torque of a case."""
     yield from check_deviations(set_deviations(case), planetary_set(case))
+    yield from width_warnings(case)
     yield from steep_helix("set.helix_angle", case.set.helix_angle)
     if case.operation.torque <= 0:
         nothing = "without torque no tooth touches; only static results exist"
         text = "a negative torque loads the other flanks" if case.operation.torque < 0 else nothing
         yield Finding("W-TORQUE", "operation.torque", text)
+
+
+def width_warnings(case: Any) -> Iterator[Finding]:
+    """Say what gears that are wider than the faces they share with their mates leave out."""
+    gears: Any = planetary_set(case)
+    common = flank_widths([gear.face_width for gear in gears.gears])
+    beyond = {
+        gear.name.replace("_", " "): 1e3 * (gear.face_width - max(widths))
+        for gear, widths in zip(gears.gears, common, strict=True)
+        if gear.face_width > max(widths)
+    }
+    if not beyond:
+        return
+    wider = " and ".join(f"{name} ({more:.4g} mm)" for name, more in beyond.items())
+    text = (
+        f"wider than their mates: {wider}: teeth bend over the common face width (ISO 6336-1), what they "
+        "have beyond it does not help; rims and bodies have their own width"
+    )
+    remedy = "take mesh stiffness and transmission error with that margin"
+    if case.static.slices > 1:
+        text += "; over the width the common face ends in mirror planes, as if the wider gear ended there too"
+        remedy += ", and loads at the ends of the face as an estimate"
+    key = next(iter(beyond)).replace(" ", "_")
+    yield Finding("W-WIDTHS", f"{key}.face_width", text, remedy=remedy)
+
+
+def describe_materials(case: Any) -> Iterator[Block]:
+    """Tabulate materials and face widths of the gears, where one has others than the rest."""
+    sections = [getattr(case, name) for name in case.gear_names]
+    if all(one.material is None and one.face_width is None for one in sections):
+        return
+
+    def limit(value: float | None) -> str:
+        return "-" if value is None else f"{1e-6 * value:g}"
+
+    rows = [(name, gear_material(case, name), face_width(case, name)) for name in case.gear_names]
+    columns = {
+        "": lambda row: row[0].replace("_", " "),
+        "face width [mm]": lambda row: f"{1e3 * row[2]:.6g}",
+        "E [GPa]": lambda row: f"{1e-9 * row[1].youngs_modulus:.6g}",
+        "Poisson's ratio": lambda row: f"{row[1].poisson_ratio:.4g}",
+        "density [kg/m^3]": lambda row: f"{row[1].density:.6g}",
+        "sigma_Flim [MPa]": lambda row: limit(row[1].root_stress_limit),
+        "sigma_Hlim [MPa]": lambda row: limit(row[1].contact_stress_limit),
+    }
+    yield tabulate("Materials", rows, columns, ("what a gear leaves out is that of set and material",))
 
 
 def describe_gears(s: GearSet, helix_angle: float | None = None) -> Block:
@@ -943,7 +993,7 @@ def describe_gears(s: GearSet, helix_angle: float | None = None) -> Block:
     notes = (
         *_helix(first, helix_angle),
         f"{transverse}module {first.module * 1e3:.6g} mm, {transverse}pressure angle "
-        f"{math.degrees(first.pressure_angle):.6g} deg, face width {first.face_width * 1e3:.6g} mm, "
+        f"{math.degrees(first.pressure_angle):.6g} deg, {_widths(s)}, "
         f"centre distance {s.centre_distance * 1e3:.6g} mm",
         *[f"{s.n_planets} planet{'s' * (s.n_planets > 1)} at {angles} deg"][: len(s.kinds) - 1],
         *[
@@ -953,6 +1003,15 @@ def describe_gears(s: GearSet, helix_angle: float | None = None) -> Block:
         ],
     )
     return tabulate("Gears", rows, columns, notes)
+
+
+def _widths(s: GearSet) -> str:
+    """Face width of all gears in words, or the widths that meshes have in common where gears differ."""
+    widths = [gear.face_width for gear in s.gears]
+    if len(set(widths)) == 1:
+        return f"face width {widths[0] * 1e3:.6g} mm"
+    shown = " and ".join(f"{width * 1e3:.6g}" for width in dict.fromkeys(s.mesh_widths))
+    return f"face width in common {shown} mm"
 
 
 def _helix(gear: Gear, helix_angle: float | None) -> Iterator[str]:
@@ -976,11 +1035,11 @@ def _contact_ratio_rows(s: GearSet, helix_angle: float | None) -> Iterator[tuple
     if helix_angle is None:
         yield ("contact ratio", *(f"{ratio:.4f}" for ratio in ratios))
         return
-    first = s.gears[0]
-    overlap = overlap_ratio(first.face_width, first.module * math.cos(helix_angle), helix_angle)
+    normal_module = s.gears[0].module * math.cos(helix_angle)
+    overlap = [overlap_ratio(width, normal_module, helix_angle) for width in s.mesh_widths]
     yield ("transverse contact ratio", *(f"{ratio:.4f}" for ratio in ratios))
-    yield ("overlap ratio", *(f"{overlap:.4f}" for _ in ratios))
-    yield ("total contact ratio", *(f"{ratio + overlap:.4f}" for ratio in ratios))
+    yield ("overlap ratio", *(f"{ratio:.4f}" for ratio in overlap))
+    yield ("total contact ratio", *(f"{sum(both):.4f}" for both in zip(ratios, overlap)))
 
 
 def describe_meshes(s: GearSet, helix_angle: float | None = None) -> Block:
