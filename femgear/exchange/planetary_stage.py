@@ -681,7 +681,7 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tup
     shaft, rim = w.add("shaft", f"{name} shaft"), a(2.0 * gear.rim_radius, "mm")
     id = w.add(
         "ring_gear" if internal else "cylindrical_gear", name, number_of_teeth=a(gear.teeth),
-        normal_module=a(case.module, "mm"), face_width=a(case.set.face_width, "mm"),
+        normal_module=a(case.module, "mm"), face_width=a(gear.face_width, "mm"),
         helix_angle_reference_diameter=a(helix if gear.name == "sun" else -helix, "deg"),
         tip_diameter=a(tip, "mm"), root_diameter=a(section.root_diameter, "mm"),
         u_coordinate_on_shaft=a(0.0, "mm"), inner_diameter=None if internal else rim,
@@ -689,7 +689,7 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tup
     parts = [id]
     if internal:
         parts += [w.add(
-            "shaft_section", u_coordinate_on_shaft=a(0.0, "mm"), length=a(case.set.face_width, "mm"),
+            "shaft_section", u_coordinate_on_shaft=a(0.0, "mm"), length=a(gear.face_width, "mm"),
             outer_diameter_begin=rim, outer_diameter_end=rim,
         )]  # fmt: skip
     for part in parts:
