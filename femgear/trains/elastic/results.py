@@ -62,7 +62,7 @@ from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import checked_speeds
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 from femgear.trains.elastic.runup import KINDS, loudest, meeting_columns
-from femgear.trains.static.results import UNEQUAL, shares
+from femgear.trains.static.results import HELD, UNEQUAL, shares
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,6 +88,8 @@ _PARTS = ("sun", "planet, sun side", "planet, ring side", "ring")
 """Flanks in the order of their meshes."""
 _FORMS = ("sun", "planet_sun_side", "planet_ring_side", "ring")
 _HEARD = {"microphone [dB(A)]": "pressure_level", "sound power [dB(A)]": "power_level"}
+BEARING_FACTORS = 0.5, 2.0
+"""Multiples of the bearing stiffness of planets between which load sharing is shown."""
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
 _SUPPORTED = {
@@ -121,6 +123,9 @@ class ModesResult:
         Frequency for whose excitation the basis was made [Hz].
     symmetry : int
         Turns by ``2 pi/symmetry`` take every planet to the place of one like it.
+    bearing_share : (2N, 2) array, optional
+        Mean force of a mesh over that of all of its kind, with `BEARING_FACTORS` of the planets' bearing
+        stiffness; None where planets share equally.
     """
 
     ring: RingModel
@@ -132,6 +137,7 @@ class ModesResult:
     reach: float
     symmetry: int
     entries: Entries
+    bearing_share: np.ndarray | None = None
 
     @property
     def max_diameter(self) -> int:
@@ -158,6 +164,16 @@ class ModesResult:
             "supported_stiffness": (record, state.stiffness, "N/m", "tangent mesh stiffness on the supports"),
             "flexibility": ("mesh other_mesh", model.system.flexibility, "m/N", between),
         }
+        factors = {}
+        if self.bearing_share is not None:
+            variables["bearing_share"] = (
+                "mesh bearing_factor",
+                self.bearing_share,
+                "1",
+                "mean mesh force over that of all of its kind at other bearing stiffnesses of planets",
+            )
+            words = "bearing stiffness of planets over that of the case"
+            factors = {"bearing_factor": ("bearing_factor", np.array(BEARING_FACTORS), "1", words)}
         motions = modes.shape[model.ring_slice].T
         for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
             field = ring_field(self.ring.modes, motions, output, n_max)
@@ -173,6 +189,7 @@ class ModesResult:
                 "supported_position": ("supported_position", state.position, "1", denser),
                 **coordinates(mode=np.arange(len(modes.frequency)), dof=modes.dofs, mesh=names),
                 **coordinates(circumferential=diameters),
+                **factors,
             },
             attrs={
                 "title": "modal basis with mean mesh stiffnesses", "unknowns": len(model.system.M),
@@ -389,19 +406,32 @@ def verdict(results: Results) -> Iterator[Block]:
 
 
 def _unequal(results: Results, sharing: np.ndarray, notes: list[str]) -> Iterator[tuple[str, str]]:
-    """Row of the largest share at one instant, on supports, if K_gamma (2,) hides it; what static shows."""
+    """Rows of what K_gamma (2,) rests on, and of the largest share at one instant if it hides that.
+
+    Notes say which model it is of, and what static results show instead.
+    """
     most = sharing
+    if "modes" in results.stages and "bearing_share" in results.modes:
+        names, share = results.modes["mesh"].values, results.modes["bearing_share"].values
+        softer, stiffer = (_by_kind(names, column) for column in share.T)
+        pairs = ", ".join(f"{kind} {a:.3f} and {b:.3f}" for kind, a, b in zip(KINDS, softer, stiffer))
+        yield "K_gamma with half and twice the bearing stiffness", pairs
+        notes.append(
+            "K_gamma: largest mean share of a planet over the equal one, on supports and bearings; it rests "
+            f"on planet.bearing_stiffness = {results.case.planet.bearing_stiffness:.3g} N/m"
+        )
     if "modes" in results.stages and "supported_force" in results.modes:
         force = results.modes["supported_force"].values
         most = np.array([(one / one.mean(axis=0)).max() for one in np.split(force, 2)])
     if (most > UNEQUAL * sharing).any():
-        yield "the same at one instant, at rest", _kinds("{:.3f}", most)
-        notes.append("at one instant: largest share of a planet over the equal one; K_v contains it")
+        yield "largest share at one instant, at rest", _kinds("{:.3f}", most)
+        notes.append("at one instant: of the equal share, on the same supports and bearings; K_v contains it")
     shown, mean, held = shares(results.static)
     if not 1.0 / UNEQUAL < shown / most.max() < UNEQUAL:
         notes.append(
             "K_gamma, K_v: on supports and bearings; static stresses and load shares (static.members): "
-            f"{held}, K_gamma = {mean:.3f}, at one instant {shown:.3f}"
+            f"{held}, largest share {mean:.3f} of the equal one, at one instant {shown:.3f}"
+            + (": there the teeth alone take up errors of pins, an upper bound" if held == HELD else "")
         )
 
 

@@ -23,17 +23,17 @@ from femgear.case.dependencies import (
     state_entries,
     static_entries,
 )
-from femgear.case.gear_set import material_of, planetary_set, set_deviations
+from femgear.case.gear_set import driving_torque, material_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, with_ring
-from femgear.contact.cycle import CycleOptions
-from femgear.contact.loaded_period import loaded_period
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.loaded_period import LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import mass
 from femgear.findings import Finding
 from femgear.gears.deviations import common_period, rotational_symmetry
-from femgear.gears.planetary import mesh_names
+from femgear.gears.planetary import PlanetarySet, mesh_names
 from femgear.housing.sensor import component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound
 from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
@@ -96,6 +96,7 @@ from femgear.trains.elastic.model import (
 )
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs, named_sensors, sensor_lines
 from femgear.trains.elastic.results import (
+    BEARING_FACTORS,
     DynamicsResult,
     HousingResult,
     ModesResult,
@@ -150,6 +151,10 @@ _BELOW_WAVES = 0.9
 _NOTICED, _PACKED, _SECONDS = 2e9, 2.5, 1.5e-5
 """Size of files that is said before, and that of a number in compressed ones [bytes]; what a harmonic of one
 speed takes (2 GHz, one core) [s]."""
+_SHARING_POSITIONS = 8
+"""Positions of a mesh period from which mean shares at other bearing stiffnesses are taken."""
+_EQUAL = 0.005
+"""Mean shares that differ less from one another than this are equal."""
 _LINES = ("deflection", "force", "modal")
 """What a response has of every harmonic."""
 
@@ -208,7 +213,49 @@ def solve_modes(
     )
     modes = replace(modes, kind=kinds, nodal_diameter=diameters)
     symmetry = rotational_symmetry(deviations, gears)
-    return ModesResult(ring, model, excitation, modes, bodies, state, reach, symmetry, modal_entries(case))
+    sharing = _sharing_over_bearings(case, gears, bodies[0], state, steps)
+    return ModesResult(
+        ring, model, excitation, modes, bodies, state, reach, symmetry, modal_entries(case), sharing
+    )
+
+
+def _sharing_over_bearings(
+    case: Case, gears: PlanetarySet, bodies: Bodies, state: LoadedPeriod, steps: Steps
+) -> np.ndarray | None:
+    """Compute mean shares (2N, 2) of the meshes with `BEARING_FACTORS` of the planets' bearing stiffness.
+
+    Means over a few positions, of plane contact: within 0.5 % of those of the record. None where planets
+    share equally, or their bearings are rigid.
+    """
+    share = _shares(state.resampled("force", RECORD * state.periods))
+    supports, known = linear_supports(case), state_entries(case)
+    if supports.planet is None or np.abs(share - 1.0).max() < _EQUAL:
+        return None
+    deviations = set_deviations(case)
+    if (kept := steps.kept("sharing over bearings", known)) is not None:
+        return kept
+    found = [
+        _shares(
+            walk_mesh_cycle(
+                gears,
+                bodies,
+                sun_torque=driving_torque(case),
+                positions=gears.equal_positions(_SHARING_POSITIONS),
+                contact=case.static.contact,
+                deviations=None if deviations.ideal else deviations,
+                supports=replace(supports, planet=factor * supports.planet),
+                periods=state.periods,
+            ).force
+        )
+        for factor in BEARING_FACTORS
+    ]
+    return steps.keep("sharing over bearings", known, np.array(found).T)
+
+
+def _shares(force: np.ndarray) -> np.ndarray:
+    """Mean forces (2N,) of meshes (2N, P), over those of all of their kind."""
+    mean = force.mean(axis=1)
+    return np.concatenate([half / half.mean() for half in np.split(mean, 2)])
 
 
 def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:

@@ -758,6 +758,11 @@ def describe_static(data: xr.Dataset) -> Block:
     notes = [sharing, f"{k}, held at their bores and at the outer surface of the ring"]
     if data.sizes.get("member", 0):
         notes[1] = f"{k}; {SERIES}; the STE contains that and the motion of the members"
+    if most > UNEQUAL and held == HELD:
+        notes.append(
+            "K_gamma with held centres: the teeth alone take up errors of pins, an upper bound; "
+            'static.members = "elastic" has that on supports and bearings'
+        )
     if data.sizes["mesh"] == 1:
         notes = [contact, f"{k}, held at bore or outer surface"]
     if "axial_force" in data:

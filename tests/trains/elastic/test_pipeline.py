@@ -349,3 +349,20 @@ def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_error
     spectrum = np.fft.rfft(static.cycle.force, axis=1)
     spectrum[:, 8] = 0.0
     assert force == pytest.approx(np.fft.irfft(spectrum, 16, axis=1), rel=2e-3)
+
+
+def test_shares_with_half_and_twice_the_bearing_stiffness_are_those_of_the_other_cases(case, modes, steps):
+    """One pin 10 um ahead: the range beside K_gamma is that of runs with these bearings."""
+    assert modes.bearing_share is None and "bearing_share" not in modes.dataset()
+    pin = {"set.pin_errors": [{"planet": 1, "tangential": "10 um"}], "static.positions": 8}
+    shares = {}
+    for bearing in ("3e8 N/m", "6e8 N/m"):
+        one = with_values(case, pin | {"planet.bearing_stiffness": bearing})
+        shares[bearing] = solve_modes(one, solve_static(one, steps=steps), steps=steps)
+    own = {name: result.state.resampled("force", 64).mean(axis=1) for name, result in shares.items()}
+    own = {name: force[:3] / force[:3].mean() for name, force in own.items()}
+    assert shares["3e8 N/m"].bearing_share[:3, 1] == pytest.approx(own["6e8 N/m"], abs=1e-3)
+    assert shares["6e8 N/m"].bearing_share[:3, 0] == pytest.approx(own["3e8 N/m"], abs=1e-3)
+    assert own["6e8 N/m"].max() > own["3e8 N/m"].max() + 2e-3
+    data = shares["3e8 N/m"].dataset()
+    assert data.bearing_factor.values.tolist() == [0.5, 2.0]
