@@ -545,7 +545,7 @@ def import_rexs(
     from femgear.trains.imports import case_drafts
 
     model = read_model(file)
-    drafts = case_drafts(model, output.stem, stage=stage, load_case=load_case)
+    drafts = case_drafts(model, output.name, stage=stage, load_case=load_case)
     _warn(model.findings)
     paths = [output.with_name(f"{output.stem}{one.suffix}{output.suffix}") for one in drafts]
     _need_new(paths, force=force)

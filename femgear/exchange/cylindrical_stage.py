@@ -6,12 +6,13 @@ gear 1 is the sun and gear 2 a planet, or the ring where it is internal.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 from femgear.case.estimates import usual_torque
 from femgear.case.quantities import LENGTH, SPEED, TORQUE, to_si
-from femgear.exchange.gear_unit import power_flow, shaft_of, turning
+from femgear.exchange.gear_unit import PowerFlow, shaft_of, turning
 from femgear.exchange.planetary_stage import (
     add_bearings,
     add_modifications,
@@ -27,11 +28,12 @@ _NAMES = {"sun": "gear_1", "planet": "gear_2", "ring": "gear_2"}
 
 
 def pair_tables(
-    model: Model, mesh: Component, load_case: int | None = None
+    model: Model, mesh: Component, load_case: int | None, flows: Sequence[PowerFlow]
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Read two gears as tables of a pair case, with remarks by key on what is assumed.
 
-    Torque and speeds follow from the power that flows through the unit; load cases are taken as by
+    Torque and speeds follow from the power ``flows`` through the unit, see
+    `femgear.exchange.gear_unit.case_flows`; load cases are taken as by
     `femgear.exchange.planetary_stage.case_tables`.
 
     CaseError: E-CHOICE: no such load case. E-REXS, E-UNIT.
@@ -48,7 +50,7 @@ def pair_tables(
         remarks["set.centre_distance"] = (
             "assumed: no play at this distance, hence the profile shift of gear 1"
         )
-    operation = _operation(model, mesh, read, remarks, load_case)
+    operation = _operation(model, mesh, read, remarks, load_case, flows)
     forwards = to_si(operation["torque"], TORQUE) > 0.0
     add_modifications(stage, read, remarks, dict.fromkeys(stage.gears, forwards))
     if before < len(model.findings):
@@ -75,15 +77,15 @@ def _renamed(key: str) -> str:
 
 
 def _operation(
-    model: Model, mesh: Component, read: dict[str, Any], remarks: dict[str, str], wanted: int | None
-) -> dict[str, Any]:
+    model: Model, mesh: Component, read: dict[str, Any], remarks: dict[str, str], wanted: int | None,
+    flows: Sequence[PowerFlow],
+) -> dict[str, Any]:  # fmt: skip
     """Torque on gear 1, positive where it drives in its sense of rotation, and its speeds."""
-    number, given = model.chosen_case(wanted)
+    number, _ = model.chosen_case(wanted)
     gear = pair_stage(model, mesh).gears["sun"][0]
     shaft = shaft_of(model, gear)
     torques, speeds = [], []
-    for case in (given, *model.load_cases):
-        flow = power_flow(model, case)
+    for flow in flows:
         speed = flow.speed.get(shaft.id, 0.0) if shaft else 0.0
         by_mesh = flow.torque.get(mesh.id)
         torques.append(None if not by_mesh else -by_mesh * turning(speed))

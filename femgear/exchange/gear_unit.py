@@ -8,7 +8,8 @@ coupling joins turn as one; those that one joins with the ``gear_casing`` stand 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -39,11 +40,12 @@ class UnitStage:
 class PowerFlow:
     """Speeds of shafts [rad/s] by their ids, and torques by the meshes of a stage on its first shaft [N m].
 
-    What a file leaves open is missing.
+    What a file leaves open is missing. ``joined`` are the ids of stages that other stages hang on.
     """
 
     speed: Mapping[str, float]
     torque: Mapping[str, float]
+    joined: frozenset[str] = frozenset()
 
 
 def shaft_of(model: Model, part: Component) -> Component | None:
@@ -138,11 +140,33 @@ def power_flow(model: Model, given: Mapping[str, Mapping]) -> PowerFlow:
     for shaft in shafts:
         loads.setdefault(place[group[shaft.id]], []).extend(loads_on(model, shaft, given))
     standing, of_stage = [place[one] for one in held if one in place], {}
+    joined = {stages[i].component.id for rows in _connected(table) if len(rows) > 1 for i in rows}
     for rows in _connected(table):
         torques = _torques(table[rows], loads, standing)
         of_stage |= {stages[i].component.id: t for i, t in zip(rows, torques, strict=True) if t is not None}
     by_shaft = {one.id: speeds[place[group[one.id]]] for one in shafts}
-    return PowerFlow({id: one for id, one in by_shaft.items() if one is not None}, of_stage)
+    return PowerFlow(
+        {id: one for id, one in by_shaft.items() if one is not None}, of_stage, frozenset(joined)
+    )
+
+
+def case_flows(model: Model, load_case: int | None) -> list[PowerFlow]:
+    """Compute the power flow of the load case of a number, by default the first, then those of all.
+
+    CaseError: no such load case (E-CHOICE).
+    """
+    _, given = model.chosen_case(load_case)
+    return [power_flow(model, one) for one in (given, *model.load_cases)]
+
+
+def plain_ids(ids: Iterable[str]) -> dict[str, str]:
+    """Make ids that names of files and bodies can hold, each of its own."""
+    found: dict[str, str] = {}
+    for id in ids:
+        plain = re.sub(r"[^A-Za-z0-9_-]", "_", id)[:20]
+        number = sum(one == plain or one.startswith(f"{plain}-") for one in found.values())
+        found[id] = f"{plain}-{number + 1}" if number else plain
+    return found
 
 
 def _groups(model: Model) -> tuple[dict[str, str], set[str]]:

@@ -595,12 +595,13 @@ def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[st
         turns |= {} if speed is None else {name: turns.get(name) or speed}
         for torque in loads_on(model, shaft, given):
             loads |= {} if torque is None else {name: loads.get(name, 0.0) + torque}
-    if (not turns or not loads) and len(stage_components(model)) > 1:
+    if len(stage_components(model)) > 1:
         flow = power_flow(model, given)
         if not turns:
             members = ((name, one.id) for name in MEMBERS if name != fixed for one in s.shafts[name][:1])
             turns = {name: flow.speed[id] for name, id in members if id in flow.speed}
-        if not loads and s.stage.id in flow.torque:
+        # what acts on a shaft is shared where another stage sits on it, too
+        if s.stage.id in flow.torque and (not loads or s.stage.id in flow.joined):
             loads = {"sun": -flow.torque[s.stage.id]}
     return turns, loads
 

@@ -32,6 +32,8 @@ from femgear.findings import DOUBT, SEVERITIES, Finding
 
 MOST_BYTES = 20_000_000
 """Of a file, and of what a zip holds; those of whole gear units have some hundred kilobytes."""
+MOST_CASES = 1000
+"""Of load cases."""
 MOST_ELEMENTS = 500_000
 """Tags of an XML text, tables of a JSON text; those of whole gear units have some ten thousand."""
 _ENCODINGS = {
@@ -373,8 +375,12 @@ def _attributes(table: dict, component: str, name: str) -> dict[str, tuple[str, 
 
 def _load_cases(data: dict, name: str) -> tuple[dict, ...]:
     """Attributes by component id of every load case of the first load spectrum."""
+    cases = [c for one in _dicts(data, "load_spectrum")[:1] for c in _dicts(one, "load_cases")]
+    if len(cases) > MOST_CASES:
+        message, limit = f"{len(cases)} load cases are too many", f"{MOST_CASES} load cases"
+        raise _broken(message, name, "export fewer", limit=limit)
     found = []
-    for case in (c for one in _dicts(data, "load_spectrum")[:1] for c in _dicts(one, "load_cases")):
+    for case in cases:
         where, members = f"load case {len(found) + 1}, component ", _dicts(case, "components")
         _need_once([str(one.get("id")) for one in members], where, name)
         found.append({(id := str(one.get("id"))): _attributes(one, where + id, name) for one in members})

@@ -26,7 +26,7 @@ from femgear.case.quantities import (
     TORQUE,
     to_si,
 )
-from femgear.exchange.gear_unit import gears_of, power_flow, shaft_of, stage_components, turning
+from femgear.exchange.gear_unit import gears_of, plain_ids, power_flow, shaft_of, stage_components, turning
 from femgear.exchange.planetary_stage import bearings_between, is_bearing, shown
 from femgear.exchange.rexs import Component, Model
 
@@ -73,6 +73,7 @@ def chain_tables(
     units = [one.name for one in model.components.values() if one.type == "gear_unit" and one.name]
     if units:
         tables["title"] = "".join(c for c in units[0] if c.isprintable())[:200] or "Gear unit"
+    bodies = _body_names(model)
     tables |= {"body": [], "shaft": [], "parallel": [], "bearing": []}
     remarks: dict[str, str] = {}
     on = {id: one.id for id, (gear, _) in gears.items() if (one := shaft_of(model, gear)) is not None}
@@ -80,9 +81,9 @@ def chain_tables(
     ordered = sorted(shafts.values(), key=lambda one: one.id != first)
     names = {}
     for shaft in ordered:
-        names[shaft.id] = _shaft(model, shaft, gears, pairs, tables, remarks)
+        names[shaft.id] = _shaft(model, shaft, gears, pairs, bodies, tables, remarks)
     for stage in stages:
-        _stage(model, stage, pairs[stage.id], files[stage.id], tables, flow.speed)
+        _stage(model, stage, pairs[stage.id], files[stage.id], bodies, tables, flow.speed)
     # power in over the speed there, with the torque of any mesh
     stage = stages[0]
     power = abs(flow.torque[stage.id] * flow.speed[on[gears_of(model, stage)[0].id]])
@@ -102,6 +103,15 @@ def chain_tables(
         remedy="add the inertias of motor and load to the bodies at the ends",
     )  # fmt: skip
     return tables, remarks
+
+
+def _body_names(model: Model) -> dict[str, str]:
+    """Names of the bodies of gears, bearings and loads, by the ids of these."""
+    words = {"external_load": "load", "cylindrical_gear": "gear"}
+    return {
+        id: f"{words.get(model.components[id].type, 'bearing')} {plain}"
+        for id, plain in plain_ids(model.components).items()
+    }
 
 
 def _sorted_remarks(tables: dict[str, Any], remarks: dict[str, str], driver: str) -> dict[str, str]:
@@ -136,7 +146,7 @@ def _load_seat(names: list[tuple[str, str]]) -> str:
     return next((name for name, kind in names if kind == "external_load"), names[-1][0])
 
 
-def _shaft(model: Model, shaft: Component, gears, pairs, tables, remarks) -> list[tuple[str, str]]:
+def _shaft(model: Model, shaft: Component, gears, pairs, names, tables, remarks) -> list[tuple[str, str]]:
     """Add bodies, beams and bearings of a shaft; names and types of its bodies."""
     at: list[tuple[float, Component]] = []
     for part in model.related(("assembly", "ordered_assembly"), "part", assembly=shaft.id):
@@ -152,7 +162,7 @@ def _shaft(model: Model, shaft: Component, gears, pairs, tables, remarks) -> lis
     for place, part in at:
         new = not bodies or place - bodies[-1][0] > 1e-4
         if new:
-            bodies.append((place, _body(model, part, gears, pairs, tables, remarks), part.type))
+            bodies.append((place, _body(model, part, gears, pairs, names, tables, remarks), part.type))
         if is_bearing(part):
             _bearing(model, part, bodies[-1][1], gears, pairs, tables, remarks)
     if sum(is_bearing(part) for _, part in at) < 2:
@@ -174,14 +184,13 @@ def _shaft(model: Model, shaft: Component, gears, pairs, tables, remarks) -> lis
     return [(name, kind) for _, name, kind in bodies]
 
 
-def _body(model: Model, part: Component, gears, pairs, tables, remarks) -> str:
+def _body(model: Model, part: Component, gears, pairs, names, tables, remarks) -> str:
     """Add the body of a gear, a solid cylinder without its shaft, or a seat; its name."""
+    name = names[part.id]
     if part.id not in gears:
-        name = f"{'load' if part.type == 'external_load' else 'bearing'} {part.id}"[:40]
         mass, inertia, transverse = _SEAT[0], _SEAT[1], _SEAT[1]
         how = "assumed: a seat, little beside the shaft"
     else:
-        name = f"gear {part.id}"[:40]
         pair = pairs[gears[part.id][1].id]
         key = _key(model, part, gears[part.id][1])
         module, width = (to_si(pair["set"][k], LENGTH) for k in ("module", "face_width"))
@@ -238,14 +247,16 @@ def _section(model: Model, shaft: Component, start: float, end: float) -> tuple[
     return (covered / compliance + bore**4) ** 0.25, bore
 
 
-def _stage(model: Model, stage: Component, pair, file: str, tables, speed: Mapping[str, float]) -> None:
+def _stage(
+    model: Model, stage: Component, pair, file: str, names, tables, speed: Mapping[str, float]
+) -> None:
     """Add a parallel stage; its helix is positive where it pushes the second gear along z (see the docs)."""
     gears = gears_of(model, stage)
     helix = to_si(pair["set"].get("helix_angle", "0 deg"), ANGLE)
     normal = to_si(pair["set"]["pressure_angle"], ANGLE)
     angle = math.atan(math.tan(normal) / math.cos(helix))
     module = to_si(pair["set"]["module"], LENGTH) / math.cos(helix)
-    table: dict[str, Any] = {"between": [f"gear {one.id}"[:40] for one in gears]}
+    table: dict[str, Any] = {"between": [names[one.id] for one in gears]}
     table["teeth"] = [pair["gear_1"]["teeth"], pair["gear_2"]["teeth"]]
     distance = pair["set"].get("centre_distance")
     base = [0.5 * module * z * math.cos(angle) for z in table["teeth"]]

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from femgear.case import text as case_text
-from femgear.errors import CaseError, FemgearError
+from femgear.case.gear_set import flank_form, planetary_set
+from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.exchange.cylindrical_stage import pair_tables
-from femgear.exchange.gear_unit import stage_components, stage_in_words
+from femgear.exchange.gear_unit import PowerFlow, case_flows, plain_ids, stage_components, stage_in_words
 from femgear.exchange.planetary_stage import case_tables, named
 from femgear.exchange.rexs import Component, Model
 from femgear.exchange.shaft_chain import NoChain, chain_tables
-from femgear.findings import NOTE
+from femgear.findings import DOUBT, NOTE
 from femgear.trains.drafts import draft_text
+from femgear.trains.reading import parse_case
 
 _READ = ("planetary_stage", "cylindrical_stage")
+MOST_STAGES = 40
+"""Of a file from which all are taken."""
 
 
 @dataclass(frozen=True)
 class CaseDraft:
-    """Text of a case, with what stands behind the name of the file, and what it is in words."""
+    """Text of a case, with what stands behind the stem of the file's name, and what it is in words."""
 
     suffix: str
     text: str
@@ -28,7 +34,7 @@ class CaseDraft:
 
 
 def case_drafts(
-    model: Model, stem: str, *, stage: str | None = None, load_case: int | None = None
+    model: Model, name: str, *, stage: str | None = None, load_case: int | None = None
 ) -> list[CaseDraft]:
     """Write the cases of the stages of a REXS file; `Model.findings` holds what they have not.
 
@@ -38,8 +44,8 @@ def case_drafts(
 
     Parameters
     ----------
-    stem : str
-        Of the names of the files, for the drivetrain to name those of its stages.
+    name : str
+        Of the file, such as "case.toml", for the drivetrain to name those of its stages.
     stage : str, optional
         Id of the only stage to take.
     load_case : int, optional
@@ -64,64 +70,111 @@ def case_drafts(
         if left:
             model.remark("--stage", f"stages that are not taken: {_listed(left)}", first=True)
         stages = chosen
+    model.chosen_case(load_case)
     if not [one for one in stages if one.type in _READ] or stages == planetary == stages[:1]:
         # a file without a stage is refused as one without a planetary stage
         return [CaseDraft("", _text(model, *case_tables(model, stage, load_case), stage), "the stage")]
+    if len(stages) > MOST_STAGES:
+        limit = f"at most {MOST_STAGES}, or one by --stage"
+        model.refuse(f"{len(stages)} stages are too many", "components", "name one by --stage", limit)
     found: dict[str, tuple[dict, dict]] = {}
     texts: dict[str, str] = {}
     refusals: list[FemgearError] = []
+    flows = case_flows(model, load_case)
     for one in stages:
         try:
-            found[one.id] = _stage_tables(model, one, load_case)
-            texts[one.id] = _text(model, *found[one.id], one.id)
+            tables = _stage_tables(model, one, load_case, flows)
+            texts[one.id] = _text(model, *tables, one.id)
+            found[one.id] = tables
         except FemgearError as error:
-            if error.key == "--load-case" or len(stages) == 1:
+            if len(stages) == 1:
                 raise
             refusals.append(error)
-            found.pop(one.id, None)
             model.remark(one.id, f"{stage_in_words(model, one)} is not taken: {error.message}", first=True)
     if not texts:
         raise refusals[0]
-    return list(_drafts(model, stem, stages, found, texts, load_case))
+    return list(_drafts(model, Path(name), stages, found, texts, load_case))
 
 
-def _stage_tables(model: Model, stage: Component, load_case: int | None) -> tuple[dict, dict]:
+def _stage_tables(
+    model: Model, stage: Component, load_case: int | None, flows: Sequence[PowerFlow]
+) -> tuple[dict, dict]:
     if stage.type == "planetary_stage":
         return case_tables(model, stage.id, load_case)
     if stage.type != "cylindrical_stage":
         model.refuse(f"femgear has no {stage.type.replace('_', ' ')}", str(stage), limit=" or ".join(_READ))
-    return pair_tables(model, stage, load_case)
+    return pair_tables(model, stage, load_case, flows)
 
 
 def _text(model: Model, tables: dict, remarks: dict, stage: str | None) -> str:
+    """Text of a case; what of modifications lies beside a flank is left out, with a finding."""
     head = [f"Written by femgear import (REXS {model.version}). What is assumed says so."]
     with named(model, stage):
-        return draft_text(tables, remarks, word="assumed", head=head)
+        while True:
+            text = draft_text(tables, remarks, word="assumed", head=head)
+            case = parse_case(text)
+            try:
+                for gear in planetary_set(case).gears:
+                    for side in ("sun side", "ring side"):
+                        flank_form(case, gear, side)
+            except GeometryError as error:
+                left_out = _shortened(tables, error.key or "")
+                if not left_out:
+                    raise
+                found = f"{error.message} ({error.value}; {error.limit}): {left_out}"
+                model.remark((error.key or "").partition("[")[0], found)
+            else:
+                return text
 
 
-def _drafts(model: Model, stem: str, stages, found, texts, load_case: int | None) -> Iterator[CaseDraft]:
+def _shortened(tables: dict, key: str) -> str:
+    """Leave out the ends of a modification that may be left out, else all of it; what was done, in words."""
+    place = re.fullmatch(r"(\w+)\.modifications\[(\d+)\]", key)
+    if place is None:
+        return ""
+    parts, number = tables[place[1]]["modifications"], int(place[2])
+    relief = parts[number]["kind"].endswith("relief")
+    ends = [name for name in parts[number] if name.startswith("end_" if relief else ("start_", "end_"))]
+    for name in ends:
+        del parts[number][name]
+    if not ends:
+        return f"the {parts.pop(number)['kind']} is not taken"
+    return f"the {parts[number]['kind']} is taken to the end of the flank"
+
+
+def _drafts(model: Model, name: Path, stages, found, texts, load_case: int | None) -> Iterator[CaseDraft]:
     """The case without an id in its name, then those of the stages."""
     if len(stages) == 1:
         yield CaseDraft("", texts[stages[0].id], stage_in_words(model, stages[0]))
         return
     planetary = [one for one in stages if one.type == "planetary_stage" and one.id in texts]
+    suffixes = {id: f"_{plain}" for id, plain in plain_ids(texts).items()}
     try:
-        files = {id: f"{stem}_{id}.toml" for id in texts}
+        files = {id: f"{name.stem}{suffix}{name.suffix}" for id, suffix in suffixes.items()}
         pairs = {id: tables for id, (tables, _) in found.items() if tables.get("model") == "pair"}
-        tables, remarks = chain_tables(model, pairs, files, load_case)
-        head = [f"Written by femgear import (REXS {model.version}). What is assumed says so."]
-        lines = [f"# {one}" for one in head]
-        yield CaseDraft("", "\n".join([*lines, case_text.write(tables, remarks)]), "drivetrain of all stages")
+        yield CaseDraft("", _chain_text(model, pairs, files, load_case), "drivetrain of all stages")
     except NoChain as error:
         whole = f"no drivetrain of all stages is written: {error}"
-        model.remark(
-            "", f"{whole}; each stage is a case of its own", severity=NOTE if not planetary else "doubt"
-        )
+        severity = DOUBT if planetary else NOTE
+        model.remark("", f"{whole}; each stage is a case of its own", severity=severity)
         if len(planetary) == 1:
             yield CaseDraft("", texts[planetary[0].id], stage_in_words(model, planetary[0]))
     for one in stages:
         if one.id in texts and not (one in planetary and len(planetary) == 1):
-            yield CaseDraft(f"_{one.id}", texts[one.id], stage_in_words(model, one))
+            yield CaseDraft(suffixes[one.id], texts[one.id], stage_in_words(model, one))
+
+
+def _chain_text(model: Model, pairs: dict[str, dict], files: dict[str, str], load_case: int | None) -> str:
+    """Text of the drivetrain; NoChain where it makes no case."""
+    tables, remarks = chain_tables(model, pairs, files, load_case)
+    cases = {file: pairs[id] for id, file in files.items()}
+    whole = [one | {"stiffness": cases[one["stiffness"]]} for one in tables["parallel"]]
+    try:
+        parse_case(case_text.write(tables | {"parallel": whole}))
+    except FemgearError as error:
+        raise NoChain(f"{error.key}: {error.message}") from error
+    head = f"# Written by femgear import (REXS {model.version}). What is assumed says so."
+    return "\n".join([head, case_text.write(tables, remarks)])
 
 
 def _listed(words: list[str]) -> str:

@@ -18,7 +18,7 @@ from femgear.trains.reading import parse_case, read_case
 
 def drafts_of(box, tmp_path, **options):
     model = read_model(box.write(tmp_path / "unit.rexs"))
-    return {one.suffix: one for one in case_drafts(model, "unit", **options)}, model.findings
+    return {one.suffix: one for one in case_drafts(model, "unit.toml", **options)}, model.findings
 
 
 def written(box, tmp_path, monkeypatch, *more):
@@ -142,12 +142,14 @@ def test_load_cases_of_pairs(tmp_path):
     )
     path.write_text(text, encoding="utf-8")
     model = read_model(path)
-    second = {one.suffix: parse_case(one.text) for one in case_drafts(model, "u", load_case=2) if one.suffix}
+    second = {
+        one.suffix: parse_case(one.text) for one in case_drafts(model, "u.toml", load_case=2) if one.suffix
+    }
     assert second["_52"].operation.torque == pytest.approx(160.0)
     assert [one * 30 / math.pi for one in second["_52"].operation.speeds] == pytest.approx([1500.0])
     assert any(one.key == "52: operation" and "1: 500 rpm, 100 N m" in one.text for one in model.findings)
     with pytest.raises(CaseError, match="no such load case"):
-        case_drafts(read_model(path), "u", load_case=3)
+        case_drafts(read_model(path), "u.toml", load_case=3)
 
 
 def test_files_that_are_there_are_kept(tmp_path, monkeypatch, capsys):
@@ -175,3 +177,61 @@ def test_a_planetary_stage_takes_what_flows_through_the_unit(tmp_path):
     assert operation.input == "sun" and operation.torque == pytest.approx(200.0)
     assert operation.speeds[0] * 30 / math.pi == pytest.approx(1500.0)
     assert parse_case(found["_710"].text).operation.torque == pytest.approx(100.0)
+
+
+def test_ids_are_no_paths(tmp_path, monkeypatch):
+    box = ParallelUnit()
+    names = {51: "../51", 52: "/x\\y:52", 41: "a gear!", 12: "a/b", 13: "a_b", 5: "\u00fc" * 60}
+    box.components = {names.get(id, id): one for id, one in box.components.items()}
+    box.relations = [
+        (type, {role: names.get(id, id) for role, id in roles.items()}) for type, roles in box.relations
+    ]
+    written(box, tmp_path, monkeypatch)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "unit.rexs", "unit.toml", "unit____51.toml", "unit__x_y_52.toml"
+    }  # fmt: skip
+    chain = read_case("unit.toml")
+    assert {"gear a_gear_", "bearing a_b", "bearing a_b-2"} <= {one.name for one in chain.body}
+
+
+def test_ends_beside_the_flank_are_left_out(tmp_path):
+    box = Gearbox()
+    at = {"diameter_where_profile_crowning_root_is_specified": (60.0, "mm"),
+          "diameter_where_profile_crowning_tip_is_specified": (90.0, "mm")}  # fmt: skip
+    box.add(9999, "profile_crowning", profile_crowning_at_tip=(5.0, "mum"),
+            profile_crowning_at_root=(5.0, "mum"), **at)  # fmt: skip
+    for flank in (2053, 3053):
+        box.relate("reference", origin=flank, referenced=9999)
+    found, findings = drafts_of(box, tmp_path)
+    (part,) = parse_case(found[""].text).sun.modifications
+    assert part.amount == 5e-6 and part.start_diameter is None and part.end_diameter is None
+    told = [one for one in findings if one.key == "sun.modifications"]
+    assert len(told) == 1 and told[0].severity == DOUBT and "taken to the end of the flank" in told[0].text
+    # a relief that starts beside it is none
+    box.components[9999] = {
+        "type": "tip_relief", "name": "",
+        "attributes": {"tip_relief_depth": (5.0, "mum"), "tip_relief_datum_diameter": (90.0, "mm")},
+    }  # fmt: skip
+    found, findings = drafts_of(box, tmp_path)
+    assert not parse_case(found[""].text).sun.modifications
+    assert any("tip relief is not taken" in one.text for one in findings)
+
+
+def test_too_many_stages_and_load_cases_are_refused(tmp_path):
+    box = ParallelUnit()
+    for number in range(50):
+        box.add(100 + number, "cylindrical_stage")
+    with pytest.raises(CaseError, match="52 stages are too many"):
+        drafts_of(box, tmp_path)
+    path = tmp_path / "unit.rexs"
+    spectrum = '<load_spectrum id="1">' + '<load_case id="1"/>' * 1001 + "</load_spectrum></model>"
+    path.write_text(ParallelUnit().xml().replace("</model>", spectrum), encoding="utf-8")
+    with pytest.raises(CaseError, match="1001 load cases are too many"):
+        read_model(path)
+
+
+def test_names_without_an_ending(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ParallelUnit().write(Path("unit.rexs"))
+    assert cli.main(["import", "unit.rexs", "-o", "unit"]) == 0
+    assert read_case("unit").parallel[0].stiffness
