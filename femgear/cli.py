@@ -6,6 +6,7 @@ import _thread
 import atexit
 import contextlib
 import os
+import re
 import shlex
 import signal
 import sys
@@ -64,6 +65,23 @@ app = App(
 
 
 Quantity = Annotated[str, Parameter(allow_leading_hyphen=True)]
+
+
+def whole_number(text: str, key: str) -> int:
+    """Read a whole number; 27.5 is none, and is not rounded (CaseError, E-TYPE)."""
+    if re.fullmatch(r"\s*[+-]?\d+(\.0*)?\s*", text):
+        return int(text.partition(".")[0])
+    raise CaseError(
+        f"{text!r} is no whole number", code="E-TYPE", key=key, value=text, limit="whole numbers"
+    )  # fmt: skip
+
+
+def _convert_whole(_: Any, tokens: Sequence[Any]) -> int:
+    """Whole number of an option; what cyclopts would round is refused."""
+    return whole_number(tokens[0].value, tokens[0].keyword or "")
+
+
+Whole = Annotated[int, Parameter(converter=_convert_whole)]
 """A number with its unit, which may be negative."""
 
 
@@ -466,18 +484,45 @@ def _need_new(paths: Sequence[Path], *, force: bool) -> None:
             )  # fmt: skip
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class _ToothForm:
+    """What is known of the teeth.
+
+    Parameters
+    ----------
+    teeth
+        Of sun, planet and ring, or of both gears.
+    shifts
+        Profile shifts of sun and planet, perhaps of the ring (positive outwards), or of both gears. Default:
+        none where the teeth close without, else shared by equal sliding.
+    centre_distance
+        Default: that at which the shifts close the gears.
+    helix
+        Helix angle of planetary sets, pairs and helical cases. Default: none, of helical cases 20 deg.
+    addendum
+        Of the basic rack, in modules. Default: 1.
+    """
+
+    teeth: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
+    shifts: Annotated[tuple[float, ...], Parameter(consume_multiple=True, negative="")] = ()
+    centre_distance: Quantity | None = None
+    helix: Quantity | None = None
+    addendum: float | None = None
+
+
 @app.command
 def new(
     kind: str,
     /,
     *,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
-    teeth: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = (),
     module: Quantity | None = None,
     torque: Quantity | None = None,
     speed: Quantity | None = None,
-    planets: int | None = None,
+    planets: Whole | None = None,
     face_width: Quantity | None = None,
+    form: _ToothForm | None = None,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Write a commented case from a few numbers; masses, inertias and stiffnesses are estimated.
@@ -488,8 +533,6 @@ def new(
         planetary, pair, planar, helical or drivetrain.
     output
         Case file to write. Default: KIND.toml.
-    teeth
-        Of sun, planet and ring, or of both gears.
     module
         Of helical teeth the normal one. Default: 2 mm.
     torque, speed
@@ -501,10 +544,13 @@ def new(
     force
         Replace the file.
     """
-    from femgear.trains.drafts import new_case
+    from femgear.trains.drafts import ToothForm, new_case
 
-    numbers: dict[str, Any] = {"teeth": teeth, "module": module, "torque": torque, "speed": speed}
-    text = new_case(kind, **numbers, planets=planets, face_width=face_width)
+    form = form or _ToothForm()
+    count = tuple(whole_number(one, "--teeth") for one in form.teeth)
+    numbers: dict[str, Any] = {"teeth": count, "module": module, "torque": torque, "speed": speed}
+    teeth_as = ToothForm(form.shifts, form.centre_distance, form.helix, form.addendum)
+    text = new_case(kind, **numbers, planets=planets, face_width=face_width, form=teeth_as)
     output = output or Path(f"{kind}.toml")
     _write_case(text, output, force=force)
     for line in takewhile(lambda one: one.startswith("#"), text.splitlines()):
@@ -520,7 +566,7 @@ def import_rexs(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("case.toml"),
     stage: str | None = None,
-    load_case: int | None = None,
+    load_case: Whole | None = None,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Write the cases of the stages of a REXS file; say what they have not, what is assumed and not used.
@@ -609,7 +655,7 @@ class Tasks:
         Dask scheduler whose workers compute: tcp://host:port or tls://host:port (docs/cluster.md).
     """
 
-    workers: int = 1
+    workers: Whole = 1
     cluster: str | None = None
 
 
@@ -674,7 +720,7 @@ class Drawn:
     """
 
     number: Annotated[int, Parameter(name=("--number", "-n"))] = 1000
-    seed: int = 1
+    seed: Whole = 1
     index: int | None = None
 
 
@@ -685,7 +731,7 @@ def samples(
     *,
     tolerances: Path,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    positions: int = 16,
+    positions: Whole = 16,
     method: Literal["spring", "exact"] = "spring",
     force: bool = False,
     drawn: Drawn | None = None,

@@ -251,8 +251,20 @@ def test_wrong_arguments(arguments, capsys, tmp_path, monkeypatch):
 
 
 def test_options_that_new_has_not_are_entries_of_the_file(capsys):
-    assert cli.main(["new", "planetary", "--centre-distance", "51 mm"]) == 2
+    assert cli.main(["new", "planetary", "--backlash", "51 um"]) == 2
     assert "remedy:  femgear new --help; other entries are written into the file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("given", [["--teeth", "27.5", "40", "108"], ["--planets", "3.5"]])
+def test_numbers_that_are_not_whole_are_refused_and_not_rounded(given, tmp_path, capsys):
+    assert cli.main(["new", "planetary", *given, "-o", str(tmp_path / "a.toml")]) == 2
+    assert "is no whole number" in capsys.readouterr().err and not (tmp_path / "a.toml").exists()
+
+
+def test_new_refuses_a_centre_distance_at_which_nothing_closes(tmp_path, capsys):
+    given = ["--centre-distance", "51 mm", "-o", str(tmp_path / "a.toml")]
+    assert cli.main(["new", "planetary", *given]) == 2
+    assert "--centre-distance: no profile shifts close" in capsys.readouterr().err
 
 
 def test_an_argument_that_is_missing_is_named(capsys):

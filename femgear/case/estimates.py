@@ -87,7 +87,7 @@ def usual_rim(
     """
     sense = 1.0 if internal else -1.0
     root = module * (0.5 * teeth / math.cos(helix) + shift + sense * dedendum)
-    return root + 4.0 * module if internal else max(root - 3.0 * module, 0.4 * root), root
+    return root + 4.0 * module if internal else max(root - 3.0 * module, 0.15 * root), root
 
 
 def estimates(case: Any) -> dict[str, Estimate]:

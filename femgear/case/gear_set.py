@@ -133,7 +133,7 @@ def free_tips(case: Any) -> tuple[str, ...]:
 def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = False) -> Gear:
     """Make a gear of a case from its section; the rim is its bore or outer radius [m].
 
-    A tip without a diameter is left open, see `femgear.gears.tips.settled_tips`.
+    Its tip is open until the gears are closed, see `femgear.gears.tips.settled_tips`.
     """
     given, module, pressure_angle = section.rack or case.rack, case.module, case.pressure_angle
     rack = BasicRack(**given.model_dump())
@@ -158,7 +158,7 @@ def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = 
         root_diameter=section.root_diameter,
         thickness_allowance=0.5 * case.set.backlash,
         name=name,
-        tip_open=tip is None,
+        tip_open=True,
     )
 
 

@@ -34,9 +34,9 @@ from femgear.gears.profile import (
 TEETH_RANGE = (5, 5000)
 MODULE_RANGE = (0.05e-3, 0.1)
 PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
-CUTTER_RANGE = 60
+CUTTER_RANGE = 20
 """Teeth that a pinion cutter may have more or fewer than the usual one, where that cannot make the gear."""
-CUTTER_SHIFTS = (0.0, -0.3, -0.6, -1.0)
+CUTTER_SHIFTS = (0.0, -0.5)
 """Profile shifts of new and worn pinion cutters that are tried in this order [modules]."""
 ROOM_TOLERANCE = 1e-12
 """Part of a module, or angle [rad], by which the rounding of a tool may be too large for it."""
@@ -495,6 +495,13 @@ def _largest_rounding(gear: Gear) -> float:
     """Largest tool tip rounding [modules] that fits with the same root circle, rounded down to 1e-4."""
     first = bisect_left(range(30_001), True, key=lambda n: not _generating_tool(gear, n / 1e4).room >= 0.0)
     return max(first - 1, 0) / 1e4
+
+
+def with_room(gear: Gear) -> Gear:
+    """Reduce the rounding of a gear's tool to what has room between its flanks, where it has none."""
+    if gear.tool.room / (1.0 if gear.internal else gear.module) >= -ROOM_TOLERANCE:
+        return gear
+    return replace(gear, rack=replace(gear.rack, root_radius=_largest_rounding(gear)))
 
 
 def tip_radius_at_land(gear: Gear, land: float) -> float:

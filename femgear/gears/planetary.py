@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import Gear, is_whole
+from femgear.gears.gear import Gear, is_whole, with_room
 from femgear.gears.pair import EACH, GearPair, zero_backlash_distance, zero_backlash_shift
 from femgear.gears.profile import BasicRack
 
@@ -276,19 +276,21 @@ def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
     The normal section cuts the reference cylinder in an ellipse with the radius of curvature
     ``r / cos^2(beta)`` at the tooth (G. Niemann and H. Winter, Maschinenelemente, vol. 2, section 21.3).
     Rims keep their thickness beside the roots. The ring's profile shift is found, which takes up that the
-    tooth numbers were rounded.
+    tooth numbers were rounded; roundings of tools that then have no room are reduced.
 
     ``gears`` are those of the transverse section, the helix angle is in rad. GeometryError where virtual
     gears cannot be made.
     """
-    sun, planet, ring = virtual_teeth(gears, helix_angle)
-    return close_set(
-        _virtual(gears.sun, sun, helix_angle),
-        _virtual(gears.planet, planet, helix_angle),
-        _virtual(gears.ring, ring, helix_angle),
+    teeth = virtual_teeth(gears, helix_angle)
+    closed = close_set(
+        _virtual(gears.sun, teeth[0], helix_angle),
+        _virtual(gears.planet, teeth[1], helix_angle),
+        _virtual(gears.ring, teeth[2], helix_angle),
         planet_angles=(0.0,),
         find=("ring",),
     )
+    sun, planet, ring = (replace(with_room(gear), tip_open=False) for gear in closed.gears)
+    return replace(closed, sun=sun, planet=planet, ring=ring)
 
 
 def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
@@ -315,6 +317,7 @@ def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
         root_diameter=moved(gear.root_diameter),
         thickness_allowance=gear.thickness_allowance * factor,
         tip_shortening=gear.tip_shortening,
+        tip_open=True,
         name=gear.name,
     )
     return replace(made, rim_radius=made.root_radius + gear.rim_radius - gear.root_radius)

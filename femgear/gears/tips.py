@@ -13,7 +13,15 @@ from typing import TypeVar
 
 import numpy as np
 
-from femgear.gears.gear import USUAL_LAND, Gear, half_thickness_angle, tip_radius_at_land, working_half_angles
+from femgear.errors import GeometryError
+from femgear.gears.gear import (
+    USUAL_LAND,
+    Gear,
+    combined_fault,
+    half_thickness_angle,
+    tip_radius_at_land,
+    working_half_angles,
+)
 from femgear.gears.pair import GearPair
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import inv, pressure_angle_at
@@ -130,6 +138,8 @@ def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
 def settled_tips(gears: AnySet, *, free: Collection[str] = ()) -> AnySet:
     """Find the tips of a set or pair that are left open (`Gear.tip_open`), and check those gears.
 
+    Tips that have a diameter keep it.
+
     A tip is that of the basic rack, shortened to keep its clearance (`clearance_shortening`). It is further
     shortened, to run free of its mates, where it would be refused: tips that reach below the base circle of a
     planet, overlap a fillet by more than `allowed_overlap`, strike passing tips, or belong to a pointed
@@ -150,15 +160,18 @@ def settled_tips(gears: AnySet, *, free: Collection[str] = ()) -> AnySet:
     for pair, numbers in zip(gears.kinds, gears.mates, strict=True):
         for number in numbers:
             shortening[names[number]] = max(shortening[names[number]], clearance_shortening(pair))
-    by_name = dict(zip(names, gears.gears, strict=True))
-    gears = replace(
-        gears,
-        **{
-            name: replace(gear, tip_shortening=shortening[name])
-            for name, gear in by_name.items()
-            if gear.tip_open
-        },
-    )
+    made, faults = {}, []
+    for name, gear in zip(names, gears.gears, strict=True):
+        try:
+            given = gear.tip_open and gear.tip_diameter is not None
+            made[name] = replace(gear, tip_open=False) if given else gear
+        except GeometryError as error:
+            faults.append(error)
+        if gear.tip_open and gear.tip_diameter is None:
+            made[name] = replace(gear, tip_shortening=shortening[name])
+    if faults:
+        raise combined_fault(faults)
+    gears = replace(gears, **made)
     for number in sorted(range(len(names)), key=lambda n: (not gears.gears[n].internal, -n)):
         gear = gears.gears[number]
         if gear.tip_open:

@@ -8,8 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
+from dataclasses import dataclass
+from itertools import pairwise
 from textwrap import wrap
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 from femgear.case import text as case_text
 from femgear.case.estimates import (
@@ -21,10 +23,14 @@ from femgear.case.estimates import (
     usual_torque,
 )
 from femgear.case.gear_set import planetary_set
-from femgear.case.quantities import ANGLE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
-from femgear.case.sections import FaceWidth, Module
+from femgear.case.quantities import ANGLE, FREE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION, Quantity
+from femgear.case.sections import LARGEST_HELIX, FaceWidth, Module
 from femgear.errors import CaseError
 from femgear.gears.phasing import neighbouring_teeth
+from femgear.gears.planetary import equal_planet_angles, feasible_angles
+from femgear.gears.profile import BasicRack, overlap_ratio, transverse_rack, transverse_tool
+from femgear.gears.shifts import share_shifts
+from femgear.gears.tips import SEEN, typed_diameter
 from femgear.trains.reading import parse_case
 
 
@@ -80,16 +86,45 @@ KINDS = {
     "drivetrain": (23, 71),
 }  # fmt: skip
 """Kinds of cases that `new_case` writes, with the teeth of their gears."""
+BACKLASH = 0.04
+"""Backlash of new cases on the reference circles [normal modules]."""
+Angle = Annotated[float, Quantity(ANGLE, -LARGEST_HELIX, LARGEST_HELIX)]
+CentreDistance = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 _HEAD = "Written by femgear new {}. What is estimated says so: give what is known instead."
 _LEAVE = " Masses and inertias stay when teeth change: delete their lines to have them estimated anew."
 _STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"}
 
 
+@dataclass(frozen=True)
+class ToothForm:
+    """What a new case may be given of its teeth.
+
+    Parameters
+    ----------
+    shifts : tuple of float
+        Of sun and planet, perhaps of the ring (positive outwards), or of both gears.
+    centre_distance : str, optional
+    helix : str, optional
+        Helix angle of planetary sets, pairs and helical cases, of these by default 20 deg.
+    addendum : float, optional
+        Of the basic rack [modules], by default 1; the dedendum is a quarter more.
+    """
+
+    shifts: tuple[float, ...] = ()
+    centre_distance: str | None = None
+    helix: str | None = None
+    addendum: float | None = None
+
+
 def new_case(
     kind: str, *, teeth: tuple[int, ...] = (), module: str | None = None, torque: str | None = None,
     speed: str | None = None, planets: int | None = None, face_width: str | None = None,
+    form: ToothForm | None = None,
 ) -> str:  # fmt: skip
     """Write a commented case from a few numbers.
+
+    Profile shifts and centre distance that are not given are those of `femgear.gears.shifts.share_shifts`,
+    tips run free of their mates.
 
     Parameters
     ----------
@@ -104,61 +139,84 @@ def new_case(
     speed : str, optional
         By default 1000 rpm.
     planets : int, optional
-        By default the first of 3, 4, 5 and 2 that equal spacing allows.
+        By default the first of 3, 4 and 5 that equal spacing allows and that have room; else three as near
+        to it as they assemble, or fewer.
     face_width : str, optional
         By default twelve modules.
+    form : ToothForm, optional
+        Shifts, centre distance, helix and addendum, where they are given.
 
     Raises
     ------
     CaseError, GeometryError
-        Another kind (E-CHOICE), other numbers of teeth (E-COUNT), planets of two gears
-        (E-ARGUMENTS), planets that equal spacing does not allow (E-ASSEMBLY), and what makes no case.
+        Another kind (E-CHOICE), other numbers of teeth or shifts (E-COUNT), planets or a helix where there
+        are none (E-ARGUMENTS), planets that equal spacing does not allow (E-ASSEMBLY), and what makes no
+        case.
     """
     given = {"teeth": teeth, "module": module, "planets": planets, "face-width": face_width}
     given |= {"torque": torque, "speed": speed}
-    teeth, count = _teeth_and_planets(kind, teeth, planets)
+    teeth, form = _teeth(kind, teeth), form or ToothForm()
+    _check_options(kind, teeth, planets, form)
+    of_set, notes = len(teeth) == 3, _usual_notes(given)
     module, speed = "2 mm" if module is None else module, "1000 rpm" if speed is None else speed
-    size, of_set = _read(Module, module, "--module"), len(teeth) == 3
+    size, beta = _read(Module, module, "--module"), math.radians(20.0) if kind == "helical" else 0.0
+    beta = beta if form.helix is None else _read(Angle, form.helix, "--helix")
     width = 12.0 * size if face_width is None else _read(FaceWidth, face_width, "--face-width")
+    gears, of_all = _gears(teeth, size, beta, form, notes)
+    count, angles = _planets(teeth, planets, gears) if of_set else (1, None)
     load = f"{usual_torque(teeth[0], teeth[1], size, width, count):.3g} N m" if torque is None else torque
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
     head = [_HEAD.format(kind) + ("" if kind == "drivetrain" else _LEAVE)]
     head += [f"Assumed: {' '.join(left)}"] if left else []
-    helix = math.radians(20.0) if kind == "helical" else 0.0
+    of_all["set"] |= {"backlash": _millimetres(BACKLASH * size), "face_width": LENGTH.show(width)}
+    tables: dict[str, Any] = {"format": 1, "title": f"{kind.capitalize()} {'/'.join(map(str, teeth))}"}
+    tables |= {**of_all, "material": _STEEL, **_sections(gears, of_all, size, beta, notes)}
+    tables["operation"] = {"torque": load, "speeds": [speed]}
+    if beta and kind != "helical":
+        tables["set"]["helix_angle"] = ANGLE.show(beta)
+        tables["static"] = {"slices": _slices(width, size, beta)}
     shared = {"module": module, "pressure_angle": "20 deg"}
+    if not of_set:
+        tables = _with_tips(tables | {"model": "pair", "set": {**shared, **tables["set"]}}, notes)
+        tables = _chain(tables, notes) if kind == "drivetrain" else tables
+        return draft_text(tables, notes, word="estimated", head=head)
+    tables["sun"] = {"teeth": teeth[0], **shared, **tables["sun"]}
+    tables["set"] = {"planets": count, **({"planet_angles": angles} if angles else {}), **tables["set"]}
+    tables["operation"] = {"input": "sun", "fixed": "ring", **tables["operation"]}
+    more = {"planar": {"response": {}}, "helical": {"helix_angle": ANGLE.show(beta)}}
+    tables |= {kind: more[kind]} if kind in more else {}
+    return draft_text(_with_tips(tables, notes), notes, word="estimated", head=head)
+
+
+def _usual_notes(given: Mapping[str, Any]) -> dict[str, str]:
+    """Remarks on entries that every new case has, and on those whose option is not given."""
     notes = {f"material.{key}": "estimated: steel" for key in _STEEL}
     notes |= {f"{key}.pressure_angle": "estimated: ISO 53" for key in ("sun", "set", "parallel[0]")}
-    notes |= {"set.planets": "estimated: as equal spacing allows"} if planets is None and of_set else {}
-    notes |= {} if face_width else {"set.face_width": "estimated: 12 modules"}
-    notes |= {} if torque else {"operation.torque": "estimated: K factor of 1 N/mm^2"}
-    gears: dict[str, dict[str, Any]] = {}
-    for name, z in zip(("sun", "planet", "ring") if of_set else ("gear_1", "gear_2"), teeth, strict=True):
-        radius, key = usual_rim(z, size, 1.25, internal=name == "ring", helix=helix)[0], "bore_radius"
-        key = "outer_radius" if name == "ring" else key
-        notes[f"{name}.{key}"] = f"estimated: a rim of {'four' if name == 'ring' else 'three'} modules"
-        gears[name] = {"teeth": z, "profile_shift": 0.0, key: LENGTH.show(radius)}
-    tables: dict[str, Any] = {"format": 1, "title": f"{kind.capitalize()} {'/'.join(map(str, teeth))}"}
-    tables |= {"set": {"face_width": LENGTH.show(width)}, "material": _STEEL, **gears}
-    tables["operation"] = {"torque": load, "speeds": [speed]}
-    if not of_set:
-        tables |= {"model": "pair", "set": {**shared, **tables["set"]}}
-        if kind == "drivetrain":
-            tables = _chain(tables, notes)
-        return draft_text(tables, notes, word="estimated", head=head)
-    gears["sun"] = {"teeth": teeth[0], **shared, **gears["sun"]}
-    tables |= {"sun": gears["sun"], "set": {"planets": count, **tables["set"]}}
-    tables["operation"] = {"input": "sun", "fixed": "ring", **tables["operation"]}
-    # with the other shift the set closes: of the sun where the ring has teeth left over
-    del gears["sun" if teeth[2] >= teeth[0] + 2 * teeth[1] else "ring"]["profile_shift"]
-    more = {"planar": {"response": {}}, "helical": {"helix_angle": ANGLE.show(helix)}}
-    tables |= {kind: more[kind]} if kind in more else {}
-    return draft_text(tables, notes, word="estimated", head=head)
+    notes |= {"set.planets": "estimated: as equal spacing allows"} if given["planets"] is None else {}
+    notes |= {} if given["face-width"] else {"set.face_width": "estimated: 12 modules"}
+    notes |= {} if given["torque"] else {"operation.torque": "estimated: K factor of 1 N/mm^2"}
+    return notes | {
+        "set.backlash": f"estimated: {BACKLASH:g} modules",
+        "set.planet_angles": "estimated: nearest to equal spacing, which these teeth do not allow",
+        "static.slices": "estimated: helical teeth need slices over the face width",
+    }
 
 
-def _teeth_and_planets(kind: str, teeth: tuple[int, ...], planets: int | None) -> tuple[tuple[int, ...], int]:
-    """Settle the teeth of a kind of cases and the number of planets, of two gears 1."""
+def _check_options(kind: str, teeth: tuple[int, ...], planets: int | None, form: ToothForm) -> None:
+    """Refuse planets and a helix where there are none, and planets that equal spacing does not allow."""
+    of_set = len(teeth) == 3
+    if planets is not None and not of_set:
+        raise _no_such(kind, "--planets", "no planets")
+    if planets and planets > 0 and sum(teeth[::2]) % planets:
+        raise _unequal(teeth, planets)
+    if form.helix is not None and kind in ("planar", "drivetrain"):
+        raise _no_such(kind, "--helix", "spur teeth, or a helix_angle of its own tables")
+
+
+def _teeth(kind: str, teeth: tuple[int, ...]) -> tuple[int, ...]:
+    """Settle the teeth of a kind of cases."""
     if kind not in KINDS:
         limit = ", ".join(KINDS)
         raise CaseError("there is no such kind of case", code="E-CHOICE", key="kind", value=kind, limit=limit)
@@ -170,15 +228,141 @@ def _teeth_and_planets(kind: str, teeth: tuple[int, ...], planets: int | None) -
             f"a {kind} case needs {len(usual)} numbers of teeth", code="E-COUNT", key="--teeth",
             value=teeth, limit=f"5 to 5000 each, as in --teeth {' '.join(map(str, usual))}",
         )  # fmt: skip
-    of_set, total = len(usual) == 3, sum(teeth[::2])
-    if planets is not None and not of_set:
-        remedy = "leave it out"
-        raise CaseError(f"a {kind} case has no planets", code="E-ARGUMENTS", key="--planets", remedy=remedy)
-    if planets is None:
-        planets = next((n for n in (3, 4, 5, 2) if total % n == 0), 3) if of_set else 1
-    if of_set and planets > 0 and total % planets:
-        raise _unequal(teeth, planets)
-    return teeth, planets
+    return teeth
+
+
+def _no_such(kind: str, option: str, words: str) -> CaseError:
+    message = f"a {kind} case has {words}"
+    return CaseError(message, code="E-ARGUMENTS", key=option, remedy="leave it out")
+
+
+def _gears(
+    teeth: tuple[int, ...], size: float, beta: float, form: ToothForm, notes: dict[str, str]
+) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Teeth, shift and rack of every gear, and tables of all: centre distance and rack."""
+    names = ("sun", "planet", "ring") if len(teeth) == 3 else ("gear_1", "gear_2")
+    gears: list[dict[str, Any]] = [{"name": n, "teeth": z} for n, z in zip(names, teeth, strict=True)]
+    of_all: dict[str, Any] = {"set": {}}
+    rack, shifts, addendum = BasicRack(), form.shifts, form.addendum
+    if addendum is not None:
+        rack = BasicRack(addendum, addendum + 0.25, 0.25)
+        of_all["rack"] = {"addendum": addendum, "dedendum": rack.dedendum, "root_radius": rack.root_radius}
+        notes["rack.root_radius"] = "estimated: a quarter of a module"
+        notes["rack.dedendum"] = "estimated: a quarter of a module below the mate's tips"
+        check_rack(of_all["rack"])
+    distance = None
+    if form.centre_distance is not None:
+        distance = _read(CentreDistance, form.centre_distance, "--centre-distance")
+        of_all["set"]["centre_distance"] = form.centre_distance
+    if shifts:
+        if len(shifts) not in (len(teeth), 2):
+            raise CaseError(
+                f"{len(shifts)} profile shifts of {len(teeth)} gears", code="E-COUNT", key="--shifts",
+                limit="those of sun and planet, or of all three gears" if len(teeth) == 3 else "two",
+            )  # fmt: skip
+        for gear, shift in zip(gears, shifts, strict=False):
+            gear["profile_shift"] = shift
+        return gears, of_all
+    module, alpha = transverse_tool(size, math.radians(20.0), beta)
+    step = 10.0 ** (math.floor(math.log10(1e3 * size)) - 5) / module
+    shared = share_shifts(
+        teeth, alpha, transverse_rack(rack, beta), backlash=BACKLASH * math.cos(beta), step=step,
+        centre_distance=None if distance is None else distance / module,
+    )  # fmt: skip
+    found = [round(shift / math.cos(beta), 4) + 0.0 for shift in shared.shifts]
+    rounding = shared.gears.gears[-1].rack.root_radius / math.cos(beta)
+    if rounding < rack.root_radius - 1e-9:
+        gears[-1]["rack"] = {"addendum": rack.addendum, "dedendum": rack.dedendum}
+        gears[-1]["rack"]["root_radius"] = round(rounding, 4)
+        notes[f"{names[-1]}.rack.root_radius"] = "estimated: what its pinion cutter has room for"
+    if not any(found) and distance is None:
+        for gear in gears:
+            gear["profile_shift"] = 0.0
+        return gears, of_all
+    # the other shifts are found, so that the set closes to the last digit
+    own = 1 if len(teeth) == 3 else 0
+    gears[own]["profile_shift"] = found[own]
+    others = ", ".join(f"{n} {x:g}" for n, x in zip(names, found, strict=True) if n != names[own])
+    notes[f"{names[own]}.profile_shift"] = (
+        f"estimated: specific sliding of {names[0]} and {names[1]} as equal as undercut, tips and contact "
+        f"ratios allow; found with it: {others}"
+    )
+    if distance is None:
+        of_all["set"]["centre_distance"] = _millimetres(shared.centre_distance * module)
+        notes["set.centre_distance"] = "estimated: with these shifts the gears close"
+    return gears, of_all
+
+
+def check_rack(rack: Mapping[str, float]) -> None:
+    """Refuse an addendum that no rack has (E-RANGE), under the name of its option."""
+    if not 0.5 <= rack["addendum"] <= 1.5:
+        raise CaseError(
+            "no usual addendum", code="E-RANGE", key="--addendum", value=rack["addendum"],
+            limit="0.5 to 1.5 modules",
+        )  # fmt: skip
+
+
+def _sections(
+    gears: list[dict[str, Any]], of_all: dict[str, Any], size: float, beta: float, notes: dict[str, str]
+) -> dict[str, dict[str, Any]]:
+    """Sections of all gears, with rims and tips that run free."""
+    found = {}
+    for gear in gears:
+        section = dict(gear)
+        name, internal = section.pop("name"), gear["name"] == "ring"
+        dedendum = of_all.get("rack", {}).get("dedendum", 1.25)
+        shift = section.get("profile_shift", 0.0)
+        radius, _ = usual_rim(gear["teeth"], size, dedendum, shift, internal=internal, helix=beta)
+        key = "outer_radius" if internal else "bore_radius"
+        notes[f"{name}.{key}"] = f"estimated: a rim of {'four' if internal else 'three'} modules"
+        found[name] = {**section, key: LENGTH.show(radius), "tip_diameter": FREE}
+    return found
+
+
+def _with_tips(tables: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
+    """Tables with the diameters of free tips, where they are not those of the rack."""
+    case = parse_case(case_text.write(tables))
+    gears: Any = planetary_set(case)
+    for gear in gears.gears:
+        del tables[gear.name]["tip_diameter"]
+        if gear.tip_shortening > SEEN:
+            diameter = typed_diameter(gear, gear.tip_radius)
+            tables[gear.name]["tip_diameter"] = _millimetres(diameter)
+            less = gear.tip_shortening / case.module
+            notes[f"{gear.name}.tip_diameter"] = (
+                f"estimated: {less:.4f} modules shorter than of the rack, for clearance and free fillets"
+            )
+    return tables
+
+
+def _millimetres(length: float) -> str:
+    """Length [m] as text in mm, to 0.1 um."""
+    return f"{round(1e3 * length, 4):.10g} mm"
+
+
+def _slices(width: float, size: float, beta: float) -> int:
+    """Slices over the face width that helical teeth need."""
+    most = int(4.0 * width * math.cos(beta) / size)
+    return max(min(25, most), math.ceil(6.0 * overlap_ratio(width, size, beta)) + 1)
+
+
+def _planets(
+    teeth: tuple[int, ...], planets: int | None, gears: list[dict[str, Any]]
+) -> tuple[int, list[str] | None]:
+    """Number of planets, and their angles where equal spacing does not go."""
+    if planets is not None:
+        return planets, None
+    total = teeth[0] + teeth[2]
+    # reference circles and an addendum, with one module between neighbours
+    distance = 0.5 * max(teeth[0] + teeth[1], teeth[2] - teeth[1])
+    reach = 0.5 * teeth[1] + 1.5 + max(gears[1].get("profile_shift", 0.0), 0.0)
+    for count, equal in ((3, True), (4, True), (5, True), (3, False), (2, True), (2, False)):
+        angles = equal_planet_angles(count) if equal else feasible_angles(total, equal_planet_angles(count))
+        gap = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
+        if (total % count and equal) or distance * math.sin(0.5 * min(gap, math.pi)) < reach:
+            continue
+        return count, None if equal else [f"{math.degrees(one):.10g} deg" for one in angles]
+    return 1, None
 
 
 def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:

@@ -1,6 +1,7 @@
 """Cases that ``femgear new`` writes."""
 
 import contextlib
+import math
 import re
 
 import pytest
@@ -9,7 +10,7 @@ from femgear import solve
 from femgear.case.gear_set import planetary_set
 from femgear.case.text import parse, write
 from femgear.errors import CaseError, FemgearError
-from femgear.trains.drafts import KINDS, new_case
+from femgear.trains.drafts import KINDS, ToothForm, new_case
 from femgear.trains.reading import parse_case, read_case, with_values
 from femgear.trains.registry import check_case, train_of
 
@@ -65,7 +66,9 @@ def test_numbers_that_are_given():
 def test_sets_close_with_teeth_left_over_or_missing(teeth, planets):
     gears = planetary_set(read_case(new_case("planetary", teeth=teeth)))
     assert gears.n_planets == planets
-    assert abs(gears.backlash_sun_planet) + abs(gears.backlash_planet_ring) < 1e-9
+    play = 0.04 * gears.sun.module * math.cos(gears.sun.pressure_angle)
+    assert gears.backlash_sun_planet == pytest.approx(play, rel=1e-6)
+    assert gears.backlash_planet_ring == pytest.approx(play, rel=1e-6)
     assert min(gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring) > 1.0
 
 
@@ -79,7 +82,12 @@ def test_sets_close_with_teeth_left_over_or_missing(teeth, planets):
         ("planar", {"teeth": (27, 40, 10**400)}, "E-COUNT"),
         *((kind, {"module": "1e300 mm"}, "E-RANGE") for kind in KINDS),
         *(("pair", {name: ""}, "E-UNIT") for name in ("module", "face_width", "torque", "speed")),
-        ("planetary", {"teeth": (17, 22, 62)}, "E-ASSEMBLY"),
+        ("planetary", {"teeth": (17, 22, 62), "planets": 3}, "E-ASSEMBLY"),
+        ("planetary", {"form": ToothForm(shifts=(0.2,))}, "E-COUNT"),
+        ("planetary", {"form": ToothForm(addendum=2.0)}, "E-RANGE"),
+        ("planetary", {"form": ToothForm(centre_distance="90")}, "E-UNIT"),
+        ("planetary", {"form": ToothForm(centre_distance="90 mm")}, "E-SHIFT"),
+        ("planar", {"form": ToothForm(helix="10 deg")}, "E-ARGUMENTS"),
         ("pair", {"module": "2"}, "E-UNIT"),
         ("drivetrain", {"module": "2 kg"}, "E-UNIT"),
         ("planetary", {"torque": "12 N"}, "E-UNIT"),
@@ -99,18 +107,19 @@ def test_refusals_name_the_option():
         new_case("planetary", module="1e300 mm")
     assert caught.value.key == "--module"
     with pytest.raises(CaseError, match="E-ASSEMBLY") as caught:
-        new_case("planetary", teeth=(17, 22, 62))
+        new_case("planetary", teeth=(17, 22, 62), planets=3)
     assert "or 17 22 61" in (caught.value.remedy or "")
 
 
 def test_rounding_is_no_play_and_one_planet_is_singular():
     """Profile shifts that close the set leave a play of about 1e-18 m, of either sign."""
     for teeth in ((27, 40, 108), (30, 20, 70)):
-        case = read_case(new_case("planar", teeth=teeth))
+        case = with_values(read_case(new_case("planar", teeth=teeth)), {"set.backlash": "0 mm"})
         notes = [note for block in train_of(case).describe_case(case) for note in block.notes]
         assert any(note.startswith("play along the line of action 0 um,") for note in notes)
         pins = [{"planet": 1, "tangential": "20 um"}]
-        case = with_values(read_case(new_case("planetary", teeth=teeth)), {"set.pin_errors": pins})
+        changes = {"set.pin_errors": pins, "set.backlash": "0 mm"}
+        case = with_values(read_case(new_case("planetary", teeth=teeth)), changes)
         said = next(one for one in train_of(case).case_warnings(case) if one.code == "W-WEDGING")
         assert "ideal gears have 0.000 um" in str(said)
     case = read_case(new_case("planetary", planets=1))
@@ -183,3 +192,84 @@ def test_new_cases_have_modes(kind):
     coarse = {"static.positions": 16, "static.flank_elements": 8}
     found = solve(with_values(parse_case(new_case(kind)), coarse), "modes")
     assert found["modes"].modes.frequency.max() > 500.0
+
+
+def said(text):
+    """Codes of what a case is warned of, once it is found that it runs."""
+    case = read_case(text)
+    check_case(case)
+    return {one.code for one in train_of(case).case_warnings(case)} | {one.code for one in case.notices}
+
+
+LEFT_OVER = [(z, p, z + 2 * p + d) for d in (3, 4) for z in range(17, 46, 4) for p in range(17, 48, 5)][:99]
+"""Teeth that close by sharing the shift between sun and planet alone."""
+
+
+def check_draft(teeth):
+    codes = said(new_case("planetary", teeth=teeth))
+    # two planets are all that have room or assemble evenly
+    assert not codes - {"", "W-PLANETS"}, (teeth, codes)
+
+
+@pytest.mark.parametrize("teeth", [(19, 17, 56), (17, 19, 57), (20, 24, 70), *LEFT_OVER[::20]])
+def test_drafts_never_warn_of_themselves(teeth):
+    check_draft(teeth)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("teeth", LEFT_OVER)
+def test_all_drafts_with_teeth_left_over(teeth):
+    check_draft(teeth)
+
+
+@pytest.mark.parametrize(
+    ("kind", "numbers"),
+    [
+        ("planetary", {"teeth": (17, 17, 51)}),
+        ("planetary", {"teeth": (18, 12, 42)}),
+        ("planetary", {"teeth": (17, 22, 62)}),
+        ("planetary", {"form": ToothForm(helix="20 deg")}),
+        ("planetary", {"form": ToothForm(addendum=1.1)}),
+        ("helical", {"teeth": (37, 27, 89), "module": "0.2 mm"}),
+        ("planar", {"teeth": (21, 33, 87)}),
+        ("pair", {"teeth": (12, 24), "form": ToothForm(centre_distance="37 mm")}),
+        ("pair", {"teeth": (9, 40)}),
+        ("pair", {"form": ToothForm(shifts=(0.3, 0.1), helix="-15 deg")}),
+    ],
+)
+def test_drafts_of_other_kinds_never_warn_of_themselves(kind, numbers):
+    assert not said(new_case(kind, **numbers)) - {""}
+
+
+def test_shifts_are_shared_by_equal_sliding():
+    """Specific sliding at the ends of the path of contact of sun and planet, from velocities by hand."""
+    text = new_case("planetary", teeth=(27, 40, 108))
+    gears = planetary_set(read_case(text))
+    assert gears.centre_distance == pytest.approx(68e-3) and "specific sliding of sun and planet" in text
+    assert gears.sun.profile_shift > gears.planet.profile_shift > 0.1
+    length = gears.centre_distance * math.sin(gears.working_pressure_angle_sun_planet)
+    ends = []
+    for one, two in ((gears.sun, gears.planet), (gears.planet, gears.sun)):
+        far = two.tip_roll
+        ends.append(one.teeth / two.teeth * far / (length - far) - 1.0)
+    assert ends[0] == pytest.approx(ends[1], rel=0.06)  # shifts are tried in steps of 0.02
+
+
+def test_shifts_and_distance_that_are_given_stay():
+    form = ToothForm(shifts=(0.3, 0.1), centre_distance="68.2 mm", addendum=0.9)
+    text = new_case("planetary", form=form)
+    case = read_case(text)
+    assert (case.sun.profile_shift, case.planet.profile_shift) == (0.3, 0.1)
+    assert case.set.centre_distance == 68.2e-3 and case.rack.addendum == 0.9
+    assert "estimated" not in "".join(re.findall("(?m)^(?:profile_shift|centre_distance).*", text))
+
+
+def test_teeth_that_space_no_planets_evenly_get_angles():
+    case = read_case(new_case("planetary", teeth=(17, 22, 62)))
+    assert case.set.planets == 3 and case.set.planet_angles[1] * 79 / math.tau == pytest.approx(26.0)
+
+
+def test_stubs_rings_and_gives_tips_that_run_free():
+    text = new_case("planetary", teeth=(21, 33, 87))
+    assert text.count("tip_diameter") == 1 and text.index("tip_diameter") > text.index("[ring]")
+    assert {one.profile_shift for one in planetary_set(read_case(text)).gears} == {0.0}

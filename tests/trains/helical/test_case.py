@@ -243,14 +243,28 @@ def test_errors_that_turn_are_refused(case):
         check_helical_case(eccentric, planetary_set(eccentric))
 
 
-def test_virtual_gears_that_cannot_be_made_are_refused(case):
-    # a round tool tip that fits between the flanks of the transverse section alone
+def test_virtual_gears_have_tools_with_room(case):
+    """A round tool tip that fits between the flanks of the transverse section alone is less round there."""
     blunt = with_value(case, "rack", {"root_radius": 0.445, "addendum": 0.7})
     gears = planetary_set(blunt)
+    check_helical_case(blunt, gears)
+    from femgear.gears.planetary import virtual_set
+
+    virtual = virtual_set(gears, blunt.helical.helix_angle)
+    assert virtual.ring.rack.root_radius < 0.445 and virtual.ring.tool.room >= 0.0
+    assert virtual.sun.rack.root_radius == pytest.approx(0.445)
+
+
+def test_virtual_gears_that_cannot_be_made_are_refused(case, monkeypatch):
+    def refuse(*_):
+        raise GeometryError("no such gear", code="E-TIP", key="sun.tip_diameter")
+
+    monkeypatch.setattr("femgear.trains.helical.model.virtual_set", refuse)
+    gears = planetary_set(case)
     with pytest.raises(CaseError, match="E-GEOMETRY") as info:
-        check_helical_case(blunt, gears)
+        check_helical_case(case, gears)
     assert 'section = "transverse"' in info.value.remedy
-    check_helical_case(with_value(blunt, "helical.section", "transverse"), gears)
+    check_helical_case(with_value(case, "helical.section", "transverse"), gears)
 
 
 def test_refusals_of_the_gears_say_that_they_are_of_the_transverse_section(case):
