@@ -123,8 +123,7 @@ def new_case(
 ) -> str:  # fmt: skip
     """Write a commented case from a few numbers.
 
-    Profile shifts and centre distance that are not given are those of `femgear.gears.shifts.share_shifts`,
-    tips run free of their mates.
+    Shifts that are not given are those of `femgear.gears.shifts.share_shifts`; tips run free of their mates.
 
     Parameters
     ----------
@@ -149,9 +148,8 @@ def new_case(
     Raises
     ------
     CaseError, GeometryError
-        Another kind (E-CHOICE), other numbers of teeth or shifts (E-COUNT), planets or a helix where there
-        are none (E-ARGUMENTS), planets that equal spacing does not allow (E-ASSEMBLY), and what makes no
-        case.
+        Another kind (E-CHOICE), other numbers of teeth or shifts (E-COUNT), options that it has not
+        (E-ARGUMENTS), planets that equal spacing does not allow (E-ASSEMBLY), and what makes no case.
     """
     given = {"teeth": teeth, "module": module, "planets": planets, "face-width": face_width}
     given |= {"torque": torque, "speed": speed}
