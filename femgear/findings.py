@@ -51,6 +51,7 @@ CATALOGUE = {
     "W-PARTED": (NOTE, "Teeth never touch."),
     "W-PLANETS": (NOTE, "Planets are not equally spaced, or their number is unusual."),
     "W-POINTS": (DOUBT, "Points on the ring do not resolve its waves."),
+    "W-POSITIONS": (DOUBT, "Peaks between positions may be higher."),
     "W-PRESSURE": (FAULT, "The contact pressure exceeds what any steel carries."),
     "W-PROFILE": (NOTE, "A profile has proportions that are unusual."),
     "W-PULL": (DOUBT, "Meshes pull where real teeth would part."),

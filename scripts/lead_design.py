@@ -109,7 +109,7 @@ def in_slices(case, positions: int):
 
     gears, deviations, cache = planetary_set(case), set_deviations(case), grid_cache()
     bodies = flank_compliances(case, gears, cache=cache)[1]
-    options = CycleOptions(**over_width(case, gears, cache=cache))
+    options = CycleOptions(peaks=True, **over_width(case, gears, cache=cache))
     basis = DesignBasis(gears, bodies, static_supports(case), deviations, positions, case.static.contact)
     per_input = sun_torque(case, gears, case.operation.torque) / case.operation.torque
 
@@ -120,7 +120,7 @@ def in_slices(case, positions: int):
         found = replace(basis, deviations=replace(deviations, sun=form))
         cycle = found.walk(per_input * torque, options=options)
         assert cycle.face_load_factor is not None
-        return float(cycle.face_load_factor[: gears.n_planets].max()), float(np.ptp(cycle.sun_arc))
+        return float(cycle.face_load_factor[: gears.n_planets].max()), float(cycle.peak_to_peak("sun_arc"))
 
     return state
 

@@ -91,7 +91,8 @@ def _print_summary(torques, results):
     for torque, static in zip(torques, results):
         for name, j in distinct_lines(static["mesh"].values, static["mesh_stiffness"]):
             k, ste = static["mesh_stiffness"].values[j] / 1e6, static["ste"].values[j] * 1e6
-            values = (k.mean(), np.ptp(k), ste.mean(), np.ptp(ste))
+            k_peak, ste_peak = (static[f"{one}_peak_to_peak"].values[j] for one in ("mesh_stiffness", "ste"))
+            values = (k.mean(), k_peak / 1e6, ste.mean(), ste_peak * 1e6)
             per_width = k.mean() / (1e3 * static.attrs["face_width"])
             rows.append((name, f"{torque:g}", *(f"{v:.4f}" for v in values), f"{per_width:.3f}"))
     header = ("mesh", "torque [N m]", "k mean [N/um]", "k p-p", "STE mean [um]", "STE p-p", "k/b [N/(mm um)]")
@@ -127,8 +128,11 @@ def _figure(torques, results):
         title, mean = f"{kind} meshes", ""
         if number == 1:
             # one curve needs no legend: its title says what it shows
-            title += f", {torques[0]:g} N m: {np.ptp(ste):.3g} µm peak to peak"
-            mean = f"mean {np.mean(k[:-1]):.4g} N/µm, {np.ptp(k):.4g} N/µm peak to peak"
+            stored = results[0].isel(mesh=j)
+            peak = 1e6 * float(stored["ste_peak_to_peak"])
+            title += f", {torques[0]:g} N m: {peak:.3g} µm peak to peak"
+            peak = 1e-6 * float(stored["mesh_stiffness_peak_to_peak"])
+            mean = f"mean {np.mean(k[:-1]):.4g} N/µm, {peak:.4g} N/µm peak to peak"
         label(axes[column], y="transmission error [µm]", title=title)
         label(axes[len(kinds) + column], "position in the mesh period [1]", "tangent stiffness [N/µm]", mean)
     axes[0].set_xlim(0, 1)

@@ -34,6 +34,7 @@ from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
 from femgear.contact.flank_pairs import mesh_count
 from femgear.contact.omitted_pairs import needed_nearest
+from femgear.contact.peaks import FEWEST, MOST_PLACES, MOST_ROUNDS, Between, open_places, tooth_pair_codes
 from femgear.contact.slices import largest_mean
 from femgear.contact.supports import (
     RIGID,
@@ -83,6 +84,9 @@ class CycleOptions:
         By how much the slices of helical teeth run ahead of mid-width [mesh periods].
     width_supports : WidthSupports
         What holds members against tilting and twisting in slices.
+    peaks : bool
+        Solve further positions where the extremes between equidistant ones lie (`MeshCycle.between`), see
+        `femgear.contact.peaks`; not of helical teeth.
     progress : callable, optional
         Called with (positions done, positions).
     """
@@ -97,6 +101,7 @@ class CycleOptions:
     slices: int = 1
     ahead: np.ndarray | None = None
     width_supports: WidthSupports = UPRIGHT
+    peaks: bool = False
     progress: Callable[[int, int], None] | None = None
 
     def mirrored(self, order: np.ndarray) -> CycleOptions:
@@ -187,6 +192,10 @@ class MeshCycle:
         Slope of the axes of members that tilt, and wind-up of the carrier [rad], named by `tilt_names`.
     helical : bool
         Whether the slices are those of helical teeth: the path coordinates are those at mid-width.
+    between : Between, optional
+        States at further positions, between which and the others no extremes are left.
+    alike : int
+        Rotations that map the planets onto one another: they go through the same states.
     """
 
     position: np.ndarray
@@ -225,6 +234,32 @@ class MeshCycle:
     member_tilt: np.ndarray | None = None
     tilt_names: tuple[str, ...] = ()
     helical: bool = False
+    between: Between | None = None
+    alike: int = 1
+
+    def extremes(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest values over the record and the positions between.
+
+        Of ``deflection`` or ``stiffness`` of every mesh (M,), ``load_share`` of planets (N,), or ``sun_arc``.
+        """
+        values = np.asarray(getattr(self, name))
+        if self.between is not None:
+            values = np.concatenate([values, getattr(self.between, name)], axis=-1)
+        if values.ndim == 1:
+            return values.min(), values.max()
+        classes, shape = len(self.open_planets) // self.alike, (-1, self.alike, values.shape[-1])
+        # the same states at other times: the positions between are those of one planet
+        of_class = values.reshape(-1, self.alike, classes, values.shape[-1]).swapaxes(1, 2).reshape(shape)
+        low, high = (
+            np.repeat(extreme.reshape(-1, 1, classes), self.alike, axis=1).ravel()
+            for extreme in (of_class.min(axis=(1, 2)), of_class.max(axis=(1, 2)))
+        )
+        return low, high
+
+    def peak_to_peak(self, name: str = "deflection") -> np.ndarray:
+        """Compute the difference of the `extremes`: of a static transmission error by default."""
+        low, high = self.extremes(name)
+        return np.asarray(high - low)
 
     @property
     def face_load_factor(self) -> np.ndarray | None:
@@ -366,12 +401,16 @@ def walk_mesh_cycle(
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
         springs, width = bearing_springs(solved, supports, members), _face_width(solved, options)
         each = springs or options.both_flanks or options.planet_gaps is not None or (width and width.tilting)
-        images = 1 if each else math.gcd(planet_symmetry(solved, deviations), solved.gears[0].teeth)
+        alike = 1 if each else planet_symmetry(solved, deviations)
+        images = math.gcd(alike, solved.gears[0].teeth)
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
         walk = _Walk(
             solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, width
         )
-        found = in_windows(walk.attempt, *first_windows(solved, bodies, abs(sun_torque)))
+        peaks = options.peaks and options.ahead is None and not np.ndim(positions)
+        walk = replace(walk, alike=alike if periods == 1 else 1)
+        attempt = walk.attempt_with_peaks if peaks else walk.attempt
+        found = in_windows(attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
     if options.ahead is not None and not np.ndim(positions):
         record = replace(record, **over_slices(record, options.ahead, periods=periods))
@@ -480,6 +519,7 @@ class _Walk:
     empty: MeshCycle
     options: CycleOptions
     width: FaceWidth | None = None
+    alike: int = 1
 
     @property
     def images(self) -> int:
@@ -545,6 +585,67 @@ class _Walk:
             largest = 0.0 if record.slice_load is None else record.slice_load.max()
             share = enlarged(share, max(record.force.max(), record.back_force.max(), largest))
         return record, share, nearest
+
+    def attempt_with_peaks(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
+        """Solve all positions, and those between them at which extremes lie, in windows of one size."""
+        record, wider, further = self.attempt(share, nearest)
+        if record is None or (wider, further) != (share, nearest) or not record.force.any():
+            return record, wider, further
+        equidistant, doubt = len(record.position), 0.0
+        known, places = self._curves(record), self._first_places(record.position)
+        for _ in range(MOST_ROUNDS + 1):
+            if not len(places):
+                places, doubt = self._open_places(known)
+            added = len(known["position"]) - equidistant
+            if not len(places) or added + len(places) > MOST_PLACES:
+                doubt = max(doubt, 1.0) if len(places) else doubt
+                break
+            between, wider, further = self._at(places).attempt(share, nearest)
+            if between is None or (wider, further) != (share, nearest):
+                return None, wider, further
+            more = self._curves(between)
+            known = {name: np.concatenate([known[name], more[name]], axis=-1) for name in known}
+            places = np.zeros(0)
+        order = equidistant + np.argsort(known["position"][equidistant:])
+        names = ("position", "deflection", "stiffness", "sun_arc", "load_share")
+        between = Between(**{name: known[name][..., order] for name in names}, doubt=doubt)
+        return replace(record, between=between, alike=self.alike), share, nearest
+
+    def _first_places(self, position: np.ndarray) -> np.ndarray:
+        """Positions that divide the intervals of a record of few positions."""
+        periods = self.empty.periods
+        parts = -(-FEWEST * periods // len(position))
+        between = np.arange(1, parts) / parts * (periods / len(position))
+        return (position[:, None] - between if position[-1] <= 0.0 else position[:, None] + between).ravel()
+
+    def _at(self, places: np.ndarray) -> _Walk:
+        """The same set at other positions (n,), of which nobody is told."""
+        options, empty = replace(self.options, progress=None, pressures=False), self.empty
+        record = {"periods": empty.periods, "contact": empty.contact, "options": options}
+        return replace(self, options=options, empty=cycle_without_load(self.planetary_set, places, **record))
+
+    def _curves(self, record: MeshCycle) -> dict[str, np.ndarray]:
+        """What has peaks over the positions, and the tooth pairs that carry as `tooth_pair_codes`."""
+        names = ("position", "deflection", "stiffness", "sun_arc", "load_share")
+        pitch = self.planetary_set.base_pitch
+        codes = tooth_pair_codes(record.path, record.tooth_load, record.position, pitch)
+        return {name: np.asarray(getattr(record, name)) for name in names} | {"codes": codes}
+
+    def _open_places(self, known: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
+        """Find open peaks, see `open_places`; the first of planets that are alike stands for all."""
+        order, N = np.argsort(known["position"]), self.planetary_set.n_planets
+        deflection, stiffness = known["deflection"], known["stiffness"]
+        first = np.flatnonzero(np.arange(len(deflection)) % N < N // self.alike)
+        arc, share = known["sun_arc"][None], known["load_share"][: N // self.alike]
+        codes = known["codes"][first]
+        # which pairs carry changes slopes of deflections; stiffnesses jump there, and are equal on both sides
+        same = np.zeros((len(first) + len(share), len(order)), np.int64)
+        curves = np.concatenate([arc, deflection[first], stiffness[first], share])
+        still = [1e-3] * (1 + len(first)) + [0.1] * len(same)
+        least = np.array(still) * np.abs(curves).max(axis=1)
+        codes = np.concatenate([known["codes"].sum(axis=0)[None], codes, same])
+        position, curves, codes = known["position"][order], curves[:, order], codes[:, order]
+        return open_places(position, curves, codes, least, self.empty.periods)
 
     def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
         """What `MeshCycle` keeps of some positions, by the names of its fields; of the planets solved."""
@@ -673,6 +774,16 @@ def _seen_from_front(cycle: MeshCycle, planetary_set: GearSet, order) -> MeshCyc
             place = own[axis] if axis in own else slice(None, None, -1)
             values = values[(slice(None),) * number + (place,)]
         found[name] = -values if name in _ODD else values
+    if cycle.between is not None:
+        one, mesh = cycle.between, own["m"]
+        found["between"] = replace(
+            one,
+            position=0.0 - one.position[::-1],
+            deflection=one.deflection[mesh, ::-1],
+            stiffness=one.stiffness[mesh, ::-1],
+            sun_arc=one.sun_arc[::-1],
+            load_share=one.load_share[planet, ::-1],
+        )
     found["member_motion"] = _in_mirror(cycle.member_names, cycle.member_motion, planet, angle)
     if cycle.member_tilt is not None:
         found["member_tilt"] = _in_mirror(cycle.tilt_names, cycle.member_tilt, planet, angle)

@@ -208,13 +208,16 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
 
 def _signal(mesh: Mesh, arc: np.ndarray, deflection: np.ndarray, n: int) -> np.ndarray:
     """Rows of the transmission error (K, P) [m] of one kind of mesh, the overall one, or all of them."""
-    kinds = {"sun-planet": deflection[:n], "planet-ring": deflection[n:], "overall": np.atleast_2d(arc)}
+    arc = np.reshape(arc, (1, -1))
+    kinds = {"sun-planet": deflection[:n], "planet-ring": deflection[n:], "overall": arc}
     return np.vstack([arc, deflection]) if mesh == "largest" else kinds[mesh]
 
 
 def _peak_to_peak(signal: Callable, torque: float | None, variant: Variant) -> float:
     cycle = variant.static(torque).cycle
-    return float(np.ptp(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2), axis=1).max())
+    arc, meshes = (cycle.extremes(name) for name in ("sun_arc", "deflection"))
+    low, high = (signal(arc[i], meshes[i][:, None], len(meshes[i]) // 2) for i in (0, 1))
+    return float((high - low).max())
 
 
 def mesh_force(

@@ -63,7 +63,10 @@ class DesignBasis:
     contact: str = "profile"
 
     def walk(self, sun_torque: float, *, periods: int = 1, options: CycleOptions | None = None) -> MeshCycle:
-        """Solve the static problem over some mesh periods under a torque on the sun [N m]."""
+        """Solve the static problem over some mesh periods under a torque on the sun [N m].
+
+        With the extremes between positions, as ``femgear run`` finds them, where no options are given.
+        """
         return walk_mesh_cycle(
             self.gears,
             self.bodies,
@@ -73,7 +76,7 @@ class DesignBasis:
             deviations=self.deviations,
             supports=self.supports,
             periods=periods,
-            options=options,
+            options=options or CycleOptions(peaks=True),
         )
 
     def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
@@ -238,9 +241,8 @@ def harris_map(
         periods = 1 if variant is None else common_period(variant, basis.gears)[0]
         for t, torque in enumerate(torques):
             cycle = replace(basis, deviations=variant).walk(float(torque), periods=periods)
-            peak = np.ptp(cycle.deflection, axis=1)
-            peaks[v, :, t] = peak.reshape(kinds, -1).max(axis=1)
-            overall[v, t] = np.ptp(cycle.sun_arc)
+            peaks[v, :, t] = cycle.peak_to_peak().reshape(kinds, -1).max(axis=1)
+            overall[v, t] = cycle.peak_to_peak("sun_arc")
             residual = max(residual, float(cycle.residual.max()))
             if progress is not None:
                 progress("contact", v * len(torques) + t + 1, peaks[:, 0].size)

@@ -499,7 +499,8 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
         static.planetary_set, static.bodies, static_supports(case), set_deviations(case),
         case.static.positions, case.static.contact,
     )  # fmt: skip
-    linear = linearise(basis, sun_torque=static.sun_torque, periods=static.cycle.periods)
+    peaks = () if static.cycle.between is None else static.cycle.between.position
+    linear = linearise(basis, sun_torque=static.sun_torque, periods=static.cycle.periods, between=peaks)
     n, signal = static.planetary_set.n_planets, objective.signal
     assert signal is not None, "see has_derivatives"
     value = signal(linear.sun_arc, linear.deflection, n)

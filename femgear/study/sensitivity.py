@@ -128,7 +128,9 @@ def _original_rows(order) -> np.ndarray:
 
 
 @one_blas_thread()
-def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=None) -> LinearContact:
+def linearise(
+    basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=None, between=()
+) -> LinearContact:
     """Solve the contact of all drive flanks, and what it answers to small separations [m] of any cell.
 
     CaseError: E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
@@ -140,13 +142,15 @@ def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=N
         As for `contact.cycle.walk_mesh_cycle`; the torque is not zero.
     only : sequence of int, optional
         Numbers of the positions wanted; all of the record when left out.
+    between : sequence of float, optional
+        Further positions of the record, which are counted in [mesh periods].
     """
     solved, order = basis.loaded(sun_torque)
-    record = basis.positions * periods
-    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
-    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
-        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
-    position, numbers = cycle_positions(basis.positions, periods=periods), chosen
+    record = np.sort(np.append(cycle_positions(basis.positions, periods=periods), between))
+    chosen = np.arange(len(record)) if only is None else np.atleast_1d(np.asarray(only, int))
+    if not len(chosen) or chosen.min() < 0 or chosen.max() >= len(record):
+        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {len(record) - 1}")
+    position, numbers = record, chosen
     if sun_torque < 0:
         # the mirror image turns the other way and ends at position zero
         position, numbers = -position[::-1], len(position) - 1 - chosen
@@ -159,7 +163,7 @@ def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=N
         solved=solved.gears,
         order=order,
         load=load,
-        position=chosen / basis.positions,
+        position=record[chosen],
         solved_position=position[numbers],
         sun_arc=stacked["sun_arc"],
         deflection=stacked["deflection"].T[rows],

@@ -16,7 +16,13 @@ from pathlib import Path
 
 import femgear
 from femgear.trains.reading import with_values
-from femgear.trains.static.results import HELIX_VARIABLES, SLICE_VARIABLES, STATIC_VARIABLES, STRESS_VARIABLES
+from femgear.trains.static.results import (
+    HELIX_VARIABLES,
+    PEAK_VARIABLES,
+    SLICE_VARIABLES,
+    STATIC_VARIABLES,
+    STRESS_VARIABLES,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "results.md"
@@ -96,7 +102,8 @@ Variables = Mapping[str, tuple[str, str, str]]
 
 def variables() -> dict[tuple[str, str], Variables]:
     """Variables of every file by train and stage."""
-    declared = {"static": STATIC_VARIABLES | SLICE_VARIABLES | HELIX_VARIABLES, "stress": STRESS_VARIABLES}
+    static = STATIC_VARIABLES | PEAK_VARIABLES | SLICE_VARIABLES | HELIX_VARIABLES
+    declared = {"static": static, "stress": STRESS_VARIABLES}
     found: dict[tuple[str, str], Variables] = {("elastic", stage): one for stage, one in declared.items()}
     for train, (name, changes) in RUNS.items():
         case = with_values(femgear.read_case(ROOT / "cases" / f"{name}.toml"), changes)

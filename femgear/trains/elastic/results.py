@@ -62,7 +62,7 @@ from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import checked_speeds
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 from femgear.trains.elastic.runup import KINDS, loudest, meeting_columns
-from femgear.trains.static.results import HELD, UNEQUAL, shares
+from femgear.trains.static.results import HELD, UNEQUAL, peak_to_peak, shares
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -377,7 +377,7 @@ def verdict(results: Results) -> Iterator[Block]:
         notes.append("teeth and pins without errors")
     if "static" in stages:
         static = results.static
-        error = _by_kind(static["mesh"].values, np.ptp(static["ste"].values, axis=1) * 1e6)
+        error = _by_kind(static["mesh"].values, peak_to_peak(static, "ste") * 1e6)
         rows.append((f"transmission error, peak to peak{_where(static, '')}", _kinds("{:.3f} um", error)))
     factors, known = np.ones((1, 2)), dict[str, np.ndarray]()
     if "dynamics" in stages:

@@ -48,7 +48,7 @@ from femgear.report.style import (
 )
 from femgear.storage.files import write_text
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.results import SIDES, UNEQUAL, StaticResult, shares
+from femgear.trains.static.results import SIDES, UNEQUAL, StaticResult, peak_to_peak, shares
 from femgear.trains.static.stages import over_width, static_supports
 
 if TYPE_CHECKING:
@@ -67,26 +67,37 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     """Draw the static transmission error of every mesh, and of sun to ring over every planet (static.nc)."""
     figure, (left, right) = new_figure(columns=2, height=3.6, sharex=True)
     drawn = distinct_lines(static["mesh"].values, static["ste"], partly=True, within=ALIKE)
-    position, each = periodic(static["position"], static["ste"].values * 1e6)
+    position, each = periodic(*_with_between(static, "ste"))
     if len(drawn) == len(_kinds(static)) == 1:
         return _one_error(position, each[0], drawn[0][0])
     for i, (text, row) in enumerate(drawn):
         left.plot(position, each[row], label=text, **line_style(i))
-    overall = periodic(static["position"], static["ste_overall"].values * 1e6)[1]
+    overall = periodic(*_with_between(static, "ste_overall"))[1]
     planets = _of_planets(static, overall)
     for i, (text, row) in enumerate(planets, len(drawn)):
         right.plot(position, overall[row], label=f"sun to ring over {text}", **line_style(i))
     right.set_xlim(0, position[-1])
-    size = " and ".join(f"{np.ptp(each[row]):.3g}" for _, row in drawn[:: max(len(drawn) - 1, 1)])
-    size = size if len(drawn) == 2 else f"up to {np.ptp(each, axis=1).max():.3g}"
+    sizes = peak_to_peak(static, "ste") * 1e6
+    size = " and ".join(f"{sizes[row]:.3g}" for _, row in drawn[:: max(len(drawn) - 1, 1)])
+    size = size if len(drawn) == 2 else f"up to {sizes.max():.3g}"
     label(left, position_words(position), "transmission error [µm]", f"each mesh\npeak to peak {size} µm")
-    size = f"{'up to ' * (len(planets) > 1)}{np.ptp(overall, axis=1).max():.3g}"
+    size = f"{'up to ' * (len(planets) > 1)}{peak_to_peak(static, 'ste_overall').max() * 1e6:.3g}"
     label(right, position_words(position), "sum of both meshes [µm]", f"sun to ring\npeak to peak {size} µm")
     if len(drawn) == 2 and len(planets) == 1:
         name_curves(left)
     else:
         legend_below(figure, columns=2)
     return figure
+
+
+def _with_between(static: xr.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of static.nc and those between in their order, and a transmission error there [um]."""
+    position, values = static["position"].values, static[name].values
+    if f"{name}_between" in static:
+        position = np.concatenate([position, static["between"].values])
+        values = np.concatenate([values, static[f"{name}_between"].values], axis=-1)
+    order = np.argsort(position, kind="stable")
+    return position[order], values[:, order] * 1e6
 
 
 def _one_error(position: np.ndarray, error: np.ndarray, title: str) -> Figure:

@@ -72,6 +72,18 @@ STATIC_VARIABLES = {
     "iterations": ("position", "1", "steps of the active set"),
 }
 """Variables of static.nc: dimensions, unit, and what they are."""
+_PEAK = "peak to peak of the {} over the record and the positions between"
+PEAK_VARIABLES = {
+    "ste_peak_to_peak": ("mesh", "m", _PEAK.format("static transmission error of the mesh")),
+    "ste_overall_peak_to_peak": ("planet", "m", _PEAK.format("transmission error from sun to ring")),
+    "mesh_stiffness_peak_to_peak": ("mesh", "N/m", _PEAK.format("tangent mesh stiffness")),
+    "smallest_load_share": ("planet", "1", "smallest share of the planet in the torque"),
+    "largest_load_share": ("planet", "1", "largest share of the planet in the torque"),
+    "ste_between": ("mesh between", "m", "transmission error of the mesh at the positions between"),
+    "ste_overall_between": ("planet between", "m", "that from sun to ring at the positions between"),
+    "mesh_stiffness_between": ("mesh between", "N/m", "tangent mesh stiffness at the positions between"),
+}
+"""Extremes, and further positions at which they lie."""
 SLICE_VARIABLES = {
     "slice_load": ("mesh tooth slice position", "N", "load of a tooth pair in a slice, times their number"),
     "face_load_factor": (
@@ -171,6 +183,8 @@ STRESS_VARIABLES = {
 Contact in slices has those over the width and no pressures of cells.
 """
 
+LARGEST_PEAK_DOUBT = 0.03
+"""Share of a peak to peak that may be missing between positions without a word (docs/verified.md)."""
 _HARMONICS, _ROWS = 6, 8
 """Harmonics whose phasing is listed, and neighbouring sets."""
 _DISTANCE, _TOLERANCE = 3, 0.02
@@ -228,10 +242,13 @@ class StaticResult:
             variables = variables | {
                 name: HELIX_VARIABLES[name] for name in HELIX_VARIABLES if name in values
             }
+        values |= self._peaks()
+        variables = variables | {name: PEAK_VARIABLES[name] for name in PEAK_VARIABLES if name in values}
         teeth, planets = cycle.tooth_load.shape[1], np.arange(1, gears.n_planets + 1)
         return dataset(
             declared(variables, values),
             coords=self._over_width(width)
+            | self._places_between()
             | {
                 "member": ("member", list(cycle.member_names), "1", "moving member and direction"),
                 "tooth": ("tooth", np.arange(teeth), "1", "tooth pair in the order of the path"),
@@ -257,12 +274,30 @@ class StaticResult:
                 "sun_torque": self.sun_torque,
                 "contact": cycle.contact,
                 "mesh_periods": cycle.periods,
+                **({} if cycle.between is None else {"peak_doubt": cycle.between.doubt}),
                 "period": self.period_message,
                 "pressure_cells": cycle.unknowns,
                 "unknowns": np.array([body.unknowns for body in bodies]),
                 "message": cycle.message,
             },
         )
+
+    def _peaks(self) -> dict[str, np.ndarray]:
+        """Extremes of the record, and what was solved between its positions."""
+        cycle, planets = self.cycle, np.ones(self.planetary_set.n_planets)
+        share = cycle.extremes("load_share")
+        found = {
+            "ste_peak_to_peak": cycle.peak_to_peak(),
+            "ste_overall_peak_to_peak": cycle.peak_to_peak("sun_arc") * planets,
+            "mesh_stiffness_peak_to_peak": cycle.peak_to_peak("stiffness"),
+            "smallest_load_share": share[0],
+            "largest_load_share": share[1],
+        }
+        if (between := cycle.between) is not None:
+            found["ste_between"] = between.deflection
+            found["ste_overall_between"] = planets[:, None] * between.sun_arc
+            found["mesh_stiffness_between"] = between.stiffness
+        return found
 
     def _planet_couple(self) -> np.ndarray:
         """Couple (N, P) [N m] of the axial forces of sun and ring on every planet, at the working circles."""
@@ -279,6 +314,12 @@ class StaticResult:
         slope = math.tan(self.base_helix_angle) / math.cos(gear.pressure_angle)
         normal_module = gear.module * math.cos(math.atan(slope))
         return (_ENDS[0] + _ENDS[1] * slope**2) * normal_module / min(self.planetary_set.mesh_widths)
+
+    def _places_between(self) -> dict[str, Any]:
+        """Coordinate of the positions between, where these were looked for."""
+        if (between := self.cycle.between) is None:
+            return {}
+        return {"between": ("between", between.position, "1", "position between those of the record")}
 
     def _over_width(self, width: float) -> dict[str, Any]:
         """Coordinate of the slices, where there are any."""
@@ -563,6 +604,12 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
             "are those of the unmoved set"
         )
         yield Finding("W-MOTION", "", text)
+    if (doubt := float(data.attrs.get("peak_doubt", 0.0))) > LARGEST_PEAK_DOUBT:
+        text = (
+            "between the positions transmission errors, mesh stiffnesses or load shares may go on by "
+            f"{doubt:.0%} of their peak to peak"
+        )
+        yield Finding("W-POSITIONS", "static.positions", text, remedy="take more positions")
     if ((force > 0) & (pressure <= 0)).any():
         text = (
             "at some positions every contact of a mesh lies at the end of a flank: its pressure has no limit "
@@ -721,9 +768,15 @@ def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
     )
 
 
+def peak_to_peak(data: xr.Dataset, name: str) -> np.ndarray:
+    """Find the peak to peak of a variable of static.nc, positions between included where there are any."""
+    stored = data.get(f"{name}_peak_to_peak")
+    return np.ptp(data[name].values, axis=-1) if stored is None else stored.values
+
+
 def describe_static(data: xr.Dataset) -> Block:
     """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
-    share = data.load_share.values
+    lowest, highest = (data.get(f"{end}_load_share", data.load_share) for end in ("smallest", "largest"))
 
     def error(one: xr.Dataset, value: float) -> str:
         """Write a transmission error, marked where the mesh of a loaded set carries nothing at times."""
@@ -736,9 +789,9 @@ def describe_static(data: xr.Dataset) -> Block:
     columns = {
         "mesh": lambda one: str(one.mesh.item()),
         "STE mean [um]": lambda one: error(one, one.ste.values.mean()),
-        "STE p-p [um]": lambda one: error(one, np.ptp(one.ste.values)),
+        "STE p-p [um]": lambda one: error(one, float(peak_to_peak(one, "ste"))),
         "k mean [N/um]": lambda one: f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
-        "k p-p [N/um]": lambda one: f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
+        "k p-p [N/um]": lambda one: f"{float(peak_to_peak(one, 'mesh_stiffness')) / 1e6:.3f}",
         "force [N]": lambda one: f"{one.mesh_force.values.mean():.3f}",
         "p max [MPa]": lambda one: f"{p.max() / 1e6:.1f}" if (p := one.max_pressure.values).any() else "-",
     }
@@ -749,7 +802,7 @@ def describe_static(data: xr.Dataset) -> Block:
         columns["misaligned [um]"] = lambda one: f"{float(one.mesh_misalignment.mean()) * 1e6:+.2f}"
     contact = f"contact: {data.attrs.get('contact', 'unknown')}"
     sharing = (
-        f"load share of a planet {share.min():.4f} to {share.max():.4f} "
+        f"load share of a planet {float(lowest.min()):.4f} to {float(highest.max()):.4f} "
         f"(equal sharing {1 / data.sizes['planet']:.4f}); {contact}"
     )
     most, mean, held = shares(data)
@@ -780,7 +833,8 @@ def shares(data: xr.Dataset) -> tuple[float, float, str]:
     """Find the largest share of static.nc and K_gamma, over the equal share, and what holds the members."""
     share = data["load_share"] * data.sizes["planet"]
     held = "on supports and bearings" if data.sizes.get("member", 0) else HELD
-    return float(share.max()), float(share.mean("position").max()), held
+    most = data.get("largest_load_share", data["load_share"]).max() * data.sizes["planet"]
+    return float(most), float(share.mean("position").max()), held
 
 
 def describe_stress(data: xr.Dataset) -> Block:

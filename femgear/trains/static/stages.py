@@ -113,6 +113,7 @@ def solve_static(
             both_flanks=case.static.back_flanks,
             # pressures of the plane contact are not those of slices
             pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
+            peaks=True,
             progress=partial(progress, "contact"),
             **over_width(case, gears, cache=cache),
         ),

@@ -1,0 +1,119 @@
+"""Peaks between the positions of a mesh cycle: where transmission error, stiffness or load shares rise on.
+
+Most peaks lie where a tooth pair begins or ceases to carry, often within a hundredth of the mesh period, and
+equidistant positions cut them off. Between two positions a curve may rise on to where its straight lines from
+both sides meet; where tooth pairs come or go between them, by as much as its steepest slope nearby allows.
+Intervals in which that exceeds what is known of a peak by more than half of `TOLERANCE` are halved, and those
+with other pairs at their ends until they are as short as `ENCLOSED`: slopes need not show a narrow peak.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+TOLERANCE = 0.01
+"""Share of a peak to peak that what is not resolved may still add to it."""
+ENCLOSED = 1.0 / 64.0
+"""Mesh periods between positions at least where tooth pairs come or go between them."""
+SHORTEST = 2.0**-10
+"""Mesh periods that are not halved."""
+MOST_ROUNDS, MOST_PLACES = 12, 512
+"""Rounds of halving, and positions that they may add."""
+FEWEST = 16
+"""Positions of a mesh period with which halving begins, at least."""
+
+
+@dataclass(frozen=True)
+class Between:
+    """States at E positions between those of a mesh cycle, ascending.
+
+    Parameters
+    ----------
+    position : (E,) array
+        In mesh periods.
+    deflection, stiffness : (M, E) arrays
+        As in `femgear.contact.cycle.MeshCycle` [m], [N/m].
+    sun_arc : (E,) array
+        [m]
+    load_share : (N, E) array
+    doubt : float
+        Share of a peak to peak that what is not resolved may still add.
+    """
+
+    position: np.ndarray
+    deflection: np.ndarray
+    stiffness: np.ndarray
+    sun_arc: np.ndarray
+    load_share: np.ndarray
+    doubt: float
+
+
+def tooth_pair_codes(
+    path: np.ndarray, load: np.ndarray, position: np.ndarray, base_pitch: float
+) -> np.ndarray:
+    """Find numbers (M, P) that are equal at positions where the same tooth pairs of a mesh carry.
+
+    From path coordinates [m] and loads, (M, T, P). A tooth pair is known by its place on the path at zero.
+    """
+    place = np.rint((path / base_pitch - position) * 1e6).astype(np.int64)
+    mixed = (place + 1_000_003) * np.int64(2_654_435_761) % np.int64(2_147_483_647)
+    return np.where(load > 0.0, mixed, 0).sum(axis=1)
+
+
+def open_places(
+    position: np.ndarray,
+    values: np.ndarray,
+    codes: np.ndarray,
+    least: np.ndarray,
+    periods: int,
+) -> tuple[np.ndarray, float]:
+    """Find the middles of intervals (n,) that may hold higher peaks, and what is left beyond them.
+
+    Parameters
+    ----------
+    position : (P,) array
+        Ascending, over so many mesh ``periods``.
+    values : (K, P) array
+        Curves over the positions.
+    codes : (K, P) array
+        Numbers of the tooth pairs that carry, which say where these change.
+    least : (K,) array
+        Peak to peak below which a curve counts as constant.
+
+    Returns
+    -------
+    places : (n,) array
+        [mesh periods]
+    doubt : float
+        Largest share of a peak to peak that intervals which are not halved any more may add.
+    """
+    P, length = len(position), np.diff(np.append(position, position[0] + periods))
+    after = np.roll(values, -1, axis=1)
+    slope = (after - values) / length
+    low, high = values.min(axis=1)[:, None], values.max(axis=1)[:, None]
+    size = np.maximum(high - low, least[:, None])
+    other = codes != np.roll(codes, -1, axis=1)
+    steepest = np.abs(slope)
+    steepest = np.maximum(steepest, np.maximum(np.roll(steepest, 1, axis=1), np.roll(steepest, -1, axis=1)))
+    beyond = np.zeros(values.shape)
+    for sign, extreme in ((1.0, high), (-1.0, -low)):
+        begin, end = sign * values, sign * after
+        # both neighbours go on as lines until they meet
+        rising, falling = sign * np.roll(slope, 1, axis=1), -sign * np.roll(slope, -1, axis=1)
+        bent = (rising > 0.0) & (falling > 0.0)
+        at = (end + falling * length - begin) / np.where(bent, rising + falling, 1.0)
+        meet = bent & (at > 0.0) & (at < length)
+        most = np.where(meet, begin + rising * at, np.maximum(begin, end))
+        by_slope = 0.5 * (begin + end) + 0.5 * steepest * length
+        most = np.where(other, np.maximum(most, by_slope), most)
+        beyond = np.maximum(beyond, (most - extreme) / size)
+    wanted = (beyond > 0.5 * TOLERANCE) | (other & (length > (1.0 + 1e-9) * ENCLOSED))
+    halved = wanted.any(axis=0) & (length > SHORTEST)
+    left = np.where(halved, 0.0, beyond)
+    places = (position + 0.5 * length)[halved]
+    if position[-1] <= 1e-9:
+        # a record that ends at zero has no position beyond it
+        places = np.where(places > 0.0, places - periods, places)
+    return np.sort(places), float(left.max(initial=0.0)) if P > 2 else 1.0

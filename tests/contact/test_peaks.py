@@ -1,0 +1,119 @@
+"""Extremes between the positions of a mesh cycle, against 512 and 1024 equidistant ones."""
+
+import numpy as np
+import pytest
+from contact.test_cycle import STEEL, TORQUE, reference_set
+from random_sets import random_set
+
+from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.peaks import TOLERANCE, open_places, tooth_pair_codes
+from femgear.study.relief import design_basis, sun_torque, with_tip_relief
+
+PEAKS = CycleOptions(peaks=True)
+
+
+def settled(curve, count, codes=lambda tau: np.zeros(len(tau), int)):
+    """Peak to peak of a curve by halving, from equidistant positions, and the doubt that is left."""
+    tau, doubt = np.arange(count) / count, 0.0
+    for _ in range(20):
+        places, doubt = open_places(tau, curve(tau)[None], codes(tau)[None], np.array([1e-12]), 1)
+        if not len(places):
+            break
+        tau = np.sort(np.append(tau, places))
+    return np.ptp(curve(tau)), doubt, len(tau) - count
+
+
+@pytest.mark.parametrize("count", [8, 16, 33, 64])
+@pytest.mark.parametrize("place", [0.3, 0.41234, 0.999])
+def test_a_cusp_between_positions_is_found(count, place):
+    """The height of a ridge of two straight lines is one."""
+    found, doubt, _ = settled(lambda tau: 1.0 - 2.0 * np.abs((tau - place + 0.5) % 1.0 - 0.5), count)
+    assert found == pytest.approx(1.0, abs=TOLERANCE)
+    assert doubt <= TOLERANCE
+
+
+def test_smooth_curves_need_no_further_positions():
+    found, doubt, added = settled(lambda tau: np.cos(2.0 * np.pi * tau), 32)
+    assert (found, added) == (pytest.approx(2.0, abs=1e-12), 0) and doubt < TOLERANCE
+
+
+def test_a_peak_that_slopes_do_not_show_lies_where_pairs_change():
+    """A ridge over a sixteenth of the period, between two of 16 positions, where another pair carries."""
+
+    def curve(tau):
+        return np.maximum(1.0 - 32.0 * np.abs(tau - 0.5312), 0.0)
+
+    assert settled(curve, 16)[0] < 0.01
+    found = settled(curve, 16, lambda tau: (tau > 0.53).astype(int))[0]
+    assert found == pytest.approx(1.0, abs=0.02)
+
+
+def test_codes_tell_which_pairs_carry():
+    path = np.array([[[0.1, 0.2, 0.3], [1.1, 1.2, 1.3]]])
+    load = np.array([[[1.0, 1.0, 0.0], [0.0, 2.0, 2.0]]])
+    codes = tooth_pair_codes(path, load, np.array([0.1, 0.2, 0.3]), 1.0)[0]
+    assert len(set(codes.tolist())) == 3
+    assert tooth_pair_codes(path, np.ones((1, 2, 3)), np.array([0.1, 0.2, 0.3]), 1.0).min() == codes[1]
+
+
+@pytest.fixture(scope="module")
+def reference():
+    gears = reference_set()
+    return gears, make_bodies(make_sectors(gears, STEEL, flank_elements=8), STEEL)
+
+
+def against_many(walk, count):
+    """Largest relative difference of peaks to peaks from those of 512 positions, and of shares."""
+    many, few = walk(512, None), walk(count, PEAKS)
+    apart = []
+    for name in ("deflection", "stiffness", "sun_arc"):
+        values = getattr(many, name)
+        apart.append(few.peak_to_peak(name) / np.ptp(values, axis=-1) - 1.0)
+    share = few.extremes("load_share")[1] / many.load_share.max(axis=1) - 1.0
+    return np.abs(np.hstack(apart)).max(), np.abs(share).max(), few
+
+
+@pytest.mark.parametrize("torque", [TORQUE, -TORQUE, 0.05 * TORQUE])
+@pytest.mark.parametrize("count", [8, 16, 32, 64])
+def test_equal_planets_in_phase(reference, count, torque):
+    """64 equidistant positions cut off 0.5 %, 8 nearly half of the planet-ring meshes' peak to peak."""
+    gears, bodies = reference
+
+    def walk(positions, options):
+        return walk_mesh_cycle(gears, bodies, sun_torque=torque, positions=positions, options=options)
+
+    apart, share, few = against_many(walk, count)
+    assert apart < 0.02 and share < 1e-9 and few.between.doubt < 0.03
+    assert len(few.position) == count and (np.diff(few.between.position) > 0.0).all()
+    assert ((few.between.position >= 0.0) & (few.between.position < 1.0)).all()
+
+
+@pytest.mark.parametrize("seed", [4, 7, 10, 13])
+@pytest.mark.parametrize("count", [8, 64])
+def test_random_sets_out_of_phase(seed, count, tmp_path):
+    """Three to six planets, in sequence or not equally spaced, of either torque."""
+    case = random_set(seed).case
+    basis = design_basis(case, cache=tmp_path)
+    torque = sun_torque(case, basis.gears)
+
+    def walk(positions, options):
+        options = {"sun_torque": torque, "positions": positions, "options": options}
+        return walk_mesh_cycle(basis.gears, basis.bodies, supports=basis.supports, **options)
+
+    apart, share, few = against_many(walk, count)
+    assert apart < 0.02 and share < 0.005 and few.between.doubt < 0.03
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_tip_relief_that_makes_the_error_small(reference, power):
+    gears, bodies = reference
+    relief = with_tip_relief(None, gears, amount=5e-6, length=0.9, power=power)
+
+    def walk(positions, options):
+        options = {"sun_torque": TORQUE, "positions": positions, "options": options}
+        return walk_mesh_cycle(gears, bodies, deviations=relief, **options)
+
+    for count in (8, 32):
+        apart, _, _ = against_many(walk, count)
+        assert apart < 0.03
