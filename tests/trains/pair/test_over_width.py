@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from trains.pair.test_pair import INTERNAL, STEEL, TAU, pair_case
 from validation.planetary import reference_set
 
@@ -19,7 +20,7 @@ from femgear.trains.pair.stages import iso_stiffness
 from femgear.trains.reading import with_values
 from femgear.trains.registry import check_case
 from femgear.trains.static.figures import contact_pattern
-from femgear.trains.static.results import load_warnings, static_warnings
+from femgear.trains.static.results import _helical, load_warnings, static_warnings
 from femgear.trains.static.stages import solve_static
 
 SLICES = 12
@@ -179,3 +180,16 @@ def test_stiffness_of_the_standard_knows_material_and_small_loads():
     assert light == pytest.approx(steel * 70.0 / 206.0)
     # 20 N m on a reference radius of 36 mm and 20 mm of width are 27.8 N/mm
     assert small == pytest.approx(steel * (20.0 / 0.036 / 0.020 / 100e3) ** 0.25)
+
+
+@pytest.mark.parametrize(("modules", "told"), [(6.7, True), (12.0, False)])
+def test_ends_of_narrow_spur_teeth_are_told_with_their_sizes(modules, told):
+    """Solid gears with free ends, 6.7 modules wide: 3.4 % softer, K_Hbeta 1.032, slopes 12 to 17 % less."""
+    ratio = 6.7 / modules
+    data = xr.Dataset(attrs={"face_width": 3e-3 * modules, "module": 3e-3, "free_ends": 0.034 * ratio})
+    found = [one for one in _helical(data) if one.code == "W-ENDS"]
+    assert bool(found) == told
+    if told:
+        softer, aligned, slope = (float(x) for x in re.findall(r"about ([\d.]+)", found[0].text))
+        assert softer == pytest.approx(3.4, abs=0.1) and aligned == pytest.approx(1.032, abs=0.005)
+        assert 12.0 <= slope <= 17.0
