@@ -31,7 +31,7 @@ from femgear.case.quantities import (
     Dimension,
     to_si,
 )
-from femgear.case.sections import OVER_WIDTH, Case
+from femgear.case.sections import OVER_WIDTH, Case, gear_material
 from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
 from femgear.exchange.gear_unit import gears_of, loads_on, power_flow, stage_components, with_values
@@ -104,6 +104,8 @@ def case_tables(
     ratios = torque_ratios(tables["sun"]["teeth"], tables["ring"]["teeth"])
     forwards = to_si(operation["torque"], TORQUE) * ratios[operation["input"]] > 0.0
     add_modifications(s, tables, remarks, {"sun": forwards, "ring": not forwards})
+    if tables.get("static", {}).get("slices", 0) > 1:
+        _one_width(tables, remarks)
     if left := [name for name in ("sun", "ring") if "profile_shift" not in tables[name]]:
         of = f"hence the profile shift of {' and '.join(left)}"
         remarks["set.centre_distance"] = f"assumed: no play at the distance of the file, {of}"
@@ -112,8 +114,10 @@ def case_tables(
 
 def gear_tables(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     """Tables of what the gears of a stage share, of their material, and of each, without modifications."""
-    tables = {"set": _set(s, remarks), "material": _material(s, remarks)}
+    tables: dict[str, Any] = {"set": _set(s, remarks), "material": {}}
     tables |= {name: _gear(s, name, remarks) for name in s.gears}
+    _widths(s, tables, remarks)
+    _materials(s, tables, remarks)
     _racks(s, tables, remarks)
     for name in s.gears:
         _rim(s, name, tables, remarks)
@@ -237,13 +241,10 @@ def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     if (distance := s.common(s.meshes, "center_distance", LENGTH)) is not None:
         found["centre_distance"] = shown(distance, LENGTH)
     given = [s.common(s.gears[name], "face_width", LENGTH) for name in s.gears]
-    widths = {one for one in given if one is not None}
-    width = s.common(s.meshes, "common_face_width", LENGTH)
-    if width is None:
-        width = min(widths) if widths else s.needed(s.gears["sun"], "face_width", LENGTH)
+    given += [s.model.number(mesh, "common_face_width", LENGTH) for mesh in s.meshes]
+    widths = [one for one in given if one is not None]
+    width = min(widths) if widths else s.needed(s.gears["sun"], "face_width", LENGTH)
     found["face_width"] = shown(width, LENGTH)
-    if len(widths) > 1:
-        remarks["set.face_width"] = f"assumed: of all gears; the widest has {shown(max(widths), LENGTH)}"
     turned = [s.model.number(mesh, "rotating_angle_around_neg_u_axis", ANGLE) for mesh in s.sun_meshes]
     angles = sorted(one % math.tau for one in turned if one is not None)
     if len(angles) < len(turned):
@@ -265,30 +266,72 @@ def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     return found
 
 
-def _material(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
-    """Material of the sun for all gears, the lowest strengths of all."""
+def _widths(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
+    """Face widths of gears that are wider than what all meshes have in common."""
+    common, second = to_si(tables["set"]["face_width"], LENGTH), [*s.gears][1]
+    widths = {name: s.common(s.gears[name], "face_width", LENGTH) or common for name in s.gears}
+    if min(min(pair) for pair in pairwise(widths.values())) > (1.0 + 1e-9) * common:
+        whole, widths[second] = shown(widths[second], LENGTH), common
+        remarks[f"{second}.face_width"] = f"assumed: what the meshes have in common; the gear has {whole}"
+        tables[second]["face_width"] = shown(common, LENGTH)
+    for name, width in widths.items():
+        if abs(width - common) > 1e-9 * common:
+            tables[name]["face_width"] = shown(width, LENGTH)
+
+
+def _one_width(tables: dict[str, Any], remarks: dict[str, str]) -> None:
+    """Make planets as narrow as the narrower one of their meshes, where slices take one width for both."""
+    common = tables["set"]["face_width"]
+    widths = [to_si(tables[name].get("face_width", common), LENGTH) for name in _GEARS]
+    meshes = [min(pair) for pair in pairwise(widths)]
+    if max(meshes) > (1.0 + 1e-9) * min(meshes):
+        tables["planet"]["face_width"] = shown(min(meshes), LENGTH)
+        remarks["planet.face_width"] = (
+            f"assumed: slices take one width for both meshes; planets have {shown(widths[1], LENGTH)}"
+        )
+
+
+def _materials(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
+    """Material of the sun for all gears, and what those of others have different."""
     of = {k: s.model.related("reference", "referenced", origin=ones[0].id) for k, ones in s.gears.items()}
     made = {name: [one for one in ones if one.type == "material"] for name, ones in of.items()}
-    found: dict[str, Any] = {}
     for key, attribute, dimension, usual in (
         ("youngs_modulus", "elastic_modulus", MODULUS, STEEL),
         ("poisson_ratio", "poisson_ratio", None, 0.3),
         ("density", "density", DENSITY, 7850.0),
     ):
-        values = [s.model.number(one, attribute, dimension) for ones in made.values() for one in ones[:1]]
-        known = [one for one in values if one is not None]
-        value = known[0] if known else usual
-        found[key] = shown(value, dimension) if dimension else value
-        if len(known) < len(s.gears) or max(known) - min(known) > 1e-9 * abs(value):
-            what = "of all gears; those of the file differ" if known else "steel"
+        values = {
+            name: s.model.number(one, attribute, dimension) for name, ones in made.items() for one in ones[:1]
+        }
+        known = {name: value for name, value in values.items() if value is not None}
+        value = next(iter(known.values()), usual)
+        tables["material"][key] = shown(value, dimension) if dimension else value
+        if missing := [name for name in s.gears if name not in known]:
+            what = f"of the {' and the '.join(missing)} too" if known else "steel"
             remarks[f"material.{key}"] = f"assumed: {what}"
+        _differing(tables, key, dimension, value, known)
     for key, attribute in (("root", "endurance_limit_root"), ("contact", "endurance_limit_flank")):
-        values = [s.common((s.gears[name][0], *made[name][:1]), attribute, STRESS) for name in s.gears]
-        if known := [one for one in values if one is not None and None not in values]:
-            found[f"{key}_stress_limit"] = shown(min(known), STRESS)
-            if max(known) > min(known):
-                remarks[f"material.{key}_stress_limit"] = "assumed: of all gears, the lowest of the file"
-    return found
+        values = {n: s.common((s.gears[n][0], *made[n][:1]), attribute, STRESS) for n in s.gears}
+        known = {name: value for name, value in values.items() if value is not None}
+        common = None
+        if len(known) == len(values):
+            common = next(iter(known.values()))
+            tables["material"][f"{key}_stress_limit"] = shown(common, STRESS)
+        _differing(tables, f"{key}_stress_limit", STRESS, common, known)
+
+
+def _differing(
+    tables: dict[str, Any],
+    key: str,
+    dimension: Dimension | None,
+    common: float | None,
+    known: dict[str, float],
+) -> None:
+    """Give the materials of gears an entry that is another one than the common one, if there is one."""
+    for name, value in known.items():
+        if common is None or abs(value - common) > 1e-9 * abs(common):
+            own = tables[name].setdefault("material", {})
+            own[key] = shown(value, dimension) if dimension else value
 
 
 def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
@@ -678,7 +721,7 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tup
     """Add a gear with shaft, flanks, tool and material; ids of gear and shaft."""
     a, section, internal = _attribute, getattr(case, gear.name), gear.internal
     tip = 2.0 * gear.tip_radius if section.tip_diameter or gear.tip_shortening else None
-    rack, helix, material = section.rack or case.rack, case.helix_angle or 0.0, case.material
+    rack, helix, material = section.rack or case.rack, case.helix_angle or 0.0, gear_material(case, gear.name)
     shaft, rim = w.add("shaft", f"{name} shaft"), a(2.0 * gear.rim_radius, "mm")
     id = w.add(
         "ring_gear" if internal else "cylindrical_gear", name, number_of_teeth=a(gear.teeth),
