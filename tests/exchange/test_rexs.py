@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 from femgear import cli
 from femgear.case.gear_set import planetary_set
+from femgear.case.sections import face_width, gear_material
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.exchange.planetary_stage import RIGID, case_tables, named, stage_model
 from femgear.exchange.rexs import MOST_BYTES, model_text, read_model
@@ -21,6 +22,11 @@ from femgear.trains.drafts import draft_text
 from femgear.trains.reading import parse_case, read_case, with_values
 
 CASES = Path(__file__).parents[2] / "cases"
+IRON_RING = {
+    "ring.material.youngs_modulus": "110 GPa", "ring.material.density": "7100 kg/m^3",
+    "ring.material.root_stress_limit": "140 MPa", "planet.material.contact_stress_limit": "1400 MPa",
+    "planet.face_width": "27 mm", "ring.face_width": "24 mm",
+}  # fmt: skip
 STRENGTH = {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1.4 GPa"}
 OWN = os.environ.get("FEMGEAR_REXS")  # a file of FVA's example, for whoever has it
 
@@ -155,6 +161,7 @@ def test_the_profile_shift_of_the_ring_has_the_sign_of_iso(tmp_path):
         ("planetary_27_40_108", {"operation.input": "ring", "operation.fixed": "carrier"}),
         ("planetary_27_40_108", {"set.planet_angles": ["0 deg", "120 deg", "245.3333333333333 deg"]}),
         ("planetary_27_40_108", {"sun.tip_diameter": "44.9 mm", **STRENGTH}),
+        ("planetary_27_40_108", IRON_RING),
         ("helical_30_20_70", {}),
     ],
 )
@@ -174,7 +181,9 @@ def test_a_case_comes_back(tmp_path, name, changes):
             assert getattr(one, key) == pytest.approx(getattr(other, key), rel=1e-9, abs=1e-12), key
     assert same.centre_distance == pytest.approx(gears.centre_distance, rel=1e-11)
     assert same.planet_angles == pytest.approx(gears.planet_angles, abs=1e-9)
-    assert back.material == case.material and back.set.face_width == case.set.face_width
+    for gear in case.gear_names:
+        assert gear_material(back, gear) == gear_material(case, gear)
+        assert face_width(back, gear) == pytest.approx(face_width(case, gear), rel=1e-12)
     assert (back.operation.input, back.operation.fixed) == (case.operation.input, case.operation.fixed)
     assert back.operation.torque == pytest.approx(case.operation.torque, rel=1e-11)
     assert back.operation.speeds == pytest.approx(case.operation.speeds, rel=1e-11)

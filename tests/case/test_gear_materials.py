@@ -1,0 +1,157 @@
+"""Materials and face widths of single gears in case files: what they decide, and what they do not go with."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.case.dependencies import (
+    compliance_entries,
+    dynamic_entries,
+    fingerprint,
+    modal_entries,
+    ring_entries,
+    static_entries,
+)
+from femgear.case.estimates import estimates
+from femgear.case.gear_set import materials_of, planetary_set, set_deviations
+from femgear.case.sections import face_width, gear_material
+from femgear.errors import CaseError
+from femgear.gears.deviations import lead_separation
+from femgear.trains.elastic.results import _safeties
+from femgear.trains.reading import read_case, with_value, with_values
+from femgear.trains.static.results import describe_set, width_warnings
+from femgear.trains.static.stages import nominal_stresses
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+@pytest.fixture(scope="module")
+def case():
+    return read_case(CASES / "planetary_27_40_108.toml")
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return read_case(CASES / "spur_pair.toml")
+
+
+def test_a_gear_has_what_it_gives_and_else_what_all_have(case):
+    other = with_values(
+        case, {"ring.material.youngs_modulus": "110 GPa", "material.root_stress_limit": "461 MPa"}
+    )
+    assert [one.youngs_modulus for one in materials_of(other)] == [206e9, 206e9, 110e9]
+    ring = gear_material(other, "ring")
+    assert (ring.poisson_ratio, ring.root_stress_limit) == (0.3, 461e6)
+    assert materials_of(case) == (materials_of(case)[0],) * 3
+
+
+def test_widths_of_all_gears_are_that_of_the_set(case, pair):
+    own = {f"{name}.face_width": "25 mm" for name in case.gear_names}
+    assert planetary_set(with_values(case, own | {"set.face_width": None})) == planetary_set(case)
+    wider = with_value(pair, "gear_2.face_width", f"{1.25 * pair.set.face_width!r} m")
+    assert face_width(wider, "gear_2") == pytest.approx(1.25 * pair.set.face_width)
+    assert planetary_set(wider).face_width == pair.set.face_width
+    for broken in (case, pair):
+        with pytest.raises(CaseError) as refused:
+            with_value(broken, "set.face_width", None)
+        assert (refused.value.code, refused.value.key) == ("E-KEY-MISSING", "set.face_width")
+
+
+@pytest.mark.parametrize("key", ["static.slices", "static.back_flanks"])
+def test_one_width_of_both_meshes_where_contact_takes_one(case, key):
+    value = 25 if key.endswith("slices") else True
+    different = {"planet.face_width": "30 mm", "sun.face_width": "28 mm", key: value}
+    with pytest.raises(CaseError) as refused:
+        with_values(case, different)
+    assert (refused.value.code, refused.value.key) == ("E-CHOICE", key)
+    assert 'planet.face_width = "25 mm"' in refused.value.remedy
+    with_values(case, different | {"planet.face_width": "25 mm"})
+
+
+KINDS = (static_entries, compliance_entries, ring_entries, modal_entries, dynamic_entries)
+
+
+@pytest.mark.parametrize(
+    "key, value, changes",
+    [
+        ("ring.material.youngs_modulus", "110 GPa", (True,) * 5),
+        ("planet.material.poisson_ratio", 0.28, (True,) * 5),
+        ("ring.material.density", "7100 kg/m^3", (False, True, True, True, True)),
+        ("sun.face_width", "26 mm", (True,) * 5),
+        ("ring.material.root_stress_limit", "306 MPa", (False,) * 5),
+    ],
+)
+def test_steps_notice_what_they_depend_on(case, key, value, changes):
+    other = with_value(case, key, value)
+    assert tuple(fingerprint(kind(case)) != fingerprint(kind(other)) for kind in KINDS) == changes
+
+
+def test_estimates_follow_density_modulus_and_width(case):
+    other = with_values(
+        case,
+        {"planet.material.density": "3925 kg/m^3", "ring.material.youngs_modulus": "103 GPa",
+         "sun.face_width": "50 mm"},
+    )  # fmt: skip
+    one, two = estimates(case), estimates(other)
+    ratio = {key: two[key].value / one[key].value for key in one}
+    assert ratio["planet.mass"] == pytest.approx(0.5) and ratio["sun.inertia"] == pytest.approx(2.0)
+    assert ratio["carrier.mass"] == pytest.approx(1.0)
+    # E = 2 E1 E2 / (E1 + E2): two thirds of steel with one gear half as stiff
+    assert ratio["ring.foundation_radial"] == pytest.approx(2 / 3)
+    assert ratio["sun.support_stiffness"] == pytest.approx(1.0)
+    assert ratio["planet.bearing_stiffness"] == pytest.approx(5 / 6)
+
+
+def test_safeties_are_those_of_every_gear(case):
+    """sigma_Flim/sigma_Hlim of a case-hardened sun and planets, and of a quenched ring, ISO 6336-5."""
+    strong = {"material.root_stress_limit": "461 MPa", "material.contact_stress_limit": "1500 MPa"}
+    weak = {"ring.material.root_stress_limit": "306 MPa", "ring.material.contact_stress_limit": "740 MPa"}
+    tips = {"sun.tip_diameter": "45.08043 mm", "planet.tip_diameter": "63 mm"}
+    other = with_values(case, strong | weak | tips)
+    stresses = nominal_stresses(planetary_set(other), 100.0, materials_of(other))
+    notes: list[str] = []
+    arguments = stresses.root.ravel(), stresses.contact, np.ones(2), "", notes
+    rows = dict(_safeties(other, *arguments))
+    assert rows["safety S_F, ISO 6336-3"].startswith("sun 6.75, planet, sun side")
+    sun, sun_side, ring_side, ring = (
+        float(one.split()[-1]) for one in rows["safety S_H, ISO 6336-2"].split(", ") if one[-1].isdigit()
+    )
+    assert sun == sun_side == pytest.approx(2.25, abs=0.015)
+    assert ring == pytest.approx(740.0 / 1500.0 * ring_side, abs=0.01)
+    assert any("306 MPa (ring)" in note for note in notes)
+    alike = dict(_safeties(with_values(case, strong | tips), *arguments))
+    assert alike["safety S_H, ISO 6336-2"].startswith(f"sun-planet {sun:.2f}, planet-ring")
+
+
+def test_some_limits_give_some_safeties(case):
+    other, notes = with_value(case, "ring.material.root_stress_limit", "306 MPa"), list[str]()
+    rows = dict(_safeties(other, np.full(4, 100e6), np.full(2, 500e6), np.ones(2), "", notes))
+    assert rows == {"safety S_F, ISO 6336-3": "sun -, planet, sun side -, planet, ring side -, ring 6.12"}
+    assert any("of all gears would give safeties" in note for note in notes)
+
+
+def test_check_shows_materials_and_widths_where_they_differ(case):
+    assert not [block for block in describe_set(case) if block.title == "Materials"]
+    other = with_values(case, {"ring.material.youngs_modulus": "110 GPa", "planet.face_width": "27 mm"})
+    (block,) = [block for block in describe_set(other) if block.title == "Materials"]
+    assert [row[:3] for row in block.rows] == [
+        ("sun", "25", "206"), ("planet", "27", "206"), ("ring", "25", "110"),
+    ]  # fmt: skip
+
+
+def test_gears_wider_than_their_mates_are_said(case):
+    assert not list(width_warnings(case))
+    (found,) = width_warnings(with_value(case, "planet.face_width", "27 mm"))
+    assert (found.code, found.key, found.severity) == ("W-WIDTHS", "planet.face_width", "note")
+    assert "planet (2 mm)" in found.text and "mirror planes" not in found.text
+    sliced = {"planet.face_width": "27 mm", "static.slices": 25}
+    assert "mirror planes" in next(width_warnings(with_values(case, sliced))).text
+
+
+def test_leads_are_taken_over_the_common_width(case):
+    """A slope over a face twice as wide opens half as far over the part that both gears have."""
+    slope = {"sun.modifications": [{"kind": "lead slope", "amount": "10 um"}], "static.slices": 25}
+    one, two = (with_values(case, slope | {"sun.face_width": width}) for width in ("25 mm", "50 mm"))
+    found = [lead_separation(set_deviations(of), planetary_set(of), 25)[0] for of in (one, two)]
+    assert found[1] == pytest.approx(0.5 * found[0])
