@@ -55,7 +55,7 @@ def test_pressure_is_that_of_hertz_with_both_materials_over_the_common_width(wid
 def test_gears_that_exchange_their_materials_are_the_mirrored_pair():
     pair = pair_of(WIDTH, WIDTH)
     one, two = walked(pair, STEEL, IRON), walked(pair, IRON, STEEL)
-    # positions run from the pitch point on: the mirror image passes them backwards, with cells laid on flank 1
+    # the mirror image passes the positions backwards, with cells laid on flank 1
     assert two.deflection[0] == pytest.approx(np.roll(one.deflection[0, ::-1], 1), rel=2e-4)
     assert two.stiffness.mean() == pytest.approx(one.stiffness.mean(), rel=2e-4)
 
