@@ -45,6 +45,7 @@ try:
     import femgear
     from femgear.errors import CaseError, FemgearError, printable
     from femgear.exchange.formats import Sampling
+    from femgear.findings import FindingWarning
     from femgear.storage.files import noted_interrupts, storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
@@ -219,17 +220,18 @@ def _given(error: CycloptsError) -> list[str]:
 
 
 def _warn(findings) -> None:
-    """Print what deserves a look on standard error, as `_show_warning` does."""
+    """Print findings on standard error, a line each."""
     for finding in findings:
-        print(f"warning: {finding}", file=sys.stderr)
+        print(f"warning: {printable(str(finding))}", file=sys.stderr)
 
 
 def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
-    """Print a warning as one line on standard error; takes the place of `warnings.showwarning`."""
-    text = (
-        str(message) if category is UserWarning else f"{message} ({category.__name__}, {filename}:{lineno})"
-    )
-    print(f"warning: {printable(text)}", file=sys.stderr)
+    """Print a warning on standard error as a finding; takes the place of `warnings.showwarning`.
+
+    Those of other libraries say where they come from.
+    """
+    ours = issubclass(category, FindingWarning) or category is UserWarning
+    _warn([message if ours else f"{message} ({category.__name__}, {filename}:{lineno})"])
 
 
 @app.command

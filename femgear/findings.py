@@ -6,7 +6,11 @@ which terminal, page, manifest, result files, ``femgear check`` and docs/errors.
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+import json
+import warnings
+from collections.abc import Iterable
+from dataclasses import KW_ONLY, asdict, dataclass, field, replace
+from typing import Any
 
 from femgear.errors import printable
 
@@ -104,6 +108,8 @@ class Finding:
         What to do about it.
     severity : str, optional
         One of `SEVERITIES`; empty takes that of the catalogue, for a remark ``"note"``.
+    stage : str, optional
+        Stage of a run whose results draw it, empty of the case. Findings that differ in it alone are equal.
 
     Raises
     ------
@@ -119,6 +125,7 @@ class Finding:
     _: KW_ONLY
     remedy: str = ""
     severity: str = ""
+    stage: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         usual = CATALOGUE[self.code][0] if self.code else NOTE
@@ -135,3 +142,52 @@ class Finding:
 def remark(text: str) -> Finding:
     """Make a finding without code and entry: what was read in a way that deserves to be said."""
     return Finding("", "", text)
+
+
+def once(findings: Iterable[Finding], stage: str = "") -> tuple[Finding, ...]:
+    """List findings of a stage, each once and in their order; without a stage they keep theirs."""
+    found = (replace(one, stage=stage) if stage else one for one in findings)
+    return tuple(dict.fromkeys(found))
+
+
+def by_severity(findings: Iterable[Finding]) -> list[Finding]:
+    """Sort findings from the most to the least severe, those of one severity in their order."""
+    return sorted(findings, key=lambda one: -SEVERITIES.index(one.severity))
+
+
+def as_data(findings: Iterable[Finding]) -> list[dict[str, str]]:
+    """Turn findings into tables of texts, as manifest.json and the result files hold them."""
+    return [asdict(one) for one in findings]
+
+
+def from_data(data: Iterable[dict[str, Any]]) -> tuple[Finding, ...]:
+    """Make the findings that `as_data` turned into tables; a code that the catalogue has no more is text.
+
+    TypeError, KeyError, ValueError: other data.
+    """
+    found = []
+    for one in data:
+        values = {name: str(value) for name, value in one.items()}
+        if (code := values["code"]) and code not in CATALOGUE:
+            values |= {"code": "", "text": f"[{code}] {values['text']}"}
+        found.append(Finding(**values))
+    return tuple(found)
+
+
+def as_text(findings: Iterable[Finding]) -> str:
+    """Write findings as JSON, the attribute ``findings`` of a result file."""
+    return json.dumps(as_data(findings))
+
+
+def findings_in(attributes: Any) -> tuple[Finding, ...]:
+    """Read the findings of a stage from the attributes of its file, none where it has none."""
+    return from_data(json.loads(attributes.get("findings", "[]")))
+
+
+class FindingWarning(UserWarning):
+    """A finding outside a run, such as of an export or a search; its argument is the `Finding`."""
+
+
+def tell(finding: Finding, *, stacklevel: int = 2) -> None:
+    """Tell a finding that belongs to no results: the command line prints it as those of a run."""
+    warnings.warn(FindingWarning(finding), stacklevel=stacklevel + 1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import time
-import warnings
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -28,7 +27,7 @@ from femgear.exchange.formats import (
     write_wav,
     write_workbook,
 )
-from femgear.findings import Finding
+from femgear.findings import Finding, as_text, once, remark, tell
 from femgear.housing.sound import sound_quality
 from femgear.report.page import page, write_pictures
 from femgear.storage.files import (
@@ -39,6 +38,7 @@ from femgear.storage.files import (
     read_dataset,
     read_result,
     replaced_file,
+    write_attribute,
     write_csv,
     write_dataset,
     write_result,
@@ -128,18 +128,24 @@ _LOSS = -0.1
 
 @dataclass
 class _Run:
-    """What a run has written into its folder: files with checksums, seconds and verdicts of the stages."""
+    """What a run has written into its folder: files with checksums, seconds and verdicts of the stages.
+
+    ``findings`` are those of the stages by name, under "" those of the case.
+    """
 
     folder: Path
     files: dict[str, str] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
     convergence: dict[str, Any] = field(default_factory=dict)
     data: dict[str, xr.Dataset] = field(default_factory=dict)
+    findings: dict[str, tuple[Finding, ...]] = field(default_factory=dict)
 
     def record(self, *names: str, complete: bool = False) -> Manifest:
         """Write the manifest with some more files."""
         known = {name: digest for name, digest in self.files.items() if name not in names}
+        findings = once(one for stage in self.findings.values() for one in stage)
         told = {"timings": self.timings, "convergence": self.convergence, "known": known}
+        told["findings"] = findings
         manifest = record(
             self.folder, list({**self.files, **dict.fromkeys(names)}), **told, complete=complete
         )
@@ -166,8 +172,9 @@ def run_case(
     asked, stages = _asked(case, only)
     run, results = _resumed(folder, asked, stages)
     if results:
-        warnings.warn(f"{', '.join(results)}: as the run that was interrupted left them", stacklevel=3)
+        tell(remark(f"{', '.join(results)}: as the run that was interrupted left them"), stacklevel=3)
     write_text(case.source, folder / "case.toml")
+    run.findings[""] = train_of(case).case_warnings(case)
     run.record("case.toml")
     own_files(folder / KEPT, ["*"])
     for stage in stages:
@@ -216,6 +223,8 @@ def _compute(
                 found = first if one is stage else one.solve(part, first, **_options(one, progress))
                 path, data = run.folder / f"{one.name}.nc", found.dataset()
                 if part is case:
+                    run.findings[one.name] = one.findings(data)
+                    data.attrs["findings"] = as_text(run.findings[one.name])
                     write_dataset(data, path)
                     run.data[one.name] = data
                 else:
@@ -224,19 +233,29 @@ def _compute(
                         files[one.name] = opened.enter_context(replaced_file(path, size=data.nbytes / share))
                     append_dataset(data, files[one.name], "speed")
                 results[one.name] = found if part is case else None
-                verdicts[one.name].append(one.verdict(found))
+                verdicts[one.name].append(one.convergence(found))
                 seconds[one.name] += time.perf_counter() - start
                 start = time.perf_counter()
+        for one in members:
+            if one.name in files:
+                run.findings[one.name] = _findings_of_file(one, files[one.name])
     names = []
     for one in members:
-        run.timings[one.name], run.convergence[one.name] = (
-            seconds[one.name],
-            joint_verdict(verdicts[one.name]),
-        )
+        run.timings[one.name] = seconds[one.name]
+        codes = [finding.code for finding in run.findings[one.name] if finding.code]
+        run.convergence[one.name] = joint_verdict(verdicts[one.name]) | {"findings": codes}
         names += _file_names(one)
         write_result(results[one.name], run.folder / names[-1], fingerprint=_fingerprint(case))
         progress(one.name, 1, 1)
     run.record(*names)
+
+
+def _findings_of_file(stage: Stage, path: Path) -> tuple[Finding, ...]:
+    """Findings of a stage whose parts are all in its file, which is given them."""
+    with read_dataset(path) as data:
+        findings = stage.findings(data)
+    write_attribute(path, "findings", as_text(findings))
+    return findings
 
 
 def _file_names(stage: Stage) -> tuple[str, str]:
@@ -264,6 +283,7 @@ def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, di
     run = _Run(folder, files)
     for name in results:
         run.timings[name], run.convergence[name] = manifest.timings[name], manifest.convergence.get(name)
+        run.findings[name] = tuple(one for one in manifest.findings if one.stage == name)
     return run, results
 
 
@@ -330,7 +350,7 @@ def export_results(
         tables = (table for stage in results for table in tables_of(results[stage], stage))
         if long := write_workbook(tables, folder / "results.xlsx"):
             text = f"tables that no sheet can hold are left out: {', '.join(long)}"
-            warnings.warn(str(Finding("W-ROWS", "", text, remedy="export them with --csv")), stacklevel=2)
+            tell(Finding("W-ROWS", "", text, remedy="export them with --csv"))
         found.append("results.xlsx")
     if "mat" in formats:
         write_matlab({stage: results[stage] for stage in results}, folder / "results.mat")
@@ -369,7 +389,7 @@ def _scaled(sampling: Sampling, extent: Mapping[str, tuple[float, float, float]]
                 f"lines at {sampling.rate / 2:g} Hz and above are left out: up to {lost:.3g} {unit} r.m.s. "
                 f"of {level:.3g}, {left:+.2g} dB of the level"
             )
-            warnings.warn(str(Finding("W-RATE", "", text, remedy="raise --rate to hear them")), stacklevel=4)
+            tell(Finding("W-RATE", "", text, remedy="raise --rate to hear them"), stacklevel=4)
     return sampling
 
 
@@ -393,7 +413,7 @@ def _export_sound(
             f"samples reach {peaks[unit]:.4g} {unit}, the full scale is {scales[unit]:g}: most players clip"
         )
         remedy = f"raise --{SCALES[unit].replace('_', '-')} to hear it"
-        warnings.warn(str(Finding("W-CLIPPING", "", text, remedy=remedy)), stacklevel=4)
+        tell(Finding("W-CLIPPING", "", text, remedy=remedy), stacklevel=4)
     if rows:
         header = (
             "signal",

@@ -11,7 +11,6 @@ import os
 import re
 import subprocess
 import sys
-import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import metadata
@@ -21,6 +20,7 @@ import numpy as np
 
 from femgear.errors import GridError, StorageError
 from femgear.fe.grid import Grid, check_grid, read_grid, write_grid
+from femgear.findings import remark, tell
 
 CLOSE = 1e-9  # points nearer than this share of the size of the outline count as the same
 MAX_SEGMENTS = 5_000
@@ -342,7 +342,7 @@ def _mesh_cached(plan: Plan, folder: Path) -> Grid:
         try:
             return _grid_of_plan(plan, read_grid(path), path)
         except StorageError as error:
-            warnings.warn(f"the grid is made again: {error.message}", stacklevel=2)
+            tell(remark(f"the grid is made again: {error.message}"))
     grid = _mesh_plan(plan)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -351,7 +351,7 @@ def _mesh_cached(plan: Plan, folder: Path) -> Grid:
         cause = error if isinstance(error, OSError) else error.__cause__
         reason = getattr(cause, "strerror", None) or cause or error
         reason = "no folder" if folder.exists() and not folder.is_dir() else reason
-        warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
+        tell(remark(f"grids are made but not kept: cannot write into {folder} ({reason})"))
     return grid
 
 

@@ -11,7 +11,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from femgear.report.page import chart_figure, document, part_of, shown_data, table
-from femgear.report.tables import Block
+from femgear.report.tables import WARNINGS, Block, unmarked
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -35,9 +35,20 @@ def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]
     others = {block.title: block for block in train.describe_results(second)}
     found = [entries]
     for block in train.describe_results(first):
-        if block.title in others and block.title != "Time":
+        if block.title in others and block.title not in ("Time", WARNINGS):
             found.append(_differences(block, others[block.title]))
-    return tuple(found)
+    return (*found, _findings(first, second))
+
+
+def _findings(first: Results, second: Results) -> Block:
+    """Tabulate the warnings that one of two runs alone has, by code and stage."""
+    a, b = ({(one.code, one.stage): one for one in run.findings} for run in (first, second))
+    rows = tuple(
+        (f"{one.severity} {one.code}", one.stage or "the case", *(("yes", "-") if key in a else ("-", "yes")))
+        for key, one in (a | b).items()
+        if (key in a) != (key in b)
+    )
+    return Block(WARNINGS, ("", "of", "first", "second") if rows else (), rows, () if rows else ("the same",))
 
 
 def _entries(*cases: tuple[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -123,7 +134,7 @@ def _shared(block: Block, header: tuple[str, ...]) -> Block:
 def _change(first: str, second: str, *, decibels: bool) -> str:
     """Change in per cent, of levels in dB, nothing where a cell is no number."""
     try:
-        x, y = float(first), float(second)
+        x, y = (float(unmarked(one)) for one in (first, second))
     except ValueError:
         return ""
     if decibels:

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from femgear.errors import FemgearError, printable
+from femgear.findings import SEVERITIES, Finding, by_severity, remark
 from femgear.report.charts import chart
 from femgear.report.explorer import DRAWN, EXPLORER
 from femgear.report.solid import SOLID
@@ -226,10 +227,12 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     if "runup" in data:
         pictures = [one for one in pictures if one.name not in DRAWN]
         data["charts"] = {name: one for name, one in data.get("charts", {}).items() if name not in DRAWN}
-    warnings = [*train.case_warnings(case), *train.result_warnings(results), *skipped]
+    warnings = [*by_severity(results.findings), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
-    known = f'<p class="warn"><a href="#warnings">Warnings: {len(warnings)}</a></p>\n' if warnings else ""
+    known = (
+        f'<p class="warn"><a href="#warnings">Warnings: {_counted(warnings)}</a></p>\n' if warnings else ""
+    )
     head = "".join(
         (
             f"<h1>{escape(case.title)}</h1>\n",
@@ -259,6 +262,16 @@ def document(title: str, main: str, data: dict[str, Any] | None) -> str:
         f"<title>{title}</title>\n<style>{(_WEB / 'page.css').read_text('utf-8')}</style>\n</head>\n<body>\n"
         f"<main>\n{main}</main>\n{scripts}</body>\n</html>\n"
     )
+
+
+def _counted(warnings: Sequence[Finding]) -> str:
+    """Count warnings, and those of them that make numbers doubtful."""
+    severe = [
+        f"{count} {severity}{'s' * (count > 1)}"
+        for severity in reversed(SEVERITIES[1:])
+        if (count := sum(one.severity == severity for one in warnings))
+    ]
+    return f"{len(warnings)}{' (' + ', '.join(severe) + ')' if severe else ''}"
 
 
 def _scripts(data: dict[str, Any]) -> str:
@@ -423,7 +436,7 @@ def _own_bytes(results: Results, name: str) -> bytes | None:
         return path.read_bytes()
 
 
-def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[str]]:
+def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[Finding]]:
     """Read the pictures that the manifest names, in the order of the captions, and what was left out."""
     found, skipped = [], []
     for name in results.manifest.files:
@@ -432,9 +445,9 @@ def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[str]
             continue
         data = _own_bytes(results, name)
         if data is None:
-            skipped.append(f"{name} is missing or was changed since the run, and is not shown")
+            skipped.append(remark(f"{name} is missing or was changed since the run, and is not shown"))
         elif kind is not None and len(data) > _LARGEST_PICTURE:
-            skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
+            skipped.append(remark(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)"))
         elif kind is not None:
             stem = Path(name).stem
             rank, section, caption = caption_of(train, stem)
@@ -459,12 +472,25 @@ def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
     return len(captions), _OTHER, re.sub("[_-]+", " ", stem)
 
 
-def _trust(results: Results, numbers, warnings: Sequence[Any], static: bool) -> str:
+def _said(finding: Finding) -> str:
+    """Write a finding with its severity and its stage."""
+    return f"{finding.severity}{f' of {finding.stage}' if finding.stage else ''}: {finding}"
+
+
+def _value(value: Any) -> str:
+    """Write what a solver says of its result; a dash for nothing."""
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "none"
+    return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _trust(results: Results, numbers, warnings: Sequence[Finding], static: bool) -> str:
     """Show warnings, what the solvers say of their results, time, versions, checksums, the case as run."""
     manifest = results.manifest
-    items = "".join(f"<li>{escape(str(warning))}</li>\n" for warning in warnings) or "<li>none</li>\n"
+    items = "".join(f'<li class="{one.severity}">{escape(_said(one))}</li>\n' for one in warnings)
+    items = f'<ul class="warnings">\n{items}</ul>\n' if items else '<p class="note">none</p>\n'
     said = tuple(
-        (stage, name.replace("_", " "), f"{value:.3g}" if isinstance(value, float) else str(value))
+        (stage, name.replace("_", " "), _value(value))
         for stage, verdict in manifest.convergence.items()
         for name, value in (verdict or {}).items()
     )
@@ -474,7 +500,7 @@ def _trust(results: Results, numbers, warnings: Sequence[Any], static: bool) -> 
     blocks += [numbers["Time"]] if "Time" in numbers else []
     tables = "".join(map(table, [*blocks, versions, Block("Files", ("file", "SHA-256"), files)]))
     content = (
-        f'<h3 id="warnings">Warnings</h3>\n<ul class="warnings">\n{items}</ul>\n{tables}'
+        f'<h3 id="warnings">Warnings</h3>\n{items}{tables}'
         f'<h3>Case as run</h3>\n<pre tabindex="0">{escape(results.case.source)}</pre>\n'
     )
     return _folded("trust", "Trust: warnings, residuals, checksums, case", content, static)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.findings import Finding
+from femgear.findings import CATALOGUE, NOTE, Finding, by_severity
 from femgear.report.response import harmonics_of, some_at_a_time
 from femgear.system.fourier import fluctuation, sample
 
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 MANY = 8
 """Rows of a table that shows the speeds, and speeds that a warning names."""
+WARNINGS = "Warnings"
+"""Title of the table of findings."""
+_MARKS = "†‡§¶‖◊*#"
+"""Marks of doubtful numbers, in the order in which a table needs them."""
 _MODES = 16
 """Rows of the table of modes."""
 _NUMBERED = re.compile(r"(.*?)((?<![\d.])\d{1,9}(?![\d.]))?(\D*)", re.DOTALL)
@@ -57,11 +61,72 @@ def merged(rows: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
 
 
 def tabulate(
-    title: str, items: Iterable, columns: Mapping[str, Callable[[Any], str]], notes: Iterable[str] = ()
+    title: str,
+    items: Iterable,
+    columns: Mapping[str, Callable[[Any], str]],
+    notes: Iterable[str] = (),
+    marks: Marks | None = None,
 ) -> Block:
-    """Make a table with a row for every item, its text in every column by the name of the column."""
+    """Make a table with a row for every item, its text in every column by the name of the column.
+
+    What the marks mean that the columns have used stands under the table.
+    """
     rows = tuple(tuple(text(item) for text in columns.values()) for item in items)
-    return Block(title, tuple(columns), rows, tuple(notes))
+    return Block(title, tuple(columns), rows, (*notes, *(marks.notes if marks else ())))
+
+
+def listed(findings: Iterable[Finding]) -> tuple[Block, ...]:
+    """Tabulate which findings a run has, from the most severe, with their meanings; none without findings.
+
+    Their texts, with the numbers, stand on standard error and on the page.
+    """
+    columns = {
+        "": lambda one: f"{one.severity} {one.code}".strip(),
+        "of": lambda one: one.stage or "the case",
+        "meaning": lambda one: CATALOGUE[one.code][1] if one.code else one.text,
+    }
+    block = tabulate(WARNINGS, by_severity(findings), columns)
+    return (replace(block, rows=tuple(dict.fromkeys(block.rows))),) if block.rows else ()
+
+
+class Marks:
+    """Marks of the numbers of a table that findings of severity doubt or fault concern.
+
+    ``marks(text, "W-PRESSURE")`` is the text of a number with a mark where the finding was raised, as in
+    "4573.4†"; `notes` tells under the table what the marks mean. A number of which only a bound is known, or
+    none at all, is written so by who writes it: ``marks.raised`` tells whether there is such a finding.
+
+    Parameters
+    ----------
+    findings : iterable of Finding
+        Of the stages that the numbers come from.
+    """
+
+    def __init__(self, findings: Iterable[Finding]) -> None:
+        self._known = {one.code: one for one in findings if one.severity != NOTE}
+        self._used = dict[str, str]()
+
+    def raised(self, *codes: str) -> bool:
+        """Tell whether one of some findings was raised."""
+        return not self._known.keys().isdisjoint(codes)
+
+    def __call__(self, text: str, *codes: str) -> str:
+        """Mark the text of a number that findings of these codes concern; a dash needs no mark."""
+        raised = [code for code in codes if code in self._known] if text.strip("-") else []
+        return text + "".join(self._used.setdefault(code, _MARKS[len(self._used)]) for code in raised)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the marks that were used mean."""
+        return tuple(
+            f"{mark} {code}, {self._known[code].severity}: {CATALOGUE[code][1]}"
+            for code, mark in self._used.items()
+        )
+
+
+def unmarked(text: str) -> str:
+    """Take the marks of `Marks` off the text of a number."""
+    return text.rstrip(_MARKS)
 
 
 def describe_modes(

@@ -167,6 +167,18 @@ def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
         file.attrs.update({str(name): text for name, text in dataset.attrs.items() if isinstance(text, str)})
 
 
+def write_attribute(path: Path, name: str, text: str) -> None:
+    """Give a file of `append_dataset` an attribute that is known when all of it is written."""
+
+    def write(stream: io.RawIOBase) -> None:
+        import h5py
+
+        with h5py.File(stream, "r+") as file:
+            file.attrs[name] = text
+
+    write_hdf5(path, write)
+
+
 def write_hdf5(path: str | os.PathLike, write: Callable[[io.RawIOBase], object]) -> None:
     """Write an HDF5 file by ``write(stream)``; raises the `OSError` of a disk that fails meanwhile."""
     with _Disk(path, "r+b") as disk, _other_thread() as pool:

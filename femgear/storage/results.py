@@ -12,8 +12,7 @@ import os
 import platform
 import re
 import shlex
-import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
@@ -27,6 +26,7 @@ import numpy as np
 
 from femgear import __version__
 from femgear.errors import StorageError
+from femgear.findings import Finding, as_data, from_data, remark, tell
 from femgear.storage.files import (
     WRITTEN,
     checked_name,
@@ -48,8 +48,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
-_FORMAT = 4
+_FORMAT, _READ = 5, (4, 5)
+"""Format of manifests that are written, and those that are read: of format 4 the findings are unknown."""
 MANIFEST = "manifest.json"
+_UNKNOWN = remark(
+    "the former version of femgear that wrote this folder stored no warnings: run the case again to see them"
+)
 KEPT = ".stages"
 """Folder of results that a run goes on from when it was interrupted."""
 _CASE, _LOCK = "case.toml", ".lock"
@@ -255,6 +259,8 @@ class Manifest:
         What each stage says about its convergence.
     versions : mapping of str to str
         femgear and the libraries that computed.
+    findings : tuple of Finding
+        Of the case, and of the stages that were computed.
     """
 
     complete: bool
@@ -262,6 +268,7 @@ class Manifest:
     timings: Mapping[str, float] = field(default_factory=dict)
     convergence: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self):
         for name in ("files", "timings", "convergence", "versions"):
@@ -295,6 +302,11 @@ class Results:
         """Take the contents of some files, by stage, from memory instead of reading them."""
         vars(self).update(data)
         return self
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What deserves a look in the case and in the results of its stages, each once."""
+        return self.manifest.findings
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.stages)
@@ -347,7 +359,7 @@ def results_of(
     if not partial:
         _refuse_incomplete(results)
     elif not results.manifest.complete:
-        warnings.warn(f"{folder}: {_interrupted(results)}", stacklevel=2)
+        tell(remark(f"{folder}: {_interrupted(results)}"))
     return results
 
 
@@ -501,6 +513,7 @@ def record(
     *,
     timings: Mapping[str, float],
     convergence: Mapping[str, object],
+    findings: Iterable[Finding] = (),
     known: Mapping[str, str] = MappingProxyType({}),
     complete: bool = False,
 ) -> Manifest:
@@ -516,7 +529,7 @@ def record(
         Numbers, texts, arrays and tables of these; numbers that are not finite are stored as null.
     """
     files = {name: known.get(name) or checksum(Path(folder) / name) for name in names}
-    manifest = Manifest(complete, files, timings, convergence, versions())
+    manifest = Manifest(complete, files, timings, convergence, versions(), tuple(findings))
     _write_manifest(folder, manifest)
     return manifest
 
@@ -543,16 +556,17 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
         data = json.loads(text)
         seal, right = data.pop("checksum", None), _seal(data)
         written = data.pop("femgear_format")
-        if type(written) is not int or written != _FORMAT:
+        if type(written) is not int or written not in _READ:
             raise StorageError(
                 "written by another version of femgear", code="E-FORMAT", file=str(path), value=written,
-                limit=str(_FORMAT), remedy="run the case again",
+                limit=" and ".join(map(str, _READ)), remedy="run the case again",
             )  # fmt: skip
         if seal != right:
             raise StorageError(
                 "changed since femgear wrote it (its checksum does not fit)", code="E-FORMAT",
                 file=str(path), remedy="run the case again in a new folder",
             )  # fmt: skip
+        data["findings"] = (_UNKNOWN,) if written < _FORMAT else from_data(data["findings"])
         manifest = Manifest(**data)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
         raise StorageError(
@@ -570,7 +584,7 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
 
 def _write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
     """Write ``manifest.json``; the last file of a run."""
-    data = _plain({"femgear_format": _FORMAT, **vars(manifest)})
+    data = _plain({"femgear_format": _FORMAT, **vars(manifest), "findings": as_data(manifest.findings)})
     sealed = {**data, "checksum": _seal(data)}
     write_text(json.dumps(sealed, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
 

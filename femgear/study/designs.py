@@ -16,7 +16,6 @@ import os
 import pickle
 import stat
 import time
-import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -31,7 +30,7 @@ from femgear import __version__
 from femgear.case.dependencies import Steps, compliance_entries
 from femgear.case.sections import Case
 from femgear.errors import ContactError, FemgearError, StorageError
-from femgear.findings import Finding
+from femgear.findings import Finding, tell
 from femgear.storage.files import exclusive_lock, storage_errors
 from femgear.study.objectives import STAGES, Quantity, Variant
 from femgear.study.problem import Limit, Point, Problem, Variable, Vector
@@ -100,7 +99,7 @@ class Journal(dict[str, dict]):
                 "W-JOURNAL", "", f"{path}: changed or damaged since it was written: {shown}",
                 remedy="what stood there is left out, and computed again where no later line holds it",
             )  # fmt: skip
-            warnings.warn(str(finding), stacklevel=2)
+            tell(finding)
         if whole < len(text):
             with storage_errors(path):
                 stream.truncate(whole)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import math
 import re
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ import numpy as np
 
 from femgear.case.sections import Case
 from femgear.errors import CaseError
-from femgear.findings import Finding
+from femgear.findings import Finding, tell
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
 from femgear.report.tables import Block
 from femgear.storage.files import own_files, resumable, write_csv
@@ -166,7 +165,7 @@ def _warn_of_time(left: int, seconds: float, workers: int) -> None:
     shown = f"{total / 3600.0:.1f} h" if total > 5400.0 else f"{total / 60.0:.1f} min"
     text = f"{left} more cases of about {seconds:.2g} s each: {shown}"
     finding = Finding("W-SWEEP", "", text, remedy="an interrupted sweep goes on where it was")
-    warnings.warn(str(finding), stacklevel=3)
+    tell(finding, stacklevel=3)
 
 
 def parse_over(text: str) -> tuple[str, Sequence[object]]:

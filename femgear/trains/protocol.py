@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import lru_cache
-from itertools import chain
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,8 @@ import numpy as np
 import scipy
 
 from femgear.errors import FemgearError
-from femgear.report.tables import Block
+from femgear.findings import by_severity, once
+from femgear.report.tables import Block, listed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,6 +69,42 @@ def blaming_start(case: Any, key: str) -> Iterator[None]:
         raise
 
 
+class StageResult:
+    """What the result of every stage has beside its numbers; base of their dataclasses.
+
+    A class overrides what it knows better: results of direct solutions converge, and have no residual.
+    """
+
+    @property
+    def converged(self) -> bool:
+        """Whether all solutions satisfy their tolerance."""
+        return True
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the solutions, NaN of what is not iterated."""
+        return math.nan
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found, in words."""
+        return "solved directly, without iteration"
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the result says against itself, each once."""
+        return once(self.warnings(self.dataset()))
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what the contents of the stage's file say against themselves."""
+        return ()
+
+    def dataset(self) -> xr.Dataset:
+        """Collect the contents of the stage's file."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
 class Drawn:
     """What pictures are made of.
@@ -118,9 +155,9 @@ class Stage:
         Of the file, and of its section on the page.
     solve : callable
         ``(case, *results of the stages in `takes`, **options) -> result``; the result of a stage that was
-        not computed is None.
+        not computed is None. The result is a `StageResult`.
     verdict : callable
-        ``(result) -> dict`` for the manifest.
+        ``(result) -> dict``: what the manifest says of it beside `convergence`.
     describe : callable
         ``(Results) -> Block``: the numbers of the stage, read from its folder.
     parts : callable, optional
@@ -144,7 +181,8 @@ class Stage:
     tables : callable
         ``(Results) -> blocks`` that the page shows beside the numbers.
     warnings : callable
-        ``(Dataset) -> findings``: what the solver says against the contents of the stage's file.
+        ``(Dataset) -> findings``: what the solver says against the contents of the stage's file, the
+        `StageResult.warnings` of its results.
     """
 
     name: str
@@ -166,6 +204,16 @@ class Stage:
     def before(self, case: Any) -> tuple[str, ...]:
         """List the stages that must come before this one."""
         return self.takes if self.needs is None else self.needs(case)
+
+    def convergence(self, result: StageResult) -> dict[str, Any]:
+        """Tell how a result was found, and what its verdict is, for the manifest."""
+        said = result if isinstance(result, StageResult) else StageResult()  # of trains without the base
+        known = {"converged": said.converged, "residual": said.residual, "message": said.message}
+        return known | self.verdict(result)
+
+    def findings(self, data: xr.Dataset) -> tuple[Finding, ...]:
+        """List what the contents of the stage's file say against themselves, each once."""
+        return once(self.warnings(data), self.name)
 
 
 @dataclass(frozen=True)
@@ -228,14 +276,15 @@ class Train:
 
     def describe_case(self, case: Any) -> tuple[Block, ...]:
         """Tabulate a case: its title, what it is, and its warnings."""
-        warnings = tuple(map(str, self.warnings(case)))
+        warnings = tuple(map(str, by_severity(self.case_warnings(case))))
         return Block(case.title), *self.describe(case), Block("Warnings", notes=warnings or ("none",))
 
     def describe_results(self, results: Results) -> tuple[Block, ...]:
         """Tabulate the numbers of a run: its verdict, one block a stage, and the time that each took."""
         blocks = [stage.describe(results) for stage in self._in(results)]
         timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
-        return (*self.verdict(results), *blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
+        time = Block("Time", ("stage", "[s]"), tuple(timings))
+        return (*self.verdict(results), *blocks, *listed(results.findings), time)
 
     def case_warnings(self, case: Any) -> tuple[Finding, ...]:
         """List what a case is allowed to be but deserves a look, each once.
@@ -245,12 +294,11 @@ class Train:
         FemgearError
             What cannot be computed at all.
         """
-        return tuple(dict.fromkeys(self.warnings(case)))
+        return once(self.warnings(case))
 
     def result_warnings(self, results: Results) -> tuple[Finding, ...]:
         """List what the solvers say against their own results, each once."""
-        found = (stage.warnings(results[stage.name]) for stage in self._in(results))
-        return tuple(dict.fromkeys(chain.from_iterable(found)))
+        return tuple(one for one in results.findings if one.stage)
 
     def _in(self, results: Results) -> list[Stage]:
         """Stages whose results there are."""
@@ -264,7 +312,7 @@ def modes_verdict(result: Any) -> dict:
 
 def joint_verdict(verdicts: Sequence[dict]) -> dict:
     """Join the verdicts of the parts of a stage: all of them, the largest number, the latest text."""
-    joins = {bool: all, float: max, int: max}
+    joins = {bool: all, float: lambda values: float(np.fmax.reduce(values)), int: max}
     found = {}
     for name, latest in verdicts[-1].items():
         values = [one[name] for one in verdicts]
@@ -273,10 +321,5 @@ def joint_verdict(verdicts: Sequence[dict]) -> dict:
 
 
 def response_verdict(result: Any) -> dict:
-    """Tell convergence and stability of any result with a periodic response, for the manifest."""
-    return {
-        "converged": bool(np.all(result.response.converged)),
-        "stable": bool(np.all(result.stability.stable)),
-        "residual": float(np.max(result.response.residual)),
-        "message": result.response.message,
-    }
+    """Tell the stability of any result with a periodic response, for the manifest."""
+    return {"stable": bool(np.all(result.stability.stable))}

@@ -6,11 +6,11 @@ import numpy as np
 
 from femgear.report.tables import Block
 from femgear.storage.results import dataset
-from femgear.trains.protocol import Figures, Stage, Train
+from femgear.trains.protocol import Figures, Stage, StageResult, Train
 
 
 @dataclass(frozen=True)
-class ModesResult:
+class ModesResult(StageResult):
     """Natural frequency [Hz]."""
 
     frequency: float
@@ -23,7 +23,7 @@ class ModesResult:
 
 
 @dataclass(frozen=True)
-class ReceptanceResult:
+class ReceptanceResult(StageResult):
     """Receptance (n,) [m/N] over the frequency (n,) [Hz]."""
 
     frequency: np.ndarray

@@ -64,17 +64,18 @@ def make_run(folder, *, case=None, stages=("static", "modes", "dynamics", "housi
     case = read_case(CASE) if case is None else case
     prepare_output(folder)
     write_text(case.source, folder / "case.toml")
-    names = ["case.toml"]
+    names, findings = ["case.toml"], [*ELASTIC.case_warnings(case)]
     for stage in stages:
         data = getattr(synthetic, stage)()
         if change is not None:
             change(stage, data)
+        findings += ELASTIC.stage(stage).findings(data)
         write_dataset(data, folder / f"{stage}.nc")
         names.append(f"{stage}.nc")
     style.save_figure(static_figures.load_sharing(synthetic.static()), folder / "load_sharing.png")
     style.save_figure(static_figures.tooth_loads(synthetic.static()), folder / "tooth_loads.png")
     names += ["tooth_loads.png", "load_sharing.png"]
-    finish(folder, names, timings={"static": 1.25}, convergence={})
+    finish(folder, names, timings={"static": 1.25}, convergence={}, findings=findings)
     return folder
 
 
@@ -171,11 +172,9 @@ def test_verdicts_are_warnings(tmp_path):
             data["stable"].values[0] = False
 
     text = html(ELASTIC, open_results(make_run(tmp_path / "out", change=change)))
-    assert (
-        "<li>[W-CONVERGENCE] operation.speeds: the periodic solution did not converge at 3100 rpm</li>"
-        in text
-    )
-    assert "<li>[W-UNSTABLE] operation.speeds: the periodic solution is unstable at 250 rpm</li>" in text
+    for code, state in (("W-CONVERGENCE", "did not converge at 3100"), ("W-UNSTABLE", "is unstable at 250")):
+        words = f"[{code}] operation.speeds: the periodic solution {state} rpm</li>"
+        assert f'<li class="doubt">doubt of dynamics: {words}' in text
 
 
 def test_verdict_stands_before_the_stages_and_trust_is_folded_away_at_the_end(tmp_path):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, reco
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.parts import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.simulation import BALANCE, PASS_BAND, DrivetrainRun
+from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +51,7 @@ _NOTHING = 1e-6
 
 
 @dataclass(frozen=True)
-class DrivetrainModesResult:
+class DrivetrainModesResult(StageResult):
     """Modes at standstill with mean mesh stiffnesses, and over the speed with gyroscopic terms.
 
     ``speed`` is that of the first body in operation [rad/s].
@@ -95,12 +96,32 @@ class DrivetrainModesResult:
 
 
 @dataclass(frozen=True)
-class TransientResult:
+class TransientResult(StageResult):
     """Motion in time, by variant: with bending, and torsional where it is asked for; external torques."""
 
     models: dict[str, DrivetrainModel]
     runs: dict[str, DrivetrainRun]
     torques: tuple[TorqueHistory, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether energy and angular momentum balance."""
+        return self.residual <= BALANCE
+
+    @property
+    def residual(self) -> float:
+        """Largest error of the balances of energy and angular momentum, relative."""
+        return float(max(max(run.energy_balance.error, run.momentum) for run in self.runs.values()))
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return "integrated in time; residual: balances of energy and angular momentum"
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what transient.nc says against itself, see `transient_warnings`."""
+        return transient_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of transient.nc."""
@@ -194,7 +215,7 @@ class AveragedSpectrum:
 
 
 @dataclass(frozen=True)
-class SpectrumResult:
+class SpectrumResult(StageResult):
     """Spectra of the mesh forces by variant, over frequency and order, and the named lines.
 
     After ``settle`` [s], at the mean ``speed`` of the first body [rad/s]; ``amplitudes`` (L, n_meshes) [N] of
@@ -210,6 +231,11 @@ class SpectrumResult:
     amplitudes: dict[str, np.ndarray]
     order_distance: float
     resolved: np.ndarray
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return "spectra of the record in time"
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of spectrum.nc."""

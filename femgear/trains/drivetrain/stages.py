@@ -39,7 +39,6 @@ from femgear.trains.drivetrain.results import (
     describe_drivetrain_modes,
     describe_spectrum,
     describe_transient,
-    transient_warnings,
 )
 from femgear.trains.drivetrain.simulation import PASS_BAND, DrivetrainRun, Records, march_drivetrain
 from femgear.trains.protocol import Progress, Stage, Train, modes_verdict, one_blas_thread, silent
@@ -317,7 +316,7 @@ DRIVETRAIN = Train(
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
             check=check_drivetrain,
-            warnings=transient_warnings,
+            warnings=TransientResult.warnings,
         ),
         Stage(
             name="spectrum",

@@ -6,7 +6,7 @@ belong to real motions by ``x(t) = Re sum_h X_h exp(i h omega t)``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -59,9 +59,10 @@ from femgear.storage.results import (
     response_entries,
 )
 from femgear.system.fourier import sample
-from femgear.trains.elastic.checks import checked_speeds
+from femgear.trains.elastic.checks import checked_speeds, dynamics_warnings, housing_warnings
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 from femgear.trains.elastic.runup import KINDS, loudest, meeting_columns
+from femgear.trains.protocol import StageResult
 from femgear.trains.static.results import HELD, UNEQUAL, peak_to_peak, shares
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ _DIRECTIONS = {RADIAL: "radial", TANGENTIAL: "tangential"}
 
 
 @dataclass(frozen=True)
-class ModesResult:
+class ModesResult(StageResult):
     """Mechanical system with its elastic ring, its loaded state, and its modal basis.
 
     Parameters
@@ -222,7 +223,7 @@ class FixedHousing:
 
 
 @dataclass(frozen=True)
-class DynamicsResult:
+class DynamicsResult(StageResult):
     """Periodic response at every ``input_speed`` (speeds,) [rad/s], stability, and field of the ring.
 
     ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial``
@@ -248,9 +249,28 @@ class DynamicsResult:
     excitation_limit: np.ndarray
     level_change: np.ndarray
     compared_to: float
-    warnings: tuple[Finding, ...]
     entries: Entries
     fixed: FixedHousing | None = None
+
+    @property
+    def converged(self) -> bool:
+        """Whether all solutions satisfy their tolerance."""
+        return bool(np.all(self.response.converged))
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the solutions."""
+        return float(np.max(self.response.residual))
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return self.response.message
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what dynamics.nc says against itself, see `dynamics_warnings`."""
+        return dynamics_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
@@ -278,14 +298,14 @@ class DynamicsResult:
             ),
             attrs=({"periods": periods} if periods > 1 else {}) | {
                 "title": "periodic response by the spectral method", "message": response.message,
-                "compared_to": self.compared_to, "warnings": " ".join(map(str, self.warnings)),
+                "compared_to": self.compared_to,
                 "ring_teeth": self.ring_teeth, "fourier_convention": FOURIER,
             },
         )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class HousingResult:
+class HousingResult(StageResult):
     """What a fixed sensor on the ring hears at every ``input_speed`` (speeds,) [rad/s].
 
     ``exact`` are the lines of the components, ``lines`` those of the case's ``form``, "exact" or "linear"
@@ -315,6 +335,16 @@ class HousingResult:
     def lines(self) -> SensorLines:
         """Lines in the form of the case."""
         return lines_in_form(self.exact, self.form, self.points, self.harmonics)
+
+    @property
+    def message(self) -> str:
+        """What the lines rest on."""
+        return "summed from the periodic response"
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what housing.nc says against itself, see `housing_warnings`."""
+        return housing_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of housing.nc; `femgear.housing.sensor.stored_lines` reads the lines."""

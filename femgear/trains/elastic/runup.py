@@ -9,7 +9,7 @@ by the forces of the set in it. Modes and what one does alone are always those o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,7 @@ from femgear.report.tables import Block, tabulate
 from femgear.solvers.linear.resonances import EXCITED
 from femgear.storage.results import as_written, complex_entries, coordinates, dataset, declared
 from femgear.system.fourier import fluctuation, sample
+from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -164,7 +165,7 @@ def resonances(modes: Modes, forces: ModalForces, met: Crossings, speed, operati
 
 
 @dataclass(frozen=True)
-class RunupResult:
+class RunupResult(StageResult):
     """Levels, mesh forces and lines over ``input_speed`` (s,) [rad/s], and the resonances between its ends.
 
     Mesh frequency and end of the excitation (s,) [Hz], speed of the carrier (s,) and operating
@@ -183,6 +184,16 @@ class RunupResult:
     operating_speeds: np.ndarray
     unresolved: int
     method: str = "exact"
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return "spectral method; a speed without a solution is refused"
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what runup.nc says against itself, see `runup_warnings`."""
+        return runup_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of runup.nc."""

@@ -24,7 +24,6 @@ from femgear.case.dependencies import (
     static_entries,
 )
 from femgear.case.gear_set import driving_torque, material_of, planetary_set, set_deviations
-from femgear.case.quantities import RPM
 from femgear.case.sections import Case
 from femgear.contact.bodies import Bodies, with_ring
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
@@ -33,10 +32,10 @@ from femgear.contact.supports import Supports
 from femgear.fe.elasticity import mass
 from femgear.findings import Finding
 from femgear.gears.deviations import common_period, rotational_symmetry
-from femgear.gears.planetary import PlanetarySet, mesh_names
+from femgear.gears.planetary import PlanetarySet
 from femgear.housing.sensor import component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound
-from femgear.report.tables import describe_modes, describe_response, pulling_meshes, pulls_of
+from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.linear.resonances import (
     ONE_FREQUENCY,
@@ -56,11 +55,8 @@ from femgear.trains.elastic.checks import (
     check_reach,
     check_rim_speed,
     checked_speeds,
-    dynamics_warnings,
     fastest_mesh_frequency,
-    housing_warnings,
     max_nodal_diameter,
-    missing_level,
     no_runup,
     runup_ends,
     slowest_wave,
@@ -117,7 +113,6 @@ from femgear.trains.elastic.runup import (
     joined,
     mode_levels,
     resonances,
-    runup_warnings,
 )
 from femgear.trains.protocol import (
     Progress,
@@ -328,7 +323,7 @@ def dynamics_parts(
     check_reach(case, modes.reach, fastest_mesh_frequency(case, static.planetary_set))
     basis, excitation, gears = modes.modes, modes.excitation, static.planetary_set
     speeds, (frequency, carrier) = np.array(case.operation.speeds), _turning_speeds(case, modes)
-    names, pulls, some = mesh_names(gears.n_planets), list[np.ndarray](), checked_speeds(len(speeds))
+    some = checked_speeds(len(speeds))
     up_to, beyond, change = excitation_end(case, modes, frequency, carrier, some)
     limit = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics)
     level_change = np.full(len(speeds), np.nan)
@@ -336,7 +331,6 @@ def dynamics_parts(
     slow = frequency * HARMONICS < beyond - frequency
     if slow.any():
         level_change[slow] = lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
-    short_of = missing_level(speeds / RPM, level_change, limit.frequency, beyond)
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     room = _HARMONIC * limit.response * excitation.periods
     if case.housing.stands_still:
@@ -344,8 +338,7 @@ def dynamics_parts(
     for own, part in parts_of_speeds(case, room, memory):
         response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
-        pulls.append(pulls_of(response.force))
-        if (complete := own[-1] + 1 == len(speeds)) and part is not case:
+        if own[-1] + 1 == len(speeds) and part is not case:
             response = replace(response, message=joint_message(told))
         last = replace(response, **{name: getattr(response, name)[-1:] for name in _LINES})
         heard = response if any(math.sin(one.direction) for one in case.housing.sensor) else last
@@ -357,7 +350,6 @@ def dynamics_parts(
             ring_tangential=mesh_and_ring_outputs(modes, heard, TANGENTIAL)[1],
             ring_teeth=gears.ring.teeth, symmetry=modes.symmetry, harmonics=int(limit.response.max()),
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
-            warnings=(*short_of, *pulling_meshes(speeds / RPM, names, pulls)) if complete else (),
             entries=dynamic_entries(part),
             fixed=fixed_part(case, modes, carrier, own) if case.housing.stands_still else None,
         )  # fmt: skip
@@ -529,19 +521,19 @@ ELASTIC = Train(
             options=("progress",),
             verdict=lambda result: {"speeds": len(result.input_speed)},
             describe=lambda results: describe_runup(results.runup),
-            warnings=runup_warnings,
+            warnings=RunupResult.warnings,
             unavailable=no_runup,
         ),
         Stage(
             name="dynamics", title="Dynamics", solve=solve_dynamics, parts=dynamics_parts,
             takes=("static", "modes"), options=("progress",), verdict=response_verdict,
-            describe=lambda results: describe_response(results.dynamics), warnings=dynamics_warnings,
+            describe=lambda results: describe_response(results.dynamics), warnings=DynamicsResult.warnings,
         ),
         Stage(
             name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
             verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(results.housing),
-            tables=lambda results: (mesh_bands(results),), warnings=housing_warnings,
+            tables=lambda results: (mesh_bands(results),), warnings=HousingResult.warnings,
         ),
     ),
     describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,

@@ -6,7 +6,7 @@ tells these units.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +32,15 @@ from femgear.trains.gear_pair.model import (
     separation_ratios,
     state_regions,
 )
-from femgear.trains.protocol import Progress, Stage, Train, blaming_start, one_blas_thread, silent
+from femgear.trains.protocol import (
+    Progress,
+    Stage,
+    StageResult,
+    Train,
+    blaming_start,
+    one_blas_thread,
+    silent,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +59,7 @@ _LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseResult:
+class ResponseResult(StageResult):
     """Periodic motions along the branch, and ratios (b,) where flanks part or hit, by level.
 
     Of every motion the extremes (p,) in half backlashes, and shares (p,) of the time with the drive flanks,
@@ -64,6 +72,26 @@ class ResponseResult:
     highest: np.ndarray
     shares: dict[str, np.ndarray]
     borders: dict[float, np.ndarray]
+
+    @property
+    def converged(self) -> bool:
+        """Whether all solutions satisfy their tolerance."""
+        return bool(np.all(self.branch.converged))
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the solutions."""
+        return float(np.max(self.branch.residual))
+
+    @property
+    def message(self) -> str:
+        """Where the branch ended, and why."""
+        return self.branch.message
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what response.nc says against itself."""
+        return _response_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of response.nc."""
@@ -89,12 +117,27 @@ class ResponseResult:
 
 
 @dataclass(frozen=True, eq=False)
-class SweepResult:
+class SweepResult(StageResult):
     """Motions to which integration settles, over ascending ratios and back."""
 
     case: GearPairCase
     up: SweepResponse
     down: SweepResponse
+
+    @property
+    def converged(self) -> bool:
+        """Whether all motions repeat."""
+        return bool(np.all(self.up.settled) and np.all(self.down.settled))
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return "integrated in time until the motion repeats"
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what sweep.nc says against itself."""
+        return _sweep_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of sweep.nc; both directions over the ascending ratio."""
@@ -121,13 +164,18 @@ class SweepResult:
 
 
 @dataclass(frozen=True, eq=False)
-class ChaosResult:
+class ChaosResult(StageResult):
     """Exponents and sections over the ratio (r,), and long sections at some of the ratios."""
 
     case: GearPairCase
     ratio: np.ndarray
     found: list[LyapunovExponents]
     sections: list[tuple[float, LyapunovExponents]]
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return "integrated in time; the error of every exponent stands beside it"
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
@@ -346,7 +394,7 @@ GEAR_PAIR = Train(
             verdict=lambda result: {"points": len(result.lowest), "message": result.branch.message},
             describe=lambda results: _describe_response(results.response),
             unavailable=_no_response,
-            warnings=_response_warnings,
+            warnings=ResponseResult.warnings,
         ),
         Stage(
             name="sweep",
@@ -355,7 +403,7 @@ GEAR_PAIR = Train(
             verdict=lambda result: {"settled": int(result.up.settled.sum() + result.down.settled.sum())},
             describe=lambda results: _describe_sweep(results.sweep),
             unavailable=lambda case: "" if case.sweep else "the case has no section sweep",
-            warnings=_sweep_warnings,
+            warnings=SweepResult.warnings,
         ),
         Stage(
             name="chaos",

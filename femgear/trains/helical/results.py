@@ -6,7 +6,7 @@ static.nc of a helical case holds spur gears, and its table sets the helical num
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,16 +14,18 @@ import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.gears.planetary import virtual_teeth
-from femgear.report.tables import Block
+from femgear.report.tables import Block, response_warnings
 from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness
+from femgear.trains.protocol import StageResult
 from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from femgear.findings import Finding
     from femgear.gears.kinematics import Speeds
     from femgear.gears.planetary import PlanetarySet
     from femgear.solvers.stability.parametric import Stability
@@ -36,7 +38,7 @@ _BODIES = (
 
 
 @dataclass(frozen=True)
-class HelicalModesResult:
+class HelicalModesResult(StageResult):
     """Modes with mean mesh stiffness, and what excites them.
 
     ``excitation`` has a row a slice, ``whole`` a row a mesh at its static state with fixed centres, both
@@ -78,7 +80,7 @@ class HelicalModesResult:
 
 
 @dataclass(frozen=True)
-class HelicalDynamicsResult:
+class HelicalDynamicsResult(StageResult):
     """Periodic response at every ``input_speed`` (speeds,) [rad/s], its stability, and loads.
 
     ``loads`` holds complex harmonics by name: ``pin`` (speeds, N, 6, H + 1) and ``support``
@@ -91,6 +93,26 @@ class HelicalDynamicsResult:
     response: Response
     stability: Stability
     loads: dict[str, np.ndarray]
+
+    @property
+    def converged(self) -> bool:
+        """Whether all solutions satisfy their tolerance."""
+        return bool(np.all(self.response.converged))
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the solutions."""
+        return float(np.max(self.response.residual))
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return self.response.message
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what dynamics.nc says against itself, see `response_warnings`."""
+        return response_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc of a helical case."""

@@ -16,7 +16,7 @@ from femgear.case.dependencies import check_entries, static_entries
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears import profile
-from femgear.report.tables import describe_modes, describe_response, response_warnings
+from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
@@ -273,7 +273,7 @@ HELICAL = Train(
             unavailable=lambda case: (
                 _NOTHING_EXCITES if _given(case) else ""
             ),
-            warnings=response_warnings,
+            warnings=HelicalDynamicsResult.warnings,
         ),
     ),
     describe=lambda case: (*describe_set(case), *describe_helical(case, planetary_set(case))),

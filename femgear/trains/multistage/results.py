@@ -5,7 +5,7 @@ Every variable of a file carries its units; complex amplitudes are stored as rea
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ from femgear.trains.multistage.model import (
     train_speeds,
     train_torques,
 )
+from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class MultistageModes:
+class MultistageModes(StageResult):
     """Modes of the whole train.
 
     Parameters
@@ -98,7 +99,7 @@ class MultistageModes:
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseResult:
+class ResponseResult(StageResult):
     """Answers of all meshes to the transmission errors of every stage at the input's speeds (F,) [rad/s]."""
 
     data: MultistageSet
@@ -137,31 +138,46 @@ class ResponseResult:
 
 
 @dataclass(frozen=True, eq=False)
-class BalanceResult:
+class BalanceResult(StageResult):
     """Mesh forces (F, meshes, lines) [N] by harmonic balance with k(t) of all meshes.
 
     ``orders`` (lines, S) are the multiples of the mesh frequencies; the first line is the mean. At the
-    speeds (F,) of the input [rad/s]; ``converged`` (F,).
+    speeds (F,) of the input [rad/s]; ``found`` (F,) says at which it converged.
     """
 
     data: MultistageSet
     speed: np.ndarray
     orders: np.ndarray
     force: np.ndarray
-    converged: np.ndarray
+    found: np.ndarray
 
     @property
     def forces(self) -> np.ndarray:
         """R.m.s. force (F, S) in sun-planet 1 of every stage [N]; NaN where not converged."""
         squares = np.abs(self.force[:, _first_meshes(self.data), 1:]) ** 2
-        return np.where(self.converged[:, None], np.sqrt(0.5 * squares.sum(axis=2)), np.nan)
+        return np.where(self.found[:, None], np.sqrt(0.5 * squares.sum(axis=2)), np.nan)
+
+    @property
+    def converged(self) -> bool:
+        """Whether all solutions satisfy their tolerance."""
+        return bool(np.all(self.found))
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return f"harmonic balance, {int(self.found.sum())} of {len(self.found)} speeds converged"
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what balance.nc says against itself, see `balance_warnings`."""
+        return balance_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of balance.nc."""
         words = "r.m.s. of the force in sun-planet 1 of every stage"
         variables = {
             "orders": (("line", "stage"), self.orders, "1", "multiples of the mesh frequency of the stage"),
-            "converged": (("speed",), self.converged, "1", "whether harmonic balance found a solution"),
+            "converged": (("speed",), self.found, "1", "whether harmonic balance found a solution"),
             "total_force": (("speed", "stage"), self.forces, "N", words),
         }
         lines = [("mesh_force", ("speed", "mesh", "line"), self.force, "N", "mesh force")]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from femgear.case.dependencies import Entries
 from femgear.case.quantities import RPM
 from femgear.exchange.formats import Sampling, Signal, line_extent
-from femgear.findings import Finding
+from femgear.findings import Finding, tell
 from femgear.gears.pair import GearPair
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
 from femgear.report.tables import Block, chosen, first_speeds, response_warnings, tabulate
@@ -29,6 +28,7 @@ from femgear.storage.results import (
 )
 from femgear.system.fourier import fluctuation
 from femgear.trains.pair.model import PairModel
+from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,7 +64,7 @@ _PLAY = "m", "play along the line of action, 0: no back side"
 
 
 @dataclass(frozen=True)
-class PairModesResult:
+class PairModesResult(StageResult):
     """Modes with the mean mesh stiffness, and what excites them."""
 
     gears: GearPair
@@ -120,7 +120,7 @@ class PairMotion:
 
 
 @dataclass(frozen=True)
-class PairDynamicsResult:
+class PairDynamicsResult(StageResult):
     """Motion at every ``input_speed`` (s,) [rad/s], its stability, and end of the excitation (s,) [Hz].
 
     Where the linear response pulls, all are those of the harmonic balance with play, ``backlash`` (1,) [m].
@@ -133,6 +133,27 @@ class PairDynamicsResult:
     stability: Stability
     excitation_limit: np.ndarray
     backlash: np.ndarray
+
+    @property
+    def converged(self) -> bool:
+        """Whether all solutions satisfy their tolerance."""
+        return bool(np.all(self.response.converged))
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the solutions."""
+        return float(np.max(self.response.residual))
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found, and at how many speeds flanks part."""
+        apart = int((self.motion.drive < 1.0).sum())
+        return self.response.message + (f" Flanks part at {apart} speeds." if apart else "")
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what dynamics.nc says against itself, see `dynamics_warnings`."""
+        return dynamics_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of dynamics.nc."""
@@ -154,23 +175,17 @@ class PairDynamicsResult:
 
     @property
     def verdict(self) -> dict:
-        """Tell for the manifest whether it converged, is stable, and at how many speeds flanks part."""
+        """Tell for the manifest whether it is stable, and at how many speeds flanks part."""
         apart = int((self.motion.drive < 1.0).sum())
-        return {
-            "converged": bool(np.all(self.response.converged)),
-            "stable": bool(np.all(self.stability.stable)),
-            "residual": float(np.max(self.response.residual)),
-            "separated": apart,
-            "message": self.response.message + (f" Flanks part at {apart} speeds." if apart else ""),
-        }
+        return {"stable": bool(np.all(self.stability.stable)), "separated": apart}
 
 
 @dataclass(frozen=True)
-class PairRunupResult:
+class PairRunupResult(StageResult):
     """Linear motion over ``input_speed`` (s,) [rad/s], resonances, and the branch on which flanks part.
 
     ``branch`` are speeds [rad/s] (p,), motions along it and whether they are stable (p,), None where the
-    flanks stay in contact; ``message`` tells how it ended.
+    flanks stay in contact; ``ending`` tells how it ended.
     """
 
     gears: GearPair
@@ -183,7 +198,17 @@ class PairRunupResult:
     unresolved: int
     branch: tuple[np.ndarray, PairMotion, np.ndarray] | None
     complete: bool
-    message: str
+    ending: str
+
+    @property
+    def message(self) -> str:
+        """How the branch ended."""
+        return self.ending
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what runup.nc says against itself, see `runup_warnings`."""
+        return runup_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of runup.nc."""
@@ -208,6 +233,7 @@ class PairRunupResult:
             "title": "run-up of the pair, linear and with play",
             "operating_speeds": as_written(self.operating_speeds / RPM),
             "unresolved_resonances": self.unresolved,
+            "message": self.ending,
             **self.verdict,
         }
         axes = {"axis": ["x", "y"], "harmonic": np.arange(self.motion.dte.shape[-1])}
@@ -215,9 +241,9 @@ class PairRunupResult:
 
     @property
     def verdict(self) -> dict:
-        """Tell for the manifest at how many speeds the linear response pulls, and how the branch ended."""
+        """Tell for the manifest at how many speeds the linear response pulls, whether the branch ended."""
         apart = int((self.motion.lowest < 0.0).sum())
-        return {"separated": apart, "complete": int(self.complete), "message": self.message}
+        return {"separated": apart, "complete": int(self.complete)}
 
 
 def _lines(motion: PairMotion) -> tuple[tuple, tuple]:
@@ -246,7 +272,7 @@ def signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
                 yield Signal(f"{name}_{text}_rpm", unit, rate, found)
     if "runup" in results.stages and results.runup.attrs["separated"]:
         text = "the sound of the run-up is that of flanks held together, which pull at some of its speeds"
-        warnings.warn(str(Finding("W-PULL", "runup", text, remedy="listen to the speeds")), stacklevel=2)
+        tell(Finding("W-PULL", "runup", text, remedy="listen to the speeds"))
 
 
 def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:

@@ -56,8 +56,6 @@ from femgear.trains.pair.results import (
     PairRunupResult,
     describe_dynamics,
     describe_runup,
-    dynamics_warnings,
-    runup_warnings,
     signal_extent,
     signals,
 )
@@ -412,7 +410,7 @@ PAIR = Train(
             verdict=lambda result: result.verdict,
             describe=lambda results: describe_dynamics(results.dynamics),
             unavailable=_no_speeds,
-            warnings=dynamics_warnings,
+            warnings=PairDynamicsResult.warnings,
         ),
         Stage(
             name="runup",
@@ -425,7 +423,7 @@ PAIR = Train(
             unavailable=lambda case: (
                 _no_speeds(case) or ("" if case.runup.count > 1 else "runup.count leaves it out")
             ),
-            warnings=runup_warnings,
+            warnings=PairRunupResult.warnings,
         ),
     ),
     describe=_describe_case,

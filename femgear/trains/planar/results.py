@@ -7,7 +7,7 @@ every variable of a file carries its units. The tables say what the case is and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -32,6 +32,7 @@ from femgear.trains.planar.model import (
     merged_folds,
     shown_points,
 )
+from femgear.trains.protocol import StageResult
 from femgear.trains.rigid import modes_dataset, needed, stiffness_text, torsion_text
 from femgear.trains.static.results import set_warnings
 
@@ -80,7 +81,7 @@ _OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
 
 
 @dataclass(frozen=True)
-class PlanarModesResult:
+class PlanarModesResult(StageResult):
     """Modes of the set at standstill: mean mesh stiffness, bearings closed, back flanks open."""
 
     planetary_set: PlanetarySet
@@ -97,7 +98,7 @@ class PlanarModesResult:
 
 
 @dataclass(frozen=True)
-class BranchResult:
+class BranchResult(StageResult):
     """Periodic responses to the weight over its frequency in the carrier frame.
 
     ``lines`` has one entry a point of the branch; ``sense`` is 1 where the carrier turns counter-clockwise,
@@ -110,6 +111,26 @@ class BranchResult:
     lines: tuple[MotionLines, ...]
     sense: int
     ending: str
+
+    @property
+    def converged(self) -> bool:
+        """Whether all solutions satisfy their tolerance."""
+        return bool(np.all(self.branch.converged))
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the solutions."""
+        return float(np.max(self.branch.residual))
+
+    @property
+    def message(self) -> str:
+        """Where the branch ended, and why."""
+        return self.ending
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what branch.nc says against itself, see `branch_warnings`."""
+        return branch_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of branch.nc."""
@@ -163,7 +184,7 @@ class BranchResult:
 
 
 @dataclass(frozen=True)
-class PlanarResponseResult:
+class PlanarResponseResult(StageResult):
     """Responses to weight and mesh frequency together, one at every ``input_speed`` (speeds,) [rad/s]."""
 
     planetary_set: PlanetarySet
@@ -171,6 +192,26 @@ class PlanarResponseResult:
     speeds: tuple[Speeds, ...]
     solutions: tuple[PeriodicSolution, ...]
     lines: tuple[MotionLines, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether all solutions satisfy their tolerance."""
+        return all(one.converged for one in self.solutions)
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of the solutions."""
+        return float(max(one.residual for one in self.solutions))
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return "; ".join(dict.fromkeys(one.message for one in self.solutions))
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what response.nc says against itself, see `response_warnings`."""
+        return response_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of response.nc."""

@@ -33,7 +33,6 @@ from femgear.trains.planar.results import (
     BranchResult,
     PlanarModesResult,
     PlanarResponseResult,
-    branch_warnings,
     comparisons,
     describe_branch,
     describe_planar,
@@ -41,7 +40,6 @@ from femgear.trains.planar.results import (
     doubts,
     planar_warnings,
     published_modes,
-    response_warnings,
 )
 from femgear.trains.planar.section import PlanarCase
 from femgear.trains.protocol import (
@@ -348,22 +346,15 @@ def _response_lines(case: PlanarCase, gears: PlanetarySet, static: StaticResult 
 def _branch_verdict(result: BranchResult) -> dict:
     branch = result.branch
     return {
-        "converged": bool(np.all(branch.converged)),
         "complete": bool(branch.complete),
         "points": len(branch.parameter),
         "folds": len(branch.folds),
-        "residual": float(np.max(branch.residual)),
-        "message": result.ending,
         **_truncation(branch.solutions, result.lines),
     }
 
 
 def _response_verdict(result: PlanarResponseResult) -> dict:
-    return {
-        "converged": all(one.converged for one in result.solutions),
-        "residual": max(one.residual for one in result.solutions),
-        **_truncation(result.solutions, result.lines),
-    }
+    return _truncation(result.solutions, result.lines)
 
 
 def _truncation(solutions, lines) -> dict:
@@ -409,7 +400,7 @@ PLANAR = Train(
             describe=lambda results: describe_branch(results.branch),
             unavailable=_lacks("branch"),
             needs=lambda case: ("modes",),
-            warnings=branch_warnings,
+            warnings=BranchResult.warnings,
         ),
         Stage(
             name="response",
@@ -421,7 +412,7 @@ PLANAR = Train(
             describe=lambda results: describe_response(results.response),
             unavailable=_lacks("response"),
             needs=lambda case: ("modes",),
-            warnings=response_warnings,
+            warnings=PlanarResponseResult.warnings,
         ),
     ),
     describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),

@@ -8,7 +8,7 @@ which kinds of modes these excite; neighbouring tooth numbers are listed with wh
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -35,6 +35,7 @@ from femgear.gears.tooth import ROOT_RADIUS_LIMIT, root_notches
 from femgear.report.style import family
 from femgear.report.tables import Block, chosen, tabulate
 from femgear.storage.results import coordinates, dataset, declared
+from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -208,7 +209,7 @@ _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
 
 
 @dataclass(frozen=True)
-class StaticResult:
+class StaticResult(StageResult):
     """Static transmission error, load sharing and mesh stiffness of all meshes.
 
     ``sun_torque`` [N m] keeps its sign, ``period_message`` tells how the errors repeat, and ``entries`` are
@@ -227,9 +228,19 @@ class StaticResult:
     base_helix_angle: float = 0.0
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings that an engineer should not overlook in this result."""
-        return tuple(static_warnings(self.dataset()))
+    def residual(self) -> float:
+        """Largest violation of contact conditions and equilibrium, relative."""
+        return float(self.cycle.residual.max())
+
+    @property
+    def message(self) -> str:
+        """How contact was found."""
+        return self.cycle.message
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what static.nc says against itself, see `static_warnings`."""
+        return static_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of static.nc."""
@@ -368,7 +379,7 @@ class NominalStresses:
 
 
 @dataclass(frozen=True)
-class StressResult:
+class StressResult(StageResult):
     """Stresses of all meshes and gears over the mesh cycle.
 
     Parameters
@@ -405,6 +416,16 @@ class StressResult:
     sun_torque: float
     closes: bool
     relief_kinks: tuple[bool, ...] = ()
+
+    @property
+    def message(self) -> str:
+        """What the stresses rest on."""
+        return "linear, from the loads of the static solution"
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what stress.nc says against itself, see `stress_warnings`."""
+        return stress_warnings(data)
 
     def dataset(self) -> xr.Dataset:
         """Collect the contents of stress.nc."""

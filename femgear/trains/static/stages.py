@@ -67,8 +67,6 @@ from femgear.trains.static.results import (
     StressResult,
     describe_static,
     describe_stress,
-    static_warnings,
-    stress_warnings,
 )
 
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
@@ -511,13 +509,9 @@ STATIC = Stage(
     title="Static",
     solve=solve_static,
     options=("cache", "progress"),
-    verdict=lambda result: {
-        "residual": float(result.cycle.residual.max()),
-        "message": result.cycle.message,
-        "contact": result.cycle.contact,
-    },
+    verdict=lambda result: {"contact": result.cycle.contact},
     describe=lambda results: describe_static(results.static),
-    warnings=static_warnings,
+    warnings=StaticResult.warnings,
     check=lambda case: check_slices(case, planetary_set(case)),
 )
 
@@ -533,7 +527,7 @@ STRESS = Stage(
         "iso": result.nominal.message,
     },
     describe=lambda results: describe_stress(results.stress),
-    warnings=stress_warnings,
+    warnings=StressResult.warnings,
     wanted=lambda case: case.static.stresses,
     unavailable=lambda case: (
         "" if case.helix_angle is None or case.static.slices > 1 else "helical teeth need static.slices = 25"

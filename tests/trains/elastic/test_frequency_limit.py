@@ -60,7 +60,7 @@ def test_default_reaches_the_modes_of_the_meshes_and_the_level_has_converged(
     dynamics, found = reference
     meshes = modes.modes.frequency[modes.modes.frequency < 16e3].max()
     assert 14e3 < meshes < dynamics.excitation_limit.min() <= dynamics.excitation_limit.max() <= modes.reach
-    assert np.abs(dynamics.level_change).max() < 1.0 and dynamics.warnings == ()
+    assert np.abs(dynamics.level_change).max() < 1.0 and dynamics.findings == ()
     twice = with_value(case, "dynamics.up_to", f"{2 * modes.reach} Hz")
     _, wider = levels(twice, static, solve_modes(twice, static, steps=steps))
     # the basis of the second run reaches further, too
@@ -78,7 +78,7 @@ def test_six_harmonics_are_warned_of_with_what_is_missing(case, static, modes, r
     assert missing[0] > 40.0 and missing[1] > 2.0
     # compared with the default reach, or with twice the harmonics where that is more
     assert dynamics.level_change == pytest.approx(missing, abs=0.05)
-    (text,) = map(str, dynamics.warnings)
+    (text,) = map(str, dynamics.findings)
     assert text.startswith("[W-EXCITATION] at 250 rpm the excitation ends at 540 Hz")
     assert f"{missing[0]:+.0f}" in text and "2 of the 2 speeds" in text
 
@@ -92,7 +92,7 @@ def test_a_limit_below_the_modes_of_the_meshes_is_warned_of(case, static, modes,
     assert dynamics.excitation_limit == pytest.approx([88 * 90.0, 7 * 1116.0])
     # compared with the default, which reaches the modes of the meshes
     assert dynamics.compared_to == modes.reach > 16e3
-    assert len(dynamics.warnings) == 1 and np.nanmax(dynamics.level_change) > 1.0
+    assert len(dynamics.findings) == 1 and np.nanmax(dynamics.level_change) > 1.0
 
 
 def test_lines_end_at_the_frequency_and_at_what_the_record_carries(case):
@@ -112,7 +112,7 @@ def test_speeds_too_slow_for_the_record_are_estimated_from_faster_ones(case, sta
     slow = with_value(case, "operation.speeds", ["60 rpm", "250 rpm"])
     dynamics, found = levels(slow, static, modes)
     assert (
-        dynamics.excitation_limit[0] == pytest.approx(512 * 21.6) and "at 60 rpm" in dynamics.warnings[0].text
+        dynamics.excitation_limit[0] == pytest.approx(512 * 21.6) and "at 60 rpm" in dynamics.findings[0].text
     )
     assert np.abs(dynamics.level_change[1]) < 1.0
     wide = solve_spectral(
@@ -208,6 +208,6 @@ def test_meshes_that_pull_are_warned_of_by_result_and_file(case, torque):
     case = with_values(case, changes)
     static = solve_static(case)
     dynamics = solve_dynamics(case, static, solve_modes(case, static))
-    said = [one for one in dynamics.warnings if one.code == "W-PULL"]
+    said = [one for one in dynamics.findings if one.code == "W-PULL"]
     assert len(said) == 1 and "1 of the 2 speeds: 10025.6 rpm" in str(said[0])
     assert said == [one for one in dynamics_warnings(dynamics.dataset()) if one.code == "W-PULL"]
