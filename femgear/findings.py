@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Iterable
-from dataclasses import KW_ONLY, asdict, dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from typing import Any
 
 from femgear.errors import printable
@@ -108,6 +108,8 @@ class Finding:
         What to do about it.
     severity : str, optional
         One of `SEVERITIES`; empty takes that of the catalogue, for a remark ``"note"``.
+    limit : str, optional
+        What is usual: within it there would be no finding.
     stage : str, optional
         Stage of a run whose results draw it, empty of the case. Findings that differ in it alone are equal.
 
@@ -125,6 +127,7 @@ class Finding:
     _: KW_ONLY
     remedy: str = ""
     severity: str = ""
+    limit: str = ""
     stage: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -136,7 +139,8 @@ class Finding:
     def __str__(self) -> str:
         head = f"[{self.code}] " if self.code else ""
         where = f"{self.key}: " if self.key else ""
-        return printable(f"{head}{where}{self.text}{'; ' if self.remedy else ''}{self.remedy}")
+        usual = f" (usual: {self.limit})" if self.limit else ""
+        return printable(f"{head}{where}{self.text}{'; ' if self.remedy else ''}{self.remedy}{usual}")
 
 
 def remark(text: str) -> Finding:
@@ -146,8 +150,8 @@ def remark(text: str) -> Finding:
 
 def once(findings: Iterable[Finding], stage: str = "") -> tuple[Finding, ...]:
     """List findings of a stage, each once and in their order; without a stage they keep theirs."""
-    found = (replace(one, stage=stage) if stage else one for one in findings)
-    return tuple(dict.fromkeys(found))
+    found = from_data(as_data(findings))  # of whatever class
+    return tuple(dict.fromkeys(replace(one, stage=stage) if stage else one for one in found))
 
 
 def by_severity(findings: Iterable[Finding]) -> list[Finding]:
@@ -157,7 +161,8 @@ def by_severity(findings: Iterable[Finding]) -> list[Finding]:
 
 def as_data(findings: Iterable[Finding]) -> list[dict[str, str]]:
     """Turn findings into tables of texts, as manifest.json and the result files hold them."""
-    return [asdict(one) for one in findings]
+    names = [one.name for one in fields(Finding)]
+    return [{name: getattr(one, name) for name in names} for one in findings]
 
 
 def from_data(data: Iterable[dict[str, Any]]) -> tuple[Finding, ...]:

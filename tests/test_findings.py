@@ -1,13 +1,27 @@
-"""One catalogue of findings: every code in the source stands in it, and none that nobody raises."""
+"""Warnings: one catalogue, and one list that every code reaches.
 
+`RAISED` has for every code a way that users have to meet it, by cases, results, exports and studies. Runs of
+every kind of train show that the list reaches standard error, manifest, files, page and terminal.
+"""
+
+import json
 import re
+import warnings
+from collections.abc import Callable, Iterable
+from functools import cache, partial
 from pathlib import Path
 
+import numpy as np
 import pytest
+import synthetic_results as synthetic
+import xarray as xr
 
-from femgear.findings import CATALOGUE, SEVERITIES, Finding, remark
+from femgear.findings import CATALOGUE, SEVERITIES, Finding, FindingWarning, as_data, from_data, once, remark
+from femgear.trains.reading import open_results, read_case, with_values
+from femgear.trains.registry import train_of, trains
 
 PACKAGE = Path(__file__).parents[1] / "femgear"
+CASES = Path(__file__).parents[1] / "cases"
 
 
 def codes_in_the_source() -> set[str]:
@@ -37,3 +51,325 @@ def test_unknown_codes_and_severities_are_refused():
         Finding("W-NOWHERE", "", "text")
     with pytest.raises(ValueError, match="loud"):
         Finding("W-PULL", "", "text", severity="loud")
+
+
+# --- a way to every code ------------------------------------------------------------------------------
+
+
+def case(name: str, changes: dict | None = None):
+    """A shipped case with some entries changed."""
+    return with_values(read_case(CASES / f"{name}.toml"), changes or {})
+
+
+def of_case(name: str, changes: dict | None = None) -> tuple[Finding, ...]:
+    read = case(name, changes)
+    return train_of(read).case_warnings(read)
+
+
+PLANETARY, HELICAL, CHAIN = "planetary_27_40_108", "helical_30_20_70", "own_chain"
+
+
+def of_text(change: Callable[[str], str]) -> tuple[Finding, ...]:
+    """Findings of the reference case with its text changed before it is read."""
+    read = read_case(change((CASES / f"{PLANETARY}.toml").read_text(encoding="utf-8")))
+    return train_of(read).case_warnings(read)
+
+
+def of_stage(train: str, stage: str, data: xr.Dataset) -> tuple[Finding, ...]:
+    """What a stage says against the contents of its file."""
+    (known,) = (one.train for one in trains() if one.name == train)
+    return known.stage(stage).findings(data)
+
+
+def told(work: Callable[[], object]) -> tuple[Finding, ...]:
+    """Findings that exports and studies tell beside results."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        work()
+    return tuple(one.message.args[0] for one in said if issubclass(one.category, FindingWarning))
+
+
+def static(**changes) -> xr.Dataset:
+    """Contents of static.nc of identical planets with some variables and attributes replaced by values."""
+    data = synthetic.static().assign_attrs(contact="profile")
+    for name, value in changes.items():
+        if name in data:
+            data[name] = data[name].copy(data=np.broadcast_to(value, data[name].shape))
+        else:
+            data.attrs[name] = value
+    return data
+
+
+def edge(name: str, value: float) -> xr.Dataset:
+    """A variable of static.nc that has another value at the first mesh and position."""
+    data = static()
+    values = data[name].values.copy()
+    values[0, 0] = value
+    return static(**{name: values})
+
+
+def over_width(*, lifted: bool = False, couple: float = 0.0, **attrs) -> xr.Dataset:
+    """static.nc of teeth in 8 slices, with K_Hbeta 1.3."""
+    data = static(face_width=25e-3, **attrs)
+    load = np.broadcast_to(data["tooth_load"].values[:, :, None], (6, 2, 8, 64)).copy()
+    if lifted:
+        load[:, :, 0] = 0.0
+    dims = ("mesh", "tooth", "slice", "position")
+    data = data.assign(
+        slice_load=(dims, load),
+        slice_pressure=(dims, 1e9 * (load > 0.0)),
+        face_load_factor=("mesh", np.full(6, 1.3)),
+    )
+    return data.assign(planet_couple=(("planet", "position"), np.full((3, 64), couple)))
+
+
+def moved() -> xr.Dataset:
+    """static.nc with a sun that moves by 0.2 mm."""
+    data = static().drop_vars("member_motion")
+    return data.assign(member_motion=(("member", "position"), np.full((1, 64), 2e-4)))
+
+
+def dynamics(**values) -> xr.Dataset:
+    """dynamics.nc with some variables replaced by values at the last speed."""
+    data = synthetic.dynamics()
+    for name, value in values.items():
+        changed = data[name].values.copy()
+        changed[-1] = value
+        data[name] = data[name].copy(data=changed)
+    return data
+
+
+def housing(**values) -> xr.Dataset:
+    """housing.nc at two speeds with further variables, and attributes of text."""
+    data = xr.Dataset(coords={"speed": [250.0, 3100.0]})
+    data["excitation_limit"] = ("speed", [1e4, 2e4])
+    attrs = {name: value for name, value in values.items() if isinstance(value, str)}
+    entries = {name: ("speed", value) for name, value in values.items() if name not in attrs}
+    return data.assign(entries).assign_attrs(attrs)
+
+
+def large() -> tuple[Finding, ...]:
+    """Findings of the reference case where every size is one that is told."""
+    from femgear.trains.elastic import stages
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stages, "_NOTICED", 0.0)
+        return of_case(PLANETARY)
+
+
+def runup(lowest: float = 1.0, missed: int = 0) -> xr.Dataset:
+    speed = np.array([1000.0, 2000.0])
+    values = {"lowest_force": ("speed", [1.0, lowest]), "force_peak": ("speed", [1e3, 1e3])}
+    return xr.Dataset(values, {"speed": speed}, {"unresolved_resonances": missed})
+
+
+def tail(value: float) -> xr.Dataset:
+    """What response.nc of a planar case says of the ends of its series."""
+    values = {name: ("speed", [value, 0.0]) for name in ("tail", "force_tail")}
+    return xr.Dataset(values, {"speed": [10.0, 20.0]}, {"mesh_lines": 1})
+
+
+def exported(*options: str, rows: int | None = None):
+    """Findings of an export of synthetic results."""
+
+    def work(folder: Path) -> tuple[Finding, ...]:
+        from femgear.exchange import formats
+        from femgear.exchange.formats import Sampling
+        from femgear.run import export_results
+        from femgear.storage.files import list_own
+
+        results = open_results(synthetic_run(folder / "out"))
+        list_own(folder / "exported")
+        sampling = Sampling(duration=0.1, rate=8000.0 if "rate" in options else 48_000.0)
+        if "clip" in options:
+            sampling = Sampling(duration=0.1, acceleration_scale=1e-6)
+        with pytest.MonkeyPatch.context() as patch:
+            if rows is not None:
+                patch.setattr(formats, "_ROWS", rows)
+            wanted = ("xlsx",) if rows is not None else ("wav",)
+            return told(lambda: export_results(results, folder / "exported", wanted, sampling))
+
+    return work
+
+
+def synthetic_run(folder: Path) -> Path:
+    """A results folder of the reference case from synthetic data."""
+    from edited_manifests import finish
+
+    from femgear.storage.files import write_dataset, write_text
+    from femgear.storage.results import prepare_output
+
+    prepare_output(folder)
+    read, names, findings = case(PLANETARY), ["case.toml"], []
+    write_text(read.source, folder / "case.toml")
+    for stage in ("static", "modes", "dynamics", "housing"):
+        data = getattr(synthetic, stage)()
+        for name in data.coords:
+            data[name].attrs.setdefault("units", "1")
+            data[name].attrs.setdefault("long_name", str(name))
+        findings += train_of(read).stage(stage).findings(data)
+        write_dataset(data, folder / f"{stage}.nc")
+        names.append(f"{stage}.nc")
+    finish(folder, names, timings={}, convergence={}, findings=findings)
+    return folder
+
+
+def damaged_journal(folder: Path) -> tuple[Finding, ...]:
+    """A sweep that goes on from a journal of which a line was changed."""
+    from femgear.study.sweep import sweep_into
+
+    work = partial(
+        sweep_into,
+        case(PLANETARY),
+        folder,
+        over=["carrier.mass=1 kg..2 kg/3"],
+        of=["contact ratio sun-planet"],
+    )
+    work()
+    (journal,) = (path for path in folder.iterdir() if path.suffix == ".jsonl")
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join([*lines[:2], lines[2][:20] + b"\n", *lines[3:]]))
+    return told(work)
+
+
+def long_sweep(folder: Path) -> tuple[Finding, ...]:
+    from femgear.study import sweep
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sweep, "_MANY", 4)
+        over, of = ["carrier.mass=1 kg..2 kg/5"], ["contact ratio sun-planet"]
+        return told(lambda: sweep.sweep_into(case(PLANETARY), folder, over=over, of=of))
+
+
+def rexs(folder: Path) -> tuple[Finding, ...]:
+    """Findings of a file whose case leaves something out."""
+    from rexs_stage import stage_file
+
+    from femgear.exchange.rexs import read_model
+
+    return read_model(stage_file(folder)).findings
+
+
+@cache
+def transient_base() -> xr.Dataset:
+    vm, one = ("variant", "mesh"), np.ones((1, 1))
+    return xr.Dataset(
+        {
+            "least_force": (vm, -200.0 * one), "pulling": (vm, 0.0 * one), "lost": (vm, 0.0 * one),
+            "growth": (("variant",), [-3.0]), "gain": (("variant",), [1.0]),
+            "energy_error": (("variant",), [1e-12]), "momentum_error": (("variant",), [1e-14]),
+        },
+        {"variant": ["with bending"], "mesh": ["a-b"]},
+        {"steps": 40_000, "step": 5e-5, "contact": "linear"},
+    )  # fmt: skip
+
+
+def transient(contact: str = "linear", **values) -> xr.Dataset:
+    """What transient.nc says of a run of 2 s."""
+    data = transient_base().assign_attrs(contact=contact)
+    return data.assign({name: data[name] * 0.0 + value for name, value in values.items()})
+
+
+PROFILE = {"kind": "measured profile", "diameters": ["41 mm", "41.5 mm"], "deviations": ["0 um", "1 um"]}
+ASKED = {"lowest": "1 rpm", "highest": "2 rpm"}
+CLOSE = ["0 deg", f"{29 * 360 / 135} deg", "200 deg"]
+SHARP = {
+    "sun.teeth": 14, "sun.profile_shift": 0.0, "sun.bore_radius": "3 mm", "planet.teeth": 40, "ring.teeth": 94,
+    "planet.bore_radius": "3 mm", "set.centre_distance": "40.5 mm", "ring.tip_diameter": "138.6 mm",
+    "ring.cutter_teeth": None,
+}  # fmt: skip
+RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
+    "W-BACK": lambda: of_stage("elastic", "static", static(mesh_force=0.0, back_force=10.0)),
+    "W-BALANCE": lambda: of_stage("drivetrain", "transient", transient(energy_error=1e-3)),
+    "W-BRANCH": lambda: of_stage(
+        "gear_pair", "response", xr.Dataset(attrs={"complete": 0, "message": "lost at 0.7"})
+    ),
+    "W-CHAOS": lambda: of_stage("drivetrain", "transient", transient("separating", growth=5.0)),
+    "W-CONVERGENCE": lambda: of_stage("elastic", "dynamics", dynamics(converged=False)),
+    "W-DEFLECTION": lambda: of_stage("elastic", "static", static(ste=1e-4)),
+    "W-EDGE": lambda: of_stage("elastic", "static", edge("max_pressure", 0.0)),
+    "W-ENDS": lambda: of_stage("elastic", "static", over_width(free_ends=0.09)),
+    "W-FACE-LOAD": lambda: of_stage("elastic", "static", over_width()),
+    "W-GROWTH": lambda: of_stage("drivetrain", "transient", transient(growth=2.0)),
+    "W-LIFTED": lambda: of_stage("elastic", "static", over_width(lifted=True)),
+    "W-MOTION": lambda: of_stage("elastic", "static", moved()),
+    "W-ONE-WAY": lambda: of_stage("elastic", "housing", housing(one_way_difference=[0.1, 5.0])),
+    "W-OPEN": lambda: of_stage("elastic", "static", edge("mesh_force", 0.0)),
+    "W-PARTED": lambda: of_stage("drivetrain", "transient", transient("separating", lost=1.0)),
+    "W-PRESSURE": lambda: of_stage("pair", "static", static(max_pressure=5e9)),
+    "W-PULL": lambda: of_stage("elastic", "runup", runup(lowest=-100.0)),
+    "W-RESIDUAL": lambda: of_stage("elastic", "housing", housing(missing_compliance="a tenth")),
+    "W-SEPARATION": lambda: of_stage(
+        "pair", "dynamics", dynamics().assign(
+            drive_contact=("speed", [1.0, 0.9]), back_contact=("speed", [0.0, 0.0]), backlash=("x", [1e-5])
+        )
+    ),
+    "W-SETTLED": lambda: of_stage("gear_pair", "sweep", xr.Dataset({"settled": ("ratio", [1, 0])})),
+    "W-STEPS": lambda: of_stage("elastic", "runup", runup(missed=3)),
+    "W-TAIL": lambda: of_stage("planar", "response", tail(0.3)),
+    "W-THRUST": lambda: of_stage("helical", "static", over_width(couple=20.0)),
+    "W-UNSTABLE": lambda: of_stage("elastic", "dynamics", dynamics(stable=False)),
+    "W-WEDGED": lambda: of_stage("planar", "static", static(back_force=10.0)),
+}  # fmt: skip
+OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
+    "W-BACKLASH": lambda: of_case(
+        CHAIN, {"simulation.contact_loss": True, "parallel[0].mesh.backlash": None}
+    ),
+    "W-BEARING": lambda: of_case(PLANETARY, {"planet.bearing_clearance": "10 um"}),
+    "W-CLEARANCE": lambda: of_case(PLANETARY, {"sun.tip_diameter": "45.6 mm"}),
+    "W-CONTACT-POINTS": lambda: of_case(HELICAL, {"helical.contact_points": "base_circles"}),
+    "W-CONTACT-RATIO": lambda: of_case(PLANETARY, {"rack.addendum": 0.7}),
+    "W-COUPLING": lambda: of_case(PLANETARY, {"motor.coupling_stiffness": "1 N m/rad"}),
+    "W-DAMPING": lambda: of_case(PLANETARY, {"dynamics.damping_ratio": 0.0}),
+    "W-ESTIMATED": lambda: of_case(PLANETARY, {"sun.mass": None}),
+    "W-EXCITATION": lambda: of_case("gear_pair", {"mesh.error": None, "mesh.stiffness_waves": None}),
+    "W-FILLET": lambda: of_case(PLANETARY, {"rack.root_radius": 0.26, "sun.profile_shift": None}),
+    "W-HELIX": lambda: of_case(HELICAL, {"helical.helix_angle": "31 deg", "helical.mesh_stiffness": None}),
+    "W-LOAD": lambda: of_case("gear_pair", {"operation.torque": "0 N m"}),
+    "W-NEIGHBOURS": lambda: of_case(PLANETARY, {"set.planet_angles": CLOSE}),
+    "W-PLANETS": lambda: of_case(PLANETARY, {"set.planets": 1}),
+    "W-POINTS": lambda: of_case(PLANETARY, {"housing": {"form": "linear", "points": 9}}),
+    "W-PROFILE": lambda: of_case(PLANETARY, {"sun.modifications": [PROFILE]}),
+    "W-RATE": lambda: of_case(CHAIN, {"simulation.rate": "15 kHz"}),
+    "W-RECORD": lambda: of_case(CHAIN, {"simulation.record": "1 kHz"}),
+    "W-RELIEF-SIGN": lambda: of_case(
+        PLANETARY, {"sun.modifications": [{"kind": "profile crowning", "amount": "-5 um"}]}
+    ),
+    "W-RESPONSE": lambda: of_case("published_four_stages", {"response": ASKED}),
+    "W-RIM": lambda: of_case(PLANETARY, {"ring.outer_radius": "85 mm"}),
+    "W-SIZE": large,
+    "W-SLICES": lambda: of_case(HELICAL, {"helical.slices": 30}),
+    "W-SMOOTHING": lambda: of_case("nrel_pgb", {"planar.smoothing": "2 um"}),
+    "W-SPECTRUM": lambda: of_case(CHAIN, {"simulation.resolution": "0.01 Hz"}),
+    "W-SPEED": lambda: of_case(
+        CHAIN, {"operation.torque": [{"body": "motor", "torque": "300 N m"}], "simulation.rate": "100 kHz"}
+    ),
+    "W-TEETH": lambda: of_case("grc_like_drivetrain", {"planetary[0].planet_teeth": 38}),
+    "W-TIP-THIN": lambda: of_case(PLANETARY, {"set.backlash": "1 mm"}),
+    "W-TORQUE": lambda: of_case(PLANETARY, {"operation.torque": "-10 N m"}),
+    "W-UNDERCUT": lambda: of_case(PLANETARY, SHARP),
+    "W-UNUSED": lambda: of_case("nrel_pga"),
+    "W-WEDGING": lambda: of_case(PLANETARY, {"set.pin_errors": [{"planet": 1, "tangential": "20 um"}]}),
+}
+OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
+    "W-CLIPPING": exported("clip"),
+    "W-JOURNAL": damaged_journal,
+    "W-ROWS": exported(rows=3),
+    "W-SWEEP": long_sweep,
+}
+RAISED = {
+    **{code: lambda folder, way=way: way() for code, way in {**RESULTS, **OF_CASES}.items()},
+    **OTHERS,
+}
+
+
+def test_the_table_has_a_way_to_every_code():
+    assert set(RAISED) == set(CATALOGUE)
+
+
+@pytest.mark.parametrize("code", CATALOGUE)
+def test_every_code_reaches_the_list(code, tmp_path):
+    found = [one for one in RAISED[code](tmp_path) if one.code == code]
+    assert found and all(one.text for one in found)
+    assert once(found) == tuple(dict.fromkeys(once(found)))
+    assert from_data(json.loads(json.dumps(as_data(found)))) == once(found)

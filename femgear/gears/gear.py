@@ -48,10 +48,7 @@ USUAL_LAND = 0.2
 class GeometryWarning(Finding):
     """A finding on gears, with the ``limit`` within which there would be no warning."""
 
-    limit: str
-
-    def __str__(self) -> str:
-        return f"{super().__str__()} (usual: {self.limit})"
+    limit: str = ""
 
 
 @dataclass(frozen=True)

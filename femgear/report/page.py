@@ -481,7 +481,9 @@ def _value(value: Any) -> str:
     """Write what a solver says of its result; a dash for nothing."""
     if isinstance(value, list):
         return ", ".join(map(str, value)) or "none"
-    return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+    if value is None or value != value:  # not a number, which the manifest stores as nothing
+        return "-"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def _trust(results: Results, numbers, warnings: Sequence[Finding], static: bool) -> str:
