@@ -169,25 +169,21 @@ def tail(value: float) -> xr.Dataset:
     return xr.Dataset(values, {"speed": [10.0, 20.0]}, {"mesh_lines": 1})
 
 
-def exported(*options: str, rows: int | None = None):
-    """Findings of an export of synthetic results."""
+def exported(wanted: str, rows: int | None = None, **sampling):
+    """Findings of an export of synthetic results, into sheets with so many rows at most."""
 
     def work(folder: Path) -> tuple[Finding, ...]:
         from femgear.exchange import formats
-        from femgear.exchange.formats import Sampling
         from femgear.run import export_results
         from femgear.storage.files import list_own
 
         results = open_results(synthetic_run(folder / "out"))
         list_own(folder / "exported")
-        sampling = Sampling(duration=0.1, rate=8000.0 if "rate" in options else 48_000.0)
-        if "clip" in options:
-            sampling = Sampling(duration=0.1, acceleration_scale=1e-6)
+        how = formats.Sampling(duration=0.1, **sampling)
         with pytest.MonkeyPatch.context() as patch:
             if rows is not None:
                 patch.setattr(formats, "_ROWS", rows)
-            wanted = ("xlsx",) if rows is not None else ("wav",)
-            return told(lambda: export_results(results, folder / "exported", wanted, sampling))
+            return told(lambda: export_results(results, folder / "exported", [wanted], how))
 
     return work
 
@@ -218,13 +214,8 @@ def damaged_journal(folder: Path) -> tuple[Finding, ...]:
     """A sweep that goes on from a journal of which a line was changed."""
     from femgear.study.sweep import sweep_into
 
-    work = partial(
-        sweep_into,
-        case(PLANETARY),
-        folder,
-        over=["carrier.mass=1 kg..2 kg/3"],
-        of=["contact ratio sun-planet"],
-    )
+    over, of = ["carrier.mass=1 kg..2 kg/3"], ["contact ratio sun-planet"]
+    work = partial(sweep_into, case(PLANETARY), folder, over=over, of=of)
     work()
     (journal,) = (path for path in folder.iterdir() if path.suffix == ".jsonl")
     lines = journal.read_bytes().splitlines(keepends=True)
@@ -243,11 +234,16 @@ def long_sweep(folder: Path) -> tuple[Finding, ...]:
 
 def rexs(folder: Path) -> tuple[Finding, ...]:
     """Findings of a file whose case leaves something out."""
-    from rexs_stage import stage_file
+    from rexs_stage import Gearbox
 
+    from femgear.exchange.planetary_stage import case_tables
     from femgear.exchange.rexs import read_model
 
-    return read_model(stage_file(folder)).findings
+    box = Gearbox()
+    box.add(999, "cylindrical_stage")  # a second stage, of fixed axes
+    model = read_model(box.write(folder / "stage.rexs"))
+    case_tables(model)
+    return model.findings
 
 
 @cache
@@ -274,7 +270,8 @@ PROFILE = {"kind": "measured profile", "diameters": ["41 mm", "41.5 mm"], "devia
 ASKED = {"lowest": "1 rpm", "highest": "2 rpm"}
 CLOSE = ["0 deg", f"{29 * 360 / 135} deg", "200 deg"]
 SHARP = {
-    "sun.teeth": 14, "sun.profile_shift": 0.0, "sun.bore_radius": "3 mm", "planet.teeth": 40, "ring.teeth": 94,
+    "sun.teeth": 14, "sun.profile_shift": 0.0, "sun.bore_radius": "3 mm", "planet.teeth": 40,
+    "ring.teeth": 94,
     "planet.bore_radius": "3 mm", "set.centre_distance": "40.5 mm", "ring.tip_diameter": "138.6 mm",
     "ring.cutter_teeth": None,
 }  # fmt: skip
@@ -352,9 +349,10 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-WEDGING": lambda: of_case(PLANETARY, {"set.pin_errors": [{"planet": 1, "tangential": "20 um"}]}),
 }
 OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
-    "W-CLIPPING": exported("clip"),
+    "W-CLIPPING": exported("wav", acceleration_scale=1e-6),
     "W-JOURNAL": damaged_journal,
-    "W-ROWS": exported(rows=3),
+    "W-REXS": rexs,
+    "W-ROWS": exported("xlsx", rows=3),
     "W-SWEEP": long_sweep,
 }
 RAISED = {
