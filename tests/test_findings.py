@@ -108,6 +108,12 @@ def edge(name: str, value: float) -> xr.Dataset:
     return static(**{name: values})
 
 
+def corner() -> xr.Dataset:
+    """stress.nc of roots with a sharp corner."""
+    sharp = {"root_notch_radius": (("mesh", "gear"), np.zeros((6, 2))), "relief_kink": ("mesh", np.zeros(6))}
+    return synthetic.stress().assign(sharp).assign_attrs(module=1.5e-3, nominal_load=0.0)
+
+
 def over_width(*, lifted: bool = False, couple: float = 0.0, **attrs) -> xr.Dataset:
     """static.nc of teeth in 8 slices, with K_Hbeta 1.3."""
     data = static(face_width=25e-3, **attrs)
@@ -270,7 +276,7 @@ PROFILE = {"kind": "measured profile", "diameters": ["41 mm", "41.5 mm"], "devia
 ASKED = {"lowest": "1 rpm", "highest": "2 rpm"}
 CLOSE = ["0 deg", f"{29 * 360 / 135} deg", "200 deg"]
 SHARP = {
-    "sun.teeth": 14, "sun.profile_shift": 0.0, "sun.bore_radius": "3 mm", "planet.teeth": 40,
+    "sun.teeth": 14, "sun.tip_diameter": None, "sun.profile_shift": 0.0, "sun.bore_radius": "3 mm", "planet.teeth": 40,
     "ring.teeth": 94,
     "planet.bore_radius": "3 mm", "set.centre_distance": "40.5 mm", "ring.tip_diameter": "138.6 mm",
     "ring.cutter_teeth": None,
@@ -288,6 +294,7 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-ENDS": lambda: of_stage("elastic", "static", over_width(free_ends=0.09)),
     "W-FACE-LOAD": lambda: of_stage("elastic", "static", over_width()),
     "W-GROWTH": lambda: of_stage("drivetrain", "transient", transient(growth=2.0)),
+    "W-KINK": lambda: of_stage("elastic", "stress", corner()),
     "W-LIFTED": lambda: of_stage("elastic", "static", over_width(lifted=True)),
     "W-MOTION": lambda: of_stage("elastic", "static", moved()),
     "W-ONE-WAY": lambda: of_stage("elastic", "housing", housing(one_way_difference=[0.1, 5.0])),
@@ -315,7 +322,9 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-BEARING": lambda: of_case(PLANETARY, {"planet.bearing_clearance": "10 um"}),
     "W-CLEARANCE": lambda: of_case(PLANETARY, {"sun.tip_diameter": "45.6 mm"}),
     "W-CONTACT-POINTS": lambda: of_case(HELICAL, {"helical.contact_points": "base_circles"}),
-    "W-CONTACT-RATIO": lambda: of_case(PLANETARY, {"rack.addendum": 0.7}),
+    "W-CONTACT-RATIO": lambda: of_case(
+        PLANETARY, {"sun.tip_diameter": "44 mm", "planet.tip_diameter": "62.4 mm"}
+    ),
     "W-COUPLING": lambda: of_case(PLANETARY, {"motor.coupling_stiffness": "1 N m/rad"}),
     "W-DAMPING": lambda: of_case(PLANETARY, {"dynamics.damping_ratio": 0.0}),
     "W-ESTIMATED": lambda: of_case(PLANETARY, {"sun.mass": None}),
@@ -342,6 +351,7 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
         CHAIN, {"operation.torque": [{"body": "motor", "torque": "300 N m"}], "simulation.rate": "100 kHz"}
     ),
     "W-TEETH": lambda: of_case("grc_like_drivetrain", {"planetary[0].planet_teeth": 38}),
+    "W-TIP": lambda: of_case(PLANETARY, {"sun.tip_diameter": None}),
     "W-TIP-THIN": lambda: of_case(PLANETARY, {"set.backlash": "1 mm"}),
     "W-TORQUE": lambda: of_case(PLANETARY, {"operation.torque": "-10 N m"}),
     "W-UNDERCUT": lambda: of_case(PLANETARY, SHARP),
