@@ -276,8 +276,8 @@ PROFILE = {"kind": "measured profile", "diameters": ["41 mm", "41.5 mm"], "devia
 ASKED = {"lowest": "1 rpm", "highest": "2 rpm"}
 CLOSE = ["0 deg", f"{29 * 360 / 135} deg", "200 deg"]
 SHARP = {
-    "sun.teeth": 14, "sun.tip_diameter": None, "sun.profile_shift": 0.0, "sun.bore_radius": "3 mm", "planet.teeth": 40,
-    "ring.teeth": 94,
+    "sun.teeth": 14, "sun.tip_diameter": None, "sun.profile_shift": 0.0, "sun.bore_radius": "3 mm",
+    "planet.teeth": 40, "ring.teeth": 94,
     "planet.bore_radius": "3 mm", "set.centre_distance": "40.5 mm", "ring.tip_diameter": "138.6 mm",
     "ring.cutter_teeth": None,
 }  # fmt: skip
@@ -356,6 +356,7 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-TORQUE": lambda: of_case(PLANETARY, {"operation.torque": "-10 N m"}),
     "W-UNDERCUT": lambda: of_case(PLANETARY, SHARP),
     "W-UNUSED": lambda: of_case("nrel_pga"),
+    "W-WIDTHS": lambda: of_case(PLANETARY, {"sun.face_width": "35 mm"}),
     "W-WEDGING": lambda: of_case(PLANETARY, {"set.pin_errors": [{"planet": 1, "tangential": "20 um"}]}),
 }
 OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
