@@ -15,6 +15,8 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+from femgear.findings import CATALOGUE
+
 ROOT = Path(__file__).resolve().parents[2]
 CODE = re.compile(r"E-[A-Z0-9]+(?:-[A-Z0-9]+)*")
 HEAD = """# Errors
@@ -30,8 +32,14 @@ nothing, follow [at the end](#warnings). This page is written by
 """
 WARNINGS = """## Warnings
 
-What a result deserves to be doubted for. They stand in the terminal and in the report; `femgear check` tells
-those that the case alone decides. A run that warns ends with exit code 0.
+What a case or a result deserves to be doubted for: one list, on standard error, in the terminal, in the report
+and in the results (`open_results(OUT).findings`); `femgear check` tells those that the case alone decides. A run
+that warns ends with exit code 0. Severities: `note`, worth knowing; `doubt`, a number may be wrong; `fault`,
+nothing real carries that. Those below are the usual ones; a finding may have another.
+
+| code | severity | meaning |
+|---|---|---|
+{meanings}
 
 | code | entry | message | remedy |
 |---|---|---|---|"""
@@ -90,7 +98,7 @@ def warnings(folder: Path = ROOT / "femgear") -> list[tuple[str, str, str, str]]
             if isinstance(function, ast.FunctionDef):
                 calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
                 for call in calls:
-                    if ast.unparse(call.func) == "Finding" and _text(call.args[0]).startswith("W-"):
+                    if call.args and ast.unparse(call.func) == "Finding" and _text(call.args[0])[:2] == "W-":
                         remedy = next((word.value for word in call.keywords if word.arg == "remedy"), None)
                         cells = [*call.args[:3], call.args[3] if len(call.args) > 3 else remedy]
                         found.add(tuple(_text(_assigned(cell, call, function)) for cell in cells))
@@ -152,7 +160,10 @@ def page(meanings: dict[str, str]) -> str:
             table = "\n".join(f"| {row} |" for row in cells)
             parts.append(f"| message | allowed | remedy |\n|---|---|---|\n{table}\n")
     rows = "\n".join(f"| {' | '.join(map(_cell, row))} |" for row in warnings())
-    return "\n".join([*parts, f"{WARNINGS}\n{rows}\n"])
+    known = "\n".join(
+        f"| {code} | {severity} | {_cell(text)} |" for code, (severity, text) in CATALOGUE.items()
+    )
+    return "\n".join([*parts, f"{WARNINGS.format(meanings=known)}\n{rows}\n"])
 
 
 def _cell(text: str) -> str:
