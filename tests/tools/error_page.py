@@ -34,8 +34,8 @@ WARNINGS = """## Warnings
 
 What a case or a result deserves to be doubted for: one list, on standard error, in the terminal, on the page
 and in the results (`open_results(OUT).findings`); `femgear check` tells those that the case alone decides. It
-ends no run: the exit code stays 0. Severities: `note`, worth knowing; `doubt`, a number may be wrong; `fault`,
-nothing real carries that. Those below are the usual ones; a finding may have another.
+ends no run: the exit code stays 0. Severities: `note`, worth knowing; `doubt`, a number may be wrong;
+`fault`, nothing real carries that. Those below are the usual ones; a finding may have another.
 
 | code | severity | meaning |
 |---|---|---|
