@@ -935,7 +935,8 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
         if ratio > DIFFERS or 0.0 < ratio < 1.0 / DIFFERS:
             curvature, load = float(one["contact_worst_curvature"]), float(one["contact_worst_load"])
             ends = sorted(zip(one["contact_start"].values, kind.split("-")))
-            near = f"; on the {ends[0][1]} contact begins {1e3 * ends[0][0]:.2g} mm above the base circle"
+            flank = ends[0][1] if ends[0][1].startswith("gear") else f"the {ends[0][1]}"
+            near = f"; on {flank} contact begins {1e3 * ends[0][0]:.2g} mm above the base circle"
             yield (
                 f"contact {kind}, FE/ISO = {ratio:.2f}: x {math.sqrt(curvature):.2f} by the relative "
                 f"curvature where the pressure is largest, {curvature:.2f} times that of the pitch point"
