@@ -176,7 +176,7 @@ STRESS_VARIABLES = {
     "contact_worst_path": (
         "mesh",
         "m",
-        "path of the tooth pair with the largest pressure, from the pitch point",
+        "path of the pair with the largest pressure, outwards on gear 1",
     ),
     "contact_worst_load": ("mesh", "N", "its load, in slices that of the slice times their number"),
     "contact_worst_curvature": ("mesh", "1", "relative curvature there over that at the pitch point"),
@@ -516,14 +516,16 @@ class StressResult(StageResult):
     def _most_pressed(self, mesh: int) -> tuple[float, float]:
         """Path [m] and load [N] of the tooth pair of a mesh with the largest pressure off the flank ends."""
         cycle, pair = self.cycle, self.planetary_set.kinds[mesh // self.planetary_set.n_planets]
+        # the cycle counts paths in the direction of motion, towards the root of gear 1 where that is turned
+        sense = -1.0 if self.sun_torque < 0.0 else 1.0
         if cycle.slice_pressure is not None and cycle.slice_load is not None:
             found = np.unravel_index(cycle.slice_pressure[mesh].argmax(), cycle.slice_pressure[mesh].shape)
             tooth, piece, position = (int(one) for one in found)
             ahead = 0.0 if self.influences.ahead is None else self.influences.ahead[piece]
             path = cycle.path[mesh, tooth, position] + ahead * self.planetary_set.base_pitch
-            return float(path), float(cycle.slice_load[mesh, tooth, piece, position])
+            return sense * float(path), float(cycle.slice_load[mesh, tooth, piece, position])
         position = int(cycle.max_pressure[mesh].argmax())
-        path, load = cycle.path[mesh, :, position], cycle.tooth_load[mesh, :, position]
+        path, load = sense * cycle.path[mesh, :, position], cycle.tooth_load[mesh, :, position]
         curvature = relative_curvature(
             *pair.gears, working_angle=pair.working_pressure_angle, path=np.clip(path, *pair.path)
         )

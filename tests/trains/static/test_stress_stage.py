@@ -379,6 +379,12 @@ def test_the_largest_pressure_is_that_of_hertz_for_its_place_and_load(reference)
     assert float(data.contact_pressure[0].max()) == pytest.approx(hertz, rel=0.02)
 
 
+def test_a_negative_torque_presses_at_the_same_places(reference, reversed_torque):
+    one, other = (result.dataset() for *_, result in (reference, reversed_torque))
+    for name in ("contact_worst_path", "contact_worst_curvature", "contact_worst_load"):
+        assert other[name].values[0] == pytest.approx(one[name].values[0], rel=1e-6), name
+
+
 def test_why_stresses_differ_from_the_nominal_ones_is_told_beyond_30_percent(reference):
     data = reference[2].dataset()
     told = [note for note in describe_stress(data).notes if "FE/ISO =" in note]
