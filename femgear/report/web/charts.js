@@ -10,14 +10,23 @@ page.read = async () => {
   return JSON.parse(await new Response(stream).text());
 };
 
-// greys change places in the dark; colours of the palette stand out on both grounds
+// in the dark greys change places, and colours too deep for its ground are mixed with white until they stand out
+page.light = (parts) => {
+  const [r, g, b] = parts.map((part) => (part <= 10 ? part / 3295 : ((part / 255 + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+};
 page.colour = (colour) => {
   const found = /^#(..)(..)(..)$/.exec(colour || "");
   if (!page.dark || !found) return colour;
-  const [r, g, b] = found.slice(1).map((part) => parseInt(part, 16));
-  if (Math.max(r, g, b) - Math.min(r, g, b) > 12) return colour;
-  const level = Math.round(30 + 0.85 * (255 - r));
-  return `rgb(${level},${level},${level})`;
+  const parts = found.slice(1).map((part) => parseInt(part, 16));
+  if (Math.max(...parts) - Math.min(...parts) <= 12) {
+    const level = Math.round(30 + 0.85 * (255 - parts[0]));
+    return `rgb(${level},${level},${level})`;
+  }
+  const mixed = (share) => parts.map((part) => Math.round(part + share * (255 - part)));
+  let share = 0;
+  while (share < 0.8 && page.light(mixed(share)) < 0.25) share += 0.05;
+  return `#${mixed(share).map((part) => part.toString(16).padStart(2, "0")).join("")}`;
 };
 page.style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 page.clear = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/\n/g, "<br>");
