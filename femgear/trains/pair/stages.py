@@ -93,7 +93,7 @@ _CAPTIONS = {
     ),
     "deformed_set": (
         "Deformed pair under the static load at position 0, whole and at the pitch point; at rest in grey. "
-        "The teeth that carry bend; what is pale hardly moves."
+        "The teeth that carry bend; what is pale hardly moves. Of helical teeth the transverse section."
     ),
 }
 _LOWEST, _ABOVE_MODES = 20e3, 2.0

@@ -766,7 +766,8 @@ _STATIC = Figures(
         "pitch_deviations": "Cumulative pitch deviations of the loaded flanks over the tooth number.",
         "deformed_set": (
             "Deformed set under the static load at position 0, whole and both meshes of the first planet; at "
-            "rest in grey. The teeth that carry bend; what is pale hardly moves."
+            "rest in grey. The teeth that carry bend; what is pale hardly moves. Of helical teeth the "
+            "transverse section."
         ),
     },
     draw=_static_figures,

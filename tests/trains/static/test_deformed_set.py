@@ -5,9 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femgear.case.gear_set import material_of
+from femgear.contact.bodies import make_sectors
+from femgear.contact.tooth_loads import deformed_set
 from femgear.gears.planetary import mirrored_set
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.figures import _left_flanks_loaded
+from femgear.trains.static.figures import _left_flanks_loaded, _reflected
 from femgear.trains.static.stages import solve_static
 
 SLICED = {"static.slices": 8, "sun.modifications": [{"kind": "lead slope", "amount": "12 um"}]}
@@ -49,3 +52,28 @@ def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members, more):
     seen = loads[[*order, *(3 + order)]]
     np.testing.assert_allclose(image, seen, rtol=0.0, atol=1e-3 * seen.max())
     assert gears.planet_angles == mirrored_set(static.planetary_set)[0].planet_angles
+
+
+def test_bodies_of_a_negative_torque_stand_and_bend_as_those_of_the_set():
+    """Every planet at its own pin, most bent where most is carried; teeth of the sun give way to the load."""
+    changes = {
+        "operation.torque": "-60 N m", "static.positions": 8, "static.flank_elements": 6,
+        "set.pin_errors": [{"planet": 2, "tangential": "5 um"}],
+    }  # fmt: skip
+    case = with_values(read_case(CASE), changes)
+    static = solve_static(case)
+    gears, order, cycle = _left_flanks_loaded(static, case)
+    sectors = make_sectors(gears, material_of(case), flank_elements=4, refine=0.3)
+    of_kind = {sector.gear.name: sector for sector in sectors.gears}
+    image = deformed_set(gears, sectors, cycle)
+    bodies = {body.name: body for body in (_reflected(one, of_kind[one.kind], order) for one in image)}
+    names = [f"planet {n + 1}" for n in range(3)]
+    pins = static.planetary_set.centre_distance * np.exp(1j * np.array(static.planetary_set.planet_angles))
+    centres = np.array([complex(*bodies[name].centre) for name in names])
+    np.testing.assert_allclose(centres, pins, atol=1e-12)
+    force = static.cycle.force[:3, np.argmin(np.abs(static.cycle.position))]
+    bent = [np.abs(bodies[name].displacement).max() for name in names]
+    assert np.argsort(bent).tolist() == np.argsort(force).tolist()
+    x, y = of_kind["sun"].grid.points.T
+    u, v = np.moveaxis(bodies["sun"].displacement, -1, 0)
+    assert np.mean((x * v - y * u) / np.hypot(x, y)) > 0.0
