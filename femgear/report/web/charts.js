@@ -100,7 +100,7 @@ page.arrange = (chart, width) => {
   const pixels = (width - left - right + across) / columns - across;
   const lines = Math.max(1, ...chart.panels.map((panel) => page.wrapped(panel.title, pixels).lines));
   const title = chart.title ? page.wrapped(chart.title, 0.8 * width) : { text: "", lines: 0 };
-  const gaps = { x: across, y: hidden ? 14 + 16 * lines : (single ? 70 : 58) + 16 * lines, left, right, top: 20 + 16 * lines + (title.lines && 10 + 20 * title.lines), bottom: 62 };
+  const gaps = { x: across, y: hidden ? 14 + 16 * lines : (single ? 74 : 66) + 16 * lines, left, right, top: 20 + 16 * lines + (title.lines && 10 + 20 * title.lines), bottom: 62 };
   const ratio = chart.size[1] / chart.size[0];
   const cell = chart.panels[0].square ? Math.min((width - 40) / columns, 460) * 1.02 : single ? 250 : Math.min(Math.max((width * ratio) / rows, 210), 340);
   const height = rows * cell + gaps.top + gaps.bottom;
