@@ -89,11 +89,14 @@ def solid(
     gears = (("sun", planetary_set.sun), ("planet", planetary_set.planet), ("ring", planetary_set.ring))
     packed = {
         kind: sectors[kind].packed(gear.teeth)
-        | {"twist": _HANDS[kind] * gear.face_width * math.tan(helix_angle) / gear.reference_radius}
+        | {
+            "width": 1e3 * gear.face_width,
+            "twist": _HANDS[kind] * gear.face_width * math.tan(helix_angle) / gear.reference_radius,
+        }
         for kind, gear in gears
     }
     return {
-        "width": 1e3 * planetary_set.sun.face_width,
+        "width": 1e3 * max(gear.face_width for _, gear in gears),
         "radius": 1e3 * planetary_set.ring.rim_radius,
         "pins": {
             "radius": 1e3 * _PIN * float(np.hypot(*sectors["planet"].points.T).min()),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import synthetic_results as synthetic
 
-from femgear.case.gear_set import material_of, planetary_set
+from femgear.case.gear_set import materials_of, planetary_set
 from femgear.contact.bodies import make_sectors
 from femgear.contact.tooth_loads import DeformedBody
 from femgear.report.solid import _paths, solid
@@ -21,7 +21,7 @@ def drawn():
     """Return what makes the model of the shipped set, at rest, of coarse sectors."""
     case = read_case(CASE)
     gears = planetary_set(case)
-    sectors = make_sectors(gears, material_of(case), flank_elements=4, refine=0.3)
+    sectors = make_sectors(gears, materials_of(case), flank_elements=4, refine=0.3)
     of_kind = {sector.gear.name: sector for sector in sectors.gears}
     places = [("sun", "sun", 0j), ("ring", "ring", 0j)]
     pins = gears.centre_distance * np.exp(1j * np.array(gears.planet_angles))
@@ -34,7 +34,8 @@ def drawn():
         for name, kind, pin in places
     ]  # fmt: skip
     grids = {kind: sector.grid for kind, sector in of_kind.items()}
-    return gears, lambda modes=None, **look: solid(gears, grids, bodies, material_of(case), modes, **look)
+    materials = dict(zip(of_kind, materials_of(case), strict=True))
+    return gears, lambda modes=None, **look: solid(gears, grids, bodies, materials, modes, **look)
 
 
 def test_bodies_move_in_modes_as_much_as_modes_nc_says(drawn):

@@ -51,7 +51,7 @@ page.solid = () => {
       rest[2 * to + 1] = body.centre[1] + s * x + c * y;
       moved[2 * to] = c * field[at] - s * field[at + 1];
       moved[2 * to + 1] = s * field[at] + c * field[at + 1];
-      position[3 * to + 2] = share * model.width;
+      position[3 * to + 2] = share * (sector.width || model.width);
       node[to] = k * each + i;
     };
     for (let k = 0; k < count; k++) {

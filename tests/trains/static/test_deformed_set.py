@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.gear_set import material_of
+from femgear.case.gear_set import materials_of
 from femgear.contact.bodies import make_sectors
 from femgear.contact.tooth_loads import deformed_set
 from femgear.gears.planetary import mirrored_set
@@ -63,7 +63,7 @@ def test_bodies_of_a_negative_torque_stand_and_bend_as_those_of_the_set():
     case = with_values(read_case(CASE), changes)
     static = solve_static(case)
     gears, order, cycle = _left_flanks_loaded(static, case)
-    sectors = make_sectors(gears, material_of(case), flank_elements=4, refine=0.3)
+    sectors = make_sectors(gears, materials_of(case), flank_elements=4, refine=0.3)
     of_kind = {sector.gear.name: sector for sector in sectors.gears}
     image = deformed_set(gears, sectors, cycle)
     bodies = {body.name: body for body in (_reflected(one, of_kind[one.kind], order) for one in image)}
