@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from femgear.contact.tooth_loads import DeformedBody
     from femgear.fe.elasticity import Material
+    from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
 SOLID = "solid.json"
@@ -86,23 +87,15 @@ def solid(
                 "stress": _packed(1e-6 * stress[:, sector.nodes]),
             }
         )
-    gears = (("sun", planetary_set.sun), ("planet", planetary_set.planet), ("ring", planetary_set.ring))
-    packed = {
-        kind: sectors[kind].packed(gear.teeth)
-        | {
-            "width": 1e3 * gear.face_width,
-            "twist": _HANDS[kind] * gear.face_width * math.tan(helix_angle) / gear.reference_radius,
-        }
-        for kind, gear in gears
-    }
+    gears = {gear.name: gear for gear in planetary_set.gears}
     return {
-        "width": 1e3 * max(gear.face_width for _, gear in gears),
+        "width": 1e3 * max(gear.face_width for gear in gears.values()),
         "radius": 1e3 * planetary_set.ring.rim_radius,
         "pins": {
             "radius": 1e3 * _PIN * float(np.hypot(*sectors["planet"].points.T).min()),
             "centres": [body["centre"] for body in found if body["kind"] == "planet"],
         },
-        "sectors": packed,
+        "sectors": {kind: sectors[kind].packed(gear, helix_angle) for kind, gear in gears.items()},
         "bodies": found,
         "modes": [] if modes is None else _modes(modes),
         "paths": _paths(planetary_set, backwards=backwards),
@@ -141,10 +134,13 @@ class _Sector:
         outer = edges[first[count == 1]].tolist()
         self.edges = np.array([edge for edge in outer if tuple(sorted(edge)) not in kept])
 
-    def packed(self, count: int) -> dict[str, Any]:
-        """Points [mm], triangles and edges of the free surface, for JSON."""
+    def packed(self, gear: Gear, helix_angle: float) -> dict[str, Any]:
+        """Points and width [mm], triangles and edges of the free surface, turn over the width, for JSON."""
+        slope = _HANDS[gear.name] * math.tan(helix_angle) / gear.reference_radius
         return {
-            "count": count,
+            "count": gear.teeth,
+            "width": 1e3 * gear.face_width,
+            "twist": gear.face_width * slope,
             "points": [round(1e3 * float(x), 4) for x in self.points.ravel()],
             "triangles": self.triangles.ravel().tolist(),
             "edges": self.edges.ravel().tolist(),
