@@ -33,6 +33,8 @@ from femgear.exchange.rexs import Component, Model
 _SEAT = 1e-3, 1e-7
 """Mass [kg] and inertias [kg m^2] of a seat: little beside the shaft."""
 _SOFT = 1e15
+_THICKEST = 100.0
+"""Diameter of a shaft [m] that a drivetrain can have."""
 
 
 class NoChain(Exception):
@@ -65,8 +67,8 @@ def chain_tables(
     shafts = {one.id: one for gear, _ in gears.values() if (one := shaft_of(model, gear)) is not None}
     if len(gears) != 2 * len(stages) or not set(shafts) <= flow.speed.keys():
         raise NoChain("gears without a shaft of their own, or shafts whose speed nothing determines")
-    if any(one.id not in flow.torque for one in stages):
-        raise NoChain("the file does not determine the torques of all stages")
+    if any(one.id not in flow.torque for one in stages) or not all(flow.speed[one] for one in shafts):
+        raise NoChain("the file does not determine the torques of all stages, or shafts stand still")
     if any(one.type == "ring_gear" for one, _ in gears.values()):
         raise NoChain("the gears of parallel stages of a drivetrain are external")
     tables: dict[str, Any] = {"format": 1, "model": "drivetrain", "title": "Gear unit"}
@@ -237,7 +239,7 @@ def _section(model: Model, shaft: Component, start: float, end: float) -> tuple[
         at, length, begin, finish, inner, inside = (model.number(part, key, LENGTH) or 0.0 for key in keys)
         share = min(end, at + length) - max(start, at)
         outer, bore = 0.5 * (begin + finish), 0.5 * (inner + inside)
-        if share > 0.0 and outer > bore:
+        if share > 0.0 and _THICKEST > outer > bore >= 0.0:
             compliance += share / (outer**4 - bore**4)
             covered += share
             bores.append(bore)

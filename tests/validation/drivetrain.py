@@ -19,7 +19,7 @@ from published.wind_turbine_drivetrain import (
 from femgear.fe.shaft import RoundSection
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.mesh_directions import gear_set_system
-from femgear.trains.drivetrain.kinematics import planar_of
+from femgear.trains.drivetrain.kinematics import coordinates_of, planar_of, rigid_rotation
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
@@ -32,6 +32,7 @@ from femgear.trains.drivetrain.parts import (
     Drivetrain,
     MeshSection,
     ParallelSection,
+    PlanetarySection,
     constant_torques,
 )
 from femgear.trains.drivetrain.simulation import Records, march_drivetrain
@@ -103,6 +104,30 @@ def kinematics() -> tuple[Row, ...]:
         text = f"mesh line {name}, module 5 mm, which divides every radius [Hz]"
         rows.append(information("speeds", PAPER, text, value, ours))
     return tuple(rows)
+
+
+def shifted_planets() -> tuple[Row, ...]:
+    """A planet that profile shifts give two teeth fewer than (z_r - z_s)/2, by Willis and ISO 21771."""
+    mesh = MeshSection.in_si(stiffness=1e10, contact_ratio=1.2)
+    stage = PlanetarySection.in_si(
+        carrier="carrier", sun="sun", ring_teeth=56, sun_teeth=19, planet_teeth=17, module=0.045,
+        planet_mass=1611.0, planet_inertia=174.9, sun_mesh=mesh, ring_mesh=mesh,
+    )  # fmt: skip
+    bodies = tuple(
+        BodySection.in_si(name=name, inertia=100.0, mass=1e3, tilts=False) for name in ("carrier", "sun")
+    )
+    chain = Drivetrain(bodies, planetary=(stage,))
+    place = coordinates_of(chain)
+    spin = rigid_rotation(chain, place)
+    carrier, sun, planet = (spin[i] for i in (4, place.body["sun"] + 4, place.planets[0][0, 2]))
+    base = 17 * 22.5 * math.cos(math.radians(20.0))
+    case = "shifted planets"
+    return (
+        within(case, "Willis", "19/17/56: sun over carrier", 75.0 / 19.0, sun / carrier, 1e-9),
+        within(case, "Willis", "planet over sun in the carrier's frame", -19.0 / 17.0,
+               (planet - carrier) / (sun - carrier), 1e-9),
+        within(case, "ISO 21771", "base radius of the planet [mm]", base, 1e3 * stage.base_radii[1], 1e-9),
+    )  # fmt: skip
 
 
 def shaft_joints() -> tuple[Row, ...]:

@@ -283,6 +283,7 @@ THEMES = (
             drivetrain.shafts,
             drivetrain.shaft_joints,
             drivetrain.kinematics,
+            drivetrain.shifted_planets,
             drivetrain.base_line,
             drivetrain.stiffness,
             drivetrain.reductions,
