@@ -26,7 +26,7 @@ def main(
     relief: Annotated[tuple[str, ...], Parameter(negative="")] = ("0 um", "2 um", "4 um", "6 um", "8 um"),
     length: float = 1.0,
     torque: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
-    positions: int = 32,
+    positions: int | None = None,
 ) -> None:
     """Compute the transmission error over torque for each tip relief: a table, a picture and a CSV file.
 
@@ -43,7 +43,7 @@ def main(
     torque
         Torque of the input with its unit; may be repeated. Default: 11 from a tenth to twice the case's.
     positions
-        Positions over one mesh period.
+        Positions over one mesh period. Default: those of the case, as ``femgear run`` has them.
     """
     from femgear.case.gear_set import planetary_set
     from femgear.case.quantities import LENGTH, TORQUE, to_si
@@ -61,6 +61,7 @@ def main(
 
     data = read_case(case)
     gears = planetary_set(data)
+    positions = data.static.positions if positions is None else positions
     if not 4 <= positions <= 2048:
         raise CaseError("too few or too many positions", code="E-RANGE", key="--positions", value=positions)
     amounts = [_checked(to_si(text, LENGTH), text, data.module) for text in relief]

@@ -33,9 +33,9 @@ def main(
     torque: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     also: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
     largest: str | None = None,
-    shape: Literal["linear", "parabolic"] = "linear",
+    shape: Literal["linear", "parabolic"] = "parabolic",
     points: int = 7,
-    positions: int = 32,
+    positions: int | None = None,
 ) -> None:
     """Search amount and length of the relief: contour maps, a CSV file and the tables for the case file.
 
@@ -55,11 +55,11 @@ def main(
     largest
         Largest amount searched. Default: twice the mean deflection of the sun-planet meshes.
     shape
-        Of the relief.
+        Of the relief; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
     points
         Points of the grid along each parameter.
     positions
-        Positions over one mesh period.
+        Positions over one mesh period. Default: those of the case, as ``femgear run`` has them.
     """
     from femgear.case.gear_set import need_set, planetary_set
     from femgear.case.quantities import LENGTH, TORQUE, to_si
@@ -69,6 +69,7 @@ def main(
 
     data = read_case(case)
     need_set(data)
+    positions = data.static.positions if positions is None else positions
     _check_counts(points, positions)
     design = data.operation.torque if torque is None else to_si(torque, TORQUE)
     others = [to_si(text, TORQUE) for text in also] or [0.5 * design, 1.5 * design]

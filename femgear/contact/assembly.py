@@ -779,9 +779,14 @@ def _separation_at(pair: FlankPair, zeta, arc, form):
 
 
 def _nearest_arc(pair: FlankPair, zeta, centre, low, high, reach, form):
-    """Arc length of the smallest separation within `reach` of the contact of the unmodified flanks."""
-    begin = np.maximum(centre - reach, low)
-    end = np.maximum(np.minimum(centre + reach, high), begin)
-    arc = begin[..., None] + (end - begin)[..., None] * np.linspace(0.0, 1.0, 97)
+    """Arc length of the smallest separation within `reach` or more of the contact of the unmodified flanks.
+
+    The places looked at lie as far apart under all loads between two powers of two, so that windows do not
+    step from one to the next where a load changes by little.
+    """
+    # of a scale of its own, as all lengths of a set may be
+    step = pair.base_radius_1 * 2.0 ** np.floor(np.log2(reach / (48.0 * pair.base_radius_1)))
+    away = step * np.arange(-96, 97)
+    arc = np.clip(centre[..., None] + away, low[..., None], np.maximum(low, high)[..., None])
     best = _separation_at(pair, zeta[..., None], arc, form).argmin(axis=-1)
     return np.take_along_axis(arc, best[..., None], axis=-1)[..., 0]

@@ -5,10 +5,14 @@ import pytest
 from contact.test_cycle import STEEL, TORQUE, reference_set
 from random_sets import random_set
 
+from femgear.case.dependencies import Steps
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.peaks import TOLERANCE, open_places, tooth_pair_codes
-from femgear.study.relief import design_basis, sun_torque, with_tip_relief
+from femgear.study.objectives import Variant, transmission_error
+from femgear.study.relief import design_basis, harris_map, sun_torque, with_tip_relief
+from femgear.trains.reading import with_values
+from femgear.trains.static.stages import solve_static
 
 PEAKS = CycleOptions(peaks=True)
 
@@ -117,3 +121,31 @@ def test_tip_relief_that_makes_the_error_small(reference, power):
     for count in (8, 32):
         apart, _, _ = against_many(walk, count)
         assert apart < 0.03
+
+
+def test_errors_over_torque_have_no_steps(reference):
+    """41 torques within 0.5 %: second differences are those of smooth curves, not of cells that move."""
+    gears, bodies = reference
+    relief, torques = with_tip_relief(None, gears, amount=5e-6, length=0.9), np.linspace(0.995, 1.005, 41)
+    errors = np.array(
+        [
+            walk_mesh_cycle(gears, bodies, sun_torque=TORQUE * x, positions=8, deviations=relief).deflection
+            for x in torques
+        ]
+    )
+    # a curve over the 0.6th power of the torque bends by 0.24 of the square of its steps: 2e-8
+    assert np.abs(np.diff(errors, 2, axis=0)).max() < 2e-6 * errors.mean()
+    assert np.diff(errors, axis=0).min() > 0.0
+
+
+def test_maps_have_the_numbers_of_a_run(tmp_path):
+    """Harris map, objective and static.nc of one design: the same peaks to peaks, whatever the positions."""
+    case = with_values(random_set(4).case, {"static.positions": 12})
+    data, basis = solve_static(case, cache=tmp_path).dataset(), design_basis(case, cache=tmp_path)
+    found = harris_map(basis, torques=[sun_torque(case, basis.gears)], deviations=[basis.deviations])
+    stored = data["ste_peak_to_peak"].values.reshape(2, -1).max(axis=1)
+    assert found.peak_to_peak[0, :, 0] == pytest.approx(stored, rel=1e-9)
+    assert found.overall[0, 0] == pytest.approx(data["ste_overall_peak_to_peak"].values[0], rel=1e-9)
+    variant = Variant(case, Steps(), tmp_path)
+    assert transmission_error("sun-planet").compute(variant) == pytest.approx(stored[0], rel=1e-9)
+    assert (stored > np.ptp(data["ste"].values, axis=1).reshape(2, -1).max(axis=1)).all()
