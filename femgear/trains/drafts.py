@@ -237,7 +237,7 @@ def _no_such(kind: str, option: str, words: str) -> CaseError:
 def _gears(
     teeth: tuple[int, ...], size: float, beta: float, form: ToothForm, notes: dict[str, str]
 ) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-    """Teeth, shift and rack of every gear, and tables of all: centre distance and rack."""
+    """Teeth, shift (that for the rim too) and rack of every gear, and tables of all of them."""
     names = ("sun", "planet", "ring") if len(teeth) == 3 else ("gear_1", "gear_2")
     gears: list[dict[str, Any]] = [{"name": n, "teeth": z} for n, z in zip(names, teeth, strict=True)]
     of_all: dict[str, Any] = {"set": {}}
@@ -268,6 +268,8 @@ def _gears(
         centre_distance=None if distance is None else distance / module,
     )  # fmt: skip
     found = [round(shift / math.cos(beta), 4) + 0.0 for shift in shared.shifts]
+    for gear, shift in zip(gears, found, strict=True):
+        gear["rim_shift"] = shift
     rounding = shared.gears.gears[-1].rack.root_radius / math.cos(beta)
     if rounding < rack.root_radius - 1e-9:
         gears[-1]["rack"] = {"addendum": rack.addendum, "dedendum": rack.dedendum}
@@ -309,7 +311,7 @@ def _sections(
         section = dict(gear)
         name, internal = section.pop("name"), gear["name"] == "ring"
         dedendum = of_all.get("rack", {}).get("dedendum", 1.25)
-        shift = section.get("profile_shift", 0.0)
+        shift = section.pop("rim_shift", section.get("profile_shift", 0.0))
         radius, _ = usual_rim(gear["teeth"], size, dedendum, shift, internal=internal, helix=beta)
         key = "outer_radius" if internal else "bore_radius"
         notes[f"{name}.{key}"] = f"estimated: a rim of {'four' if internal else 'three'} modules"

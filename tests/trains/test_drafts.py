@@ -207,8 +207,9 @@ LEFT_OVER = [(z, p, z + 2 * p + d) for d in (3, 4) for z in range(17, 46, 4) for
 
 def check_draft(teeth):
     codes = said(new_case("planetary", teeth=teeth))
-    # two planets are all that have room or assemble evenly
-    assert not codes - {"", "W-PLANETS"}, (teeth, codes)
+    # two planets are all that have room; no shifts give both meshes of 17/17/55 a contact ratio of 1.2
+    allowed = {"", "W-PLANETS"} | ({"W-CONTACT-RATIO"} if teeth == (17, 17, 55) else set())
+    assert not codes - allowed, (teeth, codes)
 
 
 @pytest.mark.parametrize("teeth", [(19, 17, 56), (17, 19, 57), (20, 24, 70), *LEFT_OVER[::20]])
@@ -234,6 +235,8 @@ def test_all_drafts_with_teeth_left_over(teeth):
         ("planar", {"teeth": (21, 33, 87)}),
         ("pair", {"teeth": (12, 24), "form": ToothForm(centre_distance="37 mm")}),
         ("pair", {"teeth": (9, 40)}),
+        ("pair", {"teeth": (12, 34)}),
+        ("planetary", {"teeth": (40, 14, 67)}),
         ("pair", {"form": ToothForm(shifts=(0.3, 0.1), helix="-15 deg")}),
     ],
 )
