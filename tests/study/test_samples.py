@@ -246,6 +246,7 @@ def test_planets_out_of_phase(case, planets):
     else:
         values |= {"sun.teeth": 36, "planet.teeth": 24, "ring.teeth": 84, "set.centre_distance": "45 mm"}
         values |= {"sun.bore_radius": "12 mm", "planet.bore_radius": "9 mm", "ring.outer_radius": "80 mm"}
+        values |= {"sun.tip_diameter": None, "planet.tip_diameter": None}
         values |= {"sun.profile_shift": 0.0, "ring.profile_shift": None, "rack.root_radius": 0.2}
     basis = design_basis(with_values(case, values), cache=grid_cache())
     model = sample_model(basis, PITCH_AND_PINS, sun_torque=TORQUE)
