@@ -83,7 +83,7 @@ CODES = {
     "E-RESULTS-CHANGED": "A results file is not the one that the run wrote.",
     "E-RESULTS-INCOMPLETE": "The run was interrupted.",
     "E-RESULTS-MISSING": "There are no such results.",
-    "E-REXS": "A REXS file contradicts itself, or holds no planetary stage that femgear can compute.",
+    "E-REXS": "A REXS file contradicts itself, or holds no stage that femgear can compute.",
     "E-RIGID-MODE": "Nothing holds a motion that strains an element.",
     "E-RIM": "A rim is too thin, or lies on the wrong side of the teeth.",
     "E-ROOT-RADIUS": "The root radius of the tool does not fit its profile.",

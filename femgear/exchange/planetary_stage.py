@@ -162,7 +162,7 @@ def _chosen(model: Model, wanted: str | None) -> Component:
         kinds = sorted({one.type for one in model.components.values() if one.type.endswith("_stage")})
         model.refuse(
             "the file has no planetary stage", "components", limit=f"planetary_stage, not {', '.join(kinds)}",
-            remedy="femgear imports planetary stages alone; femgear new pair writes a case of two gears",
+            remedy="femgear imports planetary and cylindrical stages",
         )  # fmt: skip
     chosen = [one for one in stages if one.id == wanted or (wanted is None and len(stages) == 1)]
     if not chosen:
