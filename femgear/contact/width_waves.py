@@ -152,9 +152,13 @@ def _wave_compliance(
         options = {"count": gear.teeth, "rim": "rim", "loads": loads, "observations": observations}
         return tooth_compliance(condense_sector(grid, matrix, **options).supported(support))
 
-    support = None if foundation is None else foundation / gear.face_width
     state: Any = RING_STATE if gear.internal else TEETH_STATE
-    uniform = compliance(stiffness(grid, material, state=state), support, loads, observations)
+    # a uniform load bends the body of a wider gear over all its width, waves that of the common width
+    thickness: Any = {"tooth": 1.0, "body": gear.face_width / width} if gear.face_width > width else 1.0
+    plane = stiffness(grid, material, state=state, thickness=thickness)
+    support = None if foundation is None else foundation / width
+    uniform = compliance(plane, support, loads, observations)
+    support = None if foundation is None else foundation / gear.face_width
     loads, observations = (
         np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, observations)
     )

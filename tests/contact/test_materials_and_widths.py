@@ -8,6 +8,7 @@ import pytest
 
 from femgear.contact.bodies import flank_widths, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.width_waves import width_waves
 from femgear.fe.elasticity import Material, stiffness
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import elasticity_factor, material_factor, root_face_width
@@ -128,3 +129,14 @@ def test_factors_of_the_standards_for_two_materials():
     assert STEEL.contact_modulus(IRON) == pytest.approx(1 / (0.91 / 206e9 + (1 - 0.26**2) / 110e9))
     assert root_face_width(0.03, 0.02, 2e-3) == pytest.approx(0.024)
     assert root_face_width(0.022, 0.02, 2e-3) == 0.022
+
+
+def test_waves_across_the_face_in_common_bend_no_more_than_that_part_of_a_wider_body():
+    """Plane part and change together are the same for a wide and a narrow body; neither falls below zero."""
+    found = []
+    for pair in (pair_of(WIDTH, WIDTH), pair_of(WIDTH, 3 * WIDTH)):
+        sectors = make_sectors(pair, STEEL, flank_elements=6, refine=0.5)
+        waves, bodies = width_waves(sectors, STEEL, 5), make_bodies(sectors, STEEL)
+        # of teeth half a gear apart nothing is local
+        found.append([bodies.planet.regular[12, 3, 3] + one.planet.regular[12, 3, 3] for one in waves.bodies])
+    assert found[0] == pytest.approx(found[1], abs=1e-9 * bodies.planet.regular[0].max())
