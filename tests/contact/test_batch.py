@@ -43,12 +43,6 @@ def random_bodies(seed):
     return _solved[seed]
 
 
-def elastic_of(bodies):
-    """The elastic constants that flanks of bodies have."""
-    corner = bodies.sun.corner
-    return Material(2 * corner.shear_modulus * (1 + corner.poisson_ratio), corner.poisson_ratio, 7850.0)
-
-
 def both_ways(gears, bodies, torque, *, supports, pins=0.0, both_flanks=False, gap=0.0):
     """Loads, motions and stiffness (own, coupled) by the batch and by the single positions.
 
@@ -268,7 +262,7 @@ def test_planets_in_the_same_state_are_solved_as_one_over_the_width(
 ):
     """With leads, errors that all planets have alike, tangents of other bodies; spur and helical teeth."""
     (gears, bodies, torque), slices = random_bodies(seed), 7
-    N, width, material = gears.n_planets, bodies.widths[0], elastic_of(bodies)
+    N, width, material = gears.n_planets, bodies.widths[0], material_of(random_set(seed).case, "sun")
     sectors = make_sectors(gears, material, flank_elements=6, refine=0.5)
     soft = replace(material, youngs_modulus=0.8 * material.youngs_modulus)
     waves, softer_waves = (width_waves(sectors, one, slices) for one in (material, soft))
