@@ -94,6 +94,8 @@ def open_places(
     slope = (after - values) / length
     low, high = values.min(axis=1)[:, None], values.max(axis=1)[:, None]
     size = np.maximum(high - low, least[:, None])
+    # what is zero throughout, as of planets that carry nothing, has no peaks
+    size = np.where(size > 0.0, size, 1.0)
     other = codes != np.roll(codes, -1, axis=1)
     steepest = np.abs(slope)
     steepest = np.maximum(steepest, np.maximum(np.roll(steepest, 1, axis=1), np.roll(steepest, -1, axis=1)))

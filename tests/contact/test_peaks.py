@@ -53,6 +53,12 @@ def test_a_peak_that_slopes_do_not_show_lies_where_pairs_change():
     assert found == pytest.approx(1.0, abs=0.02)
 
 
+def test_what_is_zero_throughout_has_no_peaks():
+    assert settled(np.zeros_like, 8) == (0.0, 0.0, 0)
+    places, doubt = open_places(np.arange(4) / 4, np.zeros((1, 4)), np.zeros((1, 4), int), np.zeros(1), 1)
+    assert not len(places) and doubt == 0.0
+
+
 def test_codes_tell_which_pairs_carry():
     path = np.array([[[0.1, 0.2, 0.3], [1.1, 1.2, 1.3]]])
     load = np.array([[[1.0, 1.0, 0.0], [0.0, 2.0, 2.0]]])
