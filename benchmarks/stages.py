@@ -214,13 +214,19 @@ def on_feet(case, harmonics: int, diameters: int, count: int):
 
 def two_way(reference: Reference, modes=None, *, count: int = 1000, harmonics: int = 6, diameters: int = 14):
     """Mesh forces of the set on four feet both ways, and of the ring without them."""
+    from femgear.trains.elastic.excitation_limit import limited
     from femgear.trains.elastic.fixed_housing import fixed_housing
     from femgear.trains.rigid import member_speeds
 
-    case = on_feet(reference.case, harmonics, diameters, count)
-    carrier = member_speeds(case, reference.gears).carrier * np.array(case.operation.speeds)
+    case, first = (
+        on_feet(reference.case, harmonics, diameters, count),
+        member_speeds(reference.case, reference.gears),
+    )
+    speeds = np.array(case.operation.speeds)
+    carrier, kept = first.carrier * speeds, case.dynamics.mesh_harmonics
     for part in np.array_split(carrier, -(-count // 250)):  # about as many as a run has in memory at a time
-        found = fixed_housing(case, modes or reference.modes, part)
+        limit = limited(case, first.mesh_frequency * part / first.carrier, 0.0, given=kept)
+        found = fixed_housing(case, modes or reference.modes, part, limit)
     return found
 
 

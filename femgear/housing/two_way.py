@@ -11,11 +11,18 @@ receptances H_m and circumferential coefficients P (`femgear.housing.structure.F
     f_j    = F_j + k_j (d_j - u_j - ste_j),
 
 a harmonic transfer function (N. M. Wereley, Analysis and Control of Linear Periodically Time Varying Systems,
-PhD thesis, MIT, 1991). k, F and ste have orders that are multiples of z_ring: the gears couple L with L + p
-z_ring alone, the structure the side bands of one mesh harmonic. Orders are ``h z_ring + r``, |h| <= H,
-|r| <= 2 n_max. A set that is the same after a turn by ``2 pi/N`` repeats itself in time, ``f_j(theta) =
+PhD thesis, MIT, 1991). With ``k = k0 + kappa(t)`` and k0 the mean all but the source
+
+    e = F - k ste + kappa (d - u)
+
+is of one mesh harmonic h alone, its side bands ``h z_ring + r``, |r| <= 2 n_max: small systems
+(`femgear.housing.harmonic_blocks`) that precondition the spectral iteration, in which the last term, a
+product in time, is iterated upon by GMRES. The cost grows with the number of harmonics.
+
+A set that is the same after a turn by ``2 pi/N`` repeats itself in time, ``f_j(theta) =
 f_i(theta + s (phi_j - phi_i))``: one of N planets is solved for, and q_m[K] vanishes unless N divides K, on
-any structure.
+any structure. Errors that turn with gears repeat the meshes after P mesh periods: lines are P-ths of a
+harmonic then, planets move in N patterns (`femgear.housing.carrier_orders`), and kappa couples all of them.
 """
 
 from __future__ import annotations
@@ -32,24 +39,24 @@ from femgear.housing.carrier_orders import (
     CarrierOrders,
     LeadingMeshes,
     MeshPaths,
-    equations,
-    mirrored,
     planet_groups,
     receptance,
     ring_load,
-    two_sided,
 )
+from femgear.housing.harmonic_blocks import HarmonicBlocks, blocks_of_speed
+from femgear.housing.mesh_fluctuation import MeshFluctuation, gmres
 from femgear.housing.sensor import ReadOnlyArrays, carrier_turns
-from femgear.housing.set_damping import set_damping
+from femgear.housing.set_damping import SetDamping, set_damping
 from femgear.housing.structure import FixedStructure
-from femgear.housing.turning_errors import TurningErrors, solve_turning_errors
+from femgear.system.fourier import Product, pad
 from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
 
-_EQUAL, _RESIDUAL, _RESIDUAL_ERRORS = 1e-9, 1e-8, 1e-6
-"""Part of the largest harmonic by which meshes that repeat others may differ; residual that is refused, and
-that with errors that turn, which are iterated upon."""
-_MEMORY, _MOST, _BYTES = 6e7, 4e9, 130
-"""Size of the speeds that are solved together, of one at most, and of one unknown times one [bytes]."""
+_EQUAL, _RESIDUAL = 1e-9, 1e-6
+"""Part of the largest harmonic by which meshes that repeat others may differ; residual that is refused."""
+_PASSES, _MIXED = 60, 5
+"""Passes of the damping at most, and those that are extrapolated together."""
+_MOST, _TINY = 4e9, np.finfo(float).tiny
+"""Size of what one speed takes at most [bytes]; what no norm is below."""
 
 
 @dataclass(frozen=True)
@@ -62,19 +69,22 @@ class TwoWayResponse(ReadOnlyArrays):
         [rad/s], counter-clockwise positive.
     order : (n_orders,) array
         From 0 upwards; multiples of 1/turns.
-    force : (n_speeds, 2 G, n_orders) complex array
-        Of the sun-planet, then the planet-ring meshes of the G planets that the others repeat [N].
+    force : (n_speeds, n, n_orders) complex array
+        Of the sun-planet, then the planet-ring meshes, of the planets that the others repeat or of all [N].
     residual : (n_speeds,) array
-        Of the planet-ring forces in their equations, over their norm. With errors that turn, or the change
-        of the deflections in the last pass if that is larger.
+        Of the forces in their equations, over their norm.
     tail : (n_speeds,) array
-        Share of the fluctuating planet-ring forces beyond n_max side bands (root of energies), a measure of
-        truncation.
-    harmonics, side_bands : int
-        Mesh harmonics H, and side bands on either side of each.
+        Share of the fluctuating planet-ring forces beyond half the side bands (root of energies), a measure
+        of truncation.
+    spectral_radius : (n_speeds,) array
+        Of the spectral iteration without GMRES: largest Ritz value.
+    products : (n_speeds,) int array
+        Products with the fluctuating stiffness.
+    harmonics : (n_speeds,) int array
+        Mesh harmonics.
     drag : (n_speeds, n_lines, m) complex array, optional
-        Two-sided modal forces on the structure [N kg^-1/2] by the damping of the set beyond that of its
-        modes, at the orders of `structure_lines`.
+        Modal forces on the structure [N kg^-1/2] by the damping of the set beyond that of its modes, at the
+        orders of `structure_lines`, two-sided.
     turns : int
         Turns of the carrier after which all repeats.
     """
@@ -84,34 +94,39 @@ class TwoWayResponse(ReadOnlyArrays):
     force: np.ndarray
     residual: np.ndarray
     tail: np.ndarray
-    harmonics: int
-    side_bands: int
+    spectral_radius: np.ndarray
+    products: np.ndarray
+    harmonics: np.ndarray
     paths: MeshPaths
     drag: np.ndarray | None = None
     turns: int = 1
 
     def at(self, some) -> TwoWayResponse:
         """Response at the speeds number ``some`` alone."""
-        names = ("carrier_speed", "force", "residual", "tail")
+        names = (
+            "carrier_speed", "force", "residual", "tail", "spectral_radius", "products", "harmonics"
+        )  # fmt: skip
         parts = {name: getattr(self, name)[some] for name in names}
         return replace(self, **parts, drag=None if self.drag is None else self.drag[some])
 
 
-def solve_two_way(
+def solve_two_way(  # noqa: PLR0913
     gears: Modes,
     excitation: MeshExcitation,
     structure: FixedStructure,
     paths: MeshPaths,
     carrier_speed,
     *,
-    harmonics: tuple[int, int] = (6, 12),
+    harmonics: Any,
+    coupled_diameters: int | None = None,
     side_bands: int | None = None,
     damping=None,
+    tolerance: float = 1e-10,
 ) -> TwoWayResponse:
     """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
 
     CaseError: data that do not belong together, planets that do not repeat one another (E-SYMMETRY),
-    E-MEMORY.
+    E-MEMORY. ConvergenceError: equations that are nearly singular (E-RESONANCE).
 
     Parameters
     ----------
@@ -123,84 +138,261 @@ def solve_two_way(
         with errors that turn: then the symmetry is that of the places of the planets and of the modes.
     carrier_speed : (n_speeds,) array
         [rad/s], counter-clockwise positive, all of one direction.
-    harmonics : (int, int)
+    harmonics : (int, int) or two (n_speeds,) int arrays
         Mesh harmonics kept in the data, and in the response.
+    coupled_diameters : int, optional
+        Nodal diameters up to which waves of the structure act on one another and make side bands; waves
+        beyond act on themselves alone. Default: all.
     side_bands : int, optional
-        Of every harmonic of the forces; default ``2 n_max``. An axisymmetric structure makes none.
+        Of every harmonic of the forces; default twice those. An axisymmetric structure makes none.
     damping : (n, n) array, optional
         Of gears and ring as a whole, see `femgear.housing.set_damping.set_damping` [N s/m, ...]; without it
         gears and structure have each the modal damping of its own.
+    tolerance : float
+        Relative residual of GMRES, and change of the forces by damping in their last pass.
     """
-    n_max, angles = structure.max_diameter, np.asarray(paths.planet_angles, float)
-    speeds = _checked(gears, excitation, carrier_speed, paths, n_max, harmonics)
-    groups, bands = planet_groups(angles, paths.symmetry), 2 * n_max if side_bands is None else side_bands
-    orders = CarrierOrders(paths, harmonics[1], n_max, bands, int(np.sign(speeds[0])))
-    if excitation.periods > 1:
-        known = gears, excitation, harmonics[0], structure, orders, groups
-        return _turning(TurningErrors(*known, damping=damping), speeds)
-    return _one_period(gears, excitation, structure, orders, groups, speeds, harmonics[0], damping)
+    n_max = structure.max_diameter
+    coupled = n_max if coupled_diameters is None else min(coupled_diameters, n_max)
+    speeds = _checked(gears, excitation, carrier_speed, paths, coupled)
+    excited, kept = _checked_harmonics(harmonics, len(speeds))
+    bands = 2 * coupled if side_bands is None else side_bands
+    sense, periods = int(np.sign(speeds[0])), excitation.periods
 
+    def problem_of(i: int) -> _Problem:
+        size = int(kept[i]) * periods, n_max, bands, sense, periods, 1 if periods == 1 else paths.symmetry
+        orders = CarrierOrders(paths, *size)
+        return _Problem(gears, excitation, structure, orders, int(excited[i]), coupled, damping)
 
-def _one_period(
-    gears: Modes, excitation: MeshExcitation, structure: FixedStructure, orders: CarrierOrders, groups,
-    speeds: np.ndarray, harmonics: int, damping,
-) -> TwoWayResponse:  # fmt: skip
-    """Response of a set without errors that turn, the forces of planets that the others repeat."""
-    paths, n_max, angles = orders.paths, orders.n_max, np.asarray(orders.paths.planet_angles, float)
-    leaders, bands, H = groups[0], orders.side_bands, orders.harmonics
-    one_sided = mesh_harmonics(excitation, harmonics)
-    _check_repeated(one_sided, orders, *groups)
-    stiffness, deflection, force = (two_sided(one[[*leaders, *(len(angles) + leaders)]]) for one in one_sided)
-    known, place = LeadingMeshes.build(gears, stiffness, orders, *groups), angles[leaders] + paths.load_angle
-    source = np.zeros((*known.product.shape[:2], 2 * bands + 1), complex)
-    wide = (0, 0), (H - harmonics,) * 2
-    deflection, force = np.pad(deflection, wide), np.pad(force, wide)
-    source[..., bands] = force - np.einsum("mhk,mk->mh", known.product, deflection)
-    count, n_orders = len(place), len(orders.positive)
-    # of one speed [bytes]
-    size = _BYTES * (count * n_orders) ** 2
-    if size > _MOST:
-        message = f"{count} planets with {n_orders} carrier orders need {size / 1e9:.2g} GB"
-        raise CaseError(message, code="E-MEMORY", remedy="take fewer mesh harmonics or nodal diameters")
-    # without side bands what the ring gives way takes more than the unknowns
-    step = max(int(_MEMORY / (size + _BYTES * (2 * n_max + 1) ** 3)), 1)
-    drag, order = None, orders.meeting()[0]
-    if damping is not None:
-        placed: Any = {"symmetry": paths.symmetry, "sense": orders.sense}
-        damping = set_damping(damping, gears, structure, orders.solved, orders.meeting(), **placed)
-        drag = np.empty((len(speeds), (order >= 0).sum(), len(structure.natural_frequency)), complex)
-    force = np.empty((len(speeds), 2 * count, n_orders), complex)
-    residual, tail = np.empty((2, len(speeds)))
-    outer = np.abs(orders.every - np.arange(-H, H + 1)[:, None] * paths.z_ring) > n_max
+    found = _Lines(problem_of(int(kept.argmax())), len(speeds))
 
-    def solve(first: int) -> None:
-        speed = np.abs(speeds[first : first + step])
-        for i, one in enumerate(equations(known, structure, place, orders, speed, damping), first):
-            found = one.solve(source)
-            kept = found.force.reshape(2 * count, -1)[:, -n_orders:]
-            force[i] = kept * np.where(np.arange(n_orders) == 0, 1, 2)
-            residual[i], tail[i] = found.residual, _share(found.force[count:], outer, orders.every == 0)
-            if drag is not None and found.drag is not None:
-                drag[i] = found.drag[order >= 0]
+    def solve(i: int) -> None:
+        problem = problem_of(i)
+        found.keep(i, problem, problem.solve(abs(float(speeds[i])), tolerance))
 
-    workers = max(min(os.cpu_count() or 1, int(_MOST / 10 / (size * step))), 1)
+    workers = max(min(os.cpu_count() or 1, int(_MOST / 4 / found.size)), 1)
     with ThreadPoolExecutor(workers) as pool:  # BLAS and LAPACK do not hold up one another
-        list(pool.map(solve, range(0, len(speeds), step)))
-    _check_residual(residual, speeds)
-    return TwoWayResponse(speeds, orders.positive, force, residual, tail, H, bands, paths, drag)
-
-
-def _turning(errors: TurningErrors, speeds: np.ndarray) -> TwoWayResponse:
-    """Response of a set with errors that turn, the forces of all its planets."""
-    orders, sense = errors.orders, errors.orders.sense
-    turns = carrier_turns(orders.paths.z_ring, errors.periods)
-    number, force, residual, tail, drag = solve_turning_errors(
-        errors, np.abs(speeds), lambda met: structure_numbers(met, turns * sense * orders.n, 1)
+        list(pool.map(solve, range(len(speeds))))
+    residual, tail, radius, products = found.figures
+    _check_residual(residual, speeds, max(_RESIDUAL, 10.0 * tolerance))
+    paths, turns = paths if periods == 1 else replace(paths, symmetry=1), found.turns
+    order = found.number if turns == 1 else found.number / turns
+    counts = products.astype(int), kept
+    return TwoWayResponse(
+        speeds, order, found.force, residual, tail, radius, *counts, paths, found.drag, turns
     )
-    _check_residual(residual, speeds, _RESIDUAL_ERRORS)
-    order, paths = number if turns == 1 else number / turns, replace(orders.paths, symmetry=1)
-    size = orders.harmonics, orders.side_bands
-    return TwoWayResponse(speeds, order, force, residual, tail, *size, paths, drag, turns)
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """Forces (J, B, R) of the leading meshes at one speed, and how they were found."""
+
+    force: np.ndarray
+    drag: np.ndarray | None
+    residual: float
+    radius: float
+    products: int
+
+
+class _Problem:
+    """Set and structure with some harmonics of the excitation, at any speed."""
+
+    def __init__(
+        self, gears: Modes, excitation: MeshExcitation, structure: FixedStructure, orders: CarrierOrders,
+        excited: int, coupled: int, damping,
+    ):  # fmt: skip
+        self.structure, self.orders, self.coupled = structure, orders, coupled
+        paths, angles = orders.paths, np.asarray(orders.paths.planet_angles, float)
+        groups = planet_groups(angles, paths.symmetry)
+        leaders, group, turn = groups
+        stiffness, deflection, force = mesh_harmonics(excitation, excited)
+        leading = np.concatenate([leaders, len(angles) + leaders])
+        owner, turns = np.concatenate([group, len(leaders) + group]), np.tile(turn, 2)
+        mean = gears.mesh_stiffness
+        if orders.patterns == 1 and orders.periods == 1:
+            _check_repeated((stiffness, deflection, force), orders, *groups)
+            stiffness, deflection, force = (one[leading] for one in (stiffness, deflection, force))
+            owner, turns, mean = np.arange(len(leading)), np.zeros(len(leading), int), mean[leading]
+        elif (apart := np.abs(mean - mean[leading][owner]).max()) > _EQUAL * mean.max():
+            message = f"the mean stiffness of planets that repeat one another differs by {apart:.3g} N/m"
+            raise CaseError(message, code="E-SYMMETRY", remedy="take the modes of `mean_excitation`")
+        self.gears = LeadingMeshes.build(gears, paths, orders.sense, groups)
+        self.place = angles[leaders] + paths.load_angle
+        J, (B, R) = 2 * len(leaders), (len(orders.base), len(orders.bands))
+        self.size = 16.0 * B * (R * R * (J / 2) ** 2 + R * J * (J + 60))
+        if self.size > _MOST:
+            message = f"{B} lines with {R} side bands of {J // 2} planets need {self.size / 1e9:.2g} GB"
+            remedy = "take fewer mesh harmonics or nodal diameters"
+            raise CaseError(message, code="E-MEMORY", limit=f"{_MOST / 1e9:g} GB", remedy=remedy)
+        lines = orders.lines
+        forcing = pad(force, lines) - Product(pad(stiffness, lines))(pad(deflection, lines)[:, None])[:, 0]
+        varying = stiffness.copy()
+        varying[:, 0] -= mean
+        self.fluctuation = MeshFluctuation(varying, orders, owner, turns)
+        source = np.zeros((len(forcing), lines + 1, R), complex)
+        source[..., orders.side_bands] = 0.5 * forcing
+        source[:, 0, orders.side_bands] = np.real(forcing[:, 0])
+        self.source = self.fluctuation.of_leaders(source)
+        self.damping = None if damping is None else set_damping(damping, gears, structure, orders)
+
+    def solve(self, speed: float, tolerance: float) -> _Answer:
+        """Solve at a speed of the carrier [rad/s], positive."""
+        blocks = blocks_of_speed(self.gears, self.structure, self.orders, self.place, speed, self.coupled)
+        if self.damping is None:
+            found = self._solved(blocks, blocks.load(), None, None, tolerance)
+            return _Answer(found.force, None, found.residual, found.radius, found.products)
+        return self._damped(blocks, self.damping, tolerance)
+
+    def _solved(self, blocks: HarmonicBlocks, moved, given, start, tolerance: float) -> _Solution:
+        """Solve for forces e beyond k0, near ``start`` if it is given, with deflections d_0 and u_0."""
+        still = _over_ring(*blocks.deflections(np.zeros_like(self.source), moved, given))
+        right, shape = self.source + self.fluctuation(still), self.source.shape
+
+        def answer(flat: np.ndarray) -> np.ndarray:
+            motion = blocks.deflections(flat.view(complex).reshape(shape))
+            return self.fluctuation(_over_ring(*motion)).ravel().view(float)
+
+        first = None if start is None else start.ravel().view(float)
+        flat, residual, radius, products = gmres(answer, right.ravel().view(float), first, tolerance)
+        extra = flat.view(complex).reshape(shape)
+        deflection, way = blocks.deflections(extra, moved, given)
+        return _Solution(extra, way, blocks.forces(extra, deflection, way), residual, radius, products)
+
+    def _damped(self, blocks: HarmonicBlocks, damping: SetDamping, tolerance: float) -> _Answer:
+        """Solve with the damping of the set, whose forces follow the motion, pass by pass."""
+        shapes, load = (blocks.on_gears.shape, blocks.on_structure.shape), blocks.load()
+        forces = [np.zeros(shape, complex) for shape in shapes]
+        moved = [np.zeros_like(load), np.zeros_like(load[: len(self.place)])]
+        start, first, products, change, passes = None, None, 0, 1.0, list[_Pass]()
+        for _ in range(_PASSES):
+            accuracy = max(0.5 * tolerance, min(1e-3 * change, 1e-4))
+            found = self._solved(blocks, load + moved[0], moved[1], start, accuracy)
+            first, start, products = first or found, found.extra, products + found.products
+            answer = damping.forces(blocks.speed, *blocks.modal(found.extra, found.way, found.force, *forces))
+            made = blocks.moved(*answer)
+            apart = self.gears.mean[:, None, None] * _over_ring(made[0] - moved[0], made[1] - moved[1])
+            change = float(np.linalg.norm(apart) / max(np.linalg.norm(found.force), _TINY))
+            if max(change, found.residual) <= tolerance:
+                break
+            passes = [*passes[1 - _MIXED :], _Pass(answer, made, apart)]
+            share = _shares([one.change for one in passes])
+            forces = _blend(share, [one.forces for one in passes])
+            moved = _blend(share, [one.moved for one in passes])
+        assert first is not None
+        return _Answer(found.force, forces[1], max(found.residual, change), first.radius, products)
+
+    def tail(self, force: np.ndarray) -> float:
+        """Share (root of energies) of the fluctuating ring forces that is at the outer side bands."""
+        energy = np.abs(force[len(self.place) :]) ** 2
+        energy[:, self.orders.base + self.orders.seed == 0] *= 0.5
+        energy[:, 0, self.orders.side_bands] = 0.0
+        outer = 2 * np.abs(self.orders.bands) > self.orders.side_bands
+        return float(np.sqrt(energy[..., outer].sum() / max(energy.sum(), _TINY)))
+
+
+class _Lines:
+    """Lines of the forces at all speeds, with the most harmonics of any of them.
+
+    Orders ``number`` (n_orders,) and ``reached`` (n_lines,) of the structure are multiples of 1/turns.
+    """
+
+    def __init__(self, widest: _Problem, count: int):
+        orders, modes = widest.orders, len(widest.structure.natural_frequency)
+        self.size, self.turns = widest.size, carrier_turns(orders.paths.z_ring, orders.periods)
+        self.number = self.numbers(orders)[0]
+        waves = self.turns * orders.sense * orders.diameters
+        self.reached = structure_numbers(
+            self.number, waves, orders.paths.symmetry if orders.periods == 1 else 1
+        )
+        self.force = np.zeros((count, len(widest.fluctuation.owner), len(self.number)), complex)
+        self.figures, self.drag = np.zeros((4, count)), None
+        if widest.damping is not None:
+            self.drag = np.zeros((count, len(self.reached), modes), complex)
+
+    def numbers(self, orders: CarrierOrders) -> tuple[np.ndarray, np.ndarray]:
+        """Orders (n_orders,) of the forces, multiples of 1/turns from 0, and places (Q + 1, R) among them."""
+        number, place = np.unique(np.abs(orders.numbers(self.turns)), return_inverse=True)
+        return number, place.reshape(-1, len(orders.bands))
+
+    def keep(self, i: int, problem: _Problem, answer: _Answer) -> None:
+        """Write down what is found at the speed number i."""
+        number, place = self.numbers(problem.orders)
+        at = np.searchsorted(self.number, number)
+        self.force[i][:, at] = self._one_sided(problem, answer.force, place, len(number))
+        self.figures[:, i] = answer.residual, problem.tail(answer.force), answer.radius, answer.products
+        if self.drag is not None and answer.drag is not None:
+            self._add_drag(self.drag[i], problem.orders, answer.drag)
+
+    def _one_sided(self, problem: _Problem, force: np.ndarray, place: np.ndarray, count: int) -> np.ndarray:
+        """Amplitudes (n, n_orders) of all meshes by two-sided forces (J, B, R) of the leaders."""
+        every, middle = problem.fluctuation.of_meshes(force), problem.orders.side_bands
+        values = 2.0 * np.where(problem.orders.numbers(self.turns) < 0, every.conj(), every)
+        # the other half of line 0 is its conjugate
+        values[:, 0, :middle] = 0.0
+        values[:, 0, middle] = np.real(every[:, 0, middle])
+        found = np.zeros((len(every), count), complex)
+        for mesh, own in zip(found, values):
+            np.add.at(mesh, place, own)
+        found[:, 0] = np.real(found[:, 0])
+        return found
+
+    def _add_drag(self, drag: np.ndarray, orders: CarrierOrders, values: np.ndarray) -> None:
+        """Add two-sided modal forces (B, S, m) to those (n_lines, m) at the orders of the structure."""
+        number, line = np.rint(orders.structure_order * self.turns).astype(int), np.arange(orders.lines + 1)
+        used = (np.tile(line, orders.patterns) > 0)[:, None] | (number >= 0)
+        at = np.minimum(np.searchsorted(self.reached, np.abs(number)), len(self.reached) - 1)
+        used &= self.reached[at] == np.abs(number)
+        np.add.at(drag, at[used], np.where((number < 0)[..., None], values.conj(), values)[used])
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """Forces e beyond k0 (J, B, R), u (G, B, R), forces of the meshes, and how GMRES found them."""
+
+    extra: np.ndarray
+    way: np.ndarray
+    force: np.ndarray
+    residual: float
+    radius: float
+    products: int
+
+
+def _over_ring(deflection: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Deflections (J, B, R) of the meshes [m], those of ring meshes without what the ring gives way."""
+    deflection[len(way) :] -= way
+    return deflection
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """Forces of the damping on gears and structure, d_0 and u_0 by these, and what is new in mesh forces."""
+
+    forces: tuple[np.ndarray, np.ndarray]
+    moved: tuple[np.ndarray, np.ndarray]
+    change: np.ndarray
+
+
+def _blend(share: np.ndarray, pairs: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """Blend pairs of arrays of the passes by the shares (n,) of these."""
+    found = [share[0] * part for part in pairs[0]]
+    for times, pair in zip(share[1:], pairs[1:]):
+        for total, part in zip(found, pair):
+            total += times * part
+    return found
+
+
+def _shares(changes: list[np.ndarray]) -> np.ndarray:
+    """Shares (n,) of the passes before, one together, that change least.
+
+    D. G. Anderson, J. ACM 12 (1965) 547-560. Equations of real signals are linear over real numbers alone.
+    """
+    newest = changes[-1]
+    steps = [newest - change for change in changes[:-1]]
+    if not steps:
+        return np.ones(1)
+    product = np.array([[np.vdot(one, other).real for other in steps] for one in steps])
+    wanted = np.array([np.vdot(one, newest).real for one in steps])
+    share = np.linalg.lstsq(product, wanted, rcond=1e-13)[0]
+    return np.append(share, 1.0 - share.sum())
 
 
 def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tuple[np.ndarray, np.ndarray]:
@@ -221,7 +413,8 @@ def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tupl
     back = np.minimum(np.searchsorted(both, met), len(both) - 1)
     back = np.where(both[back] == met, back, len(both))
     place = np.array(paths.planet_angles)[leaders] + paths.load_angle
-    ring = mirrored(response.force[:, len(place) :] * np.where(number == 0, 1.0, 0.5))
+    half = response.force[:, len(place) :] * np.where(number == 0, 1.0, 0.5)
+    ring = np.concatenate([half[..., :0:-1].conj(), half], axis=-1)
     order = heard if turns == 1 else heard / turns
     lines = np.empty((len(speed), len(order), structure.sensor_shape.shape[1]), complex)
     for i in range(len(speed)):  # one by one: modes at all orders of all speeds would fill the memory
@@ -229,7 +422,7 @@ def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tupl
         modal = load @ structure.ring_shape.conj().T
         if response.drag is not None:
             modal += response.drag[i]
-        modal *= receptance(structure, speed[i], order)
+        modal *= receptance(structure, speed[i] * order)
         lines[i] = load @ structure.sensor_residual.T + modal @ structure.sensor_shape
     lines = np.swapaxes(lines, 1, 2) * np.where(order == 0, 1.0, 2.0)
     return order, np.where(order == 0, np.real(lines), lines)
@@ -244,16 +437,17 @@ def structure_numbers(number: np.ndarray, across: np.ndarray, symmetry: int) -> 
     return met[(met >= 0) & (met % symmetry == 0)]
 
 
-def _share(force: np.ndarray, outer: np.ndarray, still: np.ndarray) -> float:
-    """Share (root of energies) of the fluctuating forces (..., n_h, R) that is at the outer side bands."""
-    energy = np.where(still, 0.0, np.abs(force) ** 2)
-    return float(np.sqrt(energy[..., outer].sum() / max(energy.sum(), np.finfo(float).tiny)))
+def _checked_harmonics(harmonics, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mesh harmonics (n_speeds,) of excitation and response."""
+    excited, kept = (np.broadcast_to(one, count).tolist() for one in harmonics)
+    for one, other in dict.fromkeys(zip(excited, kept)):
+        checked_count(one, "excitation harmonics", code="E-HARMONICS")
+        checked_count(other, "response harmonics", code="E-HARMONICS", least=one)
+    return np.array(excited, int), np.array(kept, int)
 
 
-def _checked(gears, excitation, carrier_speed, paths, n_max, harmonics) -> np.ndarray:
+def _checked(gears, excitation, carrier_speed, paths, n_max) -> np.ndarray:
     """Speeds (n_speeds,) [rad/s] of data that belong together."""
-    checked_count(harmonics[0], "excitation harmonics", code="E-HARMONICS")
-    checked_count(harmonics[1], "response harmonics", code="E-HARMONICS", least=harmonics[0])
     teeth = checked_count(paths.z_ring, "ring teeth", code="E-TEETH")
     if teeth <= 6 * n_max:
         message = f"side bands of {n_max} nodal diameters overlap between the harmonics of {teeth} teeth"
@@ -270,7 +464,7 @@ def _checked(gears, excitation, carrier_speed, paths, n_max, harmonics) -> np.nd
     return speeds
 
 
-def _check_residual(residual: np.ndarray, speeds: np.ndarray, limit: float = _RESIDUAL) -> None:
+def _check_residual(residual: np.ndarray, speeds: np.ndarray, limit: float) -> None:
     """Refuse equations that are singular at a speed (n_speeds,) [rad/s] (E-RESONANCE)."""
     if not (residual < limit).all():
         worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))

@@ -317,12 +317,6 @@ def excited_to(data, speed_index: int) -> str:
     return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
 
 
-def excited_by(data) -> str:
-    """Write how many mesh harmonics excite a housing that stands still, and up to which frequency."""
-    limit, mesh = data["excitation_limit"].values, data["mesh_frequency"].values
-    return f"{limit[0] / mesh[0]:.0f} mesh harmonics, up to {1e-3 * limit.max():.4g} kHz"
-
-
 def digits(value: float) -> str:
     """Write a number to four digits, without exponent."""
     return f"{float(f'{value:.4g}'):.12g}"

@@ -19,7 +19,6 @@ from femgear.report.style import (
     SIZE,
     SMALL,
     VERMILION,
-    excited_by,
     label,
     legend_below,
     name_curves,
@@ -204,7 +203,7 @@ def runup_levels(runup: xr.Dataset) -> Figure:
     axes[0].set_ylim(0.0, 1.45 * level.max(initial=0.0) or 1.0)
     words = "a × b: mode a at mesh harmonic b; dots: operating speeds"
     if runup.attrs.get("method", "exact") != "exact":
-        words += f"\nall speeds excited by {excited_by(runup)}"
+        words += f"\nexcited up to {1e-3 * runup['excitation_limit'].values.max():.4g} kHz"
     label(axes[0], y="level, r.m.s. [m/s²]", title=words)
     _name_resonances(axes[0], runup)
     operating = np.atleast_1d(runup.attrs["operating_speeds"])

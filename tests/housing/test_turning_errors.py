@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from validation.fixed_housing import EQUAL, excitation, feet, gears, rigid_modes, shaken
 
-from femgear.errors import CaseError, ConvergenceError
-from femgear.housing.carrier_orders import MeshPaths
-from femgear.housing.turning_errors import mean_excitation
+from femgear.errors import CaseError
+from femgear.housing.carrier_orders import MeshPaths, mean_excitation
 from femgear.housing.two_way import solve_two_way, structure_lines
 from femgear.solvers.linear.modal import solve_modes
 from femgear.trains.protocol import one_blas_thread
@@ -76,9 +75,12 @@ def test_refusals():
     unequal = solve_modes(gears(EQUAL), [5e6, 5.1e6, *[5e6] * 4], damping_ratio=0.04)
     with pytest.raises(CaseError, match=r"E-SYMMETRY.*mean stiffness"):
         solve_two_way(unequal, drive, STRUCTURE, paths(3), SPEEDS, **FEW)
-    # a mesh that is gone for half of the turns of a gear, hardly damped
-    half = np.repeat([1.9, 0.1, 1.0], 64)
+
+
+def test_errors_that_are_not_small_are_solved():
+    """A mesh that is gone for a third of the turns of a gear, hardly damped: the same equations."""
+    drive, half = shaken(paths(1), 3, planet=1, sense=-1), np.repeat([1.9, 0.1, 1.0], 64)
     wild = replace(drive, stiffness=5e6 * np.tile(half, (6, 1)))
     modes = solve_modes(gears(EQUAL), np.full(6, 5e6), damping_ratio=1e-3)
-    with pytest.raises(ConvergenceError, match=r"E-CONVERGENCE.*not small"):
-        solve_two_way(modes, wild, STRUCTURE, paths(3), SPEEDS, **FEW)
+    found = solve_two_way(modes, wild, STRUCTURE, paths(3), SPEEDS[:1], **FEW, tolerance=1e-7)
+    assert found.residual.max() < 1e-6 and found.spectral_radius[0] > 1.0 and found.products[0] > 100

@@ -157,11 +157,13 @@ def feet(max_diameter: int, highest: int = 20) -> FixedStructure:
     )  # fmt: skip
 
 
-def solved(paths: MeshPaths, structure, speeds, *, depth=0.15, harmonics=6, ratio=0.04) -> TwoWayResponse:
+def solved(
+    paths: MeshPaths, structure, speeds, *, depth=0.15, harmonics=6, ratio=0.04, **known
+) -> TwoWayResponse:
     """The set in a structure by the two-way solution."""
     drive = excitation(paths, int(np.sign(speeds[0])), depth)
     modes = solve_modes(gears(paths.planet_angles), drive.stiffness.mean(axis=1), damping_ratio=ratio)
-    return solve_two_way(modes, drive, structure, paths, speeds, harmonics=(2, harmonics))
+    return solve_two_way(modes, drive, structure, paths, speeds, harmonics=(2, harmonics), **known)
 
 
 def order_rules() -> tuple[Row, ...]:
@@ -241,7 +243,7 @@ def axisymmetric() -> tuple[Row, ...]:
         field = np.swapaxes(modes.shape[len(system.K) :] @ present.modal, 1, 2)
         field = field @ circumferential(ring, ring.output[:, 0], 5)
         two_way = solve_two_way(
-            rigid, drive, structure, paths, speed / teeth, harmonics=(2, 6),
+            rigid, drive, structure, paths, speed / teeth, harmonics=(2, 6), tolerance=1e-13,
             damping=modal_damping(whole, mean, ratio) if ratio else None,
         )  # fmt: skip
         apart = _apart(two_way, present, structure, field, teeth, speed / teeth, slice(None))
@@ -255,7 +257,7 @@ def axisymmetric() -> tuple[Row, ...]:
 
 def _convective() -> tuple[Row, ...]:
     structure, paths, speed, ratio = _foundation(5, 0.03)[1], MeshPaths(37, EQUAL, 0.1), 20.0, 0.04
-    found = solved(paths, structure, np.array([-speed]), harmonics=8, ratio=ratio)
+    found = solved(paths, structure, np.array([-speed]), harmonics=8, ratio=ratio, tolerance=1e-13)
     drive, system = excitation(paths, -1), gears(EQUAL)
     mean = drive.stiffness.mean(axis=1)
     damping, between = modal_damping(system, mean, ratio), np.subtract.outer(EQUAL, EQUAL)
@@ -548,7 +550,9 @@ def green() -> tuple[Row, ...]:
         sensor_angles=(sensor,),
     )  # fmt: skip
     constant, none, paths = np.array([[[0.0], [1.0]]]), np.zeros(1), MeshPaths(1, (0.0,))
-    load = TwoWayResponse(np.array([speed]), np.zeros(1, int), constant, none, none, 0, 0, paths)
+    load = TwoWayResponse(
+        np.array([speed]), np.zeros(1, int), constant, *[none] * 3, *[none.astype(int)] * 2, paths
+    )
     heard_order, heard = structure_lines(structure, load)
     n = np.arange(1, top + 1)
     exact = np.empty(top, complex)
@@ -710,7 +714,9 @@ def reference_set_in_its_ring() -> tuple[Row, ...]:
             sensor_angles=(0.3,),
         )
         damping = modal_damping(whole, mean, ratio)
-        ours = solve_two_way(rigid, drive, structure, paths, base, harmonics=(6, 12), damping=damping)
+        ours = solve_two_way(
+            rigid, drive, structure, paths, base, harmonics=(6, 12), damping=damping, tolerance=1e-13
+        )
         apart = _apart(ours, present, structure, field, teeth, base, [0, 3])
         words = f"reference set, 1500 and 3100 rpm, 108e9 teeth, damping {ratio:g}"
         rows.append(at_most("axisymmetric", "solve_spectral", f"{words}: mesh forces", 1e-10, apart[0].max()))

@@ -363,7 +363,7 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
 
 
 def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """List what housing.nc says: what two ways and more harmonics change, instability, missing compliance."""
+    """List what housing.nc says: what two ways change, instability, missing compliance."""
     if "one_way_difference" in data:
         apart, speeds = data["one_way_difference"].values, data["speed"].values
         size = np.where(np.isfinite(apart), np.abs(apart), 0.0)
@@ -375,18 +375,6 @@ def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
                 f"speeds more than {_FAR:g} dB away: load factors and dynamics.nc are without them"
             )
             yield Finding("W-ONE-WAY", "", text)
-    change = data["harmonics_change"].values if "harmonics_change" in data else np.zeros(1)
-    change = np.where(np.isfinite(change), change, 0.0)
-    if np.abs(change).max() >= NOTICEABLE:
-        worst = int(np.abs(change).argmax())
-        more = f"{data['compared_harmonics'].values[worst]:.0f}"
-        text = (
-            f"at {data['speed'].values[worst]:.6g} rpm the excitation ends at "
-            f"{data['excitation_limit'].values[worst]:.4g} Hz; {more} "
-            f"mesh harmonics change the level of the housing that stands still by {change[worst]:+.1f} dB"
-        )
-        remedy = "give more dynamics.mesh_harmonics before levels are compared"
-        yield Finding("W-EXCITATION", "dynamics.mesh_harmonics", text, remedy=remedy)
     if "turn_multiplier" in data and (bad := data["turn_multiplier"].values > 1.0 + CIRCLE).any():
         speeds = first_speeds(data["speed"].values[bad])
         text = f"in the housing that stands still the periodic solution is unstable at {speeds}"
@@ -408,6 +396,12 @@ def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[Finding
         Frequency to which the excitation reached in the comparison [Hz].
     """
     known = np.where(np.isfinite(level_change), np.abs(level_change), 0.0)
+    if not np.isfinite(level_change).any():
+        text = (
+            f"the excitation ends at {limit.min():.4g} Hz at the slowest speed; what it loses is unknown: "
+            f"equations with excitation up to {compared_to:.4g} Hz are nearly singular"
+        )
+        return (Finding("W-EXCITATION", "dynamics.damping_ratio", text, remedy="give the set some damping"),)
     if known.max(initial=0.0) < NOTICEABLE:
         return ()
     worst = int(known.argmax())

@@ -9,19 +9,21 @@ at all speeds, and the level of the housing is computed again with twice that fr
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.errors import ConvergenceError
 from femgear.housing.orders import order_level
+from femgear.housing.sensor import SensorLines
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.checks import HIGHEST_RESPONSE, NOTICEABLE
 from femgear.trains.elastic.outputs import sensor_lines
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
-    from femgear.system.system import Response
     from femgear.trains.elastic.results import ModesResult
 
 _LOWEST = 20e3
@@ -45,6 +47,10 @@ class FrequencyLimit:
     excitation: np.ndarray
     response: np.ndarray
     frequency: np.ndarray
+
+    def at(self, some) -> FrequencyLimit:
+        """Limits at the speeds number ``some`` alone."""
+        return FrequencyLimit(self.excitation[some], self.response[some], self.frequency[some])
 
     def options(self, case: Case, some: Any = slice(None)) -> dict[str, Any]:
         """What `solve_spectral` takes at some of the speeds beside modes, excitation and frequencies."""
@@ -79,43 +85,47 @@ def limited(case: Case, mesh_frequency, up_to: float, *, given: int | None = Non
     return FrequencyLimit(excitation, response, excitation * frequency)
 
 
-def excitation_end(
-    case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, some: np.ndarray
-) -> tuple[float, float, np.ndarray]:
-    """Choose where the excitation ends, from some of the speeds, so that the level has converged if it may.
+Heard = Callable[[np.ndarray, np.ndarray, FrequencyLimit], SensorLines]
+"""Lines of the sensor that has the level, by mesh frequencies (n_speeds,) [Hz], speeds of the carrier [rad/s]
+and limits of the excitation at these."""
 
-    Frequency [Hz], that to which the level was compared [Hz], and its changes at those speeds [dB]; mesh
-    frequencies [Hz] and speeds of the carrier [rad/s] are (n_speeds,).
+
+def lines_on_foundation(
+    case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, limit: FrequencyLimit
+) -> SensorLines:
+    """Lines of the sensor of a ring on its foundation, see `Heard`."""
+    response = solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
+    return sensor_lines(case, modes, response, carrier)
+
+
+def excitation_end(
+    case: Case, modes: ModesResult, heard: Heard, frequency: np.ndarray, carrier: np.ndarray
+) -> tuple[float, float, np.ndarray]:
+    """Choose where the excitation ends, from some speeds, so that the level has converged if it may.
+
+    Frequency [Hz], that to which the level was compared [Hz], and its changes at the speeds [dB], nan where
+    the equations with more excitation are nearly singular; mesh frequencies [Hz] and speeds of the carrier
+    [rad/s] are (n_speeds,).
     """
     given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
+    limit = limited(case, frequency, up_to, given=given)
+    level = order_level(heard(frequency, carrier, limit))
     while True:
-        limit = limited(case, frequency, up_to, given=given)
-        response = solve_spectral(modes.modes, modes.excitation, frequency[some], **limit.options(case, some))
         beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
-        change, short = _level_change(case, modes, carrier[some], response, beyond)
+        limit = limited(case, frequency, beyond)
+        try:
+            wider = order_level(heard(frequency, carrier, limit))
+        except ConvergenceError:
+            return up_to, beyond, np.full(len(frequency), np.nan)
+        change = 20.0 * np.log10(wider / level)
+        reached = limit.frequency > beyond - frequency
+        short = np.abs(change[reached]).max(initial=0.0) >= NOTICEABLE
         if not short or given is not None or up_to != modes.reach or case.dynamics.up_to is not None:
             return up_to, beyond, change
-        up_to = beyond  # once: the modal basis carries no more
+        up_to, level = beyond, wider  # once: the modal basis carries no more
 
 
-def _level_change(
-    case: Case, modes: ModesResult, carrier: np.ndarray, response: Response, beyond: float
-) -> tuple[np.ndarray, bool]:
-    """What the level of the housing changes when the excitation reaches a frequency beyond [dB].
-
-    The changes (n_speeds,) at the speeds of a response and of the carrier [rad/s], and whether one of those
-    whose excitation comes as far is worth it.
-    """
-    frequency = response.mesh_frequency
-    further = limited(case, frequency, beyond)
-    wider = solve_spectral(modes.modes, modes.excitation, frequency, **further.options(case))
-    level, wider_level = (order_level(sensor_lines(case, modes, one, carrier)) for one in (response, wider))
-    change = 20.0 * np.log10(wider_level / level)
-    reached = further.frequency > beyond - frequency
-    return change, bool(np.abs(change[reached]).max(initial=0.0) >= NOTICEABLE)
-
-
-def lost_level(case: Case, modes: ModesResult, frequency, beyond: float, sense: float) -> np.ndarray:
+def lost_level(case: Case, heard: Heard, frequency, beyond: float, sense: float) -> np.ndarray:
     """What the level loses that ends at frequencies (n,) instead of beyond, of the slowest speed [Hz] [dB].
 
     Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
@@ -123,9 +133,7 @@ def lost_level(case: Case, modes: ModesResult, frequency, beyond: float, sense: 
     speed (within 1 dB from 250 to 60 rpm of the reference set).
     """
     fast = np.array([beyond / HARMONICS * (1.0 + 1e-9)])
-    options = limited(case, fast, beyond).options(case)
-    response = solve_spectral(modes.modes, modes.excitation, fast, **options)
-    lines = sensor_lines(case, modes, response, sense * 2.0 * np.pi * fast / case.ring.teeth)
+    lines = heard(fast, sense * 2.0 * np.pi * fast / case.ring.teeth, limited(case, fast, beyond))
     power = np.cumsum(np.abs(lines.acceleration[0]) ** 2)
     place = np.searchsorted(lines.frequency[0], frequency, side="right") - 1
     return -20.0 * np.log10(np.maximum(np.sqrt(power[place] / power[-1]), 1e-10))

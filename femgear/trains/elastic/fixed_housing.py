@@ -7,154 +7,201 @@ beside it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set
 from femgear.findings import Finding
 from femgear.gears.deviations import no_deviations, rotational_symmetry
-from femgear.housing.carrier_orders import MeshPaths
+from femgear.housing.carrier_orders import MeshPaths, mean_excitation
 from femgear.housing.casing_files import may_lack_compliance, missing_compliance
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines
+from femgear.housing.set_damping import with_set_damping
 from femgear.housing.sound import equivalent_sound, surface_sound
 from femgear.housing.structure import FixedStructure, supported_ring
 from femgear.housing.turn_stability import turn_stability
-from femgear.housing.turning_errors import mean_excitation
 from femgear.housing.two_way import TwoWayResponse, solve_two_way, structure_lines
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.trains.elastic.checks import (
-    checked_speeds,
-    fastest_mesh_frequency,
     fixed_diameters,
     housing_supports,
     imported_casing,
     record_periods,
 )
-from femgear.trains.elastic.excitation_limit import MODES_ABOVE
+from femgear.trains.elastic.excitation_limit import (
+    MODES_ABOVE,
+    FrequencyLimit,
+    highest_excitation,
+    limited,
+)
 from femgear.trains.elastic.model import gears_alone, mesh_springs, ring_mesh_compliance
 from femgear.trains.elastic.results import DynamicsResult, FixedHousing, HousingResult, ModesResult
 from femgear.trains.elastic.runup import HeardSpeeds, heard_speeds
+from femgear.trains.rigid import member_speeds
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
+    from femgear.system.system import MeshExcitation, Modes
 
-_MOST_ORDERS = 2500
-"""Carrier orders of the forces in a housing that stands still up to which more harmonics are looked at:
-0.8 GB."""
-_FEW_SPEEDS = 20
-"""Speeds, at most, that are solved with twelve mesh harmonics in a housing that stands still."""
 _JUDGED = 6
 """Mesh harmonics of the stiffness in the verdict of a housing that stands still, at most."""
-_TURNING = 0.3
-"""What a thousand unknowns of a seed and pattern take [s]."""
-_STANDING = 42e3
-"""What a mesh harmonic of a planet takes at one speed [bytes]."""
+_ACCURACY, _ROUGH = 1e-2, 1e-4
+"""Residual of the two-way response over the tolerance of the case; of levels that are compared."""
+_PRODUCTS, _FLOPS = 60, 1e10
+"""Products of a solution with its blocks, and operations of one core in a second, roughly."""
 
 
-def fixed_part(case: Case, modes: ModesResult, carrier: np.ndarray, own: np.ndarray) -> FixedHousing:
-    """Housing that stands still at some of the speeds (n_speeds,) of the carrier [rad/s].
+@dataclass(frozen=True)
+class _Surroundings:
+    """Set, ring and casing for the two-way response.
 
-    The first and the last of all are solved with more mesh harmonics too, some get a verdict.
+    ``gears`` and ``structure`` have the damping that the set as a whole gives each of their modes where
+    ``damping``, that of gears and ring together, is known.
     """
-    count = len(carrier)
-    wider, judged = (
-        np.flatnonzero(np.isin(own, some)) for some in (checked_speeds(count, 2), checked_speeds(count))
-    )
-    return fixed_housing(case, modes, carrier[own], wider_at=wider, judged_at=judged)
+
+    gears: Modes
+    excitation: MeshExcitation
+    structure: FixedStructure
+    paths: MeshPaths
+    damping: np.ndarray | None
+    coupled: int
+
+    def solve(self, carrier: np.ndarray, limit: FrequencyLimit, tolerance: float, **known) -> TwoWayResponse:
+        """Solve for the forces at speeds of the carrier (n_speeds,) [rad/s], with a limit of each."""
+        return solve_two_way(
+            self.gears, self.excitation, self.structure, self.paths, carrier, damping=self.damping,
+            harmonics=(limit.excitation, limit.response), tolerance=tolerance,
+            **{"coupled_diameters": self.coupled} | known,
+        )  # fmt: skip
 
 
-def fixed_harmonics(case: Case, speeds: int | None = None) -> tuple[int, int]:
-    """Choose the mesh harmonics of excitation and response of a ring on supports, the same at all speeds.
+class HousingModel:
+    """Set that turns in a ring on supports or in a casing, at any speeds.
 
-    Of the speeds of the case unless their number is given: of many, of planets that differ, and with errors
-    that turn fewer harmonics, for the equations take time with their third power.
+    Waves of a ring on supports beyond the nodal diameters that act on one another act on themselves alone; in
+    a casing of a file the meshes keep what they give. Supports damp nothing: gears and ring have the damping
+    of the set without them. Gears in a casing of a file, which brings its own, have modal damping against a
+    rigid ring.
+
+    Parameters
+    ----------
+    case : Case
+    modes : ModesResult
+    sense : float
+        Of the carrier: its sign.
     """
-    gears, deviations = planetary_set(case), set_deviations(case)
-    alike = rotational_symmetry(deviations, gears) == gears.n_planets
-    few = alike and (len(case.operation.speeds) if speeds is None else speeds) <= _FEW_SPEEDS
-    excited = case.dynamics.mesh_harmonics or (12 if few else 6)
-    return excited, case.dynamics.response_harmonics or 2 * excited
+
+    def __init__(self, case: Case, modes: ModesResult, sense: float):
+        self.case, self.modes, self.sense = case, modes, int(np.sign(sense))
+        self.highest, n_max = MODES_ABOVE * modes.reach, fixed_diameters(case)
+        self.missing, known = (
+            "",
+            {"max_frequency": self.highest, "damping_ratio": case.dynamics.damping_ratio},
+        )
+        self.ring = supported_ring(modes.ring.modes, (), max_diameter=modes.max_diameter, **known)
+        if case.housing.structure:
+            low = {name: getattr(modes.ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
+            told = _casing(case, low["compliance"], self.highest)
+            self.structure, self.sensors, self.forces, self.missing = told
+            self.springs = mesh_springs(planetary_set(case), replace(modes.ring, **low), modes.state)
+        else:
+            known["max_diameter"] = modes.max_diameter
+            self.structure, self.sensors, self.forces = _ring_on_supports(case, modes, known)
+            self.springs = modes.excitation, modes.model.system.flexibility
+
+    def paths(self, *, even: bool = True) -> MeshPaths:
+        """Paths of the meshes in the ring; ``even`` where errors that turn are left out."""
+        gears, symmetry = planetary_set(self.case), self.modes.symmetry
+        if self.modes.excitation.periods > 1:
+            symmetry = rotational_symmetry(no_deviations(gears), gears)
+        return MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), self.modes.ring.load_angle, symmetry)
+
+    def in_ring(self) -> _Surroundings:
+        """The set in the ring on its foundation, without supports or casing."""
+        return self._surroundings(self.ring, (self.modes.excitation, self.modes.model.system.flexibility), 0)
+
+    def in_housing(self, *, even: bool = False) -> _Surroundings:
+        """The set in its housing; with the mean of errors that turn if ``even``."""
+        found = self._surroundings(self.structure, self.springs, fixed_diameters(self.case))
+        if even:
+            found = replace(found, excitation=self._even(found.excitation))
+        # the ring of a file is loaded where flanks touch
+        return replace(found, paths=self.lines_paths)
+
+    @property
+    def lines_paths(self) -> MeshPaths:
+        """Paths of the meshes in the housing."""
+        return replace(self.paths(), load_angle=0.0) if self.case.housing.structure else self.paths()
+
+    def _even(self, excitation: MeshExcitation) -> MeshExcitation:
+        return mean_excitation(excitation, self.paths(), self.sense) if excitation.periods > 1 else excitation
+
+    def _surroundings(self, structure: FixedStructure, springs, coupled: int) -> _Surroundings:
+        (excitation, flexibility), ratio = springs, self.case.dynamics.damping_ratio
+        mean, system = self._even(excitation).stiffness.mean(axis=1), self.modes.model.system
+        alone = gears_alone(self.modes.model, flexibility)
+        gears = solve_modes(alone, mean, damping_ratio=ratio, max_frequency=self.highest)
+        damping = None
+        if len(structure.wave_order):
+            damping = modal_damping(system, mean, ratio)
+            gears, structure = with_set_damping(damping, gears, structure)
+        return _Surroundings(gears, excitation, structure, self.paths(), damping, coupled)
 
 
 def fixed_housing(
-    case: Case,
-    modes: ModesResult,
-    carrier: np.ndarray,
-    *,
+    case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit, *, judged_at: Any = (),
     both: bool = True,
-    wider_at: Any = (),
-    judged_at: Any = (),
-    harmonics: tuple[int, int] | None = None,
-) -> FixedHousing:
+) -> FixedHousing:  # fmt: skip
     """Make the structure of ring and casing, and solve for forces at speeds of the carrier [rad/s].
 
-    Of the set in it, and if ``both`` in the ring on its foundation alone. The meshes keep what higher
-    diameters give. At the speeds number ``wider_at`` also for forces of more mesh harmonics;
-    those number ``judged_at`` get a Floquet verdict. With errors that turn the latter, and
-    damping, are those of the mean of all planets and mesh periods.
-    Supports damp nothing: gears and ring have the damping of the set without them. Gears in a casing of a
-    file, which brings its own, have modal damping against a rigid ring.
+    Of the set in it, and if ``both`` in the ring on its foundation alone; the excitation has a limit at every
+    speed. Those number ``judged_at`` get a Floquet verdict.
     """
-    gears, ring, n_max = planetary_set(case), modes.ring, fixed_diameters(case)
-    low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
-    excitation, flexibility = mesh_springs(gears, replace(ring, **low), modes.state)
-    harmonics, damping = harmonics or fixed_harmonics(case), case.dynamics.damping_ratio
-    highest = MODES_ABOVE * max(modes.reach, harmonics[1] * fastest_mesh_frequency(case, gears))
-    paths = MeshPaths(gears.ring.teeth, tuple(gears.planet_angles), ring.load_angle, modes.symmetry)
-    even = excitation
-    if excitation.periods > 1:
-        paths = replace(paths, symmetry=rotational_symmetry(no_deviations(gears), gears))
-        even = mean_excitation(excitation, paths, int(np.sign(carrier[0])))
-    mean, directions = even.stiffness.mean(axis=1), modes.model.system.W.copy()
-    alone = solve_modes(
-        gears_alone(modes.model, flexibility), mean, damping_ratio=damping, max_frequency=highest
-    )
-    directions[modes.model.ring_slice][modes.model.ring_diameter > n_max] = 0.0
-    whole = replace(modes.model.system, W=directions, flexibility=flexibility)
-    damped = modal_damping(whole, mean, damping)
-    known: Any = {"max_diameter": n_max, "max_frequency": highest, "damping_ratio": damping}
-    missing, own = "", paths
-    if case.housing.structure:
-        own = replace(paths, load_angle=0.0)
-        structure, sensors, forces, missing = _casing(case, low["compliance"], highest)
-    else:
-        structure, sensors, forces = _ring_on_supports(case, modes, known)
-    solved = partial(solve_two_way, alone, carrier_speed=carrier, harmonics=harmonics)
-    joint = None if case.housing.structure else damped
-    plain, one_way = supported_ring(ring.modes, (), **known), None
+    model = HousingModel(case, modes, carrier[0])
+    housing, tolerance, one_way = model.in_housing(), _ACCURACY * case.dynamics.tolerance, None
     if both:
-        one_way = solved(excitation, plain, paths=paths, side_bands=0, damping=damped)
-        one_way = replace(one_way, paths=replace(own, symmetry=one_way.paths.symmetry))
-        drag = None if joint is None else one_way.drag @ (plain.wave_shape @ structure.wave_shape.conj().T)
-        one_way = replace(one_way, drag=drag)
-    two_way, wider = solved(excitation, structure, paths=own, damping=joint), list[TwoWayResponse]()
-    # twice as many, or half as many again
-    most = _MOST_ORDERS // (gears.n_planets // own.symmetry * (4 * n_max + 1))
-    further: Any = next((more for half in (4, 3) if (more := _times(harmonics, half))[1] <= most), None)
-    wider_at = np.asarray(wider_at if further else (), int)
-    if len(wider_at):
-        some: Any = {"carrier_speed": carrier[wider_at], "paths": own, "damping": joint}
-        first = two_way.at(wider_at) if excitation.periods == 1 else solved(even, structure, **some)
-        wider = [first, solved(even, structure, harmonics=further, **some)]
-    multiplier = np.full(len(carrier), np.nan)
+        ring = model.in_ring()
+        one_way = ring.solve(carrier, limit, tolerance, side_bands=0)
+        drag = None
+        if housing.damping is not None and one_way.drag is not None:
+            drag = one_way.drag @ (ring.structure.wave_shape @ housing.structure.wave_shape.conj().T)
+        paths = replace(model.lines_paths, symmetry=one_way.paths.symmetry)
+        one_way = replace(one_way, paths=paths, drag=drag)
+    two_way, multiplier = housing.solve(carrier, limit, tolerance), np.full(len(carrier), np.nan)
     if len(judged_at):
         multiplier[judged_at] = turn_stability(
-            alone, excitation, structure, own, carrier[judged_at], damping=joint,
-            harmonics=min(harmonics[0], _JUDGED),
+            housing.gears, housing.excitation, housing.structure, housing.paths, carrier[judged_at],
+            damping=housing.damping, harmonics=min(int(limit.excitation.min()), _JUDGED),
         ).modulus  # fmt: skip
     multiplier **= 1.0 / two_way.turns
-    told = sensors, forces, missing, tuple(wider), wider_at, multiplier
-    excited = harmonics[0], further[0] if further else 0
-    return FixedHousing(structure, two_way, one_way, excited, *told)
+    named = model.sensors, model.forces, model.missing
+    return FixedHousing(housing.structure, two_way, one_way, *named, multiplier)
 
 
-def _times(harmonics: tuple[int, int], half: int) -> tuple[int, ...]:
-    return tuple(-(-half * h // 2) for h in harmonics)
+def lines_at_sensor(
+    case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, limit: FrequencyLimit
+) -> SensorLines:
+    """Lines of the sensor that has the level in a housing that stands still, roughly.
+
+    See `femgear.trains.elastic.excitation_limit.Heard`; of errors that turn the mean alone.
+    """
+    model = HousingModel(case, modes, carrier[0])
+    housing = model.in_housing(even=True)
+    return _first_lines(case, modes, model, housing.structure, housing.solve(carrier, limit, _ROUGH))
+
+
+def _first_lines(case: Case, modes: ModesResult, model, structure, two_way: TwoWayResponse) -> SensorLines:
+    """Lines of the sensor that has the level; ``model`` knows the names of the others."""
+    first = _radial_sensor(structure, model, case.housing.sensor_angle, modes.max_diameter)[:, None]
+    order, moved = structure_lines(structure.combined(first), two_way)
+    place = case.housing.sensor_angle, case.ring.teeth
+    return SensorLines(
+        order, moved[:, 0], two_way.carrier_speed, *place, fixed_method(case), turns=two_way.turns
+    )
 
 
 def _casing(
@@ -200,7 +247,7 @@ def lines_in_housing(
 ) -> HousingResult:
     """What sensors and the microphone hear of the structure, by the forces of both routes."""
     structure, exact, top = fixed.structure, found.exact, dynamics.ring_radial.shape[-1] // 2
-    count, first = structure.sensor_shape.shape[1], _radial_sensor(fixed, exact.sensor_angle, top)
+    count, first = structure.sensor_shape.shape[1], _radial_sensor(structure, fixed, exact.sensor_angle, top)
     points = count - len(fixed.sensors) - len(fixed.forces)
     n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / max(points, 1)
     wave = np.exp(1j * np.outer(place, n)) / max(points, 1)
@@ -211,14 +258,6 @@ def lines_in_housing(
     by_kind = moved[:, 1:][:, : len(fixed.sensors)], moved[:, 1 + len(fixed.sensors) :]
     outputs = dict(zip(("sensor", "force"), zip((fixed.sensors, fixed.forces), by_kind)))
     assert fixed.one_way is not None
-    change, compared = np.full((2, len(lines.carrier_speed)), np.nan)
-    if fixed.wider:
-        at, levels = fixed.wider_at, list[np.ndarray]()
-        for one in fixed.wider:
-            order, wider = structure_lines(structure.combined(weights[:, :1]), one)
-            here = replace(lines, order=order, displacement=wider[:, 0], turns=one.turns)
-            levels.append(order_level(replace(here, carrier_speed=lines.carrier_speed[at])))
-        change[at], compared[at] = 20.0 * np.log10(levels[1] / levels[0]), fixed.excited[1]
     order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
     if points:
         around = structure.combined(np.eye(count)[:, :points])
@@ -232,25 +271,26 @@ def lines_in_housing(
     with np.errstate(divide="ignore", invalid="ignore"):  # of a sensor that stands still
         apart = 20.0 * np.log10(order_level(lines) / level)
     told = {
-        "harmonics_change": change, "compared_harmonics": compared, "turn_multiplier": fixed.multiplier,
+        "turn_multiplier": fixed.multiplier,
         "one_way_level": level, "one_way_difference": apart,
         "two_way_residual": fixed.two_way.residual, "order_tail": fixed.two_way.tail,
+        "two_way_radius": fixed.two_way.spectral_radius, "two_way_products": fixed.two_way.products,
     }  # fmt: skip
     return replace(
         found, exact=lines, supported=told, missing=fixed.missing,
         outputs={kind: one for kind, one in outputs.items() if one[0]},
         sound=sound,
-        excitation_limit=dynamics.response.mesh_frequency * fixed.excited[0],
     )  # fmt: skip
 
 
-def _radial_sensor(fixed: FixedHousing, angle: float, top: int) -> np.ndarray:
+def _radial_sensor(structure: FixedStructure, named, angle: float, top: int) -> np.ndarray:
     """Weights (n_sensors, ) of those of a structure that make the radial displacement at an angle [rad].
 
-    Of the sensors around a ring, by waves up to a nodal diameter; of a casing its first sensor.
+    Of the sensors around a ring, by waves up to a nodal diameter; of a casing its first sensor. ``named``
+    knows the names of the others.
     """
-    count = fixed.structure.sensor_shape.shape[1]
-    points, weights = count - len(fixed.sensors) - len(fixed.forces), np.eye(count)[0]
+    count = structure.sensor_shape.shape[1]
+    points, weights = count - len(named.sensors) - len(named.forces), np.eye(count)[0]
     if points:
         n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / points
         weights[:points] = (
@@ -260,16 +300,11 @@ def _radial_sensor(fixed: FixedHousing, angle: float, top: int) -> np.ndarray:
 
 
 def heard_in_housing(
-    case: Case, modes: ModesResult, carrier: np.ndarray, harmonics: tuple[int, int]
+    case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit
 ) -> HeardSpeeds:
     """What is kept of the run-up at speeds of the carrier [rad/s] in a housing that stands still."""
-    fixed, place = (
-        fixed_housing(case, modes, carrier, both=False, harmonics=harmonics),
-        (case.housing.sensor_angle, case.ring.teeth),
-    )
-    first = _radial_sensor(fixed, place[0], modes.max_diameter)[:, None]
-    order, moved = structure_lines(fixed.structure.combined(first), fixed.two_way)
-    lines = SensorLines(order, moved[:, 0], carrier, *place, fixed_method(case))
+    fixed = fixed_housing(case, modes, carrier, limit, both=False)
+    lines = _first_lines(case, modes, fixed, fixed.structure, fixed.two_way)
     orders, some = fixed.two_way.order, fixed.two_way.force
     force = np.zeros((*some.shape[:2], orders[-1] + 1), complex)
     force[..., orders] = some
@@ -295,24 +330,32 @@ def _sound_around(
     return tuple(np.concatenate(parts) for parts in zip(*sound))
 
 
-def housing_memory(case: Case, modes: ModesResult) -> float:
-    """Estimate what one speed takes in a housing that stands still [bytes]."""
-    planets = planetary_set(case).n_planets / modes.symmetry
-    return _STANDING * planets * (fixed_harmonics(case)[1] + 1)
+def housing_memory(case: Case, modes: ModesResult, limit: FrequencyLimit) -> np.ndarray:
+    """Estimate what the results of each speed (n_speeds,) take in a housing that stands still [bytes]."""
+    gears, periods = planetary_set(case), modes.excitation.periods
+    of_meshes = 4 * fixed_diameters(case) + 1
+    moved = of_meshes + 2 * modes.max_diameter
+    alike = modes.symmetry if periods == 1 else 1
+    lines = moved * (2 * len(modes.ring.modes.frequency) + 4 * (modes.max_diameter + 1)) / alike
+    return 16.0 * limit.response * periods * (2 * of_meshes * gears.n_planets / alike + 2 * lines)
 
 
 def turning_errors_time(case: Case) -> Iterator[Finding]:
     """Warn of minutes that errors which turn take in a housing that stands still (W-SIZE)."""
-    gears, speeds = planetary_set(case), len(case.operation.speeds)
+    gears, speeds = planetary_set(case), np.array(case.operation.speeds)
     periods = record_periods(case, gears)
     if not case.housing.stands_still or periods == 1:
         return
-    unknowns = (2 * fixed_harmonics(case)[1] + 1) * (4 * fixed_diameters(case) + 1)
-    seconds = speeds * (periods // 2 + 1) * gears.n_planets * (unknowns / 1e3) ** 2 * _TURNING
+    first = member_speeds(case, gears, speeds[0]).mesh_frequency
+    frequency = first * speeds / speeds[0]
+    up_to = case.dynamics.up_to or highest_excitation(case, 0.0, float(frequency.max()))
+    kept = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics).response
+    bands = 4 * fixed_diameters(case) + 1
+    seconds = kept.sum() * periods * gears.n_planets * bands**2 * (8 * bands + 20 * _PRODUCTS) / _FLOPS
     if seconds > 60.0:
         yield Finding(
             "W-SIZE", "housing.support" if case.housing.support else "housing.structure",
             f"errors that turn over {periods} mesh periods may take up to {seconds / 60.0:.0f} min in a "
-            f"housing that stands still, at {speeds} speeds",
-            remedy="fewer speeds, mesh harmonics or nodal diameters, if that is too much",
+            f"housing that stands still, at {len(speeds)} speeds",
+            remedy="fewer speeds or nodal diameters, or a lower dynamics.up_to, if that is too much",
         )  # fmt: skip

@@ -47,7 +47,6 @@ from femgear.housing.sound import (
     whole_turns,
 )
 from femgear.report.response import harmonics_of
-from femgear.report.style import excited_by
 from femgear.report.tables import MANY, Block, chosen, tabulate
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.storage.results import (
@@ -94,12 +93,12 @@ BEARING_FACTORS = 0.5, 2.0
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
 _SUPPORTED = {
-    "harmonics_change": ("dB", "change of the level by more mesh harmonics, at some speeds"),
-    "compared_harmonics": ("1", "number of these mesh harmonics"),
     "turn_multiplier": ("1", "largest Floquet multiplier over a turn of the carrier, at some speeds"),
     "one_way_level": ("m/s^2", "level by the mesh forces of the ring without its supports"),
     "one_way_difference": ("dB", "level over that by the mesh forces of the ring without its supports"),
     "two_way_residual": ("1", "residual of the two-way equations"),
+    "two_way_radius": ("1", "spectral radius of the iteration for the two-way response"),
+    "two_way_products": ("1", "products with the fluctuating stiffness that its solution took"),
     "order_tail": ("1", "share of the mesh forces in the outer half of the side bands"),
 }
 _ONE_WAY = "that by the mesh forces of the ring on its foundation, without supports or casing"
@@ -203,22 +202,18 @@ class ModesResult(StageResult):
 class FixedHousing:
     """Ring and casing that stand still, the forces in them, and those in the ring on its foundation alone.
 
-    The latter where they are asked for; ``excited`` are the mesh harmonics, and more of them. Sensors of the
-    structure: some at equal distances around the outer surface of a ring on supports, then the displacements
-    ``sensors`` and the forces ``forces`` by name; ``missing`` as in `HousingResult`. ``wider`` are forces of
-    either number at the speeds number ``wider_at``, without errors that turn. ``multiplier`` (speeds,) is the
-    modulus of the largest Floquet multiplier over a turn of the carrier, nan where none was computed.
+    The latter where they are asked for. Sensors of the structure: some at equal distances around the outer
+    surface of a ring on supports, then the displacements ``sensors`` and the forces ``forces`` by name;
+    ``missing`` as in `HousingResult`. ``multiplier`` (speeds,) is the modulus of the largest Floquet
+    multiplier over a turn of the carrier, nan where none was computed.
     """
 
     structure: FixedStructure
     two_way: TwoWayResponse
     one_way: TwoWayResponse | None
-    excited: tuple[int, int]
     sensors: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     missing: str = ""
-    wider: tuple[TwoWayResponse, ...] = ()
-    wider_at: Any = ()
     multiplier: Any = np.nan
 
 
@@ -424,9 +419,6 @@ def verdict(results: Results) -> Iterator[Block]:
         rows += _strength(results, known, notes)
     if "runup" in stages:
         rows.append(("largest level of the run-up", loudest(results.runup)))
-        if results.runup.attrs.get("method", "exact") != "exact" and "housing" in stages:
-            at_speeds = results.housing.assign(mesh_frequency=results.dynamics["mesh_frequency"])
-            notes.append(f"run-up: {excited_by(results.runup)}; operating speeds: {excited_by(at_speeds)}")
     if rows:
         yield Block("Verdict", rows=tuple(rows), notes=tuple(notes))
     if "dynamics" in stages:

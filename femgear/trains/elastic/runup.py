@@ -20,7 +20,6 @@ from femgear.case.quantities import RPM
 from femgear.findings import Finding
 from femgear.housing.orders import order_level
 from femgear.housing.sound import REFERENCE_ACCELERATION
-from femgear.report.style import excited_by
 from femgear.report.tables import Block, tabulate
 from femgear.solvers.linear.resonances import EXCITED
 from femgear.storage.results import as_written, complex_entries, coordinates, dataset, declared
@@ -270,10 +269,7 @@ def describe_runup(data: xr.Dataset) -> Block:
         f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; largest level {loudest(data)}",
     ]
     if data.attrs.get("method", "exact") != "exact":
-        notes.append(
-            f"levels and K_v in the housing that stands still, excited by {excited_by(data)} (at operating "
-            "speeds up to what the table Housing says); modes, and alone, on the foundation"
-        )
+        notes.append("levels and K_v in the housing that stands still; modes, and alone, on the foundation")
     return tabulate("Run-up", sorted(strongest), columns, notes)
 
 

@@ -64,18 +64,21 @@ from femgear.trains.elastic.checks import (
 from femgear.trains.elastic.excitation_limit import (
     HARMONICS,
     MODES_ABOVE,
+    FrequencyLimit,
+    Heard,
     excitation_end,
     highest_excitation,
     limited,
+    lines_on_foundation,
     lost_level,
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.fixed_housing import (
-    fixed_harmonics,
+    fixed_housing,
     fixed_method,
-    fixed_part,
     heard_in_housing,
     housing_memory,
+    lines_at_sensor,
     lines_in_housing,
     turning_errors_time,
 )
@@ -94,6 +97,7 @@ from femgear.trains.elastic.outputs import mesh_and_ring_outputs, named_sensors,
 from femgear.trains.elastic.results import (
     BEARING_FACTORS,
     DynamicsResult,
+    FixedHousing,
     HousingResult,
     ModesResult,
     describe_housing,
@@ -139,8 +143,8 @@ _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
 _LINES_TOGETHER = 8000
 """Harmonics of the run-up's speeds that are in memory at a time."""
-_SPEEDS_IN_HOUSING = 40
-"""Speeds of the run-up in a housing that stands still that are in memory at a time."""
+_COMPARED = 4
+"""Operating speeds at most at which levels in a housing that stands still are compared."""
 _BELOW_WAVES = 0.9
 """The run-up ends, unless the case says otherwise, so far below the slowest wave around the ring."""
 _NOTICED, _PACKED, _SECONDS = 2e9, 2.5, 1.5e-5
@@ -323,18 +327,18 @@ def dynamics_parts(
     check_reach(case, modes.reach, fastest_mesh_frequency(case, static.planetary_set))
     basis, excitation, gears = modes.modes, modes.excitation, static.planetary_set
     speeds, (frequency, carrier) = np.array(case.operation.speeds), _turning_speeds(case, modes)
-    some = checked_speeds(len(speeds))
-    up_to, beyond, change = excitation_end(case, modes, frequency, carrier, some)
+    some, heard_lines = _compared_speeds(case), _heard_lines(case, modes)
+    up_to, beyond, change = excitation_end(case, modes, heard_lines, frequency[some], carrier[some])
     limit = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics)
     level_change = np.full(len(speeds), np.nan)
     level_change[some] = change
     slow = frequency * HARMONICS < beyond - frequency
     if slow.any():
-        level_change[slow] = lost_level(case, modes, limit.frequency[slow], beyond, np.sign(carrier[0]))
+        level_change[slow] = lost_level(case, heard_lines, limit.frequency[slow], beyond, np.sign(carrier[0]))
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     room = _HARMONIC * limit.response * excitation.periods
     if case.housing.stands_still:
-        room = room + housing_memory(case, modes)
+        room = room + housing_memory(case, modes, limit)
     for own, part in parts_of_speeds(case, room, memory):
         response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
         told.append(response.without_lines())
@@ -351,7 +355,7 @@ def dynamics_parts(
             ring_teeth=gears.ring.teeth, symmetry=modes.symmetry, harmonics=int(limit.response.max()),
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
             entries=dynamic_entries(part),
-            fixed=fixed_part(case, modes, carrier, own) if case.housing.stands_still else None,
+            fixed=_fixed_part(case, modes, carrier, limit, own) if case.housing.stands_still else None,
         )  # fmt: skip
         progress("dynamics", float(own[-1] + 1), float(len(speeds)))
 
@@ -365,6 +369,23 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     frequency = _turning_speeds(case, modes)[0]
     limit = limited(case, frequency, case.dynamics.up_to or modes.reach, given=case.dynamics.mesh_harmonics)
     return solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
+
+
+def _fixed_part(case: Case, modes: ModesResult, carrier, limit: FrequencyLimit, own) -> FixedHousing:
+    """Housing that stands still at some speeds of all (n_speeds,) of the carrier [rad/s]."""
+    judged = np.flatnonzero(np.isin(own, checked_speeds(len(carrier))))
+    return fixed_housing(case, modes, carrier[own], limit.at(own), judged_at=judged)
+
+
+def _compared_speeds(case: Case) -> np.ndarray:
+    """Choose the numbers (n,) of operating speeds at which levels are compared, few where that takes time."""
+    return checked_speeds(len(case.operation.speeds), *([_COMPARED] if case.housing.stands_still else []))
+
+
+def _heard_lines(case: Case, modes: ModesResult) -> Heard:
+    """Choose what computes the lines of the sensor that has the level."""
+    lines = lines_at_sensor if case.housing.stands_still else lines_on_foundation
+    return partial(lines, case, modes)
 
 
 def _turning_speeds(case: Case, modes: ModesResult) -> tuple[np.ndarray, np.ndarray]:
@@ -409,12 +430,11 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     one, basis, excitation = member_speeds(case, planetary_set(case)), modes.modes, modes.excitation
     operating, given = np.array(case.operation.speeds), case.dynamics.mesh_harmonics
     some = checked_speeds(len(operating))
-    up_to = excitation_end(case, modes, *_turning_speeds(case, modes), some)[0]
+    at_operating = [one[_compared_speeds(case)] for one in _turning_speeds(case, modes)]
+    up_to = excitation_end(case, modes, _heard_lines(case, modes), *at_operating)[0]
     first, last = _runup_ends(case, modes)
     slowest, fastest = first * one.mesh_frequency, last * one.mesh_frequency
     count = int(limited(case, [slowest], up_to, given=given).excitation[0])
-    if case.housing.stands_still:
-        count = fixed_harmonics(case, case.runup.count)[0]
     motions = basis.shape[modes.model.ring_slice].T
     field = ring_field(modes.ring.modes, motions, RADIAL, modes.max_diameter)
     forces = modal_forces(basis, excitation, count, output=field)
@@ -443,9 +463,9 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
             level += mode_levels(response, field, alike, met.harmonic, turning, inside)
         progress("runup", float(own[-1] + 1), float(len(speeds)))
     if case.housing.stands_still:
-        limit = replace(limit, frequency=frequency * fixed_harmonics(case, len(frequency))[0])
-        for own in np.array_split(np.arange(len(speeds)), -(-len(speeds) // _SPEEDS_IN_HOUSING)):
-            parts.append(heard_in_housing(case, modes, carrier[own], fixed_harmonics(case, len(carrier))))
+        room = np.cumsum(housing_memory(case, modes, limit)) // _PART
+        for own in np.split(np.arange(len(speeds)), np.flatnonzero(np.diff(room)) + 1):
+            parts.append(heard_in_housing(case, modes, carrier[own], limit.at(own)))
             progress("runup", float(own[-1] + 1), float(len(speeds)))
     return RunupResult(
         input_speed=speeds,

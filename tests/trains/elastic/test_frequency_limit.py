@@ -14,7 +14,13 @@ from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.checks import dynamics_warnings, missing_level
 from femgear.trains.elastic.excitation_limit import HARMONICS, highest_excitation, limited
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs
-from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_response
+from femgear.trains.elastic.stages import (
+    solve_dynamics,
+    solve_housing,
+    solve_modes,
+    solve_response,
+    solve_runup,
+)
 from femgear.trains.reading import read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
 
@@ -211,3 +217,46 @@ def test_meshes_that_pull_are_warned_of_by_result_and_file(case, torque):
     said = [one for one in dynamics.findings if one.code == "W-PULL"]
     assert len(said) == 1 and "1 of the 2 speeds: 10025.6 rpm" in str(said[0])
     assert said == [one for one in dynamics_warnings(dynamics.dataset()) if one.code == "W-PULL"]
+
+
+SUPPORT = {
+    "angle": "35 deg", "radial_stiffness": "4e8 N/m", "tangential_stiffness": "2e8 N/m", "width": "20 mm"
+}  # fmt: skip
+
+
+def held(case, **entries):
+    """The ring on a support too, at one speed."""
+    return with_values(
+        case, {"housing.support": [SUPPORT], "housing.published": [], "runup.count": 0} | entries
+    )
+
+
+def test_a_ring_on_a_support_is_excited_as_far_as_on_its_foundation(case, static, modes):
+    """The level at 1500 rpm is 30 m/s^2 with 12 mesh harmonics: most is of the modes of the meshes."""
+    dynamics, found = levels(held(case, **{"operation.speeds": ["1500 rpm"]}), static, modes)
+    assert dynamics.excitation_limit[0] == pytest.approx(modes.reach, rel=0.03)
+    assert (
+        found[0] == pytest.approx(42.7, rel=0.02)
+        and dynamics.warnings == ()
+        and abs(dynamics.level_change[0]) < 1.0
+    )
+    assert dynamics.fixed.two_way.harmonics[0] == dynamics.response.force.shape[-1] - 1
+
+
+def test_what_a_ring_on_a_support_loses_is_warned_of(case, static, modes):
+    """What the comparison found is what the case without the limit has."""
+    few = held(case, **{"operation.speeds": ["1500 rpm"], "dynamics.mesh_harmonics": 12})
+    dynamics, found = levels(few, static, modes)
+    (finding,) = (one for one in dynamics.warnings if one.code == "W-EXCITATION")
+    change = dynamics.level_change[0]
+    assert f"{change:+.1f} dB" in finding.text and change > 2.0
+    full = levels(held(case, **{"operation.speeds": ["1500 rpm"]}), static, modes)[1]
+    assert 20 * np.log10(full / found) == pytest.approx(change, abs=0.05)
+
+
+def test_run_up_and_operating_speeds_have_one_excitation(case, modes):
+    ends = {"runup.from": "1500 rpm", "runup.to": "1520 rpm", "runup.count": 2}
+    entries = held(case, **{"operation.speeds": ["1500 rpm"]} | ends)
+    runup = solve_runup(entries, modes)
+    assert runup.heard.level[0] == pytest.approx(42.7, rel=0.02)
+    assert runup.excitation_limit == pytest.approx(modes.reach, rel=0.03)
