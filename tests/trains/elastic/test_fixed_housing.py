@@ -12,7 +12,7 @@ from femgear.errors import CaseError
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import stored_lines
 from femgear.housing.sound import pressure_level, stored_sound
-from femgear.trains.elastic import stages
+from femgear.trains.elastic import checks, stages
 from femgear.trains.elastic.checks import case_warnings, fixed_diameters, housing_warnings
 from femgear.trains.elastic.results import describe_housing, run_up_lines
 from femgear.trains.elastic.runup import describe_runup
@@ -194,11 +194,13 @@ def checksum_of(case) -> str:
     return case.housing.structure.sha256
 
 
-def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path):
+def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path, monkeypatch):
     """The ring of a file is loaded where flanks touch, that of the case at the middle of its teeth.
 
-    Without damping: the ring of the case and the gears damp each other, a casing has damping of its own.
+    Without damping: the ring of the case and the gears damp each other, a casing has damping of its own. The
+    ring has the nodal diameters of the file alone.
     """
+    monkeypatch.setattr(checks, "MAX_DIAMETER", 14)
     undamped = {"dynamics.damping_ratio": 0.0}
     case = reference(**{"housing.support": FEET, "housing.sensor_angle": "20 deg"} | undamped)
     before = before[0], solve_modes(case, before[0])
@@ -224,7 +226,10 @@ def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path):
     lines, size = theirs.exact.acceleration, np.abs(ours.exact.acceleration).max()
     np.testing.assert_allclose(lines, ours.exact.acceleration, rtol=0, atol=1e-9 * size)
     for name, values in ours.supported.items():
-        np.testing.assert_allclose(theirs.supported[name], values, rtol=1e-6, atol=1e-12)
+        # what is left of the equations, and how fast that goes, is not a property of the set
+        atol = 1e-10 if name == "two_way_residual" else 1e-12
+        rtol = 0.1 if name in ("two_way_radius", "two_way_products") else 1e-6
+        np.testing.assert_allclose(theirs.supported[name], values, rtol=rtol, atol=atol)
     data = theirs.dataset()
     assert "pressure_level" not in data and list(data["sensor"].values) == ["sensor 1"]
     assert "missing_compliance" not in data.attrs
