@@ -16,7 +16,10 @@ import pytest
 import synthetic_results as synthetic
 import xarray as xr
 
+from femgear import cli
 from femgear.findings import CATALOGUE, SEVERITIES, Finding, FindingWarning, as_data, from_data, once, remark
+from femgear.report.tables import Marks, lower_bound, tabulate, unmarked
+from femgear.run import solve
 from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import train_of, trains
 
@@ -383,3 +386,97 @@ def test_every_code_reaches_the_list(code, tmp_path):
     assert found and all(one.text for one in found)
     assert once(found) == tuple(dict.fromkeys(once(found)))
     assert from_data(json.loads(json.dumps(as_data(found)))) == once(found)
+
+
+# --- marks of doubtful numbers ------------------------------------------------------------------------
+
+
+def test_a_doubtful_number_is_marked_where_it_stands_and_a_note_is_not():
+    marks = Marks([Finding("W-PRESSURE", "", "too much"), Finding("W-OPEN", "", "a planet is unloaded")])
+    columns = {"p": lambda p: marks(p, "W-PRESSURE", "W-OPEN"), "k": lambda p: marks(p, "W-DEFLECTION")}
+    block = tabulate("Static", ["4573.4", "-"], columns, ("said before",), marks)
+    assert block.rows == (("4573.4†", "4573.4"), ("-", "-"))
+    assert block.notes == ("said before", f"† W-PRESSURE, fault: {CATALOGUE['W-PRESSURE'][1]}")
+    assert float(unmarked(block.rows[0][0])) == 4573.4
+
+
+def test_every_finding_of_a_table_has_a_mark_of_its_own():
+    codes = list(CATALOGUE)[:20]
+    marks = Marks(Finding(code, "", "text", severity="doubt") for code in codes)
+    found = [marks("1", code) for code in codes]
+    assert len(set(found)) == 20 and all(unmarked(one) == "1" for one in found)
+    assert found == [marks("1", code) for code in codes] and len(marks.notes) == 20
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0053, "> 0.005"), (5.2, "> 5"), (0.001, "> 0.001"), (0.0, "> 0")]
+)
+def test_a_bound_is_never_above_what_it_bounds(value, text):
+    assert lower_bound(value) == text and float(unmarked(text)) <= value
+
+
+def test_the_level_of_an_excitation_that_ends_early_is_a_bound(tmp_path):
+    """Of the speed whose level a longer excitation raises by 3 dB; the other is known."""
+    from femgear.trains.elastic.results import describe_housing
+
+    data, finding = synthetic.housing(), Finding("W-EXCITATION", "", "ends early")
+    first, second = (row[2] for row in describe_housing(data, np.array([3.0, 0.2]), [finding]).rows)
+    assert first == lower_bound(float(data["level"][0])) and second == f"{float(data['level'][1]):.4g}"
+    unknown = describe_housing(data, None, [finding])
+    assert unknown.rows[0][2].endswith("†") and "W-EXCITATION, doubt" in unknown.notes[-1]
+
+
+def test_pressures_that_no_steel_carries_are_marked_in_the_table_of_a_run():
+    from femgear.findings import as_text
+    from femgear.trains.static.results import describe_static
+
+    data = static(max_pressure=5e9)
+    data.attrs["findings"] = as_text(of_stage("elastic", "static", data))
+    block = describe_static(data)
+    cells = {row[block.header.index("p max [MPa]")] for row in block.rows}
+    assert cells == {"5000.0†"} and "W-PRESSURE, fault" in block.notes[-1]
+
+
+# --- the transport ------------------------------------------------------------------------------------
+
+
+def test_a_finding_of_a_run_is_in_manifest_file_page_table_and_on_standard_error(tmp_path, capsys):
+    """A pair whose teeth deflect by more than the model is meant for."""
+    changes = {"operation.torque": "3 kN m", "static.positions": 8, "static.flank_elements": 6}
+    path, out = tmp_path / "pair.toml", tmp_path / "out"
+    path.write_text(case("spur_pair", changes).source, encoding="utf-8")
+    assert cli.main(["run", str(path), "-o", str(out), "--only", "static"]) == 0
+    printed = capsys.readouterr()
+    results = open_results(out)
+    (finding,) = (one for one in results.findings if one.code == "W-DEFLECTION")
+    assert (finding.severity, finding.stage) == ("doubt", "static")
+    assert f"warning: {finding}" in printed.err.splitlines() and "doubt W-DEFLECTION" in printed.out
+    manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["findings"] == as_data(results.findings)
+    of_stages = once(one for one in results.findings if one.stage)
+    assert from_data(json.loads(results.static.attrs["findings"])) == of_stages
+    said = manifest["convergence"]["static"]
+    assert said["converged"] is True and said["residual"] < 1e-9 and said["message"]
+    assert said["findings"] == [one.code for one in of_stages]
+    (solved,) = solve(results.case, only="static").values()
+    assert solved.findings == of_stages and solved.converged and solved.residual == said["residual"]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert '<li class="fault">fault of static: [W-DEFLECTION]' in page and "Warnings: none" not in page
+    assert cli.main(["report", str(out)]) == 0
+    assert (out / "report.html").read_text(encoding="utf-8") == page
+    capsys.readouterr()
+
+
+def test_a_folder_of_the_former_format_says_that_its_warnings_are_not_known(tmp_path):
+    from edited_manifests import edit_manifest
+
+    folder = synthetic_run(tmp_path / "out")
+    edit_manifest(folder, femgear_format=4)
+    (finding,) = open_results(folder).findings
+    assert "stored no warnings" in finding.text and not finding.code
+
+
+def test_a_code_that_the_catalogue_has_no_more_is_read_as_text():
+    data = [{"code": "W-GONE", "key": "a.b", "text": "words", "severity": "doubt", "stage": "static"}]
+    (finding,) = from_data(data)
+    assert str(finding) == "a.b: [W-GONE] words" and (finding.severity, finding.stage) == ("doubt", "static")

@@ -20,7 +20,7 @@ MANY = 8
 """Rows of a table that shows the speeds, and speeds that a warning names."""
 WARNINGS = "Warnings"
 """Title of the table of findings."""
-_MARKS = "†‡§¶‖◊*#"
+_MARKS = "†‡§¶‖◊"
 """Marks of doubtful numbers, in the order in which a table needs them."""
 _MODES = 16
 """Rows of the table of modes."""
@@ -113,7 +113,10 @@ class Marks:
     def __call__(self, text: str, *codes: str) -> str:
         """Mark the text of a number that findings of these codes concern; a dash needs no mark."""
         raised = [code for code in codes if code in self._known] if text.strip("-") else []
-        return text + "".join(self._used.setdefault(code, _MARKS[len(self._used)]) for code in raised)
+        for code in raised:
+            repeats, number = divmod(len(self._used), len(_MARKS))
+            self._used.setdefault(code, _MARKS[number] * (repeats + 1))
+        return text + "".join(self._used[code] for code in raised)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -124,9 +127,15 @@ class Marks:
         )
 
 
+def lower_bound(value: float) -> str:
+    """Write a positive number of which only a lower bound is known, with one digit: "> 0.005" of 0.0053."""
+    unit = 10.0 ** np.floor(np.log10(value)) if value > 0.0 else 1.0
+    return f"> {np.floor(value / unit * (1.0 + 1e-12)) * unit:.1g}"
+
+
 def unmarked(text: str) -> str:
-    """Take the marks of `Marks` off the text of a number."""
-    return text.rstrip(_MARKS)
+    """Take the marks of `Marks`, and that of a lower bound, off the text of a number."""
+    return text.rstrip(_MARKS).removeprefix("> ")
 
 
 def describe_modes(

@@ -47,7 +47,7 @@ from femgear.housing.sound import (
     whole_turns,
 )
 from femgear.report.response import harmonics_of
-from femgear.report.tables import MANY, Block, chosen, tabulate
+from femgear.report.tables import MANY, Block, Marks, chosen, lower_bound, tabulate
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.storage.results import (
     FOURIER,
@@ -58,11 +58,11 @@ from femgear.storage.results import (
     response_entries,
 )
 from femgear.system.fourier import sample
-from femgear.trains.elastic.checks import checked_speeds, dynamics_warnings, housing_warnings
+from femgear.trains.elastic.checks import NOTICEABLE, checked_speeds, dynamics_warnings, housing_warnings
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 from femgear.trains.elastic.runup import KINDS, loudest, meeting_columns
 from femgear.trains.protocol import StageResult
-from femgear.trains.static.results import HELD, UNEQUAL, peak_to_peak, shares
+from femgear.trains.static.results import HELD, LARGE, UNEQUAL, peak_to_peak, shares
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -397,34 +397,47 @@ class HousingResult(StageResult):
 
 def verdict(results: Results) -> Iterator[Block]:
     """Tabulate what decides, as far as it was computed: errors, factors, stresses, levels, resonances."""
-    stages, rows, notes = results.stages, list[tuple[str, str]](), list[str]()
+    stages, rows, notes, marks = results.stages, list[tuple[str, str]](), list[str](), Marks(results.findings)
     if replace(set_deviations(results.case), **dict.fromkeys(_FORMS, FlankForm())).ideal:
         notes.append("teeth and pins without errors")
     if "static" in stages:
         static = results.static
         error = _by_kind(static["mesh"].values, peak_to_peak(static, "ste") * 1e6)
-        rows.append((f"transmission error, peak to peak{_where(static, '')}", _kinds("{:.3f} um", error)))
+        text = marks(_kinds("{:.3f} um", error), *LARGE, "W-POSITIONS")
+        rows.append((f"transmission error, peak to peak{_where(static, '')}", text))
     factors, known = np.ones((1, 2)), dict[str, np.ndarray]()
     if "dynamics" in stages:
         factors, sharing = _load_factors(results.dynamics)
         rows.append(("planet load factor K_gamma", _kinds("{:.3f}", sharing)))
         rows += _unequal(results, sharing, notes)
-        rows.append(("largest dynamic factor K_v", _kinds("{:.3f}", factors.max(axis=0))))
+        rows.append(
+            (
+                "largest dynamic factor K_v",
+                marks(_kinds("{:.3f}", factors.max(axis=0)), *_pulls(results, "dynamics")),
+            )
+        )
         known = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
     if "stress" in stages:
         static = results.static
         if "face_load_factor" in static:
             known["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
-            rows.append(("face load factor K_Hβ", _kinds("{:.3f}", known["K_Hβ"])))
+            text = marks(_kinds("{:.3f}", known["K_Hβ"]), "W-FACE-LOAD", "W-THRUST")
+            rows.append(("face load factor K_Hβ", text))
         rows += _strength(results, known, notes)
     if "runup" in stages:
-        rows.append(("largest level of the run-up", loudest(results.runup)))
+        text = marks(loudest(results.runup), "W-STEPS", *_pulls(results, "runup"))
+        rows.append(("largest level of the run-up", text))
     if rows:
-        yield Block("Verdict", rows=tuple(rows), notes=tuple(notes))
+        yield Block("Verdict", rows=tuple(rows), notes=(*notes, *marks.notes))
     if "dynamics" in stages:
         yield _operating_points(results, factors)
     if "runup" in stages:
         yield _near_resonances(results.runup)
+
+
+def _pulls(results: Results, stage: str) -> list[str]:
+    """Code of meshes that pull, where they do so in the results of a stage."""
+    return [one.code for one in results.findings if (one.code, one.stage) == ("W-PULL", stage)]
 
 
 def _unequal(results: Results, sharing: np.ndarray, notes: list[str]) -> Iterator[tuple[str, str]]:
@@ -576,15 +589,20 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
     """Tabulate dynamic factors and level at the operating speeds, with what they assume."""
     dynamics, housing, case = results.dynamics, "housing" in results.stages, results.case
     speeds, shown = dynamics["speed"].values, list(chosen(dynamics.sizes["speed"]))
+    marks = Marks(results.findings)
+
+    def level(i: int) -> str:
+        return _level(float(results.housing["level"][i]), level_changes(results)[i], marks)
+
     columns = {
         "speed [rpm]": lambda i: f"{speeds[i]:.6g}",
         **{f"K_v {kind}": lambda i, k=k: f"{factors[shown.index(i), k]:.3f}" for k, kind in enumerate(KINDS)},
-        "level [m/s²]": lambda i: f"{float(results.housing['level'][i]):.4g}" if housing else "-",
+        "level [m/s²]": lambda i: level(i) if housing else "-",
     }
     ring, limit, notes = case.ring, dynamics, list[str]()
     if housing and "one_way_difference" in results.housing:
         apart = results.housing["one_way_difference"].values
-        columns["level [m/s²]"] = lambda i: f"{float(results.housing['level'][i]):.4g} ({apart[i]:+.1f} dB)"
+        columns["level [m/s²]"] = lambda i: f"{level(i)} ({apart[i]:+.1f} dB)"
         notes.append(f"level: in brackets how far from {_ONE_WAY} (one way)")
     if housing:
         limit = results.housing
@@ -600,7 +618,27 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
         f"all modes; excitation up to {' to '.join(ends)} kHz; small motion about the static state"
         + (f"; past a sensor the ring moves by {1e6 * _passing(limit):.3g} um" if housing else "")
     )
-    return tabulate("At the operating speeds", shown, columns, notes)
+    return tabulate("At the operating speeds", shown, columns, notes, marks)
+
+
+def level_changes(results: Results) -> np.ndarray:
+    """Find how far a longer excitation changes the level of the housing at every speed [dB], NaN unknown."""
+    changes = [np.full(results.housing.sizes["speed"], np.nan)]
+    if "dynamics" in results.stages and "level_change" in results.dynamics:
+        changes.append(results.dynamics["level_change"].values)
+    if "harmonics_change" in results.housing:
+        changes.append(results.housing["harmonics_change"].values)
+    largest = np.array(changes)
+    worst = np.where(np.isfinite(largest), np.abs(largest), -1.0).argmax(axis=0)
+    return np.take_along_axis(largest, worst[None], axis=0)[0]
+
+
+def _level(value: float, change: float, marks: Marks) -> str:
+    """Write a level, a bound where a longer excitation raises it by much, marked where it is doubtful."""
+    if change >= NOTICEABLE:
+        return lower_bound(value)
+    text = f"{value:.4g}"
+    return text if abs(change) < NOTICEABLE else marks(text, "W-EXCITATION")
 
 
 def _passing(housing: xr.Dataset) -> float:
@@ -639,13 +677,21 @@ def _one_way(one: xr.Dataset) -> str:
     return f"{float(one.one_way_level):.4g} ({float(one.one_way_difference):+.1f} dB)"
 
 
-def describe_housing(data: xr.Dataset) -> Block:
-    """Tabulate level and largest lines [m/s^2] at every speed [rpm] of housing.nc."""
+def describe_housing(
+    data: xr.Dataset, changes: np.ndarray | None = None, findings: Iterable[Finding] = ()
+) -> Block:
+    """Tabulate level and largest lines [m/s^2] at every speed [rpm] of housing.nc.
+
+    ``changes`` (n_speeds,) [dB] are those of `level_changes`; the findings mark levels that are doubtful.
+    """
+    marks = Marks(findings)
+    changes = np.full(data.sizes["speed"], np.nan) if changes is None else changes
+    data = data.assign(_change=("speed", changes))
     audible, both = "pressure_level" in data, "one_way_difference" in data
     columns = {
         "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
         "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
-        "rms [m/s^2]": lambda one: f"{float(one.level):.4g}",
+        "rms [m/s^2]": lambda one: _level(float(one.level), float(one["_change"]), marks),
         **({"one way [m/s^2]": _one_way} if both else {}),
         **({"microphone [dB(A)]": lambda one: f"{float(one.pressure_level):.1f}"} if audible else {}),
         "largest lines: carrier order (amplitude [m/s^2])": _largest_lines,
@@ -668,7 +714,7 @@ def describe_housing(data: xr.Dataset) -> Block:
         heard += f"; {int((judged <= 1.0 + CIRCLE).sum())} of {len(judged)} speeds looked at are stable: "
         heard += "largest Floquet multiplier over a turn of the carrier at most 1"
     speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
-    return tabulate("Housing", speeds, columns, (note, heard))
+    return tabulate("Housing", speeds, columns, (note, heard), marks)
 
 
 def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:

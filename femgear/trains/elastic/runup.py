@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.findings import Finding
+from femgear.findings import Finding, findings_in
 from femgear.housing.orders import order_level
 from femgear.housing.sound import REFERENCE_ACCELERATION
-from femgear.report.tables import Block, tabulate
+from femgear.report.tables import Block, Marks, tabulate
 from femgear.solvers.linear.resonances import EXCITED
 from femgear.storage.results import as_written, complex_entries, coordinates, dataset, declared
 from femgear.system.fourier import fluctuation, sample
@@ -251,7 +251,7 @@ def loudest(data: xr.Dataset) -> str:
 def describe_runup(data: xr.Dataset) -> Block:
     """Tabulate the strongest resonances of runup.nc by speed."""
     speed = data["speed"].values
-    strongest = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN]
+    strongest, marks = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN], _marks(data)
     value = {str(name): one.values for name, one in data.items() if one.dims[:1] == ("resonance",)}
     columns = {
         "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
@@ -259,8 +259,8 @@ def describe_runup(data: xr.Dataset) -> Block:
         **meeting_columns(value),
         "force share": lambda i: f"{value['share'][i]:.3f}",
         "alone [m/s²]": lambda i: f"{value['resonance_alone'][i]:.4g}",
-        "level [m/s²]": lambda i: f"{value['resonance_level'][i]:.4g}",
-        "K_v": lambda i: f"{value['resonance_factor'][i].max():.3f}",
+        "level [m/s²]": lambda i: marks(f"{value['resonance_level'][i]:.4g}", "W-STEPS", "W-PULL"),
+        "K_v": lambda i: marks(f"{value['resonance_factor'][i].max():.3f}", "W-STEPS", "W-PULL"),
     }
     notes = [
         f"{len(strongest)} of {data.sizes['resonance']} meetings of a mode with a mesh harmonic that excites "
@@ -270,7 +270,12 @@ def describe_runup(data: xr.Dataset) -> Block:
     ]
     if data.attrs.get("method", "exact") != "exact":
         notes.append("levels and K_v in the housing that stands still; modes, and alone, on the foundation")
-    return tabulate("Run-up", sorted(strongest), columns, notes)
+    return tabulate("Run-up", sorted(strongest), columns, notes, marks)
+
+
+def _marks(data: xr.Dataset) -> Marks:
+    """Marks for the findings of runup.nc."""
+    return Marks(findings_in(data.attrs))
 
 
 def runup_warnings(data: xr.Dataset) -> Iterator[Finding]:

@@ -101,6 +101,7 @@ from femgear.trains.elastic.results import (
     HousingResult,
     ModesResult,
     describe_housing,
+    level_changes,
     mesh_bands,
     order_cuts,
     ring_shapes,
@@ -552,7 +553,9 @@ ELASTIC = Train(
         Stage(
             name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
             verdict=lambda result: {"form": result.form},
-            describe=lambda results: describe_housing(results.housing),
+            describe=lambda results: describe_housing(
+                results.housing, level_changes(results), results.findings
+            ),
             tables=lambda results: (mesh_bands(results),), warnings=HousingResult.warnings,
         ),
     ),

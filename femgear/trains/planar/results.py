@@ -7,7 +7,7 @@ every variable of a file carries its units. The tables say what the case is and 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -17,10 +17,10 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.case.sections import output_member
-from femgear.findings import NOTE, Finding
+from femgear.findings import NOTE, Finding, findings_in
 from femgear.gears.kinematics import torques
 from femgear.report.response import harmonics_of
-from femgear.report.tables import Block, chosen, first_speeds, tabulate
+from femgear.report.tables import Block, Marks, chosen, first_speeds, tabulate
 from femgear.storage.results import complex_entries, coordinates, dataset
 from femgear.system.fourier import fluctuation
 from femgear.system.rigid_bodies import CENTRAL
@@ -375,7 +375,8 @@ def _sense(case: PlanarCase) -> str:
 def describe_branch(data: xr.Dataset) -> Block:
     """Tabulate branch.nc: ends, folds and the largest responses [um], by frequency of the weight [Hz]."""
     hertz, rms = data["weight_frequency"].values, data["rms"].values
-    known = data.attrs["stability"] != "not computed"
+    known, marks = data.attrs["stability"] != "not computed", Marks(findings_in(data.attrs))
+    doubtful = _tail_codes(data)
     stable = data["stable"].values
     named = {0: "start", len(hertz) - 1: "end"}
     named |= {int(point): "fold" for point in merged_folds(hertz, data["fold"].values)}
@@ -384,10 +385,12 @@ def describe_branch(data: xr.Dataset) -> Block:
     columns = {
         "weight [Hz]": lambda point: f"{hertz[point]:.4f}",
         "": lambda point: named[point],
-        "carrier x rms [um]": lambda point: f"{1e6 * rms[point, 0, 0]:.3f}",
-        "ring x rms [um]": lambda point: f"{1e6 * rms[point, 1, 0]:.3f}",
-        "sun x rms [um]": lambda point: f"{1e6 * rms[point, 2, 0]:.3f}",
-        "back contact": lambda point: f"{float(data['back_contact'].values[point].max()):.3f}",
+        "carrier x rms [um]": lambda point: marks(f"{1e6 * rms[point, 0, 0]:.3f}", *doubtful(point)),
+        "ring x rms [um]": lambda point: marks(f"{1e6 * rms[point, 1, 0]:.3f}", *doubtful(point)),
+        "sun x rms [um]": lambda point: marks(f"{1e6 * rms[point, 2, 0]:.3f}", *doubtful(point)),
+        "back contact": lambda point: marks(
+            f"{float(data['back_contact'].values[point].max()):.3f}", *doubtful(point)
+        ),
         "stable": lambda point: _STABLE[int(stable[point])] if known else "-",
     }
     notes = [
@@ -401,7 +404,13 @@ def describe_branch(data: xr.Dataset) -> Block:
         f"tail, share of the amplitude in the upper half of the lines: up to {tail:.2g} of the deflections, "
         f"{force:.2g} of the mesh forces"
     )
-    return tabulate("Response to the weight", sorted(named), columns, notes)
+    return tabulate("Response to the weight", sorted(named), columns, notes, marks)
+
+
+def _tail_codes(data: xr.Dataset) -> Callable[[int], tuple[str, ...]]:
+    """Tell which points or speeds the warning of too few lines (W-TAIL) is about."""
+    wrong = np.maximum(data["tail"].values, data["force_tail"].values) > TAIL_LIMIT
+    return lambda i: ("W-TAIL",) * bool(wrong[i])
 
 
 def tail_warnings(data: xr.Dataset, key: str) -> tuple[Finding, ...]:
@@ -472,13 +481,14 @@ def _verdicts(data: xr.Dataset) -> Iterator[str]:
 def describe_response(data: xr.Dataset) -> Block:
     """Tabulate displacements [um], mesh forces [kN] and contact of response.nc, a row a speed [rpm]."""
     varying = fluctuation(harmonics_of(data, "mesh_force")).max(axis=1)
+    marks, doubtful = Marks(findings_in(data.attrs)), _tail_codes(data)
     columns = {
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.4g}",
         "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.4f}",
-        "carrier x rms [um]": lambda i: f"{1e6 * data.rms.values[i, 0, 0]:.4f}",
-        "mesh force rms [kN]": lambda i: f"{1e-3 * varying[i]:.4f}",
-        "drive contact": lambda i: f"{float(data.drive_contact[i].min()):.3f}",
-        "back contact": lambda i: f"{float(data.back_contact[i].max()):.3f}",
+        "carrier x rms [um]": lambda i: marks(f"{1e6 * data.rms.values[i, 0, 0]:.4f}", *doubtful(i)),
+        "mesh force rms [kN]": lambda i: marks(f"{1e-3 * varying[i]:.4f}", *doubtful(i)),
+        "drive contact": lambda i: marks(f"{float(data.drive_contact[i].min()):.3f}", *doubtful(i)),
+        "back contact": lambda i: marks(f"{float(data.back_contact[i].max()):.3f}", *doubtful(i)),
         "tail": lambda i: f"{float(data['tail'][i]):.2g}",
         "force tail": lambda i: f"{float(data['force_tail'][i]):.2g}",
     }
@@ -496,7 +506,7 @@ def describe_response(data: xr.Dataset) -> Block:
             "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
             "weight to the mesh frequency; r.m.s. values count such lines apart"
         )
-    return tabulate("Weight and mesh frequency", chosen(data.sizes["speed"]), columns, notes)
+    return tabulate("Weight and mesh frequency", chosen(data.sizes["speed"]), columns, notes, marks)
 
 
 def published_modes(case: PlanarCase, data: xr.Dataset) -> tuple[Block, ...]:

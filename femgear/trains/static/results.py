@@ -23,7 +23,7 @@ from femgear.case.sections import face_width, gear_material
 from femgear.contact.bodies import flank_widths
 from femgear.contact.root_stress import BACK, LOADED, NOTCH_REACH, RootCycle
 from femgear.contact.slices import PARTS as SLICES
-from femgear.findings import Finding
+from femgear.findings import Finding, findings_in
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import Gear, tooth_thickness
@@ -33,7 +33,7 @@ from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_se
 from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.gears.tooth import ROOT_RADIUS_LIMIT, root_notches
 from femgear.report.style import family
-from femgear.report.tables import Block, chosen, tabulate
+from femgear.report.tables import Block, Marks, chosen, tabulate
 from femgear.storage.results import coordinates, dataset, declared
 from femgear.trains.protocol import StageResult
 
@@ -203,6 +203,10 @@ _KINKED = 1.3
 """Largest pressure over that of Hertz with a kink in the contact that is told."""
 UNEQUAL = 1.03
 """Share over the equal one with which planets are no longer taken as alike."""
+LARGE = "W-DEFLECTION", "W-MOTION", "W-ENDS"
+"""Findings that concern transmission errors and stiffnesses."""
+LARGEST_PRESSURE = 4e9
+"""Contact pressure that no steel carries [Pa]."""
 SIDES = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
 """Names of the flanks in both kinds of mesh of a planetary set; those of a pair are its gears."""
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
@@ -620,7 +624,7 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if "lead_offset" in data:
         # an offset of leads is no deflection
         approach = approach - data["lead_offset"].values
-    if pressure.max(initial=0.0) > 4e9:
+    if pressure.max(initial=0.0) > LARGEST_PRESSURE:
         text = (
             f"the contact pressure reaches {pressure.max() * 1e-6:.0f} MPa: no steel carries that, and the "
             "model stays elastic"
@@ -824,6 +828,7 @@ def peak_to_peak(data: xr.Dataset, name: str) -> np.ndarray:
 def describe_static(data: xr.Dataset) -> Block:
     """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
     lowest, highest = (data.get(f"{end}_load_share", data.load_share) for end in ("smallest", "largest"))
+    marks = Marks(findings_in(data.attrs))
 
     def error(one: xr.Dataset, value: float) -> str:
         """Write a transmission error, marked where the mesh of a loaded set carries nothing at times."""
@@ -835,16 +840,20 @@ def describe_static(data: xr.Dataset) -> Block:
 
     columns = {
         "mesh": lambda one: str(one.mesh.item()),
-        "STE mean [um]": lambda one: error(one, one.ste.values.mean()),
-        "STE p-p [um]": lambda one: error(one, float(peak_to_peak(one, "ste"))),
-        "k mean [N/um]": lambda one: f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
-        "k p-p [N/um]": lambda one: f"{float(peak_to_peak(one, 'mesh_stiffness')) / 1e6:.3f}",
+        "STE mean [um]": lambda one: marks(error(one, one.ste.values.mean()), *LARGE),
+        "STE p-p [um]": lambda one: marks(error(one, float(peak_to_peak(one, "ste"))), *LARGE, "W-POSITIONS"),
+        "k mean [N/um]": lambda one: marks(f"{one.mesh_stiffness.values.mean() / 1e6:.3f}", *LARGE),
+        "k p-p [N/um]": lambda one: marks(
+            f"{float(peak_to_peak(one, 'mesh_stiffness')) / 1e6:.3f}", *LARGE, "W-POSITIONS"
+        ),
         "force [N]": lambda one: f"{one.mesh_force.values.mean():.3f}",
-        "p max [MPa]": lambda one: f"{p.max() / 1e6:.1f}" if (p := one.max_pressure.values).any() else "-",
+        "p max [MPa]": lambda one: _pressure(one.max_pressure.values, marks),
     }
     if "face_load_factor" in data:
         columns["K_Hbeta"] = lambda one: (
-            f"{float(one.face_load_factor):.3f}" if one.mesh_force.values.any() else "-"
+            marks(f"{float(one.face_load_factor):.3f}", "W-FACE-LOAD", "W-THRUST")
+            if one.mesh_force.values.any()
+            else "-"
         )
         columns["misaligned [um]"] = lambda one: f"{float(one.mesh_misalignment.mean()) * 1e6:+.2f}"
     contact = f"contact: {data.attrs.get('contact', 'unknown')}"
@@ -873,7 +882,16 @@ def describe_static(data: xr.Dataset) -> Block:
         )
     if data.attrs.get("mesh_periods", 1) > 1:
         notes.append(str(data.attrs["period"]))
-    return tabulate("Static", [data.sel(mesh=mesh) for mesh in data.mesh.values], columns, notes)
+    meshes = [data.sel(mesh=mesh) for mesh in data.mesh.values]
+    return tabulate("Static", meshes, columns, notes, marks)
+
+
+def _pressure(pressure: np.ndarray, marks: Marks) -> str:
+    """Write the largest contact pressure of a mesh [MPa], a dash without any, marked where it is doubtful."""
+    if not pressure.any():
+        return "-"
+    codes = ["W-PRESSURE"] if pressure.max() > LARGEST_PRESSURE else []
+    return marks(f"{pressure.max() / 1e6:.1f}", *codes, "W-EDGE")
 
 
 def shares(data: xr.Dataset) -> tuple[float, float, str]:
