@@ -461,7 +461,7 @@ def test_a_finding_of_a_run_is_in_manifest_file_page_table_and_on_standard_error
     (solved,) = solve(results.case, only="static").values()
     assert solved.findings == of_stages and solved.converged and solved.residual == said["residual"]
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert '<li class="fault">fault of static: [W-DEFLECTION]' in page and "Warnings: none" not in page
+    assert '<li class="doubt">doubt of static: [W-DEFLECTION]' in page and "Warnings: none" not in page
     assert cli.main(["report", str(out)]) == 0
     assert (out / "report.html").read_text(encoding="utf-8") == page
     capsys.readouterr()
